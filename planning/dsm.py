@@ -1,0 +1,120 @@
+"""The surface model: elevations on a north-up grid of square cells in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+from pyproj import CRS, Transformer
+
+from planning.errors import ParameterError
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Dsm:
+    """A digital surface model (DSM).
+
+    Heights are in the model's own vertical datum (``alt_dsm_m`` throughout the code); only
+    ``vertical_datum`` tells whether that is above mean sea level.
+    """
+
+    elevation_m: F32
+    """(H, W) float32, row 0 northernmost; NaN where unknown; read-only."""
+    transform: Affine
+    """Pixel corner (column, row) -> projected (x east, y north) in metres; square cells, north up."""
+    crs: CRS
+    """Projected coordinate reference system in metres."""
+    vertical_datum: str | None
+    """Name of the vertical datum, e.g. "EGM96 height", "ellipsoid"; None when nobody declared it."""
+    sha256: str
+    """Hex digest of the file the model was read from."""
+
+    def __post_init__(self) -> None:
+        t = self.transform
+        if self.elevation_m.ndim != 2 or self.elevation_m.dtype != np.float32:
+            raise ParameterError(
+                f"A surface model is a 2-D float32 grid, got {self.elevation_m.dtype} {self.elevation_m.shape}."
+            )
+        if not (t.a > 0 and np.isclose(t.a, -t.e, rtol=1e-6) and t.b == 0 and t.d == 0):
+            raise ParameterError(f"A surface model's cells must be square and north up, got {tuple(t)[:6]}.")
+        self.elevation_m.flags.writeable = False
+
+    @property
+    def height_px(self) -> int:
+        return self.elevation_m.shape[0]
+
+    @property
+    def width_px(self) -> int:
+        return self.elevation_m.shape[1]
+
+    @property
+    def resolution_m(self) -> float:
+        return float(self.transform.a)
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """(west, south, east, north) of the outer cell edges, projected metres."""
+        west, north = self.transform.c, self.transform.f
+        return (
+            west,
+            north - self.height_px * self.resolution_m,
+            west + self.width_px * self.resolution_m,
+            north,
+        )
+
+    def fractional_cell(self, xy_m: F64) -> tuple[F64, F64]:
+        """Projected (N, 2) metres -> (rows, columns) float; k + 0.5 is the centre of cell k."""
+        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        return (self.transform.f - xy[:, 1]) / self.resolution_m, (xy[:, 0] - self.transform.c) / self.resolution_m
+
+    def elevation_at(self, xy_m: F64) -> F64:
+        """Elevation of the cell that holds each projected point (N, 2); NaN outside or unknown."""
+        row_f, col_f = self.fractional_cell(xy_m)
+        out = np.full(row_f.shape, np.nan)
+        inside = (row_f >= 0) & (row_f < self.height_px) & (col_f >= 0) & (col_f < self.width_px)
+        out[inside] = self.elevation_m[row_f[inside].astype(np.intp), col_f[inside].astype(np.intp)]
+        return out
+
+    def with_elevation(self, elevation_m: F32) -> Dsm:
+        """The same grid and provenance with other heights (same shape)."""
+        return replace(self, elevation_m=elevation_m)
+
+    def window(self, row0: int, col0: int, height_px: int, width_px: int) -> Dsm:
+        """The part of the model that starts at (row0, col0); clipped to the model, no copy."""
+        r0, c0 = max(0, row0), max(0, col0)
+        r1, c1 = min(self.height_px, row0 + height_px), min(self.width_px, col0 + width_px)
+        if r0 >= r1 or c0 >= c1:
+            raise ParameterError("The window lies outside the surface model.")
+        return replace(
+            self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=self.transform @ Affine.translation(c0, r0)
+        )
+
+    def lat_lon_from_xy(self, xy_m: F64) -> F64:
+        """Projected (N, 2) metres -> WGS84 (N, 2) latitude, longitude in degrees."""
+        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        lon, lat = _transformer(self.crs.to_wkt(), inverse=True).transform(xy[:, 0], xy[:, 1])
+        return np.column_stack([lat, lon])
+
+    def xy_from_lat_lon(self, lat_lon_deg: F64) -> F64:
+        """WGS84 (N, 2) latitude, longitude in degrees -> projected (N, 2) metres; inf where undefined."""
+        ll = np.asarray(lat_lon_deg, dtype=np.float64).reshape(-1, 2)
+        x, y = _transformer(self.crs.to_wkt(), inverse=False).transform(ll[:, 1], ll[:, 0])
+        return np.column_stack([x, y])
+
+
+@lru_cache(maxsize=32)
+def _transformer(wkt: str, *, inverse: bool) -> Transformer:
+    wgs84, projected = CRS.from_epsg(4326), CRS.from_wkt(wkt)
+    pair = (projected, wgs84) if inverse else (wgs84, projected)
+    return Transformer.from_crs(*pair, always_xy=True)
+
+
+def is_amsl(vertical_datum: str | None) -> bool:
+    """Whether heights in this datum are above mean sea level (a geoid), not above the ellipsoid."""
+    return vertical_datum is not None and "ellipsoid" not in vertical_datum.lower()

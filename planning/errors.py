@@ -1,0 +1,88 @@
+"""What can go wrong while planning, as one tree.
+
+PlanningError
+├── RasterError            a surface model or orthomosaic that cannot be used
+│   ├── RasterFormatError      not a GeoTIFF or ESRI ASCII grid, corrupt, truncated
+│   ├── RasterTooLargeError    more pixels or larger blocks than the limits allow
+│   ├── MissingCrsError        no coordinate reference system: asks for one
+│   └── NoElevationError       every cell is unknown
+├── PoiError               a point of interest or polygon that cannot be flown
+├── ParameterError         a radius, speed or limit that contradicts itself or the terrain
+├── DatumError             an altitude is asked for in a datum nobody declared
+├── MissionError           a mission that no vehicle can hold or that cannot be judged
+│   └── CapacityError          more items than the vehicle's limit
+└── FormatError            a mission, POI or profile file that cannot be read
+
+Every error says what is wrong, where, and what to do.
+"""
+
+
+class PlanningError(ValueError):
+    """Base of all planning errors.
+
+    ``what`` is one sentence with the offending value, ``where`` names the file, row, field or
+    place, ``advice`` says what to do next. ``code`` is stable, for programs.
+    """
+
+    code = "planning"
+
+    def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
+        super().__init__(what, where, advice)
+        self.what = what
+        self.where = where
+        self.advice = advice
+
+    def __str__(self) -> str:
+        head = f"{self.where}: {self.what}" if self.where else self.what
+        return f"{head} {self.advice}" if self.advice else head
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.what, self.where, self.advice)
+
+
+def _rebuild(cls: type[PlanningError], what: str, where: str, advice: str) -> PlanningError:
+    return cls(what, where=where, advice=advice)
+
+
+class RasterError(PlanningError):
+    code = "raster"
+
+
+class RasterFormatError(RasterError):
+    code = "raster_format"
+
+
+class RasterTooLargeError(RasterError):
+    code = "raster_too_large"
+
+
+class MissingCrsError(RasterError):
+    code = "raster_no_crs"
+
+
+class NoElevationError(RasterError):
+    code = "raster_no_elevation"
+
+
+class PoiError(PlanningError):
+    code = "poi"
+
+
+class ParameterError(PlanningError):
+    code = "parameter"
+
+
+class DatumError(PlanningError):
+    code = "datum"
+
+
+class MissionError(PlanningError):
+    code = "mission"
+
+
+class CapacityError(MissionError):
+    code = "mission_capacity"
+
+
+class FormatError(PlanningError):
+    code = "format"

@@ -1,0 +1,296 @@
+"""The nouns of a plan, shared by every step: points, parameters, profile, path, mission, certificate.
+
+Heights named ``alt_dsm_m`` are in the surface model's own vertical datum, ``alt_rel_home_m`` are
+above the surface model at home, ``alt_amsl_m`` above mean sea level. ``xy_m`` are metres east and
+north in the surface model's projected CRS. ``s_m`` is horizontal distance flown since the path's start.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.dsm import Dsm
+
+F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+
+Firmware = Literal["ardupilot", "px4"]
+
+
+@dataclass(frozen=True, slots=True)
+class Poi:
+    """A point of interest (POI), WGS84."""
+
+    lat_deg: float
+    lon_deg: float
+    name: str = ""
+    loiter_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera as eq. 1 of Melita 2020 needs it."""
+
+    image_width_px: int
+    image_height_px: int
+    focal_mm: float
+    sensor_width_mm: float
+    sensor_height_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleProfile:
+    """What a vehicle can do and how well it knows where it is."""
+
+    name: str
+    firmware: Firmware = "ardupilot"
+    radius_m: float = 0.35
+    """Half the largest extent, rotors included."""
+    mean_speed_m_s: float = 3.0
+    max_speed_m_s: float = 5.0
+    max_climb_m_s: float = 2.5
+    max_descent_m_s: float = 1.5
+    max_accel_m_s2: float = 2.5
+    max_jerk_m_s3: float = 1.0
+    """The autopilot's corner and start smoothness (ArduCopter WPNAV_JERK)."""
+    endurance_s: float = 1200.0
+    reserve_share: float = 0.25
+    """Part of the endurance that must be left on landing."""
+    max_items: int = 650
+    position_error_m: float = 2.5
+    rtl_height_m: float = 30.0
+    """Return-to-launch height above home set in the autopilot (RTL_ALT, RTL_RETURN_ALT)."""
+    camera: Camera | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceParams:
+    """Melita 2020, section 5: non-flat ball (R, H), then a Gaussian."""
+
+    radius_m: float = 20.0
+    height_m: float = 5.0
+    smooth_sigma_m: float | None = None
+    """None: R / 10."""
+    floor: bool = True
+    """Keep the smoothed surface above the DSM dilated with (R, 0.8 H); False is the paper's pipeline."""
+    fill_hole_area_m2: float = 4.0
+    method: Literal["auto", "exact", "fast"] = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class PathParams:
+    """Melita 2020, section 6: sampling and LSPB timing, with the vehicle's vertical limits."""
+
+    mean_speed_m_s: float = 3.0
+    max_speed_m_s: float = 5.0
+    max_climb_m_s: float = 2.5
+    max_descent_m_s: float = 1.5
+    max_accel_m_s2: float = 2.5
+    step_m: float = 0.1
+    on_steep: Literal["raise", "slow"] = "raise"
+    """Where the surface is steeper than the limits: raise the path, or fly slower on it."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionParams:
+    """How a path becomes mission items."""
+
+    max_items: int = 650
+    excess_height_m: float = 1.0
+    """The flown lines may run at most this far above the sampled profile; 0 asks for the closest fit."""
+    end: Literal["rtl", "land"] = "rtl"
+    altitude_reference: Literal["home", "amsl"] = "home"
+    heading: Literal["path", "fixed", "point"] = "path"
+    heading_deg: float = 0.0
+    """For heading "fixed": clockwise from north."""
+    look_at: tuple[float, float] | None = None
+    """For heading "point": (lat_deg, lon_deg)."""
+    gimbal_pitch_deg: float | None = None
+    """-90 looks straight down; None leaves the gimbal alone."""
+    camera_trigger_m: float | None = None
+    """Distance between photos; None takes none."""
+    land_transit_height_m: float | None = None
+    """Height above home of the flight back before a landing at home; None: the height the certificate needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class SampledPath:
+    """The path as sampled every ``step_m``; vertices (home's entry point and POIs) are samples."""
+
+    xy_m: F64
+    """(N, 2)"""
+    s_m: F64
+    """(N,) horizontal distance from the first sample, strictly increasing inside a segment."""
+    surface_alt_dsm_m: F64
+    """(N,) the safe surface under each sample."""
+    ground_alt_dsm_m: F64
+    """(N,) the DSM under each sample; NaN where unknown."""
+    alt_dsm_m: F64
+    """(N,) the path: never below the surface."""
+    vertex: I64
+    """(V,) sample index of each vertex, first is 0 and last is N - 1."""
+    vertex_poi: tuple[int | None, ...]
+    """(V,) index of the vertex's POI; None for a home that is no POI."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """When the paper's law reaches each sample (Melita 2020, LSPB per segment)."""
+
+    t_s: F64
+    """(N,) seconds since the first sample, loiter included once it is over."""
+    speed_m_s: F64
+    """(N,) horizontal ground speed when passing the sample."""
+    loiter_s: F64
+    """(N,) seconds waited at the sample, 0 except at vertices."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """One MAVLink mission item. Params may be NaN ("not given")."""
+
+    command: int
+    """MAV_CMD"""
+    frame: int
+    """MAV_FRAME: 0 AMSL, 2 none, 3 relative to home, 10 above terrain."""
+    params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    lat_deg: float = 0.0
+    lon_deg: float = 0.0
+    alt_m: float = 0.0
+    autocontinue: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Where the vehicle takes off. ``alt_dsm_m`` is the surface model's height there."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_dsm_m: float
+    """NaN when a file gives none."""
+    vertical_datum: str | None = None
+    """Datum of ``alt_dsm_m``; None: unknown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """Items as uploaded, WITHOUT the home row that ArduPilot keeps at sequence 0."""
+
+    home: Home
+    items: tuple[MissionItem, ...]
+    firmware: Firmware = "ardupilot"
+    pois: tuple[Poi, ...] = ()
+    cruise_speed_m_s: float | None = None
+    warnings: tuple[str, ...] = ()
+    """What a reader noticed: swapped coordinates, items it had to drop, guessed values."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlownLine:
+    """The polyline that a vehicle flies through a mission, and its columns over home."""
+
+    points_m: F64
+    """(K, 3) x, y, alt_dsm of the line from the top of the take-off column to the last waypoint."""
+    leg_item: I64
+    """(K - 1,) index into ``Mission.items`` of the item each leg flies to."""
+    home_xy_m: tuple[float, float]
+    home_alt_dsm_m: float
+    takeoff_alt_dsm_m: float
+    ends_with_rtl: bool
+    unjudged: tuple[str, ...] = ()
+    """Why some items cannot be judged (terrain frame, spline, jump ...): such a mission is not certified."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearanceParams:
+    """What the certificate demands."""
+
+    required_clearance_m: float
+    vehicle_radius_m: float
+    position_error_m: float
+    rtl_height_m: float
+    """Above home, as set in the autopilot."""
+    max_height_above_ground_m: float | None = None
+
+    @staticmethod
+    def default_required_m(*, position_error_m: float, vehicle_radius_m: float, downwash_m: float = 0.5) -> float:
+        """Position error + rotor downwash (no ground effect below it, Melita 2020 fig. 8) + vehicle radius."""
+        return position_error_m + downwash_m + vehicle_radius_m
+
+
+@dataclass(frozen=True, slots=True)
+class WorstPoint:
+    """The place on the flown line where it comes nearest to the surface model."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_rel_home_m: float
+    leg: int
+    """Index of the leg in ``FlownLine``."""
+    s_m: float
+    x_m: float
+    y_m: float
+    alt_dsm_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LegClearance:
+    leg: int
+    item: int
+    min_distance_m: float
+    min_vertical_m: float
+    at_s_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a mission is not certified, and what would mend it."""
+
+    code: str
+    text: str
+    mend: str
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """The proof of clearance of one flown line against one surface model."""
+
+    certified: bool
+    min_distance_m: float
+    """Smallest 3-D distance to any cell as a solid column; 0 inside one. Take-off and landing columns left out."""
+    min_vertical_m: float
+    """Smallest height above the cell below; negative inside terrain; -inf over unknown cells."""
+    required_clearance_m: float
+    worst: WorstPoint
+    legs: tuple[LegClearance, ...]
+    rtl_height_needed_m: float
+    """Above home, smallest height from which every way home is clear; inf over unknown terrain."""
+    home_column_clear: bool
+    max_height_above_ground_m: float
+    reasons: tuple[Reason, ...]
+    trend_s_m: F64
+    """(M,) places along the line"""
+    trend_distance_m: F64
+    """(M,) 3-D distance to the surface model there"""
+    assumptions: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """The safe surface and what was done to get it."""
+
+    safe: Dsm
+    """Dilated and smoothed; may cover only the part asked for, and be coarser than the DSM."""
+    holes_filled: int
+    holes_filled_area_m2: float
+    method: Literal["exact", "fast"]
+
+
+def finite_or_none(value: float) -> float | None:
+    """JSON knows no NaN and no infinity."""
+    return value if math.isfinite(value) else None

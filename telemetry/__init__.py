@@ -1,0 +1,1 @@
+"""The telemetry floor: bus, MAVLink, sensors, recorder, replay and simulator. Imports `planning` and `mapping`."""

@@ -1,0 +1,31 @@
+"""Fixtures that tests of all floors share."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of recorded terrain, radar and flight data that may stand beside the project."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no recorded data: {folder} does not exist")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def chromium_path() -> str:
+    """The browser that end-to-end tests drive. HEDGEHOP_REQUIRE_CHROMIUM=1 makes its absence a failure."""
+    for name in CHROMIUM_NAMES:
+        if path := shutil.which(name):
+            return path
+    reason = f"no browser: none of {', '.join(CHROMIUM_NAMES)} is on the PATH"
+    if os.environ.get("HEDGEHOP_REQUIRE_CHROMIUM") == "1":
+        pytest.fail(f"{reason}, and HEDGEHOP_REQUIRE_CHROMIUM=1 demands one")
+    pytest.skip(reason)
