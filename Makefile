@@ -13,7 +13,6 @@ PIP := PIP_DISABLE_PIP_VERSION_CHECK=1 $(VENV_PYTHON) -m pip install --quiet --o
 WITH_NODE := PATH="$(CURDIR)/.venv/bin:$$PATH"
 NODE_IS_NEW_ENOUGH := node -e 'const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)' && npm --version
-CONSOLE := $(if $(wildcard web/package.json),web/dist/index.html,no-console)
 WEB_SOURCES := $(shell find web -mindepth 1 \( -name node_modules -o -name dist -o -name coverage \) -prune \
   -o -print 2>/dev/null)
 
@@ -34,13 +33,13 @@ endef
 help: ## list the tasks
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
 
-setup: $(STAMPS)/project $(CONSOLE) ## install everything that running Hedgehop needs
+setup: $(STAMPS)/project web/dist/index.html ## install everything that running Hedgehop needs
 	@echo 'Ready: make demo'
 
-demo: $(STAMPS)/project $(CONSOLE) ## start Hedgehop with a simulated drone, terrain and sensors
+demo: $(STAMPS)/project web/dist/index.html ## start Hedgehop with a simulated drone, terrain and sensors
 	@.venv/bin/hedgehop serve --demo
 
-test: $(STAMPS)/test $(CONSOLE) ## run the tests of the console and of the Python packages
+test: $(STAMPS)/test web/dist/index.html ## run the tests of the console and of the Python packages
 	@cd web && $(WITH_NODE) npm test
 	@$(WITH_NODE) $(VENV_PYTHON) -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
 
@@ -48,7 +47,7 @@ check: $(STAMPS)/test web/node_modules/.stamp ## lint, formatting, types and the
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
 	@$(WITH_NODE) PYRIGHT_PYTHON_IGNORE_WARNINGS=1 .venv/bin/pyright
-	@.venv/bin/lint-imports --no-cache
+	@.venv/bin/lint-imports --no-cache --no-logo
 	@cd web && $(WITH_NODE) npm run --silent check
 
 bench: $(STAMPS)/test ## measure the speed of the kernels and print it
@@ -108,10 +107,6 @@ web/node_modules/.stamp: web/package.json web/package-lock.json web/.npmrc $(STA
 web/dist/index.html: $(WEB_SOURCES) web/node_modules/.stamp
 	$(call step,Step 6 of 6: the console,cd web && $(WITH_NODE) npm run build)
 	@touch $@
-
-.PHONY: no-console
-no-console: $(STAMPS)/node
-	@echo 'Steps 5 and 6: no web/package.json, so no console is built'
 
 $(STAMPS)/test: requirements-test.txt $(STAMPS)/project
 	$(call step,Packages for the tests,$(PIP) -r requirements-test.txt)

@@ -1,1 +1,1 @@
-"""The ground floor: frames, radar processing, tracking and voxel maps. Arrays in, arrays out; imports no other floor."""
+"""The ground floor: frames, radar processing, tracking, voxel maps. Arrays in, arrays out; imports no other floor."""

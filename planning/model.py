@@ -204,6 +204,10 @@ class FlownLine:
     ends_with_rtl: bool
     unjudged: tuple[str, ...] = ()
     """Why some items cannot be judged (terrain frame, spline, jump ...): such a mission is not certified."""
+    landing_xy_m: tuple[float, float] | None = None
+    """Where a landing item ends the flight, its column is judged as home's is; None without one."""
+    notes: tuple[str, ...] = ()
+    """What had to be assumed about home; does not stand in the way of a certificate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,6 +293,8 @@ class Surfaces:
     holes_filled: int
     holes_filled_area_m2: float
     method: Literal["exact", "fast"]
+    floor: Dsm | None = None
+    """The DSM dilated with (R, 0.8 H) on the same grid as ``safe``, never above it; None in the paper's pipeline."""
 
 
 def finite_or_none(value: float) -> float | None:

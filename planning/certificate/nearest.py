@@ -1,0 +1,176 @@
+"""Exact 3-D distance from straight lines to a surface model whose cells are solid columns.
+
+The columns are closed boxes [x0, x1] x [y0, y1] x (-inf, elevation]. The squared distance of the moving
+point a + t d to one of them is convex in t, once differentiable and quadratic between the values of t
+where a coordinate passes a face, so its minimum over a segment has a closed form. A block of cells lies
+inside the column over its outline with the largest of its elevations, whose distance therefore bounds
+theirs from below: branch and bound over a pyramid of maxima skips blocks and loses nothing.
+
+Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid
+
+F64 = NDArray[np.float64]
+
+STACK = 256
+"""Four children for each of up to 60 levels: more than any model needs."""
+
+
+def nearest_distances(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F64, F64]:
+    """Smallest distance of each segment to the model and where it occurs.
+
+    ``start_m`` and ``end_m`` are (N, 3); equal ends ask for the distance of a point. Unknown cells and
+    everything outside the model are columns of infinite height. Returns (N,) metres, 0 inside a column,
+    and (N,) the place as a share of the segment.
+    """
+    distance_m, share = np.empty(len(start_m)), np.empty(len(start_m))
+    _nearest_all(
+        pyramid.elevation_m,
+        pyramid.maxima_m,
+        pyramid.layout,
+        pyramid.resolution_m,
+        np.ascontiguousarray(start_m, dtype=np.float64),
+        np.ascontiguousarray(end_m, dtype=np.float64),
+        distance_m,
+        share,
+    )
+    return distance_m, share
+
+
+@njit(cache=True, inline="always")
+def _beyond(value, low, high):
+    """How far ``value`` lies outside [low, high], with sign."""
+    if value < low:
+        return value - low
+    if value > high:
+        return value - high
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def _half_slope(t, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
+    """Half the derivative of the squared distance by t."""
+    slope = dx * _beyond(ax + t * dx, x0, x1) + dy * _beyond(ay + t * dy, y0, y1)
+    above = az + t * dz - top
+    return slope + dz * above if above > 0.0 else slope
+
+
+@njit(cache=True, nogil=True)
+def _narrowed(low, high, face, a, d, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
+    """The part of [low, high] on the minimum's side of the t at which a coordinate passes a face."""
+    if d == 0.0:
+        return low, high
+    t = (face - a) / d
+    if low < t < high:
+        if _half_slope(t, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top) > 0.0:
+            return low, t
+        return t, high
+    return low, high
+
+
+@njit(cache=True, nogil=True)
+def column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
+    """(smallest squared distance, t) of a + t d, t in [0, 1], to one column; ``top`` may be +inf."""
+    low, high = 0.0, 1.0
+    low, high = _narrowed(low, high, x0, ax, dx, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    low, high = _narrowed(low, high, x1, ax, dx, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    low, high = _narrowed(low, high, y0, ay, dy, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    low, high = _narrowed(low, high, y1, ay, dy, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    low, high = _narrowed(low, high, top, az, dz, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    at_low = _half_slope(low, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    at_high = _half_slope(high, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+    if at_low >= 0.0:
+        t = low
+    elif at_high <= 0.0:
+        t = high
+    else:  # the slope is a straight line between the two and passes zero
+        t = low - at_low * (high - low) / (at_high - at_low)
+    bx, by = _beyond(ax + t * dx, x0, x1), _beyond(ay + t * dy, y0, y1)
+    above = max(0.0, az + t * dz - top)
+    return bx * bx + by * by + above * above, t
+
+
+@njit(cache=True, nogil=True)
+def edge_distance(x, y, width_m, height_m):
+    """Distance of a place inside the model to the outside; 0 outside."""
+    return max(0.0, min(min(x, width_m - x), min(y, height_m - y)))
+
+
+@njit(cache=True, nogil=True)
+def _nearest_in_leaf(elevation_m, row0, col0, res, ax, ay, az, dx, dy, dz, best_sq, best_t):
+    lowest = min(az, az + dz)
+    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
+        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+            top = np.float64(elevation_m[r, c])
+            if not np.isfinite(top):
+                top = np.inf
+            above = lowest - top
+            if above > 0.0 and above * above >= best_sq:
+                continue
+            sq, t = column_distance_sq(
+                ax, ay, az, dx, dy, dz, c * res, r * res, (c + 1) * res, (r + 1) * res, top
+            )
+            if sq < best_sq:
+                best_sq, best_t = sq, t
+    return best_sq, best_t
+
+
+@njit(cache=True, nogil=True)
+def _nearest(elevation_m, maxima_m, layout, res, ax, ay, az, dx, dy, dz):
+    """(squared distance, t) of one segment: depth first, nearer child first."""
+    width_m, height_m = elevation_m.shape[1] * res, elevation_m.shape[0] * res
+    at_start = edge_distance(ax, ay, width_m, height_m)
+    at_end = edge_distance(ax + dx, ay + dy, width_m, height_m)
+    best_t = 0.0 if at_start <= at_end else 1.0  # the distance to the outside is concave along a line
+    best_sq = min(at_start, at_end) ** 2
+    bound = np.empty(STACK)
+    node = np.empty((STACK, 3), np.int64)
+    bound[0], node[0, 0], node[0, 1], node[0, 2] = 0.0, layout.shape[0] - 1, 0, 0
+    size = 1
+    while size > 0:
+        size -= 1
+        if bound[size] >= best_sq:
+            continue
+        level, i, j = node[size, 0], node[size, 1], node[size, 2]
+        if level == 0:
+            best_sq, best_t = _nearest_in_leaf(
+                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, az, dx, dy, dz, best_sq, best_t
+            )
+            continue
+        offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
+        side = LEAF_PX * 2.0 ** (level - 1) * res
+        first = size
+        for ci in range(2 * i, min(rows, 2 * i + 2)):
+            for cj in range(2 * j, min(cols, 2 * j + 2)):
+                top = np.float64(maxima_m[offset + ci * cols + cj])
+                sq, _ = column_distance_sq(
+                    ax, ay, az, dx, dy, dz, cj * side, ci * side, (cj + 1) * side, (ci + 1) * side, top
+                )
+                if sq >= best_sq:
+                    continue
+                k = size
+                while k > first and bound[k - 1] < sq:
+                    bound[k] = bound[k - 1]
+                    node[k] = node[k - 1]
+                    k -= 1
+                bound[k], node[k, 0], node[k, 1], node[k, 2] = sq, level - 1, ci, cj
+                size += 1
+    return best_sq, best_t
+
+
+@njit(cache=True, parallel=True, nogil=True)
+def _nearest_all(elevation_m, maxima_m, layout, res, start_m, end_m, distance_m, share):
+    for k in prange(start_m.shape[0]):
+        d = end_m[k] - start_m[k]
+        sq, t = _nearest(
+            elevation_m, maxima_m, layout, res, start_m[k, 0], start_m[k, 1], start_m[k, 2], d[0], d[1], d[2]
+        )
+        distance_m[k] = np.sqrt(sq)
+        share[k] = t

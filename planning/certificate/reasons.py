@@ -1,0 +1,132 @@
+"""Why a line is not certified, in words an operator can act on, each with what would mend it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planning.dsm import Dsm
+from planning.model import ClearanceParams, FlownLine, LegClearance, Reason, WorstPoint
+
+RTK_ERROR_M = 0.1
+FILL_OR_AVOID = (
+    "Keep the line farther inside the surface model and away from its holes, fill the holes,"
+    " or use a model that covers the whole flight."
+)
+
+
+def line_reasons(
+    legs: tuple[LegClearance, ...], worst: WorstPoint, params: ClearanceParams, *, worst_is_unknown: bool
+) -> list[Reason]:
+    """Unknown terrain below, terrain hit, clearance too small: at most one of each."""
+    reasons = []
+    unknown = [leg for leg in legs if leg.min_vertical_m == -math.inf]
+    hit = [leg for leg in legs if -math.inf < leg.min_vertical_m < 0.0]
+    if unknown:
+        text = f"{_legs(unknown)} over unknown terrain or outside the surface model"
+        reasons.append(Reason("unknown_terrain", f"{text}, first on {_leg(unknown[0])}.", FILL_OR_AVOID))
+    if hit:
+        deepest = min(hit, key=lambda leg: leg.min_vertical_m)
+        text = f"The line enters the terrain: {-deepest.min_vertical_m:.2f} m deep on {_leg(deepest)}."
+        mend = f"Raise the line there by at least {_up(params.required_clearance_m - deepest.min_vertical_m, 0.1):.1f} m."
+        reasons.append(Reason("terrain_hit", text, mend))
+    short = [leg for leg in legs if not leg.min_distance_m >= params.required_clearance_m]
+    if short:
+        reasons.append(_clearance_reason(short, worst, params, worst_is_unknown=worst_is_unknown))
+    return reasons
+
+
+def _clearance_reason(
+    short: list[LegClearance], worst: WorstPoint, params: ClearanceParams, *, worst_is_unknown: bool
+) -> Reason:
+    nearest = min(short, key=lambda leg: leg.min_distance_m)
+    required_m = params.required_clearance_m
+    missing_m = _up(required_m - nearest.min_distance_m, 0.01)
+    to_what = "an unknown cell or the model's edge" if worst_is_unknown else "the surface"
+    text = (
+        f"The line comes within {_down(nearest.min_distance_m, 0.01):.2f} m of {to_what} on {_leg(nearest)}, at"
+        f" {worst.lat_deg:.7f}, {worst.lon_deg:.7f}: {missing_m:.2f} m less than the required {required_m:.2f} m"
+        f" ({len(short)} {'leg' if len(short) == 1 else 'legs'} too near)."
+    )
+    if worst_is_unknown:
+        return Reason("clearance", text, FILL_OR_AVOID)
+    mend = f"Raise H by at least {missing_m:.2f} m or take a larger R."
+    with_rtk_m = required_m - params.position_error_m + RTK_ERROR_M
+    if params.position_error_m > RTK_ERROR_M and nearest.min_distance_m >= with_rtk_m:
+        mend += f" With RTK ({RTK_ERROR_M} m) in place of {params.position_error_m} m position error it would be enough."
+    return Reason("clearance", text, mend)
+
+
+def return_reason(needed_m: float, from_m: np.ndarray | None, dsm: Dsm, params: ClearanceParams) -> Reason | None:
+    """The way home at the return height; ``from_m`` (3,) projected is the place that asks for most."""
+    if params.rtl_height_m >= needed_m or from_m is None:
+        return None
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(from_m[None, :2])[0]
+    place = f"{lat_deg:.7f}, {lon_deg:.7f}"
+    if needed_m == math.inf:
+        text = f"The straight way home from {place} passes unknown terrain or comes too near the model's edge."
+        mend = "Fill the holes, use a model that covers the way home, or move home or the route."
+        return Reason("return_unknown", text, mend)
+    height_m = math.ceil(needed_m)
+    text = (
+        f"The straight way home from {place} needs {_up(needed_m, 0.01):.2f} m above home;"
+        f" the return height is {params.rtl_height_m:.2f} m."
+    )
+    mend = (
+        f"Set the return height to at least {height_m} m"
+        f" (ArduPilot: RTL_ALT {height_m * 100} cm; PX4: RTL_RETURN_ALT {height_m} m)."
+    )
+    return Reason("return_height", text, mend)
+
+
+def column_reasons(home_obstacle: str | None, landing_obstacle: str | None) -> list[Reason]:
+    mend = "Choose another place on open ground, or lower the position error."
+    reasons = []
+    if home_obstacle is not None:
+        text = f"The column over home is not clear: {home_obstacle}."
+        reasons.append(Reason("home_column", text, mend))
+    if landing_obstacle is not None:
+        text = f"The column over the landing place is not clear: {landing_obstacle}."
+        reasons.append(Reason("landing_column", text, mend))
+    return reasons
+
+
+def height_reason(highest_m: float, leg: int, item: int, params: ClearanceParams) -> Reason | None:
+    limit_m = params.max_height_above_ground_m
+    if limit_m is None or highest_m <= limit_m:
+        return None
+    text = (
+        f"The line flies {_up(highest_m, 0.01):.2f} m above ground on leg {leg + 1} (item {item + 1});"
+        f" the limit is {limit_m:.2f} m."
+    )
+    return Reason("height_above_ground", text, "Lower H or R, allow steeper climbs and descents, or use more waypoints.")
+
+
+def scale_reason(scale: float, tolerance: float) -> Reason | None:
+    if abs(scale - 1.0) <= tolerance:
+        return None
+    text = f"One metre on the ground is {scale:.4f} m in the surface model's CRS: distances in it are not true."
+    return Reason("crs_scale", text, "Reproject the surface model to its UTM zone or another local CRS.")
+
+
+def unjudged_reasons(line: FlownLine) -> list[Reason]:
+    mend = "Replace it by plain waypoints relative to home, or remove it."
+    return [Reason("unjudged", text, mend) for text in line.unjudged]
+
+
+def _leg(leg: LegClearance) -> str:
+    return f"leg {leg.leg + 1} (item {leg.item + 1})"
+
+
+def _legs(legs: list[LegClearance]) -> str:
+    return "One leg leads" if len(legs) == 1 else f"{len(legs)} legs lead"
+
+
+def _up(value: float, step: float) -> float:
+    """Rounded up to a multiple of ``step``, so that what the text asks for is enough."""
+    return math.ceil(value / step) * step
+
+
+def _down(value: float, step: float) -> float:
+    return math.floor(value / step) * step

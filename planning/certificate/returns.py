@@ -1,0 +1,132 @@
+"""How high a straight flight home must be, from every place of the line.
+
+Return to launch climbs to the larger of the set height and the vehicle's own, then flies straight home
+on the level. It keeps a distance c to a column of elevation e at horizontal distance d < c when it is
+at least e + sqrt(c^2 - d^2) high; climbing never brings it nearer to any column. A block of cells asks
+for at most what the column over its outline with its largest elevation asks for, so branch and bound
+over the pyramid of maxima finds the exact height at full resolution.
+
+Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from planning.certificate.nearest import STACK, column_distance_sq, edge_distance
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid
+
+F64 = NDArray[np.float64]
+
+CHUNKS = 32
+"""Pieces of the line searched independently; inside one, what was found raises the bar for the next place."""
+
+
+def return_altitude(pyramid: MaxPyramid, places_m: F64, home_xy_m: F64, clearance_m: float) -> tuple[float, int]:
+    """Smallest altitude from which every way home keeps ``clearance_m``, and the place that asks for it.
+
+    ``places_m`` (N, 3) are the places that a return may start from; a place that is high enough itself
+    asks for nothing. Returns (-inf, -1) when no place asks for anything and inf where unknown cells or
+    the model's edge lie within ``clearance_m`` of a way home.
+    """
+    needed_m = np.empty(CHUNKS)
+    place = np.empty(CHUNKS, dtype=np.int64)
+    _search(
+        pyramid.elevation_m,
+        pyramid.maxima_m,
+        pyramid.layout,
+        pyramid.resolution_m,
+        np.ascontiguousarray(places_m, dtype=np.float64),
+        float(home_xy_m[0]),
+        float(home_xy_m[1]),
+        float(clearance_m),
+        needed_m,
+        place,
+    )
+    worst = int(np.argmax(needed_m))
+    return float(needed_m[worst]), int(place[worst])
+
+
+@njit(cache=True, nogil=True)
+def _asked(ax, ay, dx, dy, x0, y0, x1, y1, top, clearance_m):
+    """Altitude that one column asks of a level flight; -inf when it is out of reach."""
+    sq, _ = column_distance_sq(ax, ay, 0.0, dx, dy, 0.0, x0, y0, x1, y1, np.inf)
+    if sq >= clearance_m * clearance_m:
+        return -np.inf
+    return top + np.sqrt(clearance_m * clearance_m - sq)
+
+
+@njit(cache=True, nogil=True)
+def _leaf_altitude(elevation_m, row0, col0, res, ax, ay, dx, dy, clearance_m, needed):
+    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
+        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+            top = np.float64(elevation_m[r, c])
+            if not np.isfinite(top):
+                top = np.inf
+            if top + clearance_m > needed:
+                asked = _asked(ax, ay, dx, dy, c * res, r * res, (c + 1) * res, (r + 1) * res, top, clearance_m)
+                needed = max(needed, asked)
+    return needed
+
+
+@njit(cache=True, nogil=True)
+def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearance_m, bar):
+    """The larger of ``bar`` and the altitude that the level flight from a to a + d needs."""
+    width_m, height_m = elevation_m.shape[1] * res, elevation_m.shape[0] * res
+    to_edge = min(edge_distance(ax, ay, width_m, height_m), edge_distance(ax + dx, ay + dy, width_m, height_m))
+    if to_edge < clearance_m:
+        return np.inf
+    needed = bar
+    bound = np.empty(STACK)
+    node = np.empty((STACK, 3), np.int64)
+    bound[0], node[0, 0], node[0, 1], node[0, 2] = np.inf, layout.shape[0] - 1, 0, 0
+    size = 1
+    while size > 0 and needed < np.inf:
+        size -= 1
+        if bound[size] <= needed:
+            continue
+        level, i, j = node[size, 0], node[size, 1], node[size, 2]
+        if level == 0:
+            needed = _leaf_altitude(
+                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, dx, dy, clearance_m, needed
+            )
+            continue
+        offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
+        side = LEAF_PX * 2.0 ** (level - 1) * res
+        first = size
+        for ci in range(2 * i, min(rows, 2 * i + 2)):
+            for cj in range(2 * j, min(cols, 2 * j + 2)):
+                top = np.float64(maxima_m[offset + ci * cols + cj])
+                if top + clearance_m <= needed:
+                    continue
+                x0, y0 = cj * side, ci * side
+                asked = _asked(ax, ay, dx, dy, x0, y0, x0 + side, y0 + side, top, clearance_m)
+                if asked <= needed:
+                    continue
+                k = size
+                while k > first and bound[k - 1] > asked:
+                    bound[k] = bound[k - 1]
+                    node[k] = node[k - 1]
+                    k -= 1
+                bound[k], node[k, 0], node[k, 1], node[k, 2] = asked, level - 1, ci, cj
+                size += 1
+    return needed
+
+
+@njit(cache=True, parallel=True, nogil=True)
+def _search(elevation_m, maxima_m, layout, res, places_m, home_x, home_y, clearance_m, needed_m, place):
+    n = places_m.shape[0]
+    for chunk in prange(CHUNKS):
+        best, best_place = -np.inf, -1
+        for k in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
+            x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
+            bar = max(best, z)
+            found = _needed_altitude(
+                elevation_m, maxima_m, layout, res, x, y, home_x - x, home_y - y, clearance_m, bar
+            )
+            if found > bar:
+                best, best_place = found, k
+        needed_m[chunk] = best
+        place[chunk] = best_place

@@ -1,0 +1,251 @@
+"""The clearance certificate: proof that a flown line keeps its distance from a surface model.
+
+The proof uses none of the code that makes the safe surface. Every cell of the model, at its full
+resolution, is a solid square column from below up to its elevation; unknown cells and everything outside
+the model are columns of infinite height; the line is straight between its points in the model's CRS.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import Proj
+
+import planning
+from planning.certificate.columns import FREE_RISE_M, FREE_SLOPE, column_obstacle
+from planning.certificate.heights import height_range
+from planning.certificate.nearest import nearest_distances
+from planning.certificate.places import distance_flown, places_along
+from planning.certificate.pyramid import MaxPyramid, max_pyramid
+from planning.certificate.reasons import (
+    column_reasons,
+    height_reason,
+    line_reasons,
+    return_reason,
+    scale_reason,
+    unjudged_reasons,
+)
+from planning.certificate.returns import return_altitude
+from planning.dsm import Dsm
+from planning.errors import MissionError, ParameterError
+from planning.model import (
+    Certificate,
+    ClearanceParams,
+    FlownLine,
+    LegClearance,
+    Reason,
+    WorstPoint,
+    finite_or_none,
+)
+
+F64 = NDArray[np.float64]
+
+WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")
+RETURN_STEP_M = 0.5
+"""Ways home are judged from places at most this far apart, and from every vertex."""
+SCALE_TOLERANCE = 0.01
+"""Largest deviation of the CRS's metre from the true one."""
+
+
+def certify(
+    dsm: Dsm,
+    line: FlownLine,
+    params: ClearanceParams,
+    *,
+    trend_step_m: float = 1.0,
+    assumptions: dict[str, object] | None = None,
+) -> Certificate:
+    """Certificate of a flown line against the whole of a surface model.
+
+    ``assumptions`` are added to those written down here. Distances are exact to the rounding of float64.
+    Raises ParameterError on a clearance, radius or step that is no positive number and MissionError on
+    a line with a point that is not finite.
+    """
+    _check(line, params, trend_step_m)
+    pyramid = max_pyramid(dsm.elevation_m, dsm.resolution_m)
+    points_m = _from_corner(line.points_m, dsm)
+    start_m, end_m = points_m[:-1], points_m[1:]
+    distance_m, share = nearest_distances(pyramid, start_m, end_m)
+    lowest_m, highest_m = height_range(dsm.elevation_m, dsm.resolution_m, start_m, end_m)
+    legs = _legs(line, distance_m, share, lowest_m)
+    worst = _worst_point(dsm, line, distance_m, share)
+    trend_places, trend_s_m = places_along(points_m, trend_step_m)
+    trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
+    needed_m, needed_from = _return_height(pyramid, dsm, line, points_m, params)
+    home_obstacle, landing_obstacle = _columns(dsm, line, params)
+    highest_leg = int(np.argmax(highest_m))
+    scale = _scale(dsm, worst)
+    found = [
+        *unjudged_reasons(line),
+        *line_reasons(legs, worst, params, worst_is_unknown=_is_unknown_near(pyramid, dsm, worst, distance_m)),
+        return_reason(needed_m, needed_from, dsm, params),
+        *column_reasons(home_obstacle, landing_obstacle),
+        height_reason(float(highest_m[highest_leg]), highest_leg, int(line.leg_item[highest_leg]), params),
+        scale_reason(scale, SCALE_TOLERANCE),
+    ]
+    reasons: tuple[Reason, ...] = tuple(reason for reason in found if reason is not None)
+    return Certificate(
+        certified=not reasons,
+        min_distance_m=float(distance_m.min()),
+        min_vertical_m=float(lowest_m.min()),
+        required_clearance_m=params.required_clearance_m,
+        worst=worst,
+        legs=legs,
+        rtl_height_needed_m=needed_m,
+        home_column_clear=home_obstacle is None,
+        max_height_above_ground_m=float(highest_m.max()),
+        reasons=reasons,
+        trend_s_m=trend_s_m,
+        trend_distance_m=trend_m,
+        assumptions=_assumptions(dsm, line, params, scale) | (assumptions or {}),
+    )
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """The certificate as plain JSON values; infinite and undefined numbers become null."""
+    plain = {
+        "certified": certificate.certified,
+        "min_distance_m": certificate.min_distance_m,
+        "min_vertical_m": certificate.min_vertical_m,
+        "required_clearance_m": certificate.required_clearance_m,
+        "worst": {key: getattr(certificate.worst, key) for key in WORST_KEYS},
+        "rtl_height_needed_m": certificate.rtl_height_needed_m,
+        "home_column_clear": certificate.home_column_clear,
+        "max_height_above_ground_m": certificate.max_height_above_ground_m,
+        "reasons": [asdict(reason) for reason in certificate.reasons],
+        "legs": [asdict(leg) for leg in certificate.legs],
+        "trend": {"s_m": certificate.trend_s_m, "distance_m": certificate.trend_distance_m},
+        "assumptions": certificate.assumptions,
+    }
+    return {key: _jsonable(value) for key, value in plain.items()}
+
+
+def _jsonable(value: object) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _jsonable(inner) for key, inner in value.items()}
+    if isinstance(value, np.ndarray):
+        return _jsonable(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_jsonable(inner) for inner in value]
+    if isinstance(value, np.generic):
+        return _jsonable(value.item())
+    return finite_or_none(value) if isinstance(value, float) else value
+
+
+def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> None:
+    positive = {"The required clearance": params.required_clearance_m, "The trend's step": trend_step_m}
+    if params.max_height_above_ground_m is not None:
+        positive["The largest height above ground"] = params.max_height_above_ground_m
+    for name, value in positive.items():
+        if not 0.0 < value < math.inf:
+            raise ParameterError(f"{name} is {value} m.", advice="It must be a positive number of metres.")
+    at_least_zero = {"vehicle's radius": params.vehicle_radius_m, "position error": params.position_error_m}
+    for name, value in at_least_zero.items():
+        if not 0.0 <= value < math.inf:
+            raise ParameterError(f"The {name} is {value} m.", advice="It must be zero or a positive number of metres.")
+    if not math.isfinite(params.rtl_height_m):
+        raise ParameterError(f"The return height is {params.rtl_height_m} m.", advice="Give metres above home.")
+    flown = np.append(line.points_m.ravel(), [*line.home_xy_m, line.home_alt_dsm_m])
+    if len(line.points_m) < 2 or not np.isfinite(flown).all():
+        raise MissionError("A flown line needs two points or more, all of them finite numbers, and a home.")
+
+
+def _from_corner(points_m: F64, dsm: Dsm) -> F64:
+    """Projected (K, 3) points -> metres east and SOUTH of the model's north-west corner, altitude as it is."""
+    return np.column_stack(
+        [points_m[:, 0] - dsm.transform.c, dsm.transform.f - points_m[:, 1], points_m[:, 2]]
+    )
+
+
+def _legs(line: FlownLine, distance_m: F64, share: F64, lowest_m: F64) -> tuple[LegClearance, ...]:
+    s_m = distance_flown(line.points_m)
+    at_s_m = s_m[:-1] + share * np.diff(s_m)
+    return tuple(
+        LegClearance(k, int(line.leg_item[k]), float(distance_m[k]), float(lowest_m[k]), float(at_s_m[k]))
+        for k in range(len(distance_m))
+    )
+
+
+def _worst_point(dsm: Dsm, line: FlownLine, distance_m: F64, share: F64) -> WorstPoint:
+    leg = int(np.argmin(distance_m))
+    a, b = line.points_m[leg], line.points_m[leg + 1]
+    x, y, alt_dsm_m = a + share[leg] * (b - a)
+    s_m = distance_flown(line.points_m)
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(np.array([[x, y]]))[0]
+    return WorstPoint(
+        lat_deg=float(lat_deg),
+        lon_deg=float(lon_deg),
+        alt_rel_home_m=float(alt_dsm_m - line.home_alt_dsm_m),
+        leg=leg,
+        s_m=float(s_m[leg] + share[leg] * (s_m[leg + 1] - s_m[leg])),
+        x_m=float(x),
+        y_m=float(y),
+        alt_dsm_m=float(alt_dsm_m),
+    )
+
+
+def _is_unknown_near(pyramid: MaxPyramid, dsm: Dsm, worst: WorstPoint, distance_m: F64) -> bool:
+    """Whether a column of infinite height is what the worst point is near: then climbing does not help."""
+    far_above = _from_corner(np.array([[worst.x_m, worst.y_m, 1e6]]), dsm)
+    unknown_m, _ = nearest_distances(pyramid, far_above, far_above)
+    return bool(unknown_m[0] <= distance_m.min() + 1e-6)
+
+
+def _return_height(
+    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, points_m: F64, params: ClearanceParams
+) -> tuple[float, F64 | None]:
+    """Height above home that every way home needs, 0 when none needs any, and the place that needs it."""
+    places_m, _ = places_along(points_m, RETURN_STEP_M)
+    home_m = _from_corner(np.array([[*line.home_xy_m, 0.0]]), dsm)[0, :2]
+    altitude_m, place = return_altitude(pyramid, places_m, home_m, params.required_clearance_m)
+    if place < 0:
+        return 0.0, None
+    x, y, z = places_m[place]
+    at_m = np.array([x + dsm.transform.c, dsm.transform.f - y, z])
+    return max(0.0, altitude_m - line.home_alt_dsm_m), at_m
+
+
+def _columns(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[str | None, str | None]:
+    radius_m = params.vehicle_radius_m + params.position_error_m
+    home = column_obstacle(dsm, line.home_xy_m, radius_m)
+    if line.landing_xy_m is None or line.landing_xy_m == line.home_xy_m:
+        return home, None
+    return home, column_obstacle(dsm, line.landing_xy_m, radius_m)
+
+
+def _scale(dsm: Dsm, worst: WorstPoint) -> float:
+    """The CRS's largest point scale factor at the worst point; infinite where it is not defined."""
+    factors = Proj(dsm.crs).get_factors(worst.lon_deg, worst.lat_deg)
+    scales = (float(factors.meridional_scale), float(factors.parallel_scale))
+    return max(scales, key=lambda scale: abs(scale - 1.0))
+
+
+def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: float) -> dict[str, object]:
+    return {
+        "version": planning.__version__,
+        "dsm_sha256": dsm.sha256,
+        "crs": dsm.crs.to_string() if dsm.crs.to_epsg() else dsm.crs.name,
+        "crs_scale": scale,
+        "vertical_datum": dsm.vertical_datum or "unknown",
+        "resolution_m": dsm.resolution_m,
+        "width_px": dsm.width_px,
+        "height_px": dsm.height_px,
+        "cells": "solid square columns at full resolution; unknown cells and everything outside: infinitely high",
+        "earth": "straight lines in the model's projected CRS, no wind, corners flown exactly",
+        "home_alt_dsm_m": line.home_alt_dsm_m,
+        "takeoff_and_landing": "vertical columns, left out of the distances",
+        "column_rule": (
+            f"cells within vehicle radius + position error are known and rise at most {FREE_RISE_M} m"
+            f" or {FREE_SLOPE:.2f} of their distance"
+        ),
+        "return": (
+            f"from places every {RETURN_STEP_M} m: climb to the return height or keep a larger own height,"
+            " then straight and level to home"
+        ),
+        "parameters": asdict(params),
+        "notes": list(line.notes),
+    }

@@ -1,0 +1,1 @@
+"""Grey dilation with a ball, pooling and smoothing of height grids: the kernels behind `planning.surface`."""

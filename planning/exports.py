@@ -1,0 +1,56 @@
+"""The files of a finished plan, by name, as text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from planning.clearance import certificate_json
+from planning.dsm import Dsm
+from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
+from planning.plan import Plan
+from planning.report import ReportInput, render_report
+from planning.summary import plan_summary
+
+FILES = (
+    "trajectory.csv",
+    "trajectory.kml",
+    "mission.waypoints",
+    "mission.plan",
+    "mission.geojson",
+    "certificate.json",
+    "report.html",
+)
+
+
+def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: str, seconds: dict[str, float]) -> str:
+    """One of ``FILES`` as text; ``source`` is the surface model as read."""
+    writers: dict[str, Callable[[], str]] = {
+        "trajectory.csv": lambda: trajectory_csv.write_trajectory(
+            plan.path, plan.timing, plan.mission.home, plan.dsm
+        ),
+        "trajectory.kml": lambda: kml.write_kml(plan.path, plan.mission, plan.dsm, title=title),
+        "mission.waypoints": lambda: wpl.write_wpl(plan.mission),
+        "mission.plan": lambda: qgc_plan.write_plan(plan.mission),
+        "mission.geojson": lambda: geojson.write_geojson(
+            plan.path, plan.mission, plan.dsm, summary=_plain(plan_summary(plan, source))
+        ),
+        "certificate.json": lambda: json.dumps(
+            {**certificate_json(plan.certificate), **plan_summary(plan, source), "created_utc": created_utc},
+            indent=2,
+            allow_nan=False,
+        ),
+        "report.html": lambda: render_report(report_input(plan, title=title, created_utc=created_utc, seconds=seconds)),
+    }
+    return writers[name]()
+
+
+def report_input(plan: Plan, *, title: str, created_utc: str, seconds: dict[str, float]) -> ReportInput:
+    """What the HTML report shows."""
+    raise NotImplementedError
+
+
+def _plain(summary: dict[str, Any]) -> dict[str, Any]:
+    """Only the numbers and words; nested parts stay in the certificate."""
+    return {key: value for key, value in summary.items() if not isinstance(value, dict | list)}

@@ -1,0 +1,232 @@
+"""The line that a multicopter really flies through mission items, as its autopilot reads them.
+
+ArduPilot's conventions: a take-off rises over home whatever its coordinates say; latitude and longitude
+0, 0 (or not given) keep the present place and an altitude that is stored as 0 cm keeps the present
+height; a landing item with coordinates is approached at the present height. PX4 differs in flying on
+to a take-off item's coordinates and in taking an altitude of 0 as it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.certificate.commands import BENT, LAND, OTHER_UNJUDGED, RETURN_TO_LAUNCH, STRAIGHT, TAKEOFFS, stays
+from planning.dsm import Dsm, is_amsl
+from planning.errors import MissionError
+from planning.model import FlownLine, Mission, MissionItem
+
+F64 = NDArray[np.float64]
+
+AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
+STORED_ALTITUDE_M = 0.01
+"""ArduPilot keeps whole centimetres and cuts the rest off."""
+HOME_TOLERANCE_M = 1.0
+PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {LAND}
+
+
+def flown_line(mission: Mission, dsm: Dsm) -> FlownLine:
+    """The polyline flown through a mission's items, in the surface model's CRS and vertical datum.
+
+    Items that cannot be judged are named in ``unjudged``, never skipped in silence; the line then shows
+    the straight line to their place where they have one. Raises MissionError when home or an item
+    cannot be placed at all, or nothing is flown.
+    """
+    xy_m = _item_places(mission, dsm)
+    flight = _Flight(mission, dsm, xy_m)
+    for index, item in enumerate(mission.items):
+        flight.fly(index, item)
+    return flight.line()
+
+
+def _item_places(mission: Mission, dsm: Dsm) -> F64:
+    """(N, 2) projected places; NaN where an item gives none."""
+    asked = [_coordinates(i, item) if item.command in PLACED else None for i, item in enumerate(mission.items)]
+    return _projected([(math.nan, math.nan) if at is None else at for at in asked], dsm)
+
+
+def _projected(lat_lon_deg: list[tuple[float, float]], dsm: Dsm) -> F64:
+    given = np.array(lat_lon_deg, dtype=np.float64).reshape(-1, 2)
+    xy_m = np.full(given.shape, np.nan)
+    known = ~np.isnan(given[:, 0])
+    xy_m[known] = dsm.xy_from_lat_lon(given[known])
+    lost = known & ~np.isfinite(xy_m).all(axis=1)
+    if lost.any():
+        lat, lon = given[np.argmax(lost)]
+        raise MissionError(
+            f"{lat:.7f}, {lon:.7f} cannot be placed in the surface model's CRS ({dsm.crs.name}).",
+            advice="Check that the mission belongs to this surface model.",
+        )
+    return xy_m
+
+
+def _coordinates(index: int, item: MissionItem) -> tuple[float, float] | None:
+    """(lat_deg, lon_deg), None when the item keeps the present place."""
+    return _given(item.lat_deg, item.lon_deg, f"Item {index + 1}")
+
+
+def _given(lat_deg: float, lon_deg: float, where: str) -> tuple[float, float] | None:
+    if (math.isnan(lat_deg) and math.isnan(lon_deg)) or (lat_deg == 0.0 and lon_deg == 0.0):
+        return None
+    if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+        raise MissionError(
+            f"{lat_deg}, {lon_deg} is not a place on Earth.",
+            where=where,
+            advice="Latitude lies in -90..90, longitude in -180..180 degrees.",
+        )
+    return lat_deg, lon_deg
+
+
+class _Flight:
+    """Where the vehicle is, and the line so far, while the items are gone through."""
+
+    def __init__(self, mission: Mission, dsm: Dsm, item_xy_m: F64) -> None:
+        self.ardupilot = mission.firmware == "ardupilot"
+        self.count = len(mission.items)
+        self.item_xy_m = item_xy_m
+        self.absolute = is_amsl(dsm.vertical_datum)
+        self.datum = dsm.vertical_datum or "unknown"
+        self.unjudged: list[str] = []
+        self.notes: list[str] = []
+        self.home_xy_m = self._home_place(mission, dsm)
+        self.home_alt_m = self._home_altitude(mission, dsm)
+        self.points: list[tuple[float, float, float]] = []
+        self.leg_item: list[int] = []
+        self.first_item = 0
+        self.ended_by: int | None = None
+        self.landing_xy_m: tuple[float, float] | None = None
+
+    def _home_place(self, mission: Mission, dsm: Dsm) -> tuple[float, float]:
+        home = _given(mission.home.lat_deg, mission.home.lon_deg, "Home")
+        if home is not None:
+            x, y = _projected([home], dsm)[0]
+            return float(x), float(y)
+        placed = np.flatnonzero(~np.isnan(self.item_xy_m[:, 0]))
+        if len(placed) == 0:
+            raise MissionError("The mission names neither a home nor a place.", advice="Add a home position.")
+        self.notes.append(f"The mission names no home: the place of item {placed[0] + 1} was taken for it.")
+        x, y = self.item_xy_m[placed[0]]
+        return float(x), float(y)
+
+    def _home_altitude(self, mission: Mission, dsm: Dsm) -> float:
+        ground_m = float(dsm.elevation_at(np.array([self.home_xy_m]))[0])
+        home = mission.home
+        same_datum = home.vertical_datum is not None and (
+            home.vertical_datum == dsm.vertical_datum or (self.absolute and is_amsl(home.vertical_datum))
+        )
+        known = same_datum and math.isfinite(home.alt_dsm_m)
+        if not math.isfinite(ground_m):
+            if not known:
+                raise MissionError(
+                    "Home lies outside the surface model or on unknown terrain: nothing tells its altitude.",
+                    advice="Choose a home on known terrain, or check that mission and surface model belong together.",
+                )
+            self.notes.append("The surface model does not know home: its altitude is the mission's.")
+            return home.alt_dsm_m
+        if known and abs(home.alt_dsm_m - ground_m) > HOME_TOLERANCE_M:
+            self.notes.append(
+                f"The mission puts home at {home.alt_dsm_m:.2f} m, the surface model at {ground_m:.2f} m:"
+                " altitudes relative to home were placed on the surface model."
+            )
+        return ground_m
+
+    def fly(self, index: int, item: MissionItem) -> None:
+        if stays(item.command):
+            return
+        if self.ended_by is not None:
+            self._cannot_judge(index, item, f"comes after item {self.ended_by + 1}, which ends the flight")
+        elif item.command in TAKEOFFS:
+            self._take_off(index, item)
+        elif item.command in STRAIGHT:
+            self._go(index, item)
+        elif item.command in BENT:
+            self._cannot_judge(index, item, f"{BENT[item.command]}, which is no straight line")
+            self._go(index, item)
+        elif item.command in (LAND, RETURN_TO_LAUNCH):
+            self._end(index, item)
+        else:
+            self._cannot_judge(index, item, OTHER_UNJUDGED.get(item.command, "is not a command known here"))
+
+    def _take_off(self, index: int, item: MissionItem) -> None:
+        if self.points:
+            self._cannot_judge(index, item, "is a take-off in flight")
+            return
+        alt_m = self._altitude(index, item, present_m=self.home_alt_m)
+        if alt_m <= self.home_alt_m:
+            self._cannot_judge(index, item, "is a take-off to a height that is not above home")
+        self.points.append((*self.home_xy_m, alt_m))
+        self.first_item = index
+        if not self.ardupilot and not math.isnan(self.item_xy_m[index, 0]):
+            self._leg(index, self._place(index), alt_m)
+
+    def _go(self, index: int, item: MissionItem) -> None:
+        if not self.points:
+            self._cannot_judge(index, item, "comes before any take-off: how the vehicle gets there is unknown")
+            alt_m = self._altitude(index, item, present_m=self.home_alt_m)
+            self.points.append((*self.home_xy_m, alt_m))
+            self.first_item = index
+        else:
+            alt_m = self._altitude(index, item, present_m=self._present_m)
+        self._leg(index, self._place(index), alt_m)
+
+    def _end(self, index: int, item: MissionItem) -> None:
+        self.ended_by = index
+        if item.command == LAND and self.points:
+            self.landing_xy_m = self._place(index)
+            self._leg(index, self.landing_xy_m, self._present_m)
+
+    def _place(self, index: int) -> tuple[float, float]:
+        x, y = self.item_xy_m[index]
+        return self.points[-1][:2] if math.isnan(x) else (float(x), float(y))
+
+    @property
+    def _present_m(self) -> float:
+        return self.points[-1][2]
+
+    def _altitude(self, index: int, item: MissionItem, *, present_m: float) -> float:
+        """Altitude in the surface model's datum; the present one, and a reason, where it cannot be told."""
+        if not math.isfinite(item.alt_m):
+            raise MissionError(
+                f"The altitude is {item.alt_m}.", where=f"Item {index + 1}", advice="Every place needs an altitude."
+            )
+        if item.frame in TERRAIN_FRAMES:
+            self._cannot_judge(index, item, "follows the autopilot's own terrain data (frame above terrain)")
+        elif item.frame in AMSL_FRAMES and not self.absolute:
+            self._cannot_judge(
+                index, item, f"is given above mean sea level, but the surface model's vertical datum is {self.datum}"
+            )
+        elif item.frame not in AMSL_FRAMES + HOME_FRAMES:
+            self._cannot_judge(index, item, f"uses frame {item.frame}")
+        elif not (self.ardupilot and abs(item.alt_m) < STORED_ALTITUDE_M):
+            return item.alt_m if item.frame in AMSL_FRAMES else self.home_alt_m + item.alt_m
+        return present_m
+
+    def _cannot_judge(self, index: int, item: MissionItem, why: str) -> None:
+        self.unjudged.append(f"Item {index + 1} of {self.count} (command {item.command}) {why}.")
+
+    def _leg(self, index: int, xy_m: tuple[float, float], alt_m: float) -> None:
+        point = (*xy_m, alt_m)
+        if point != self.points[-1]:
+            self.points.append(point)
+            self.leg_item.append(index)
+
+    def line(self) -> FlownLine:
+        if not self.points:
+            raise MissionError("The mission never leaves the ground.", advice="Add a take-off and a waypoint.")
+        takeoff_alt_m = self.points[0][2]
+        if not self.leg_item:  # up and down again: one leg without length at the top of the column
+            self.points.append(self.points[0])
+            self.leg_item.append(self.first_item)
+        return FlownLine(
+            points_m=np.array(self.points, dtype=np.float64),
+            leg_item=np.array(self.leg_item, dtype=np.int64),
+            home_xy_m=self.home_xy_m,
+            home_alt_dsm_m=self.home_alt_m,
+            takeoff_alt_dsm_m=takeoff_alt_m,
+            ends_with_rtl=self.ended_by is not None and self.landing_xy_m is None,
+            unjudged=tuple(self.unjudged),
+            landing_xy_m=self.landing_xy_m,
+            notes=tuple(self.notes),
+        )

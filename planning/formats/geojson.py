@@ -1,0 +1,173 @@
+"""The plan as GeoJSON (RFC 7946): path, waypoints, POIs, home and a summary of the certificate."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning import __version__
+from planning.dsm import Dsm
+from planning.errors import FormatError
+from planning.formats.commands import has_position, home_altitude_note
+from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite, load_json
+from planning.model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
+
+F64 = NDArray[np.float64]
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class GeoJsonPlan:
+    """What our own GeoJSON holds."""
+
+    home: Home
+    pois: tuple[Poi, ...]
+    waypoints: tuple[MissionItem, ...]
+    lat_lon_deg: F64
+    """(N, 2) of the sampled path"""
+    alt_rel_home_m: F64
+    """(N,)"""
+    summary: Json
+
+
+def write_geojson(path: SampledPath, mission: Mission, dsm: Dsm, *, summary: Json | None = None) -> str:
+    """A FeatureCollection; positions are lon, lat without height. ``summary`` (JSON-able) joins the path's properties.
+
+    RFC 7946 defines a third coordinate as height above the ellipsoid, which nobody here knows for sure:
+    heights stand in properties that name their datum.
+    """
+    document = {
+        "type": "FeatureCollection",
+        "features": [
+            _path(path, mission.home, dsm, summary or {}),
+            *(_waypoint(item, k) for k, item in enumerate(mission.items) if has_position(item)),
+            *(_poi(poi, k) for k, poi in enumerate(mission.pois)),
+            _home(mission.home),
+        ],
+    }
+    return json.dumps(document, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _feature(kind: str, coordinates: object, properties: Json) -> Json:
+    return {"type": "Feature", "geometry": {"type": kind, "coordinates": coordinates}, "properties": properties}
+
+
+def _lon_lat(lat_deg: float, lon_deg: float) -> list[float]:
+    return [round(float(lon_deg), 9), round(float(lat_deg), 9)]
+
+
+def _path(path: SampledPath, home: Home, dsm: Dsm, summary: Json) -> Json:
+    coordinates = [_lon_lat(lat, lon) for lat, lon in dsm.lat_lon_from_xy(path.xy_m)]
+    heights = [finite_or_none(round(float(z), 3)) for z in path.alt_dsm_m - home.alt_dsm_m]
+    return _feature("LineString", coordinates, {"role": "path", "alt_rel_home_m": heights, "summary": summary})
+
+
+def _waypoint(item: MissionItem, index: int) -> Json:
+    properties = {
+        "role": "waypoint",
+        "item": index,
+        "command": item.command,
+        "frame": item.frame,
+        "params": [finite_or_none(p) for p in item.params],
+        "alt_m": finite_or_none(item.alt_m),
+        "autocontinue": item.autocontinue,
+    }
+    return _feature("Point", _lon_lat(item.lat_deg, item.lon_deg), properties)
+
+
+def _poi(poi: Poi, index: int) -> Json:
+    properties = {"role": "poi", "poi": index, "name": clean_name(poi.name), "loiter_s": poi.loiter_s}
+    return _feature("Point", _lon_lat(poi.lat_deg, poi.lon_deg), properties)
+
+
+def _home(home: Home) -> Json:
+    properties = {
+        "role": "home",
+        "home_alt_dsm_m": finite_or_none(home.alt_dsm_m),
+        "vertical_datum": home.vertical_datum,
+        "note": home_altitude_note(home),
+        "version": __version__,
+    }
+    return _feature("Point", _lon_lat(home.lat_deg, home.lon_deg), properties)
+
+
+def read_geojson(data: bytes | str, name: str = "mission.geojson") -> GeoJsonPlan:
+    """The GeoJSON that `write_geojson` wrote. Raises FormatError with file and feature index."""
+    file = clean_name(name)
+    by_role: dict[str, list[Json]] = {"path": [], "waypoint": [], "poi": [], "home": []}
+    for feature in features(load_json(name, decode_text(name, data)), file):
+        by_role.setdefault(str(feature["properties"].get("role")), []).append(feature)
+    if len(by_role["path"]) != 1 or len(by_role["home"]) != 1:
+        raise FormatError("The file should hold one path and one home.", where=file, advice="Export it again.")
+    path, home = by_role["path"][0], by_role["home"][0]["properties"]
+    lat, lon = point(by_role["home"][0], file)
+    return GeoJsonPlan(
+        Home(lat, lon, _number(home.get("home_alt_dsm_m"), file), home.get("vertical_datum")),
+        tuple(poi_from_feature(f, file) for f in by_role["poi"]),
+        tuple(_item(f, file) for f in by_role["waypoint"]),
+        np.array([lat_lon(c, file) for c in path["geometry"]["coordinates"]]).reshape(-1, 2),
+        np.array([_number(z, file) for z in path["properties"].get("alt_rel_home_m", [])]),
+        path["properties"].get("summary", {}),
+    )
+
+
+def features(document: object, file: str) -> list[Json]:
+    """The features of a GeoJSON document (a bare geometry counts as one), each with dict properties and geometry."""
+    if not isinstance(document, dict) or not isinstance(document.get("type"), str):
+        raise FormatError("This is no GeoJSON object.", where=file, advice="It needs a member 'type'.")
+    if document["type"] != "FeatureCollection":
+        raw = [document if document["type"] == "Feature" else {"geometry": document}]
+    else:
+        raw = document.get("features")
+    if not isinstance(raw, list):
+        raise FormatError("A FeatureCollection needs a list of features.", where=file)
+    return [_checked(feature, f"{file}, feature {k}") for k, feature in enumerate(raw)]
+
+
+def _checked(feature: object, where: str) -> Json:
+    geometry = feature.get("geometry") if isinstance(feature, dict) else None
+    if not isinstance(feature, dict) or not isinstance(geometry, dict):
+        raise FormatError("The feature has no geometry.", where=where)
+    if not isinstance(geometry.get("coordinates"), list):
+        raise FormatError(f"The {clean_name(geometry.get('type'))} has no coordinates.", where=where)
+    properties = feature.get("properties")
+    return {"geometry": geometry, "properties": properties if isinstance(properties, dict) else {}}
+
+
+def point(feature: Json, where: str) -> tuple[float, float]:
+    """(lat_deg, lon_deg) of a Point feature."""
+    return lat_lon(feature["geometry"]["coordinates"], where)
+
+
+def lat_lon(position: object, where: str) -> tuple[float, float]:
+    """A GeoJSON position [lon, lat, ...] -> (lat_deg, lon_deg)."""
+    if not isinstance(position, list) or len(position) < 2:
+        raise FormatError(f"A position is [lon, lat], got {clean_name(position)!r}.", where=where)
+    return check_lat_lon(finite(position[1], "Latitude", where), finite(position[0], "Longitude", where), where)
+
+
+def poi_from_feature(feature: Json, where: str) -> Poi:
+    """A Point feature as POI, with its properties `name` and `loiter_s` if it has them."""
+    properties = feature["properties"]
+    loiter_s = finite(properties.get("loiter_s") or 0.0, "loiter_s", where)
+    return Poi(*point(feature, where), clean_name(properties.get("name") or ""), max(0.0, loiter_s))
+
+
+def _number(value: object, where: str) -> float:
+    return math.nan if value is None else finite(value, "A height", where)
+
+
+def _item(feature: Json, file: str) -> MissionItem:
+    raw, (lat, lon) = feature["properties"], point(feature, file)
+    params = raw.get("params")
+    if not isinstance(params, list) or len(params) != 4:
+        raise FormatError(f"A waypoint has 4 params, got {clean_name(params)!r}.", where=file)
+    p1, p2, p3, p4 = (_number(p, file) for p in params)
+    command, frame = (int(finite(raw.get(k), k, file)) for k in ("command", "frame"))
+    alt_m = _number(raw.get("alt_m"), file)
+    return MissionItem(command, frame, (p1, p2, p3, p4), lat, lon, alt_m, raw.get("autocontinue") is not False)

@@ -1,0 +1,13 @@
+"""Numbers that the writer and the reader of QGroundControl plans share."""
+
+from planning.formats.commands import FRAME_AMSL, FRAME_HOME, FRAME_TERRAIN
+
+FIRMWARE_TYPE = {"ardupilot": 3, "px4": 12}
+"""MAV_AUTOPILOT"""
+QUADROTOR = 2
+"""MAV_TYPE"""
+ALTITUDE_MODE = {FRAME_HOME: 1, FRAME_AMSL: 2, FRAME_TERRAIN: 4}
+"""MAV_FRAME -> QGroundControl's altitude mode: relative, absolute, terrain frame."""
+COMPUTED_ABOVE_TERRAIN = 3
+"""QGroundControl's altitude mode whose heights it turned into AMSL itself."""
+DEFAULT_SPEED_M_S = 5.0

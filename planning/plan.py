@@ -1,0 +1,191 @@
+"""The main job: points of interest and a surface model become a mission with a clearance certificate.
+
+Melita 2020, fig. 7: DSM -> dilate -> smooth -> POIs -> trajectory -> files; then decimation to what the
+vehicle can hold and a certificate of what it will really fly, taken from the exported files read back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planning import __version__
+from planning.autopilot_time import PredictedTime, predict_duration
+from planning.clearance import certify
+from planning.dsm import Dsm
+from planning.errors import MissionError
+from planning.flown import flown_line
+from planning.formats import qgc_plan, wpl
+from planning.holes import fill_holes
+from planning.mission import BuiltMission, build_mission, home_from_dsm
+from planning.model import (
+    Certificate,
+    FlownLine,
+    Mission,
+    PathParams,
+    SampledPath,
+    Surfaces,
+    Timing,
+    VehicleProfile,
+)
+from planning.path import sampled_path
+from planning.poi import check_pois
+from planning.request import PlanRequest, check_request
+from planning.surface import safe_surface, safe_surface_at
+from planning.timing import path_timing
+
+Progress = Callable[[str, float | None], None]
+
+SURFACE_STEP = "Dilating the surface"
+PATH_STEP = "Laying the path"
+CERTIFICATE_STEP = "Proving the clearance"
+
+_READ_BACK_TOLERANCE_M = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A finished plan: what was asked, what was made of it, and the proof."""
+
+    request: PlanRequest
+    dsm: Dsm
+    """The surface model with its small holes filled."""
+    surfaces: Surfaces
+    path: SampledPath
+    timing: Timing
+    built: BuiltMission
+    line: FlownLine
+    certificate: Certificate
+    predicted: PredictedTime
+    warnings: tuple[str, ...]
+
+    @property
+    def mission(self) -> Mission:
+        return self.built.mission
+
+
+def plan_mission(dsm: Dsm, request: PlanRequest, *, report: Progress = lambda step, share: None) -> Plan:
+    """Plans, decimates and certifies one mission.
+
+    Raises ParameterError, PoiError, DatumError or MissionError; a plan that is merely too close to the
+    ground is returned with a certificate that says so.
+    """
+    check_request(request)
+    report(SURFACE_STEP, 0.0)
+    filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
+    check_pois(request.pois, filled)
+    vertices_xy_m, vertex_poi = _vertices(filled, request)
+    surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
+    surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
+    report(PATH_STEP, 0.5)
+    path = sampled_path(
+        filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path
+    )
+    timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
+    profile = effective_profile(request.profile, request.path)
+    built = _mission(filled, request, profile, path)
+    report(CERTIFICATE_STEP, 0.8)
+    line = read_back(built.mission, filled)
+    certificate = certify(filled, line, request.clearance(), assumptions=_assumptions(request, surfaces))
+    predicted = predict_duration(built.mission, profile, filled)
+    return Plan(
+        request=request,
+        dsm=filled,
+        surfaces=surfaces,
+        path=path,
+        timing=timing,
+        built=built,
+        line=line,
+        certificate=certificate,
+        predicted=predicted,
+        warnings=(*built.warnings, *_warnings(request, certificate, predicted)),
+    )
+
+
+def read_back(mission: Mission, dsm: Dsm) -> FlownLine:
+    """The line that the exported files describe, read by their own readers.
+
+    Raises MissionError when the two formats do not describe the same flight: then one of them is wrong.
+    """
+    lines = [
+        flown_line(wpl.read_wpl(wpl.write_wpl(mission)), dsm),
+        flown_line(qgc_plan.read_plan(qgc_plan.write_plan(mission)), dsm),
+    ]
+    first, second = (line.points_m for line in lines)
+    if first.shape != second.shape or not np.allclose(first, second, atol=_READ_BACK_TOLERANCE_M):
+        raise MissionError(
+            "The exported .waypoints and .plan files do not describe the same flight.",
+            advice="Do not fly this plan; report it with its files.",
+        )
+    return lines[0]
+
+
+def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfile:
+    """The profile with the speeds that this plan is flown at."""
+    return replace(
+        profile,
+        mean_speed_m_s=path.mean_speed_m_s,
+        max_speed_m_s=path.max_speed_m_s,
+        max_climb_m_s=path.max_climb_m_s,
+        max_descent_m_s=path.max_descent_m_s,
+        max_accel_m_s2=path.max_accel_m_s2,
+    )
+
+
+def _vertices(dsm: Dsm, request: PlanRequest) -> tuple[np.ndarray, tuple[int | None, ...]]:
+    lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in request.pois])
+    xy_m = dsm.xy_from_lat_lon(lat_lon)
+    poi_index: tuple[int | None, ...] = tuple(range(len(xy_m)))
+    if request.home_lat_lon_deg is None:
+        return xy_m, poi_index
+    home_from_dsm(dsm, request.home_lat_lon_deg)
+    home_xy = dsm.xy_from_lat_lon(np.array([request.home_lat_lon_deg]))
+    if np.hypot(*(home_xy[0] - xy_m[0])) < request.path.step_m:
+        return xy_m, poi_index
+    return np.vstack([home_xy, xy_m]), (None, *poi_index)
+
+
+def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.ndarray:
+    return np.array([0.0 if i is None else request.pois[i].loiter_s for i in vertex_poi])
+
+
+def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: SampledPath) -> BuiltMission:
+    """Items of the mission; a landing at home first learns how high the way back must be."""
+    home = home_from_dsm(dsm, request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg))
+
+    def build(params):
+        return build_mission(path, home, params, profile, dsm, request.pois)
+
+    if request.mission.end == "rtl" or request.mission.land_transit_height_m is not None:
+        return build(request.mission)
+    scout = build(replace(request.mission, end="rtl"))
+    needed = certify(dsm, flown_line(scout.mission, dsm), request.clearance()).rtl_height_needed_m
+    transit = max(needed, profile.rtl_height_m) if math.isfinite(needed) else profile.rtl_height_m
+    return build(replace(request.mission, land_transit_height_m=math.ceil(transit)))
+
+
+def _assumptions(request: PlanRequest, surfaces: Surfaces) -> dict[str, object]:
+    return {
+        "product_version": __version__,
+        "ball_radius_m": request.surface.radius_m,
+        "ball_height_m": request.surface.height_m,
+        "dilation": surfaces.method,
+        "paper_pipeline": not request.surface.floor,
+        "holes_filled": surfaces.holes_filled,
+        "holes_filled_area_m2": surfaces.holes_filled_area_m2,
+        "vehicle_profile": request.profile.name,
+    }
+
+
+def _warnings(request: PlanRequest, certificate: Certificate, predicted: PredictedTime) -> list[str]:
+    usable_s = request.profile.endurance_s * (1 - request.profile.reserve_share)
+    warnings = []
+    if predicted.total_s > usable_s:
+        warnings.append(
+            f"The flight takes {predicted.total_s:.0f} s; endurance less reserve is {usable_s:.0f} s. "
+            "Fly faster, shorten the route or split it."
+        )
+    return warnings

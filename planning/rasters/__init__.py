@@ -1,0 +1,1 @@
+"""How raster files are opened: decoding in a child process, everything else as arithmetic on its numbers."""

@@ -1,0 +1,112 @@
+"""Makes the surface model of the stored numbers, as planned, and reports what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from planning.dsm import Dsm
+from planning.errors import NoElevationError
+from planning.rasters.heights import HeightStats, doubts, false_sentinels, mask_and_scale
+from planning.rasters.regrid import regrid
+from planning.rasters.surface_plan import SurfacePlan
+from planning.spikes import Spike
+
+F32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadReport:
+    """What was found in a file and what was done to make a surface model of it."""
+
+    source_crs: str
+    """Name, with its code where it has one."""
+    vertical_datum: str | None
+    pixel_size: tuple[float, float]
+    """Width and height of a source pixel in the units of ``source_crs``."""
+    resampled: bool
+    """Whether cells were brought to another grid."""
+    reprojected_to: str | None
+    """Code of the UTM zone, when the source's units are not metres."""
+    height_scale: float
+    """Metres per stored unit."""
+    unknown_share: float
+    spikes: tuple[Spike, ...]
+    spikes_removed: bool
+    warnings: tuple[str, ...]
+    """In plain words: what was assumed, masked, or looks wrong."""
+
+
+def assemble(
+    stored: F32,
+    plan: SurfacePlan,
+    stats: HeightStats,
+    *,
+    sha256: str,
+    where: str,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[Dsm, ReadReport]:
+    """The surface model from the stored numbers (changed in place) and the plan; NoElevationError without heights."""
+    sentinels = false_sentinels(stats)
+    kept = sum(count for text, count in stats.sentinels.items() if float(text) not in sentinels)
+    if stats.known + kept == 0:
+        raise NoElevationError(
+            "Every cell is unknown.", where=where, advice="Check the export: it should hold the surface's heights."
+        )
+    mask_and_scale(stored, sentinels=sentinels, scale=plan.height_scale, offset=plan.height_offset)
+    elevation, transform = _north_up(stored, plan, progress)
+    dsm = Dsm(elevation, transform, plan.crs, plan.reference.vertical_datum, sha256)
+    found = doubts(stats, dtype=plan.header.dtypes[0], scaled=plan.scaled) if stats.known else ()
+    return dsm, _report(dsm, plan, (*plan.notes, *_masked(stats, sentinels), *found))
+
+
+def _north_up(stored: F32, plan: SurfacePlan, progress: Callable[[str, float], None] | None) -> tuple[F32, Affine]:
+    if plan.regridding is not None:
+        resampled = regrid(stored, plan.regridding, progress=lambda s: progress("resample", s) if progress else None)
+        return resampled, plan.regridding.transform
+    t = plan.header.affine
+    rows, columns = stored.shape
+    size = (abs(t.a) + abs(t.e)) / 2 if not np.isclose(abs(t.a), abs(t.e), rtol=1e-9, atol=0) else abs(t.a)
+    west, north = min(t.c, t.c + columns * t.a), max(t.f, t.f + rows * t.e)
+    flipped = stored[:: -1 if t.e > 0 else 1, :: -1 if t.a < 0 else 1]
+    return np.ascontiguousarray(flipped), Affine(size, 0.0, west, 0.0, -size, north)
+
+
+def _masked(stats: HeightStats, sentinels: tuple[float, ...]) -> tuple[str, ...]:
+    said = [
+        f"{stats.sentinels[str(value)]} cells of {value:g} were taken as unknown: no other height is near that."
+        for value in sentinels
+    ]
+    if stats.absurd:
+        said.append(f"{stats.absurd} cells with infinite or absurd numbers were taken as unknown.")
+    return tuple(said)
+
+
+def _report(dsm: Dsm, plan: SurfacePlan, warnings: tuple[str, ...]) -> ReadReport:
+    t, source = plan.header.affine, plan.reference.source
+    epsg = source.to_epsg()
+    reprojected = plan.crs != plan.reference.horizontal
+    return ReadReport(
+        source_crs=f"{source.name} (EPSG:{epsg})" if epsg else source.name,
+        vertical_datum=dsm.vertical_datum,
+        pixel_size=(float(np.hypot(t.a, t.d)), float(np.hypot(t.b, t.e))),
+        resampled=plan.regridding is not None,
+        reprojected_to=f"EPSG:{plan.crs.to_epsg()}" if reprojected else None,
+        height_scale=plan.height_scale,
+        unknown_share=_unknown_share(dsm.elevation_m),
+        spikes=(),
+        spikes_removed=False,
+        warnings=warnings,
+    )
+
+
+def _unknown_share(elevation_m: F32) -> float:
+    rows = max(1, 4_000_000 // elevation_m.shape[1])
+    unknown = sum(
+        int(np.count_nonzero(np.isnan(elevation_m[row : row + rows]))) for row in range(0, len(elevation_m), rows)
+    )
+    return unknown / elevation_m.size

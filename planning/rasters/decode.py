@@ -1,0 +1,141 @@
+"""What the child process does with rasterio: header, heights, pictures, and writing a surface model."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+from affine import Affine
+from numpy.typing import NDArray
+from rasterio.enums import Interleaving, Resampling
+from rasterio.errors import NotGeoreferencedWarning
+from rasterio.windows import Window
+
+from planning.rasters.header import RasterHeader
+from planning.rasters.heights import HeightStats
+
+Json = dict[str, Any]
+Send = Callable[..., None]
+Ask = Callable[[Json], Json]
+
+DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
+_BAND_PX = 4_000_000
+_DIGEST_BYTES = 2**22
+# A file's own georeference is judged by the parent, in its own words.
+warnings.simplefilter("ignore", NotGeoreferencedWarning)
+
+
+def read_grid(job: Json, send: Send, ask: Ask) -> None:
+    """Band 1 as raw float32 rows in ``job["target"]``, NaN where the file says unknown."""
+    with rasterio.open(job["source"], driver=job["driver"]) as source:
+        ask(header_of(source).as_json())
+        digest = _digest(Path(job["source"]))
+        stats = HeightStats()
+        with Path(job["target"]).open("wb") as target:
+            for window in _row_bands(source):
+                rows = _known_heights(source.read(1, window=window, masked=True), stats)
+                target.write(rows)
+                send("progress", stage="decode", share=(window.row_off + window.height) / source.height)
+    send("done", sha256=digest, stats=stats.as_json())
+
+
+def read_picture(job: Json, send: Send, ask: Ask) -> None:
+    """Colours as raw uint8 (height, width, 4) in ``job["target"]``: red, green, blue, known."""
+    with rasterio.open(job["source"], driver=job["driver"]) as source:
+        order = ask(header_of(source).as_json())
+        window = Window(*order["window"])
+        height, width = order["out_shape"]
+        bands = [1, 2, 3] if source.count >= 3 else [1, 1, 1]
+        rgba = np.empty((height, width, 4), dtype=np.uint8)
+        for channel, band in enumerate(bands):
+            rgba[..., channel] = source.read(
+                band, window=window, out_shape=(height, width), resampling=Resampling.average
+            )
+            send("progress", stage="decode", share=(channel + 1) / 4)
+        rgba[..., 3] = source.dataset_mask(window=window, out_shape=(height, width))
+        Path(job["target"]).write_bytes(rgba.tobytes())
+    send("done")
+
+
+def write_grid(job: Json, send: Send, ask: Ask) -> None:
+    """A tiled, compressed GeoTIFF at ``job["target"]`` of the raw float32 rows in ``job["source"]``."""
+    del ask
+    height, width = job["shape"]
+    rows = np.memmap(job["source"], dtype=np.float32, mode="r", shape=(height, width))
+    profile = {"driver": "GTiff", "dtype": "float32", "count": 1, "height": height, "width": width, "nodata": -9999.0}
+    layout = {"tiled": True, "blockxsize": 256, "blockysize": 256, "compress": "deflate", "predictor": 3}
+    with rasterio.open(
+        job["target"],
+        "w",
+        **profile,
+        **layout,
+        BIGTIFF="IF_SAFER",
+        crs=rasterio.CRS.from_wkt(job["crs_wkt"]),
+        transform=Affine(*job["transform"]),
+    ) as target:
+        target.update_tags(**({DATUM_TAG: job["vertical_datum"]} if job["vertical_datum"] else {}))
+        for row in range(0, height, 256):
+            part = rows[row : row + 256]
+            target.write(
+                np.where(np.isnan(part), np.float32(-9999.0), part),
+                1,
+                window=Window(0, row, width, len(part)),  # pyright: ignore[reportCallIssue]
+            )
+    send("done")
+
+
+JOBS: dict[str, Callable[[Json, Send, Ask], None]] = {
+    "read_grid": read_grid,
+    "read_picture": read_picture,
+    "write_grid": write_grid,
+}
+
+
+def header_of(source: Any) -> RasterHeader:
+    """The header of an open dataset."""
+    block_height, block_width = source.block_shapes[0]
+    shared = source.count if source.interleaving == Interleaving.pixel else 1
+    return RasterHeader(
+        driver=source.driver,
+        width_px=source.width,
+        height_px=source.height,
+        dtypes=tuple(source.dtypes),
+        colours=tuple(colour.name for colour in source.colorinterp),
+        transform=tuple(source.transform)[:6],
+        crs_wkt=source.crs.to_wkt() if source.crs else None,
+        has_gcps=bool(source.gcps[0]),
+        block_bytes=block_height * block_width * shared * np.dtype(source.dtypes[0]).itemsize,
+        unit=source.units[0],
+        scale=source.scales[0],
+        offset=source.offsets[0],
+        vertical_datum=source.tags().get(DATUM_TAG),
+    )
+
+
+def _row_bands(source: Any) -> list[Window]:
+    block_height = source.block_shapes[0][0]
+    rows = max(1, _BAND_PX // (source.width * block_height)) * block_height
+    return [
+        Window(0, row, source.width, min(rows, source.height - row))  # pyright: ignore[reportCallIssue]
+        for row in range(0, source.height, rows)
+    ]
+
+
+def _known_heights(block: np.ma.MaskedArray[Any, Any], stats: HeightStats) -> NDArray[np.float32]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        heights = block.data.astype(np.float32)
+        heights[np.ma.getmaskarray(block)] = np.nan
+    return stats.add(heights)
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while part := file.read(_DIGEST_BYTES):
+            digest.update(part)
+    return digest.hexdigest()

@@ -1,0 +1,149 @@
+"""Where a raster lies and what its numbers mean: reference system, datum, unit, and the grid to bring it to."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from pyproj import CRS, Proj, Transformer
+from pyproj.exceptions import CRSError, ProjError
+
+from planning.errors import MissingCrsError, RasterFormatError
+from planning.rasters.header import RasterHeader
+
+_MOST_DISTORTION = 0.02
+"""Of a projection's metres against metres on the ground; national grids and UTM stay below 0.002."""
+_FOOT_M = 0.3048
+_UNIT_TAGS_M = {
+    "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
+    "ft": _FOOT_M, "foot": _FOOT_M, "feet": _FOOT_M,
+    "us-ft": 1200 / 3937, "us survey foot": 1200 / 3937, "ftus": 1200 / 3937,
+    "cm": 0.01, "mm": 0.001,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Georeference:
+    """The reference system of a file, split into its parts."""
+
+    source: CRS
+    """As declared or as in the file."""
+    horizontal: CRS
+    """Its two-dimensional part."""
+    vertical_datum: str | None
+    metres_per_height_unit: float
+    notes: tuple[str, ...]
+    """What was assumed."""
+
+
+def interpret(header: RasterHeader, *, crs: str | None, vertical_datum: str | None, where: str) -> Georeference:
+    """What the file says, overridden by what the user declares. MissingCrsError when nobody says anything."""
+    source, notes = _source_crs(header, crs, where)
+    vertical = _vertical_part(source)
+    metres, unit_notes = _height_unit(header, source, vertical)
+    in_file = header.vertical_datum or _datum_name(source, vertical)
+    if vertical_datum and in_file and vertical_datum != in_file:
+        unit_notes = (
+            *unit_notes,
+            f'The file\'s vertical datum is "{in_file}"; the declared "{vertical_datum}" is used.',
+        )
+    return Georeference(source, _horizontal_part(source), vertical_datum or in_file, metres, (*notes, *unit_notes))
+
+
+def _source_crs(header: RasterHeader, crs: str | None, where: str) -> tuple[CRS, tuple[str, ...]]:
+    in_file = CRS.from_wkt(header.crs_wkt) if header.crs_wkt else None
+    if crs is None and (in_file is None or in_file.is_engineering):
+        raise MissingCrsError(
+            "It has no coordinate reference system.",
+            where=where,
+            advice="Declare the one it was made in, for example --crs EPSG:32633.",
+        )
+    if crs is None:
+        assert in_file is not None
+        return in_file, ()
+    try:
+        declared = CRS.from_user_input(crs)
+    except CRSError as error:
+        raise MissingCrsError(
+            f'"{crs}" is no known coordinate reference system.', where=where, advice="Use a code such as EPSG:32633."
+        ) from error
+    if in_file is None or in_file == declared:
+        return declared, ()
+    if declared == _horizontal_part(in_file):
+        return in_file, ()
+    return declared, (f"The file says {in_file.name}; the declared {declared.name} is used.",)
+
+
+def _horizontal_part(crs: CRS) -> CRS:
+    return crs.sub_crs_list[0] if crs.is_compound else crs.to_2d()
+
+
+def _vertical_part(crs: CRS) -> CRS | None:
+    return crs.sub_crs_list[1] if crs.is_compound else None
+
+
+def _datum_name(crs: CRS, vertical: CRS | None) -> str | None:
+    if vertical is not None:
+        return re.sub(r"\s*\((us-?ft|ft(us|sus)?|m)\)$", "", vertical.name, flags=re.IGNORECASE)
+    return "ellipsoid" if len(crs.axis_info) == 3 else None
+
+
+def _height_unit(header: RasterHeader, crs: CRS, vertical: CRS | None) -> tuple[float, tuple[str, ...]]:
+    axes = vertical.axis_info if vertical is not None else crs.axis_info[2:]
+    if axes:
+        factor = float(axes[0].unit_conversion_factor)
+        return factor, () if factor == 1.0 else (f"Heights were converted from {axes[0].unit_name} to metres.",)
+    if (tag := (header.unit or "").strip().lower()) in _UNIT_TAGS_M:
+        factor = _UNIT_TAGS_M[tag]
+        return factor, () if factor == 1.0 else (f'Heights were converted from "{header.unit}" to metres.',)
+    horizontal = _horizontal_part(crs)
+    factor = 1.0 if horizontal.is_geographic else float(horizontal.axis_info[0].unit_conversion_factor)
+    if factor == 1.0:
+        return 1.0, ()
+    unit = horizontal.axis_info[0].unit_name
+    return factor, (
+        f"The map grid is in units of {unit} and the file does not say in which unit its heights are: "
+        f"they were taken as {unit} too and converted to metres. If they are metres, use --z-scale 1.",
+    )
+
+
+def center_lon_lat(header: RasterHeader, horizontal: CRS, *, where: str) -> tuple[float, float]:
+    """WGS84 degrees of the raster's centre; RasterFormatError when the reference system cannot hold it."""
+    x, y = header.affine @ (header.width_px / 2, header.height_px / 2)
+    try:
+        lon, lat = Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True).transform(x, y)
+    except ProjError:
+        lon = lat = np.inf
+    outside = horizontal.is_geographic and not (abs(x) <= 360 and abs(y) <= 90)
+    if outside or not (np.isfinite(lon) and np.isfinite(lat)):
+        raise RasterFormatError(
+            f"Its centre ({x:.6g}, {y:.6g}) lies outside {horizontal.name}.",
+            where=where,
+            advice="Declare the right reference system with --crs.",
+        )
+    return float(lon), float(lat)
+
+
+def why_reproject(horizontal: CRS, lon: float, lat: float) -> str | None:
+    """Why a model in this reference system cannot stay in it; None when its units are true metres."""
+    if horizontal.is_geographic:
+        return "degrees"
+    unit = horizontal.axis_info[0]
+    if abs(unit.unit_conversion_factor - 1.0) > 1e-9:
+        return f"units of {unit.unit_name}"
+    factors = Proj(horizontal).get_factors(lon, lat)
+    scale = max(abs(factors.meridional_scale - 1.0), abs(factors.parallel_scale - 1.0))
+    return f"metres that are {scale:.0%} off on the ground" if scale > _MOST_DISTORTION else None
+
+
+def local_utm(lon: float, lat: float, *, where: str) -> CRS:
+    """The UTM zone (WGS84) of a place."""
+    if not -80 <= lat <= 84:
+        raise RasterFormatError(
+            f"It lies at latitude {lat:.2f}, where there is no UTM zone.",
+            where=where,
+            advice="Reproject it to a polar grid in metres first.",
+        )
+    zone = int((lon + 180) % 360 // 6) + 1
+    return CRS.from_epsg((32600 if lat >= 0 else 32700) + zone)

@@ -1,0 +1,47 @@
+"""Which of the two accepted formats a file is, from its first bytes: names and extensions prove nothing."""
+
+from pathlib import Path
+
+from planning.errors import RasterFormatError
+
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_ASCII_GRID_KEYS = (b"ncols", b"nrows", b"xllcorner", b"xllcenter", b"yllcorner", b"yllcenter", b"cellsize", b"dx ")
+_OTHERS = {
+    b"<VRTDataset": "a GDAL virtual raster (VRT)",
+    b"PK\x03\x04": "a ZIP archive",
+    b"\x1f\x8b": "a gzip file",
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"LASF": "a LAS point cloud",
+    b"\x89HDF": "an HDF5 file",
+    b"<?xml": "an XML file",
+    b"%PDF": "a PDF document",
+}
+
+
+def driver_of(path: Path) -> str:
+    """GDAL's driver name, "GTiff" or "AAIGrid", for a file; RasterFormatError for any other."""
+    try:
+        if not path.is_file():
+            raise RasterFormatError("There is no such file.", where=str(path), advice="Check the path.")
+        with path.open("rb") as file:
+            head = file.read(64)
+    except OSError as error:
+        raise RasterFormatError(f"Cannot read the file: {error.strerror}.", where=str(path)) from error
+    if head.startswith(_TIFF):
+        return "GTiff"
+    text = head.lstrip().lower()
+    if text.startswith(_ASCII_GRID_KEYS):
+        return "AAIGrid"
+    raise RasterFormatError(
+        f"This is {_kind(head)}, not a GeoTIFF or an ESRI ASCII grid.",
+        where=path.name,
+        advice="Export the surface model as GeoTIFF.",
+    )
+
+
+def _kind(head: bytes) -> str:
+    if not head:
+        return "an empty file"
+    start = head.lstrip()
+    return next((name for magic, name in _OTHERS.items() if start.startswith(magic)), "an unknown kind of file")

@@ -1,0 +1,176 @@
+"""Runs a raster job in a child process that a hostile or broken file may crash, exhaust or hang."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from planning.errors import NoElevationError, RasterError, RasterFormatError, RasterTooLargeError
+from planning.rasters.limits import RasterLimits
+
+Json = dict[str, Any]
+Progress = Callable[[str, float], None]
+
+_ROOT = Path(__file__).resolve().parents[2]
+_LONGEST_MESSAGE = 2**20
+_ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
+# GDAL reads these before Python can set them through rasterio.Env: drivers register on import.
+_GDAL = {
+    "GDAL_SKIP": "VRT DERIVED GTI WMS WMTS WCS HTTP PLMOSAIC STACIT STACTA EEDA EEDAI MRF ZARR netCDF HDF5",
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+    "GDAL_PAM_ENABLED": "NO",
+    "GDAL_GEOREF_SOURCES": "INTERNAL",
+    "GDAL_DRIVER_PATH": "disable",
+    "GDAL_CACHEMAX": "128",
+    "GTIFF_REPORT_COMPD_CS": "YES",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+    "PROJ_NETWORK": "OFF",
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+}
+_FOREIGN_SETTINGS = ("GDAL_", "CPL_", "VSI_", "AWS_", "GTIFF_", "PYTHONWARNINGS")
+
+
+@contextmanager
+def private_directory() -> Iterator[Path]:
+    """A directory of our own (mode 0700): what lies beside a user's file is not beside it here."""
+    with tempfile.TemporaryDirectory(prefix="hedgehop-raster-") as name:
+        yield Path(name)
+
+
+def run_job(
+    job: Json,
+    *,
+    directory: Path,
+    limits: RasterLimits,
+    where: str,
+    on_header: Callable[[Json], Json] | None = None,
+    progress: Progress | None = None,
+) -> Json:
+    """Send one job to a new worker and return its answer; the worker never outlives the call.
+
+    ``on_header`` judges the header and returns the rest of the order; it may raise, as may ``progress``:
+    both end the worker. Raises RasterError when the worker fails, dies or is late.
+    """
+    with (directory / "stderr").open("w+b") as stderr:
+        worker = _start(directory, stderr)
+        clock = _Deadline(worker, limits.header_s)
+        try:
+            _send(worker, {**job, "memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1})
+            for message in _messages(worker):
+                kind = message.pop("type")
+                if kind == "header":
+                    order = on_header(message) if on_header else {}
+                    clock.extend(limits.decode_s)
+                    _send(worker, order)
+                elif kind == "progress" and progress:
+                    progress(message["stage"], message["share"])
+                elif kind == "done":
+                    return message
+                elif kind == "error":
+                    error = _ERRORS.get(message["kind"], RasterError)
+                    raise error(message["what"], where=where, advice=message["advice"])
+            worker.wait()
+            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where)
+        except BrokenPipeError as error:
+            worker.wait()
+            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where) from error
+        finally:
+            clock.stop()
+            _end(worker)
+
+
+def _start(directory: Path, stderr: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "planning.rasters.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        cwd=directory,
+        env=_environment(),
+        start_new_session=True,
+    )
+
+
+def _environment() -> dict[str, str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(_FOREIGN_SETTINGS)}
+    paths = [str(_ROOT), *filter(None, [kept.get("PYTHONPATH")])]
+    return {**kept, **_GDAL, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _send(worker: subprocess.Popen[bytes], message: Json) -> None:
+    assert worker.stdin is not None
+    worker.stdin.write(json.dumps(message).encode() + b"\n")
+    worker.stdin.flush()
+
+
+def _messages(worker: subprocess.Popen[bytes]) -> Iterator[Json]:
+    assert worker.stdout is not None
+    while line := worker.stdout.readline(_LONGEST_MESSAGE):
+        if not line.endswith(b"\n"):
+            return
+        yield json.loads(line)
+
+
+def _end(worker: subprocess.Popen[bytes]) -> None:
+    worker.kill()
+    for pipe in (worker.stdin, worker.stdout):
+        assert pipe is not None
+        try:
+            pipe.close()
+        except BrokenPipeError:
+            continue  # an order that a dead worker never read
+    worker.wait()
+
+
+def _death(returncode: int, *, late_after_s: float | None, where: str) -> RasterError:
+    if late_after_s is not None:
+        return RasterTooLargeError(
+            f"Decoding took more than {late_after_s:.0f} s and was stopped.",
+            where=where,
+            advice="Rewrite it as a tiled GeoTIFF, or crop it to the area of the flight.",
+        )
+    if returncode == -signal.SIGXCPU:
+        return RasterTooLargeError("Decoding used too much processor time and was stopped.", where=where)
+    cause = signal.Signals(-returncode).name if returncode < 0 else f"exit code {returncode}"
+    return RasterFormatError(
+        f"The decoder died of it ({cause}): the file is corrupt or hostile, or memory ran out.",
+        where=where,
+        advice="Export it again as a tiled GeoTIFF.",
+    )
+
+
+class _Deadline:
+    """Kills the worker when its time is up; ``passed_s`` then holds the time it was given."""
+
+    def __init__(self, worker: subprocess.Popen[bytes], seconds: float) -> None:
+        self._worker = worker
+        self.passed_s: float | None = None
+        self._timer = self._arm(seconds)
+
+    def extend(self, seconds: float) -> None:
+        self._timer.cancel()
+        self._timer = self._arm(seconds)
+
+    def stop(self) -> None:
+        self._timer.cancel()
+        self._timer.join()
+
+    def _arm(self, seconds: float) -> threading.Timer:
+        timer = threading.Timer(seconds, self._expire, [seconds])
+        timer.daemon = True
+        timer.start()
+        return timer
+
+    def _expire(self, seconds: float) -> None:
+        self.passed_s = seconds
+        self._worker.kill()

@@ -1,0 +1,86 @@
+"""The child process that decodes one raster file: a job comes in on stdin, messages go out on stdout, as JSON lines.
+
+Started by ``planning.rasters.sandbox`` with GDAL's settings already in the environment. It imports
+little, so that it starts fast and its memory limit means something.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import sys
+import threading
+from typing import Any
+
+Json = dict[str, Any]
+
+
+def main() -> None:
+    """Carry out one job, then exit; every failure becomes one "error" message."""
+    job = _receive()
+    _confine(job)
+    try:
+        from planning.rasters import decode  # after the limits: GDAL registers its drivers on import
+
+        decode.JOBS[job["job"]](job, send, ask)
+    except Exception as error:
+        send("error", **_explain(error))
+
+
+def send(kind: str, **fields: Any) -> None:
+    """One message to the parent."""
+    sys.stdout.write(json.dumps({"type": kind, **fields}) + "\n")
+    sys.stdout.flush()
+
+
+def ask(header: Json) -> Json:
+    """Show the header to the parent and wait for the rest of the order."""
+    send("header", **header)
+    order = _receive()
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    return order
+
+
+def _receive() -> Json:
+    line = sys.stdin.readline()
+    if not line:
+        os._exit(0)
+    return json.loads(line)
+
+
+def _die_with_parent() -> None:
+    sys.stdin.read()  # returns when the parent closes the pipe, or is killed
+    os._exit(0)
+
+
+def _confine(job: Json) -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (job["memory_bytes"], job["memory_bytes"]))
+
+
+def _explain(error: Exception) -> Json:
+    cause = str(error.__cause__ or error) or type(error).__name__
+    if isinstance(error, MemoryError) or "memory" in cause.lower() or "allocat" in cause.lower():
+        return {
+            "kind": "too_large",
+            "what": f"Decoding needs more memory than allowed ({cause}).",
+            "advice": "Rewrite it as a tiled GeoTIFF.",
+        }
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return {
+            "kind": "disk",
+            "what": "The disk is full: there is no room for the decoded heights.",
+            "advice": "Free some space, or point TMPDIR to a larger disk.",
+        }
+    return {
+        "kind": "format",
+        "what": f"It cannot be decoded; it is corrupt, cut short or no raster ({cause}).",
+        "advice": "Copy or export it again.",
+    }
+
+
+if __name__ == "__main__":
+    main()

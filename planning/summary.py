@@ -1,0 +1,80 @@
+"""A plan in numbers, as plain JSON-able dictionaries: what ``hedgehop plan --json`` prints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planning.clearance import certificate_json
+from planning.dsm import Dsm
+from planning.model import Certificate, finite_or_none
+from planning.plan import Plan
+
+_CERTIFICATE_KEYS = (
+    "certified",
+    "min_distance_m",
+    "min_vertical_m",
+    "required_clearance_m",
+    "worst",
+    "rtl_height_needed_m",
+    "home_column_clear",
+    "reasons",
+)
+
+
+def certificate_summary(certificate: Certificate) -> dict[str, Any]:
+    """The certificate's headline keys, without legs, trend and assumptions."""
+    whole = certificate_json(certificate)
+    return {key: whole[key] for key in _CERTIFICATE_KEYS}
+
+
+def dsm_summary(source: Dsm, *, holes_filled: int) -> dict[str, Any]:
+    """Identity and size of the surface model as it was read (before holes were filled)."""
+    return {
+        "sha256": source.sha256,
+        "crs": crs_name(source),
+        "vertical_datum": source.vertical_datum,
+        "width": source.width_px,
+        "height": source.height_px,
+        "resolution_m": source.resolution_m,
+        "unknown_share": unknown_share(source),
+        "holes_filled": holes_filled,
+    }
+
+
+def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
+    """Every figure of a plan that an operator or a script asks for; ``source`` is the model as read."""
+    request = plan.request
+    return {
+        **certificate_summary(plan.certificate),
+        "max_height_above_ground_m": finite_or_none(plan.certificate.max_height_above_ground_m),
+        "rtl_height_m": request.profile.rtl_height_m,
+        "length_m": float(plan.path.s_m[-1]),
+        "duration_s": plan.predicted.total_s,
+        "lspb_duration_s": float(plan.timing.t_s[-1]),
+        "endurance_s": request.profile.endurance_s,
+        "usable_endurance_s": request.profile.endurance_s * (1 - request.profile.reserve_share),
+        "samples": len(plan.path.s_m),
+        "waypoints": plan.built.waypoints,
+        "items": len(plan.mission.items),
+        "max_items": request.mission.max_items,
+        "excess_height_m": plan.built.excess_height_m,
+        "dsm": dsm_summary(source, holes_filled=plan.surfaces.holes_filled),
+        "warnings": list(plan.warnings),
+    }
+
+
+def crs_name(dsm: Dsm) -> str:
+    """ "EPSG:2193" where the system has such a code, its name otherwise."""
+    authority = dsm.crs.to_authority()
+    return ":".join(authority) if authority else dsm.crs.name
+
+
+def unknown_share(dsm: Dsm) -> float:
+    """Share of unknown cells, counted row block by row block (a model may be larger than spare memory)."""
+    rows = max(1, 4_000_000 // dsm.width_px)
+    unknown = sum(
+        int(np.count_nonzero(np.isnan(dsm.elevation_m[r : r + rows]))) for r in range(0, dsm.height_px, rows)
+    )
+    return unknown / dsm.elevation_m.size

@@ -1,0 +1,25 @@
+"""``hedgehop serve``: the ground station in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from server.app import run
+from server.cli.output import refusing
+from server.settings import load_settings
+
+
+def serve(
+    demo: Annotated[bool, typer.Option("--demo", help="Open the generated demo surface model and plan.")] = False,
+    host: Annotated[str | None, typer.Option("--host", help="Address to listen on; default 127.0.0.1.")] = None,
+    port: Annotated[int | None, typer.Option("--port", help="Port; default 8000.")] = None,
+    data_dir: Annotated[
+        Path | None, typer.Option("--data-dir", help="Where models and plans are kept; default: the user's data home.")
+    ] = None,
+) -> None:
+    """Start the ground station and print a sign-in link for the browser."""
+    with refusing(as_json=False):
+        run(load_settings(host=host, port=port, data_dir=data_dir), demo=demo)

@@ -1,0 +1,90 @@
+"""Keeps the answer to the present document up to date: the latest edit wins, the last answer stays in sight."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from planning.errors import PlanningError
+from server import tasks
+from server.documents import missing
+from server.errors import ServerError, error_doc
+from server.jobs import JobCancelledError, Lane, WorkerDiedError
+from server.scene.payload import PlanScene
+from server.schemas import Computation, PlanDoc
+
+_SUPERSEDE_AFTER_S = 2.0
+"""A newer edit ends a computation that has run longer; shorter ones may finish, which is cheaper."""
+_TRADE_WHEN_IDLE_S = 0.4
+
+
+class Computing:
+    """One loop, one lane. ``changed()`` is called whenever ``state`` or ``scene`` is new."""
+
+    def __init__(self, lane: Lane, *, terrain_dir: Callable[[str], Path], changed: Callable[[], None]) -> None:
+        self._lane, self._terrain_dir, self._changed = lane, terrain_dir, changed
+        self._wanted: tuple[int, PlanDoc] | None = None
+        self._wake = asyncio.Event()
+        self._started_mono_s = 0.0
+        self.state = Computation(revision=0, state="empty", hint=missing(PlanDoc()))
+        self.scene: PlanScene | None = None
+
+    def request(self, revision: int, document: PlanDoc, *, forget: bool = False) -> None:
+        """Asks for the answer to ``document``; ``forget`` drops the last one (another plan was opened)."""
+        self._wanted = (revision, document)
+        hint = missing(document)
+        if forget or hint:
+            self.scene = None
+        if hint:
+            self.state = Computation(revision=revision, state="empty", hint=hint)
+        else:
+            last = None if forget else self.state.result
+            self.state = Computation(revision=revision, state="running", result=last)
+        if self._lane.running and time.monotonic() - self._started_mono_s > _SUPERSEDE_AFTER_S:
+            self._lane.cancel()
+        self._wake.set()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._wanted is not None and not missing(self._wanted[1]):
+                await self._answer(*self._wanted)
+
+    async def _answer(self, revision: int, document: PlanDoc) -> None:
+        self._started_mono_s = time.monotonic()
+        try:
+            directory = self._terrain_dir(document.terrain_id or "")
+            result, scene = await self._lane.call(tasks.compute_plan, directory, document)
+        except JobCancelledError:
+            return
+        except (PlanningError, ServerError) as error:
+            self._settle(revision, Computation(revision=revision, state="error", error=error_doc(error)), None)
+            return
+        self._settle(revision, Computation(revision=revision, state="ready", result=result), scene)
+        await self._add_trade(revision, document, directory)
+
+    def _settle(self, revision: int, state: Computation, scene: PlanScene | None) -> None:
+        if self._wanted is None or self._wanted[0] != revision:
+            return
+        self.state, self.scene = state, scene
+        self._changed()
+
+    async def _add_trade(self, revision: int, document: PlanDoc, directory: Path) -> None:
+        try:
+            async with asyncio.timeout(_TRADE_WHEN_IDLE_S):
+                await self._wake.wait()
+            return
+        except TimeoutError:
+            pass
+        try:
+            trade = await self._lane.call(tasks.compute_trade, directory, document)
+        except (JobCancelledError, PlanningError, WorkerDiedError):
+            return
+        result = self.state.result
+        if result is not None and self.state.revision == revision:
+            with_trade = result.model_copy(update={"trade": trade})
+            self._settle(revision, self.state.model_copy(update={"result": with_trade}), self.scene)

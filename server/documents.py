@@ -1,0 +1,99 @@
+"""Plan documents to planning's own types and back."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from planning.dsm import Dsm
+from planning.model import Camera, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.poi_files import PoiFile
+from planning.request import PlanRequest
+from planning.survey import survey_lines
+from server.edits import new_poi_id
+from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
+
+
+def profile_from_doc(doc: ProfileDoc) -> VehicleProfile:
+    fields = doc.model_dump(exclude={"camera"})
+    return VehicleProfile(**fields, camera=None if doc.camera is None else Camera(**doc.camera.model_dump()))
+
+
+def doc_from_profile(profile: VehicleProfile) -> ProfileDoc:
+    return ProfileDoc.model_validate(asdict(profile))
+
+
+def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
+    """Raises PlanningError when the survey polygon or camera cannot be flown."""
+    mission, profile = document.mission, document.profile
+    pois, trigger_m = _points(document, dsm)
+    place = mission.look_at
+    return PlanRequest(
+        pois=pois,
+        profile=profile_from_doc(profile),
+        surface=SurfaceParams(**document.surface.model_dump()),
+        path=PathParams(
+            mean_speed_m_s=profile.mean_speed_m_s,
+            max_speed_m_s=profile.max_speed_m_s,
+            max_climb_m_s=profile.max_climb_m_s,
+            max_descent_m_s=profile.max_descent_m_s,
+            max_accel_m_s2=profile.max_accel_m_s2,
+            **document.path.model_dump(),
+        ),
+        mission=MissionParams(
+            max_items=profile.max_items,
+            excess_height_m=mission.excess_height_m,
+            end=mission.end,
+            altitude_reference=mission.altitude_reference,
+            heading=mission.heading,
+            heading_deg=mission.heading_deg,
+            look_at=None if place is None else (place.lat_deg, place.lon_deg),
+            gimbal_pitch_deg=mission.gimbal_pitch_deg,
+            camera_trigger_m=mission.camera_trigger_m if mission.camera_trigger_m is not None else trigger_m,
+        ),
+        home_lat_lon_deg=None if document.home is None else (document.home.lat_deg, document.home.lon_deg),
+        required_clearance_m=document.clearance.required_clearance_m,
+        max_height_above_ground_m=document.clearance.max_height_above_ground_m,
+    )
+
+
+def _points(document: PlanDoc, dsm: Dsm) -> tuple[tuple[Poi, ...], float | None]:
+    """The points to fly over, and the photo distance that a survey implies."""
+    if document.source == "pois":
+        return tuple(Poi(p.lat_deg, p.lon_deg, p.name, p.loiter_s) for p in document.pois), None
+    survey = document.survey
+    planned = survey_lines(
+        [(corner.lat_deg, corner.lon_deg) for corner in survey.polygon],
+        dsm,
+        camera=profile_from_doc(document.profile).camera,
+        gsd_cm=survey.gsd_cm,
+        side_overlap=survey.side_overlap,
+        front_overlap=survey.front_overlap,
+        angle_deg=survey.angle_deg,
+    )
+    return planned.pois, planned.trigger_distance_m
+
+
+def with_points(document: PlanDoc, points: PoiFile) -> PlanDoc:
+    """The document with a file's points, or its polygon, in place of its own."""
+    if points.polygon is not None and not points.pois:
+        corners = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in points.polygon]
+        survey = document.survey.model_copy(update={"polygon": corners})
+        return document.model_copy(update={"survey": survey, "source": "survey"})
+    pois = [
+        PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
+        for p in points.pois
+    ]
+    return document.model_copy(update={"pois": pois, "source": "pois"})
+
+
+def missing(document: PlanDoc) -> str:
+    """What the operator has to do before there is anything to compute; empty when nothing is missing."""
+    if document.terrain_id is None:
+        return "Choose or drop a surface model."
+    if document.source == "pois" and len(document.pois) < 2:
+        return "Add at least two points: choose Add point, then click the surface."
+    if document.source == "survey" and len(document.survey.polygon) < 3:
+        return "Draw the survey area: choose Polygon, then click at least three corners."
+    if document.mission.heading == "point" and document.mission.look_at is None:
+        return "Choose the place to look at: Look-at tool, then click the surface."
+    return ""

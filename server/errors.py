@@ -1,0 +1,169 @@
+"""What can go wrong at the door, as one tree, and the one table from errors to HTTP status.
+
+ServerError
+├── SignInError            no session, a wrong password, a used link
+│   └── TooManyTriesError      wrong passwords in a row
+├── ForbiddenError         a foreign origin or host
+├── NotFoundError          no plan, terrain, page or job of that id
+├── ConflictError          what was asked for does not fit the present state
+│   ├── StaleRevisionError     an edit of a plan that has changed meanwhile
+│   ├── NotReadyError          an export without a finished plan
+│   └── InUseError             deleting what something else needs
+├── TooLargeError          a body beyond its limit
+├── SlowRequestError       a body that stopped arriving
+├── StorageError           the data directory cannot be read or written
+│   ├── StorageFullError       no space left
+│   └── DataDirError           not usable at all: refused at start
+├── BusyError              too many pages, or shutting down
+└── StartError             settings or port that Hedgehop cannot start with
+
+Like ``planning.errors``, every error says what is wrong, where, and what to do.
+"""
+
+from __future__ import annotations
+
+from fastapi.exceptions import RequestValidationError
+from pydantic import ValidationError
+from starlette.exceptions import HTTPException
+
+from planning.errors import PlanningError
+from server.schemas import ErrorDoc
+
+
+class ServerError(Exception):
+    """Base of all errors of the server; ``code`` is stable, for programs."""
+
+    code = "server"
+
+    def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
+        super().__init__(what, where, advice)
+        self.what = what
+        self.where = where
+        self.advice = advice
+
+    def __str__(self) -> str:
+        head = f"{self.where}: {self.what}" if self.where else self.what
+        return f"{head} {self.advice}" if self.advice else head
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.what, self.where, self.advice)
+
+
+def _rebuild(cls: type[ServerError], what: str, where: str, advice: str) -> ServerError:
+    return cls(what, where=where, advice=advice)
+
+
+class SignInError(ServerError):
+    code = "sign_in"
+
+
+class TooManyTriesError(SignInError):
+    code = "too_many_tries"
+
+
+class ForbiddenError(ServerError):
+    code = "origin"
+
+
+class NotFoundError(ServerError):
+    code = "not_found"
+
+
+class ConflictError(ServerError):
+    code = "conflict"
+
+
+class StaleRevisionError(ConflictError):
+    code = "stale"
+
+
+class NotReadyError(ConflictError):
+    code = "not_ready"
+
+
+class InUseError(ConflictError):
+    code = "in_use"
+
+
+class TooLargeError(ServerError):
+    code = "too_large"
+
+
+class SlowRequestError(ServerError):
+    code = "too_slow"
+
+
+class StorageError(ServerError):
+    code = "storage"
+
+
+class StorageFullError(StorageError):
+    code = "disk_full"
+
+
+class DataDirError(StorageError):
+    code = "data_dir"
+
+
+class BusyError(ServerError):
+    code = "busy"
+
+
+class StartError(ServerError):
+    code = "start"
+
+
+STATUS: dict[type[Exception], int] = {
+    PlanningError: 422,
+    RequestValidationError: 422,
+    ValidationError: 422,
+    SignInError: 401,
+    TooManyTriesError: 429,
+    ForbiddenError: 403,
+    NotFoundError: 404,
+    ConflictError: 409,
+    TooLargeError: 413,
+    SlowRequestError: 408,
+    StorageError: 500,
+    StorageFullError: 507,
+    BusyError: 503,
+    StartError: 503,
+}
+"""Subclasses take the status of their nearest ancestor here; all that is missing is 500."""
+
+_HTTP_CODES = {404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
+
+
+def status_of(error: Exception) -> int:
+    if isinstance(error, HTTPException):
+        return error.status_code
+    return next((STATUS[cls] for cls in type(error).__mro__ if cls in STATUS), 500)
+
+
+def error_doc(error: Exception) -> ErrorDoc:
+    """What a page may read about an error; unforeseen ones keep their details for the log."""
+    if isinstance(error, (PlanningError, ServerError)):
+        return ErrorDoc(code=error.code, what=error.what, where=error.where, advice=error.advice)
+    if isinstance(error, (RequestValidationError, ValidationError)):
+        return _invalid(error)
+    if isinstance(error, HTTPException):
+        return ErrorDoc(code=_HTTP_CODES.get(error.status_code, "http"), what=str(error.detail))
+    return ErrorDoc(
+        code="internal",
+        what="Something in Hedgehop itself went wrong.",
+        advice="Nothing that was saved is lost. The server's log tells what happened.",
+    )
+
+
+def _invalid(error: RequestValidationError | ValidationError) -> ErrorDoc:
+    faults = error.errors()
+    first = faults[0]
+    place = ".".join(str(part) for part in first["loc"] if part != "body")
+    more = f" ({len(faults) - 1} more such errors.)" if len(faults) > 1 else ""
+    value = f" The value was {_short(first.get('input'))}." if first["type"] != "missing" else ""
+    return ErrorDoc(code="invalid", what=f"{first['msg']}.{value}{more}", where=place)
+
+
+def _short(value: object, limit: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -1,0 +1,221 @@
+"""The first thing every request meets: Host, Origin, body type and size, headers, one log line.
+
+Uvicorn and Starlette accept any Host and Origin and bodies of any size; a page of another origin could post to the
+API, open the sockets, or reach them under a name it resolves to 127.0.0.1. Pure ASGI, so that nothing is buffered.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import logging
+import time
+from dataclasses import dataclass
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.errors import ForbiddenError, ServerError, TooLargeError, error_doc, status_of
+from server.settings import Settings
+
+log = logging.getLogger("hedgehop.http")
+
+JSON_LIMIT_BYTES = 8 * 1024**2
+IMPORT_LIMIT_BYTES = 20 * 1024**2
+CHUNK_TIMEOUT_S = 30.0
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+# Neither can be sent across origins without a preflight, which nothing here answers.
+BODY_TYPES = frozenset({"application/json", "application/octet-stream"})
+PAGE_POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
+    "base-uri 'none'; form-action 'self'; frame-src 'self'; frame-ancestors 'none'; connect-src 'self' {sockets}"
+)
+HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """Under which names the server may be reached, and from which origins besides its own."""
+
+    hosts: frozenset[str]
+    origins: frozenset[str]
+    any_address_on_port: int | None
+
+    @classmethod
+    def of(cls, settings: Settings) -> Door:
+        names = {"127.0.0.1", "localhost", "[::1]"}
+        wildcard = settings.host in ("0.0.0.0", "::")
+        if not wildcard:
+            names.add(f"[{settings.host}]" if ":" in settings.host else settings.host.lower())
+        hosts = {f"{name}:{settings.port}" for name in names}
+        if settings.port in (80, 443):
+            hosts |= names
+        return cls(
+            frozenset(hosts | {host.lower() for host in settings.allowed_hosts}),
+            frozenset(origin.lower().rstrip("/") for origin in settings.allowed_origins),
+            settings.port if wildcard else None,
+        )
+
+    def knows(self, host: str) -> bool:
+        """A name that an attacker resolves to us is never a bare address: those are safe when listening on all."""
+        if host.lower() in self.hosts:
+            return True
+        address, _, port = host.rpartition(":")
+        return self.any_address_on_port is not None and port == str(self.any_address_on_port) and _is_address(address)
+
+    def check(self, scope: Scope, headers: Headers) -> None:
+        """Raises ``ForbiddenError`` for a foreign host, and for a foreign origin where state could change."""
+        host = headers.get("host", "")
+        if len(headers.getlist("host")) != 1 or not self.knows(host):
+            raise ForbiddenError(
+                f"Hedgehop does not answer under the name {host!r}.",
+                advice="Use the printed address, or add the name to the setting allowed_hosts.",
+            )
+        if scope["type"] == "http" and scope["method"] in SAFE_METHODS:
+            return
+        scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
+        origin = headers.get("origin", "").lower()
+        if len(headers.getlist("origin")) != 1 or origin not in self.origins | {f"{scheme}://{host.lower()}"}:
+            raise ForbiddenError(
+                f"A request from {origin or 'no origin'!r} was refused.",
+                advice="Use Hedgehop's own page, or add the origin to the setting allowed_origins.",
+            )
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ipaddress.ip_address(text.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return True
+
+
+class Guard:
+    """ASGI middleware around the whole app."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app = app
+        self._door = Door.of(settings)
+        self._upload_limit = settings.upload_limit_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            await self._http(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._websocket(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+    async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
+        headers = Headers(scope=scope)
+        started, status = time.monotonic(), 0
+
+        async def dressed(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                _dress(scope, headers.get("host", ""), MutableHeaders(scope=message))
+            await send(message)
+
+        try:
+            if refusal := self._refusal(scope, headers):
+                await refusal(scope, receive, dressed)
+            else:
+                await self._app(scope, _Metered(receive, self._body_limit(scope["path"])), dressed)
+        finally:
+            seconds = time.monotonic() - started
+            # The path only: a sign-in link's token stands in the query.
+            log.info("%s %s %d %.0f ms", scope["method"], scope["path"], status, 1000 * seconds)
+
+    async def _websocket(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            self._door.check(scope, Headers(scope=scope))
+        except ForbiddenError as error:
+            log.warning("WebSocket %s refused: %s", scope["path"], error)
+            await send({"type": "websocket.close", "code": 1008, "reason": ""})
+            return
+        await self._app(scope, receive, send)
+
+    def _refusal(self, scope: Scope, headers: Headers) -> Response | None:
+        try:
+            self._door.check(scope, headers)
+            _check_body(headers, self._body_limit(scope["path"]))
+        except ServerError as error:
+            return _answer(error)
+        return None
+
+    def _body_limit(self, path: str) -> int:
+        if path in ("/api/terrains", "/api/orthophotos"):
+            return self._upload_limit
+        return IMPORT_LIMIT_BYTES if path == "/api/plan/import" else JSON_LIMIT_BYTES
+
+
+def _check_body(headers: Headers, limit: int) -> None:
+    length = headers.get("content-length", "0")
+    if not length.isascii() or not length.isdigit() or len(length) > 18:
+        raise TooLargeError(f"Content-Length {length!r} is not a size.")
+    if int(length) > limit:
+        raise too_large(limit)
+    if int(length) == 0 and "transfer-encoding" not in headers:
+        return
+    kind = headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind not in BODY_TYPES:
+        raise ForbiddenError(
+            f"A body of type {kind!r} is not accepted.", advice="Send application/json or application/octet-stream."
+        )
+
+
+def too_large(limit: int) -> TooLargeError:
+    return TooLargeError(
+        f"The body is larger than {limit / 1024**2:,.0f} MiB.",
+        advice="Crop or downsample a raster, or raise the setting upload_limit_bytes.",
+    )
+
+
+class _Metered:
+    """``receive`` that counts bytes and does not wait for ever; the framework lets an HTTPException through."""
+
+    def __init__(self, receive: Receive, limit: int) -> None:
+        self._receive = receive
+        self._limit = limit
+        self._seen = 0
+        self._complete = False
+
+    async def __call__(self) -> Message:
+        if self._complete:
+            return await self._receive()
+        try:
+            async with asyncio.timeout(CHUNK_TIMEOUT_S):
+                message = await self._receive()
+        except TimeoutError:
+            raise HTTPException(408, f"No part of the body came for {CHUNK_TIMEOUT_S:g} seconds.") from None
+        self._seen += len(message.get("body", b""))
+        self._complete = not message.get("more_body", False)
+        if self._seen > self._limit:
+            raise HTTPException(413, too_large(self._limit).what)
+        return message
+
+
+def _dress(scope: Scope, host: str, headers: MutableHeaders) -> None:
+    for name, value in HEADERS.items():
+        headers.setdefault(name, value)
+    sockets = f"{'wss' if scope['scheme'] == 'https' else 'ws'}://{host}"
+    headers.setdefault("content-security-policy", PAGE_POLICY.format(sockets=sockets))
+    headers.setdefault("cache-control", "no-store")
+
+
+def _answer(error: ServerError) -> Response:
+    return Response(
+        error_doc(error).model_dump_json(),
+        status_code=status_of(error),
+        media_type="application/json",
+        headers={"connection": "close"},
+    )

@@ -1,0 +1,250 @@
+"""The ``/ws`` streams to the browsers: one bounded queue per page, so that a stalled page holds up no other.
+
+State (plan, library, view, selection, cursor, each job) is latest-wins: a newer message takes the place of the one
+still waiting. Notices must arrive: each waits on its own, and a page that lets the queue fill up is cut off, as is
+one that does not take a message within five seconds. It reconnects and starts from a fresh snapshot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import secrets
+import time
+from collections.abc import Awaitable, Callable
+from functools import cached_property
+from itertools import count
+
+from pydantic import TypeAdapter, ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from server import schemas
+from server.errors import BusyError, error_doc
+from server.together import until_first
+
+log = logging.getLogger("hedgehop.hub")
+
+PAGES_MAX = 200
+WAITING_MAX = 256
+SEND_TIMEOUT_S = 5.0
+MESSAGE_LIMIT_CHARS = 64 * 1024
+RATE_PER_S, BURST = 120.0, 600.0
+
+CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY = 1008, 4401, 4408, 1001
+
+_CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
+_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view")
+
+OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
+
+
+class _Outgoing:
+    """A message on its way to several pages: written as JSON once, and only if some page gets it."""
+
+    def __init__(self, message: schemas.ServerMessage) -> None:
+        self._message = message
+
+    @cached_property
+    def text(self) -> str:
+        return self._message.model_dump_json()
+
+
+class Page:
+    """One browser page: its queue, and the reason why it has to go once there is one."""
+
+    def __init__(self, session_key: str) -> None:
+        self.page_id = secrets.token_urlsafe(16)
+        self.session_key = session_key
+        self.gone = asyncio.Event()
+        self.close_code = CLOSE_GOING_AWAY
+        self._waiting: dict[object, _Outgoing] = {}
+        self._wake = asyncio.Event()
+        self._notices = count()
+
+    def put(self, message: schemas.ServerMessage, outgoing: _Outgoing) -> None:
+        self._waiting[self._key(message)] = outgoing
+        self._wake.set()
+        if len(self._waiting) > WAITING_MAX:
+            self.cut_off(CLOSE_SLOW)
+
+    def _key(self, message: schemas.ServerMessage) -> object:
+        if isinstance(message, schemas.JobMessage):
+            return "job", message.job.id
+        if isinstance(message, schemas.NoticeMessage):
+            return "notice", next(self._notices)
+        return message.type
+
+    async def next_text(self) -> str:
+        while not self._waiting:
+            self._wake.clear()
+            await self._wake.wait()
+        return self._waiting.pop(next(iter(self._waiting))).text
+
+    def cut_off(self, code: int) -> None:
+        if not self.gone.is_set():
+            self.close_code = code
+            self.gone.set()
+
+
+class Hub:
+    """All pages. Every method belongs to the event loop's thread."""
+
+    def __init__(self) -> None:
+        self._pages: dict[str, Page] = {}
+
+    def page(self, page_id: str) -> Page | None:
+        return self._pages.get(page_id)
+
+    @property
+    def page_ids(self) -> list[str]:
+        return list(self._pages)
+
+    def publish(self, message: schemas.ServerMessage) -> None:
+        """To every page; never waits."""
+        outgoing = _Outgoing(message)
+        for page in list(self._pages.values()):
+            page.put(message, outgoing)
+
+    def send(self, page_id: str, message: schemas.ServerMessage) -> None:
+        """To one page; nothing happens when it has gone."""
+        if page := self._pages.get(page_id):
+            page.put(message, _Outgoing(message))
+
+    def notify(self, page_id: str, error: Exception) -> None:
+        """Tells one page why what it asked for did not happen."""
+        self.send(page_id, schemas.NoticeMessage(level="error", error=error_doc(error)))
+
+    def close_session(self, session_key: str) -> None:
+        """Cuts off the pages of a session that was signed out."""
+        for page in list(self._pages.values()):
+            if page.session_key == session_key:
+                page.cut_off(CLOSE_SIGNED_OUT)
+
+    def close(self) -> None:
+        for page in list(self._pages.values()):
+            page.cut_off(CLOSE_GOING_AWAY)
+
+    async def serve(
+        self,
+        websocket: WebSocket,
+        *,
+        session_key: str,
+        session_remaining_s: float,
+        snapshot: Callable[[str], schemas.Snapshot],
+        on_message: OnMessage,
+    ) -> None:
+        """Runs one accepted socket until either side ends it."""
+        if len(self._pages) >= PAGES_MAX:
+            raise BusyError(f"{PAGES_MAX} pages are open already.", advice="Close some of them.")
+        page = Page(session_key)
+        self._pages[page.page_id] = page
+        try:
+            # Taken in the same step as the registration: no change can fall between snapshot and deltas.
+            self.send(page.page_id, snapshot(page.page_id))
+            await until_first(
+                self._sender(websocket, page),
+                self._receiver(websocket, page, on_message),
+                _wait(page.gone, session_remaining_s, page),
+            )
+        finally:
+            self._pages.pop(page.page_id, None)
+            page.cut_off(CLOSE_GOING_AWAY)
+            await _close(websocket, page.close_code)
+
+    async def _sender(self, websocket: WebSocket, page: Page) -> None:
+        while True:
+            text = await page.next_text()
+            try:
+                async with asyncio.timeout(SEND_TIMEOUT_S):
+                    await websocket.send_text(text)
+            except TimeoutError:
+                log.warning("Page %s took no message for %g s and was dropped.", page.page_id, SEND_TIMEOUT_S)
+                page.cut_off(CLOSE_SLOW)
+                return
+            except (WebSocketDisconnect, RuntimeError):
+                return
+
+    async def _receiver(self, websocket: WebSocket, page: Page, on_message: OnMessage) -> None:
+        bucket = _Bucket()
+        while True:
+            received = await websocket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            if not bucket.take():
+                log.warning("Page %s sent too many messages and was dropped.", page.page_id)
+                page.cut_off(CLOSE_POLICY)
+                return
+            await self._handle(received.get("text"), page, on_message)
+
+    async def _handle(self, text: str | None, page: Page, on_message: OnMessage) -> None:
+        try:
+            message = parse(text)
+        except ValueError as error:
+            self.send(page.page_id, _unreadable(error))
+            return
+        try:
+            await on_message(page.page_id, message)
+        except Exception as error:
+            notice = error_doc(error)
+            if notice.code == "internal":
+                log.exception("Message %s of page %s failed.", message.type, page.page_id)
+            self.send(page.page_id, schemas.NoticeMessage(level="error", error=notice))
+
+
+def parse(text: str | None) -> schemas.ClientMessage:
+    """Raises ``ValueError`` with one sentence for the operator's eyes."""
+    if text is None or len(text) > MESSAGE_LIMIT_CHARS:
+        raise ValueError(f"A message must be text of at most {MESSAGE_LIMIT_CHARS} characters.")
+    try:
+        return _CLIENT_MESSAGE.validate_json(text)
+    except ValidationError as error:
+        raise ValueError(_fault(text, error)) from None
+
+
+def _fault(text: str, error: ValidationError) -> str:
+    try:
+        kind = json.loads(text)["type"]
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return "A message was not a JSON object with a type."
+    if kind not in _CLIENT_TYPES:
+        return f"Messages of type {str(kind)[:40]!r} are unknown."
+    return f"A message of type {kind!r} was faulty: {error.errors()[0]['msg']}."
+
+
+def _unreadable(error: ValueError) -> schemas.NoticeMessage:
+    doc = schemas.ErrorDoc(
+        code="unknown_message", what=str(error), advice="Reload the page: it may be older than the server."
+    )
+    return schemas.NoticeMessage(level="error", error=doc)
+
+
+class _Bucket:
+    """A token bucket: ``RATE_PER_S`` messages for ever, ``BURST`` at once."""
+
+    def __init__(self) -> None:
+        self._tokens = BURST
+        self._at_mono_s = time.monotonic()
+
+    def take(self) -> bool:
+        now = time.monotonic()
+        self._tokens = min(BURST, self._tokens + RATE_PER_S * (now - self._at_mono_s)) - 1
+        self._at_mono_s = now
+        return self._tokens >= 0
+
+
+async def _wait(gone: asyncio.Event, session_remaining_s: float, page: Page) -> None:
+    try:
+        async with asyncio.timeout(session_remaining_s):
+            await gone.wait()
+    except TimeoutError:
+        page.cut_off(CLOSE_SIGNED_OUT)
+
+
+async def _close(websocket: WebSocket, code: int) -> None:
+    if WebSocketState.DISCONNECTED in (websocket.application_state, websocket.client_state):
+        return
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect, TimeoutError):
+        async with asyncio.timeout(SEND_TIMEOUT_S):
+            await websocket.close(code)

@@ -1,0 +1,208 @@
+"""The library: everything that Hedgehop keeps, under one data directory and one lock.
+
+All methods are plain blocking calls, safe to run in threads (``asyncio.to_thread``). Surface models and
+orthophotos are written by worker processes (``store_terrain``, ``store_orthophoto``); ``refresh`` takes them in.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+from planning.dsm import Dsm
+from planning.orthophoto import Orthophoto
+from server.errors import DataDirError, StorageError
+from server.history import History
+from server.library import orthophotos, plans, terrains
+from server.library.files import clean, new_id, storage_errors, write_atomically
+from server.library.lock import DirectoryLock
+from server.library.orthophotos import OrthophotoManifest
+from server.library.plans import PlanSummary
+from server.library.profiles import read_profiles
+from server.library.shelf import Shelf
+from server.library.terrains import TerrainManifest
+from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
+
+_LAST_PLAN = "last-plan.txt"
+_PROFILES = "profiles"
+
+
+class Library:
+    """Opens and locks the directory, clears half-written leftovers, and sets damaged things aside."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self.root = data_dir.expanduser().absolute()
+        self.notices: list[ErrorDoc] = []
+        """What was set aside, to be shown to the operator."""
+        self._change = threading.RLock()
+        self._lock = _open_directory(self.root)
+        try:
+            self._uploads = self._empty_folder("uploads")
+            told = self.notices.append
+            self._terrains = Shelf(
+                self.root, kind="surface model", folder=terrains.FOLDER, model=TerrainManifest, on_damage=told
+            )
+            self._orthophotos = Shelf(
+                self.root, kind="orthophoto", folder=orthophotos.FOLDER, model=OrthophotoManifest, on_damage=told
+            )
+            self._plans = Shelf(self.root, kind="plan", folder=plans.FOLDER, model=PlanSummary, on_damage=told)
+            self._profiles, unreadable = read_profiles(self.root / _PROFILES)
+            self.notices += unreadable
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def close(self) -> None:
+        self._lock.release()
+
+    def refresh(self) -> None:
+        """Takes in what worker processes have stored."""
+        self._terrains.refresh()
+        self._orthophotos.refresh()
+
+    def state(self) -> LibraryState:
+        """From memory: quick enough for the event loop."""
+        return LibraryState(
+            terrains=self.terrains(), orthophotos=self.orthophotos(), plans=self.plans(), profiles=self.profiles()
+        )
+
+    def new_upload(self, suffix: str = "") -> Path:
+        """Where to stream an upload; whoever used it deletes it, and the next start clears what was left."""
+        return self._uploads / f"{new_id()}{suffix}"
+
+    # Surface models and orthophotos
+
+    def terrains(self) -> list[TerrainDoc]:
+        return sorted((m.doc for m in self._terrains.manifests.values()), key=lambda doc: doc.added_utc)
+
+    def terrain_dir(self, terrain_id: str) -> Path:
+        """The folder of a surface model; raises ``NotFoundError``."""
+        return self._terrains.directory(terrain_id)
+
+    def load_terrain(self, terrain_id: str) -> Dsm:
+        """The model with its heights memory-mapped, read-only."""
+        return terrains.load_terrain(self.terrain_dir(terrain_id))
+
+    def delete_terrain(self, terrain_id: str) -> None:
+        """With its orthophotos. Whether a plan still needs it is the caller's question (``plans_using``)."""
+        with self._change:
+            self.terrain_dir(terrain_id)
+            for photo in self.orthophotos():
+                if photo.terrain_id == terrain_id:
+                    self._orthophotos.remove(photo.id)
+            self._terrains.remove(terrain_id)
+
+    def orthophotos(self) -> list[OrthophotoDoc]:
+        return sorted((m.doc for m in self._orthophotos.manifests.values()), key=lambda doc: doc.added_utc)
+
+    def orthophoto_dir(self, photo_id: str) -> Path:
+        """The folder of an orthophoto; raises ``NotFoundError``."""
+        return self._orthophotos.directory(photo_id)
+
+    def load_orthophoto(self, photo_id: str) -> Orthophoto:
+        return orthophotos.load_orthophoto(self.orthophoto_dir(photo_id))
+
+    def delete_orthophoto(self, photo_id: str) -> None:
+        with self._change:
+            self._orthophotos.remove(photo_id)
+
+    # Plans
+
+    def plans(self) -> list[PlanEntry]:
+        """Newest first."""
+        entries = [
+            PlanEntry(id=plan_id, name=m.name, terrain_id=m.terrain_id, saved_utc=m.saved_utc)
+            for plan_id, m in self._plans.manifests.items()
+        ]
+        return sorted(entries, key=lambda entry: entry.saved_utc, reverse=True)
+
+    def plans_using(self, terrain_id: str) -> list[str]:
+        """Names of the plans on this surface model, as they were saved last."""
+        return [entry.name for entry in self.plans() if entry.terrain_id == terrain_id]
+
+    def create_plan(self, history: History) -> tuple[str, History]:
+        plan_id = new_id()
+        self.save_plan(plan_id, history)
+        return plan_id, history
+
+    def save_plan(self, plan_id: str, history: History) -> str:
+        """When it was saved. Durable once this returns; raises ``StorageFullError`` with the old version kept."""
+        with self._change:
+            summary = plans.save_plan(self._plans.new_directory(plan_id), history)
+            self._plans.put(plan_id, summary)
+        return summary.saved_utc
+
+    def load_plan(self, plan_id: str) -> History:
+        """Raises ``NotFoundError``; a damaged plan is set aside and raises ``StorageError``."""
+        directory = self._plans.directory(plan_id)
+        try:
+            return plans.load_plan(directory)
+        except (ValueError, StorageError) as error:
+            with self._change:
+                self._plans.set_aside(directory, "its history is damaged")
+            raise StorageError(
+                "The plan's file is damaged.", where=plan_id, advice="It was set aside untouched; open another plan."
+            ) from error
+
+    def saved_utc(self, plan_id: str) -> str:
+        return self._plans.get(plan_id).saved_utc
+
+    def delete_plan(self, plan_id: str) -> None:
+        with self._change:
+            self._plans.remove(plan_id)
+
+    def remember_plan(self, plan_id: str) -> None:
+        """Notes which plan is open, for the next start."""
+        with self._change:
+            write_atomically(self.root / _LAST_PLAN, plan_id.encode())
+
+    def last_plan(self) -> str | None:
+        """The plan that was open last, if it can still be read."""
+        try:
+            plan_id = (self.root / _LAST_PLAN).read_text(encoding="ascii", errors="replace")
+        except FileNotFoundError:
+            return None
+        if plan_id not in self._plans.manifests:
+            return None
+        try:
+            self.load_plan(plan_id)
+        except StorageError:
+            return None
+        return plan_id
+
+    # Vehicle profiles
+
+    def profiles(self) -> list[ProfileEntry]:
+        """Those shipped with Hedgehop and the user's own, from TOML files in ``profiles/``, as of the start."""
+        return self._profiles
+
+    def _empty_folder(self, name: str) -> Path:
+        folder = self.root / name
+        with storage_errors(folder):
+            folder.mkdir(mode=0o700, exist_ok=True)
+            for path in folder.iterdir():
+                path.unlink(missing_ok=True)
+        return folder
+
+
+def _open_directory(data_dir: Path) -> DirectoryLock:
+    """Raises ``DataDirError`` unless the directory can be made, written and locked."""
+    lock: DirectoryLock | None = None
+    try:
+        data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+        lock = DirectoryLock(data_dir)
+        clean(data_dir)
+        write_atomically(data_dir / "format.txt", b"1\n")
+    except (OSError, StorageError) as error:
+        if lock is not None:
+            lock.release()
+        if isinstance(error, DataDirError):
+            raise
+        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
+        raise DataDirError(
+            f"The data directory cannot be written: {reason}.",
+            where=str(data_dir),
+            advice="Change its permissions, or start with another --data-dir.",
+        ) from error
+    return lock

@@ -1,0 +1,94 @@
+"""Surface models on disk: ``terrains/<id>/{manifest.json, elevation.npy}``; workers read and write them by folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from affine import Affine
+from pydantic import BaseModel, ConfigDict
+from pyproj import CRS
+
+from planning.dsm import Dsm
+from planning.errors import NoElevationError
+from server.library.arrays import read_array, write_array
+from server.library.files import new_directory, new_id
+from server.library.shelf import read_manifest, utc_now, write_manifest
+from server.schemas import PlaceDoc, SpikeDoc, TerrainDoc
+
+FOLDER = "terrains"
+_ELEVATION = "elevation.npy"
+
+
+class TerrainManifest(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+    format: int = 1
+    doc: TerrainDoc
+    transform: tuple[float, float, float, float, float, float]
+    """Coefficients a..f: pixel corner (column, row) -> projected metres."""
+    crs_wkt: str
+
+
+def store_terrain(
+    root: Path, dsm: Dsm, *, name: str, spikes: Sequence[SpikeDoc] = (), warnings: Sequence[str] = ()
+) -> TerrainDoc:
+    """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``."""
+    terrain_id = new_id()
+    t = dsm.transform
+    manifest = TerrainManifest(
+        doc=_describe(dsm, terrain_id, name=name, spikes=spikes, warnings=warnings),
+        transform=(t.a, t.b, t.c, t.d, t.e, t.f),
+        crs_wkt=dsm.crs.to_wkt(),
+    )
+    with new_directory(root / FOLDER / terrain_id) as folder:
+        write_array(folder / _ELEVATION, dsm.elevation_m)
+        write_manifest(folder, manifest)
+    return manifest.doc
+
+
+def load_terrain(directory: Path) -> Dsm:
+    """The model in this folder, its heights memory-mapped; raises ``StorageError`` when it is damaged."""
+    manifest = read_manifest(directory, TerrainManifest)
+    shape = (manifest.doc.height_px, manifest.doc.width_px)
+    return Dsm(
+        elevation_m=read_array(directory / _ELEVATION, shape=shape, dtype=np.float32),
+        transform=Affine(*manifest.transform),
+        crs=CRS.from_wkt(manifest.crs_wkt),
+        vertical_datum=manifest.doc.vertical_datum,
+        sha256=manifest.doc.sha256,
+    )
+
+
+def _describe(
+    dsm: Dsm, terrain_id: str, *, name: str, spikes: Sequence[SpikeDoc], warnings: Sequence[str]
+) -> TerrainDoc:
+    known = int(np.count_nonzero(np.isfinite(dsm.elevation_m)))
+    if known == 0:
+        raise NoElevationError(
+            "Every cell of the surface model is unknown.", where=name, advice="Use a raster with heights."
+        )
+    return TerrainDoc(
+        id=terrain_id,
+        name=name,
+        width_px=dsm.width_px,
+        height_px=dsm.height_px,
+        resolution_m=dsm.resolution_m,
+        crs=dsm.crs.name,
+        vertical_datum=dsm.vertical_datum,
+        unknown_share=1 - known / dsm.elevation_m.size,
+        min_m=float(np.nanmin(dsm.elevation_m)),
+        max_m=float(np.nanmax(dsm.elevation_m)),
+        sha256=dsm.sha256,
+        spikes=list(spikes),
+        warnings=list(warnings),
+        corner_lat_lon_deg=_corners(dsm),
+        added_utc=utc_now(),
+    )
+
+
+def _corners(dsm: Dsm) -> list[PlaceDoc]:
+    west, south, east, north = dsm.bounds_m
+    corners_xy_m = np.array([(west, north), (east, north), (east, south), (west, south)])
+    return [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in dsm.lat_lon_from_xy(corners_xy_m).tolist()]

@@ -1,0 +1,123 @@
+"""Feeds the 3D view: what it must show now, and the place that profile and view mark together."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from planning.dsm import Dsm
+from planning.errors import PlanningError
+from server.errors import ServerError
+from server.jobs import JobCancelledError, Lane
+from server.library import Library
+from server.scene.payload import PlanScene, SceneState, TerrainScene
+from server.scene.terrain_task import terrain_scene
+from server.schemas import CursorMessage, FrameView, PlanDoc, SelectionDoc, ViewDoc
+
+
+class View(Protocol):
+    """The part of ``server.scene.view.SceneView`` that the workspace uses."""
+
+    async def show(self, dsm: Dsm | None, state: SceneState) -> None: ...
+
+    async def cursor(self, xyz_m: np.ndarray | None) -> None: ...
+
+    async def frame(self, page_id: str, target: str) -> None: ...
+
+    def sample_under(self, page_id: str, x: float, y: float) -> float | None: ...
+
+
+class Picture:
+    """Draws the latest wish; wishes that come while it draws are merged into one."""
+
+    def __init__(self, view: View, library: Library, lane: Lane) -> None:
+        self._view, self._library, self._lane = view, library, lane
+        self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
+        self._wake = asyncio.Event()
+        self._terrain: TerrainScene | None = None
+        self._terrain_key: tuple[str | None, str | None, str] | None = None
+        self._dsm: Dsm | None = None
+        self.failed: ServerError | PlanningError | None = None
+
+    @property
+    def legend_m(self) -> tuple[float, float] | None:
+        return None if self._terrain is None else (self._terrain.legend_min_m, self._terrain.legend_max_m)
+
+    @property
+    def dsm(self) -> Dsm | None:
+        """The open surface model, at full resolution."""
+        return self._dsm
+
+    def want(
+        self, document: PlanDoc, selection: SelectionDoc, view: ViewDoc, plan: PlanScene | None, *, stale: bool
+    ) -> None:
+        self._wish = (document, selection, view, plan, stale)
+        self._wake.set()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            if self._wish is not None:
+                await self._draw(*self._wish)
+
+    async def _draw(
+        self, document: PlanDoc, selection: SelectionDoc, view: ViewDoc, plan: PlanScene | None, stale: bool
+    ) -> None:
+        await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
+        state = SceneState(
+            terrain=self._terrain,
+            plan=plan,
+            plan_is_stale=stale,
+            document=document,
+            selection=selection,
+            view=view,
+        )
+        await self._view.show(self._dsm, state)
+
+    async def _load_terrain(self, terrain_id: str | None, orthophoto_id: str | None, shading: str) -> None:
+        key = (terrain_id, orthophoto_id if shading == "orthophoto" else None, shading)
+        if key == self._terrain_key:
+            return
+        self._terrain_key, self._terrain, self._dsm = key, None, None
+        if terrain_id is None:
+            return
+        directory = self._library.terrain_dir(terrain_id)
+        photo = None if key[1] is None else self._library.orthophoto_dir(key[1])
+        self._dsm = await asyncio.to_thread(self._library.load_terrain, terrain_id)
+        try:
+            self._terrain = await self._lane.call(terrain_scene, terrain_id, directory, photo, shading)
+        except JobCancelledError:
+            self._terrain_key = None
+            self._wake.set()
+
+    async def mark(self, plan: PlanScene | None, s_m: float | None) -> CursorMessage:
+        """Marks the path at a distance in 3D and says what is there."""
+        if plan is None or s_m is None:
+            await self._view.cursor(None)
+            return CursorMessage(s_m=None)
+        s_m = float(np.clip(s_m, plan.path_s_m[0], plan.path_s_m[-1]))
+        xyz = np.array([np.interp(s_m, plan.path_s_m, plan.path_m[:, axis]) for axis in range(3)])
+        await self._view.cursor(xyz)
+        ground_m = float(np.interp(s_m, plan.path_s_m, plan.path_ground_alt_dsm_m))
+        lat_deg, lon_deg = (None, None) if self._dsm is None else self._dsm.lat_lon_from_xy(xyz[:2])[0]
+        return CursorMessage(
+            s_m=s_m,
+            lat_deg=lat_deg,
+            lon_deg=lon_deg,
+            ground_rel_home_m=None if np.isnan(ground_m) else ground_m - plan.home_m[2],
+            path_rel_home_m=float(xyz[2] - plan.home_m[2]),
+        )
+
+    async def mark_under(self, plan: PlanScene | None, page_id: str, x: float, y: float) -> CursorMessage:
+        """The same for the pointer in a page's 3D view."""
+        return await self.mark(plan, self._view.sample_under(page_id, x, y))
+
+    async def frame(self, message: FrameView, page_id: str) -> None:
+        await self._view.frame(page_id, message.target)
+
+

@@ -1,0 +1,85 @@
+"""From a grid of heights to triangles: every known cell's centre is a vertex, unknown cells are left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from server.scene.frame import LocalFrame
+from server.scene.payload import F32, F64, HeightGrid
+
+U32 = NDArray[np.uint32]
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    vertices: F32
+    """(V, 3) x east, y north of the model's centre, z above the reference, metres, not exaggerated."""
+    faces: U32
+    """(F, 3) counter-clockwise seen from above"""
+    uv: F32
+    """(V, 2) shares of the grid's extent from the north-western corner"""
+
+
+def grid_mesh(grid: HeightGrid, frame: LocalFrame) -> Mesh:
+    """Triangles between neighbouring known cells.
+
+    The outermost vertices are drawn out to the grid's edge, so that the mesh covers the model and not half a
+    cell less on each side.
+    """
+    rows, cols = grid.alt_dsm_m.shape
+    u, v = _shares(cols), _shares(rows)
+    x_m = grid.west_m + u * cols * grid.cell_m - frame.centre_x_m
+    y_m = grid.north_m - v * rows * grid.cell_m - frame.centre_y_m
+    known = np.isfinite(grid.alt_dsm_m)
+    row, col = np.nonzero(known)
+    z_m = grid.alt_dsm_m[known] - frame.reference_alt_dsm_m
+    return Mesh(
+        vertices=np.column_stack([x_m[col], y_m[row], z_m]).astype(np.float32),
+        faces=_faces(known),
+        uv=np.column_stack([u[col], v[row]]).astype(np.float32),
+    )
+
+
+def _shares(count: int) -> F64:
+    shares = (np.arange(count) + 0.5) / count
+    if count > 1:
+        shares[0], shares[-1] = 0.0, 1.0
+    return shares
+
+
+def _faces(known: NDArray[np.bool_]) -> U32:
+    number = np.cumsum(known.ravel()).reshape(known.shape).astype(np.uint32) - np.uint32(1)
+    nw, ne, sw, se = (
+        (number[r : r - 1 or None, c : c - 1 or None], known[r : r - 1 or None, c : c - 1 or None])
+        for r, c in ((0, 0), (0, 1), (1, 0), (1, 1))
+    )
+    # Two triangles where all four corners are known, one where three are.
+    corners = ((nw, sw, ne, None), (ne, sw, se, None), (nw, sw, se, ne), (nw, se, ne, sw))
+    return np.concatenate([_triangles(a, b, c, absent) for a, b, c, absent in corners])
+
+
+_Corner = tuple[U32, NDArray[np.bool_]]
+
+
+def _triangles(a: _Corner, b: _Corner, c: _Corner, absent: _Corner | None) -> U32:
+    drawn = a[1] & b[1] & c[1]
+    if absent is not None:
+        drawn = drawn & ~absent[1]
+    return np.column_stack([corner[0][drawn] for corner in (a, b, c)])
+
+
+def drawn_alt_dsm_m(grid: HeightGrid, xy_m: F64, otherwise_m: float) -> F64:
+    """Height of the drawn terrain under projected points (N, 2); ``otherwise_m`` where nothing is drawn.
+
+    The drawing stands above the model by up to a cell's slope, and marks must not sink into it.
+    """
+    xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+    at = np.array([(grid.north_m - xy[:, 1]) / grid.cell_m - 0.5, (xy[:, 0] - grid.west_m) / grid.cell_m - 0.5])
+    between = map_coordinates(grid.alt_dsm_m.astype(np.float64), at, order=1, mode="nearest")
+    nearest = map_coordinates(grid.alt_dsm_m.astype(np.float64), at, order=0, mode="nearest")
+    alt = np.where(np.isfinite(between), between, nearest)
+    return np.where(np.isfinite(alt), alt, otherwise_m)

@@ -1,0 +1,76 @@
+"""What crosses from the workers to the 3D view: plain arrays, in the surface model's own coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.schemas import PlanDoc, SelectionDoc, ViewDoc
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class HeightGrid:
+    """A coarse grid of heights for drawing; cell (0, 0) is the north-western one."""
+
+    alt_dsm_m: F32
+    """(h, w), NaN where unknown"""
+    west_m: float
+    north_m: float
+    """Projected coordinates of the grid's outer north-western corner."""
+    cell_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainScene:
+    """A surface model as the view draws it."""
+
+    terrain_id: str
+    grid: HeightGrid
+    texture_rgb: U8
+    """(th, tw, 3) draped over the grid's whole extent: height colours, hill shading or orthomosaic."""
+    legend_min_m: float
+    legend_max_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlanScene:
+    """A computed plan as the view draws it; all points are x, y, alt_dsm."""
+
+    safe_surface: HeightGrid
+    path_m: F64
+    """(N, 3) the sampled path, thinned for drawing"""
+    path_s_m: F64
+    """(N,)"""
+    path_ground_alt_dsm_m: F64
+    """(N,)"""
+    flown_m: F64
+    """(K, 3) waypoints as the vehicle flies them"""
+    flown_distance_m: F64
+    """(K - 1,) smallest distance of each leg to the surface model"""
+    worst_m: F64
+    """(3,) the place nearest to the surface model"""
+    required_clearance_m: float
+    home_m: F64
+    """(3,)"""
+    takeoff_alt_dsm_m: float
+    poi_m: F64
+    """(P, 3) points of interest at flight height; P is 0 for a survey"""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneState:
+    """Everything the view has to show; the view draws the difference to what it shows already."""
+
+    terrain: TerrainScene | None
+    plan: PlanScene | None
+    plan_is_stale: bool
+    """A newer plan is being computed."""
+    document: PlanDoc
+    selection: SelectionDoc
+    view: ViewDoc

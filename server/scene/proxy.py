@@ -1,0 +1,120 @@
+"""viser's page and socket on Hedgehop's own origin: ``/view/{page_id}/`` and ``/view/{page_id}``.
+
+A page id belongs to a live ``/ws`` stream of the same session; when that ends, so does its 3D view. Messages to the
+browser pass as they are; those from the browser pass ``server.scene.filter``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from functools import lru_cache
+
+from fastapi import APIRouter, Request, WebSocket
+from fastapi.responses import RedirectResponse, Response
+from starlette.websockets import WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+from server.api.access import parts_of, session_of
+from server.auth import session_key
+from server.errors import NotFoundError, SignInError
+from server.hub import Page
+from server.scene.filter import MessageFilter
+from server.scene.host import CLIENT_HTML, SUBPROTOCOL, SceneHost
+from server.together import until_first
+
+log = logging.getLogger("hedgehop.scene")
+router = APIRouter(include_in_schema=False)
+
+# viser is one HTML file that unpacks its script with WebAssembly and adds it inline; its decoders are workers.
+VIEW_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob: data:; "
+    "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; connect-src 'self' {sockets} data: blob:; "
+    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+)
+PASSED_ON_QUERY = frozenset({"fixedDpr"})
+CLOSE_TIMEOUT_S = 5.0
+
+
+@router.get("/view/{page_id}/")
+async def view_page(page_id: str, request: Request) -> Response:
+    """viser's client, with a query that cannot point it at a foreign server."""
+    _page(request, page_id)
+    unknown = [key for key in request.query_params if key not in PASSED_ON_QUERY]
+    if unknown:
+        return RedirectResponse(request.url.remove_query_params(unknown).replace(scheme="", netloc=""), 303)
+    sockets = f"{'wss' if request.url.scheme == 'https' else 'ws'}://{request.headers['host']}"
+    policy = VIEW_POLICY.format(sockets=sockets)
+    return Response(_client_html(), media_type="text/html", headers={"content-security-policy": policy})
+
+
+@router.websocket("/view/{page_id}")
+async def view_socket(page_id: str, websocket: WebSocket) -> None:
+    """The bridge. A stranger and a client of another viser version are refused before the upgrade."""
+    try:
+        page = _page(websocket, page_id)
+    except (SignInError, NotFoundError):
+        await websocket.close(1008)
+        return
+    if SUBPROTOCOL not in websocket.scope["subprotocols"]:
+        await websocket.close(1002)
+        return
+    await _bridge(websocket, page, parts_of(websocket).scene_host)
+
+
+def _page(connection: Request | WebSocket, page_id: str) -> Page:
+    session_id = session_of(connection)
+    page = parts_of(connection).hub.page(page_id)
+    if page is None or page.session_key != session_key(session_id):
+        raise NotFoundError("This 3D view belongs to no open page.", advice="Reload the page.")
+    return page
+
+
+async def _bridge(websocket: WebSocket, page: Page, host: SceneHost) -> None:
+    messages = MessageFilter()
+    async with connect(
+        host.url,
+        subprotocols=[Subprotocol(SUBPROTOCOL)],
+        additional_headers=host.headers(page.page_id),
+        compression=None,
+        max_size=None,
+        max_queue=4,
+        ping_interval=None,
+        proxy=None,
+    ) as upstream:
+        await websocket.accept(SUBPROTOCOL)
+        with contextlib.suppress(ConnectionClosed, WebSocketDisconnect):
+            await until_first(
+                _to_browser(upstream, websocket),
+                _to_viser(websocket, upstream, messages),
+                page.gone.wait(),
+            )
+    if messages.dropped:
+        log.warning("The 3D view of page %s sent what it must not: %s", page.page_id, dict(messages.dropped))
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect, TimeoutError):
+        async with asyncio.timeout(CLOSE_TIMEOUT_S):
+            await websocket.close(1001)
+
+
+async def _to_browser(upstream: ClientConnection, websocket: WebSocket) -> None:
+    async for message in upstream:
+        if isinstance(message, bytes):
+            await websocket.send_bytes(message)
+
+
+async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: MessageFilter) -> None:
+    while True:
+        received = await websocket.receive()
+        if received["type"] == "websocket.disconnect":
+            return
+        raw = received.get("bytes")
+        if raw is not None and messages.lets_through(raw):
+            await upstream.send(raw)
+
+
+@lru_cache(maxsize=1)
+def _client_html() -> bytes:
+    return CLIENT_HTML.read_bytes()

@@ -1,0 +1,155 @@
+"""Settings: defaults, then a TOML file, then environment variables ``HEDGEHOP_...``, then the command line."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, ValidationError
+from pydantic_settings import (
+    BaseSettings,
+    NoDecode,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    TomlConfigSettingsSource,
+)
+
+from server.errors import StartError, error_doc
+
+GIB = 1024**3
+_SCRYPT = {"n": 2**14, "r": 8, "p": 1, "maxmem": 64 * 1024**2}
+
+
+@dataclass(frozen=True, slots=True)
+class PasswordHash:
+    """All that is kept of the password (scrypt)."""
+
+    salt: bytes
+    digest: bytes
+
+    @classmethod
+    def of(cls, password: str) -> PasswordHash:
+        salt = secrets.token_bytes(16)
+        return cls(salt, hashlib.scrypt(password.encode(), salt=salt, **_SCRYPT))
+
+    def matches(self, password: str) -> bool:
+        """Takes about 50 ms, whatever the password."""
+        return hmac.compare_digest(self.digest, hashlib.scrypt(password.encode(), salt=self.salt, **_SCRYPT))
+
+
+def _hash_password(value: object) -> object:
+    if isinstance(value, str):
+        if len(value) < 8:
+            raise ValueError("a password needs at least 8 characters")
+        return PasswordHash.of(value)
+    return value
+
+
+def _split(value: object) -> object:
+    return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+
+
+Password = Annotated[PasswordHash, BeforeValidator(_hash_password)]
+Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)]
+
+
+def default_data_dir() -> Path:
+    """The user's data home, by the XDG rule."""
+    home = os.environ.get("XDG_DATA_HOME", "")
+    return (Path(home) if Path(home).is_absolute() else Path.home() / ".local" / "share") / "hedgehop"
+
+
+def default_console_dir() -> Path:
+    return Path(__file__).resolve().parent.parent / "web" / "dist"
+
+
+class Settings(BaseSettings):
+    model_config = SettingsConfigDict(
+        env_prefix="HEDGEHOP_", extra="forbid", frozen=True, use_attribute_docstrings=True, arbitrary_types_allowed=True
+    )
+
+    host: str = "127.0.0.1"
+    """Address to listen on. Anything but loopback opens Hedgehop to the network: set a password and put TLS before it."""
+    port: Annotated[int, Field(ge=1, le=65535)] = 8000
+    """Port of the console, the API and the 3D view."""
+    data_dir: Path = Field(default_factory=default_data_dir)
+    """Where surface models, plans and sessions are kept."""
+    password: Password | None = None
+    """Lets operators sign in without the link that is printed at start; at least 8 characters."""
+    session_days: Annotated[float, Field(gt=0, le=365)] = 30.0
+    """How long a sign-in lasts."""
+    allowed_hosts: Names = ()
+    """Further names (with port) under which browsers may reach Hedgehop, separated by commas."""
+    allowed_origins: Names = ()
+    """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
+    upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
+    """Largest surface model or orthophoto that can be dropped in."""
+    workers: Annotated[int, Field(ge=1, le=64)] = 2
+    """Processes for heavy work."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    """How much is written to the log."""
+    console_dir: Path = Field(default_factory=default_console_dir)
+    """Where the built console lies."""
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        del dotenv_settings, file_secret_settings
+        return init_settings, env_settings, TomlConfigSettingsSource(settings_cls, settings_file())
+
+
+def settings_file() -> Path:
+    """``HEDGEHOP_SETTINGS_FILE``, else the user's own; neither need exist."""
+    named = os.environ.get("HEDGEHOP_SETTINGS_FILE", "")
+    home = os.environ.get("XDG_CONFIG_HOME", "")
+    base = Path(home) if Path(home).is_absolute() else Path.home() / ".config"
+    return Path(named) if named else base / "hedgehop" / "settings.toml"
+
+
+def load_settings(**overrides: Any) -> Settings:
+    """Settings with those overrides that are not None; raises ``StartError`` naming the faulty one."""
+    if os.environ.get("HEDGEHOP_SETTINGS_FILE") and not settings_file().is_file():
+        raise StartError(
+            f"There is no settings file {settings_file()}.", advice="Correct or unset HEDGEHOP_SETTINGS_FILE."
+        )
+    try:
+        return Settings(**{name: value for name, value in overrides.items() if value is not None})
+    except ValidationError as error:
+        fault = error_doc(error)
+        what = fault.what if fault.where != "password" else "A password needs at least 8 characters."
+        raise StartError(
+            what,
+            where=f"setting {fault.where}",
+            advice=f"It is set by HEDGEHOP_{fault.where.split('.')[0].upper()}, by {settings_file()} or by an option.",
+        ) from None
+    except ValueError as error:
+        raise StartError(f"The settings file cannot be read: {error}.", where=str(settings_file())) from error
+
+
+def settings_table() -> str:
+    """All settings as a Markdown table, for the documentation."""
+    rows = ["| environment variable | in the file | default | meaning |", "|---|---|---|---|"]
+    for name, field in Settings.model_fields.items():
+        default = _DOCUMENTED.get(name) or str(field.default)
+        rows.append(f"| `HEDGEHOP_{name.upper()}` | `{name}` | {default} | {field.description} |")
+    return "\n".join(rows) + "\n"
+
+
+_DOCUMENTED = {
+    "data_dir": "`$XDG_DATA_HOME/hedgehop`, else `~/.local/share/hedgehop`",
+    "password": "none",
+    "allowed_hosts": "none",
+    "allowed_origins": "none",
+    "console_dir": "`web/dist` of the project",
+}

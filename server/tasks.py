@@ -1,0 +1,126 @@
+"""What the workers do: whole jobs, called by name in a process of their own.
+
+Each takes ``report(step, share)``. Surface models are opened by directory and kept open, because the next
+edit asks about the same one.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from planning.autopilot_time import predict_duration
+from planning.camera import gsd_cm
+from planning.dsm import Dsm
+from planning.exports import export_file
+from planning.mission import decimation_trade
+from planning.model import finite_or_none
+from planning.plan import Plan, effective_profile, plan_mission
+from planning.summary import plan_summary
+from server.charts import chart
+from server.documents import request_from_doc
+from server.jobs import Progress
+from server.library.terrains import load_terrain
+from server.scene.payload import PlanScene
+from server.scene.plan_payload import plan_scene
+from server.schemas import PlanDoc, ReasonDoc, ResultDoc, TradeRow, WorstDoc
+from server.stopwatch import READ_STEP, StepTimer
+
+
+@lru_cache(maxsize=2)
+def _terrain(directory: Path) -> Dsm:
+    return load_terrain(directory)
+
+
+def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
+    """The answer to an edit, without the trade table."""
+    plan, source, timer = _plan(directory, document, report)
+    return result_doc(plan, source, timer.seconds()), plan_scene(plan, source)
+
+
+def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:
+    """Waypoints, items and duration for a ladder of excess heights."""
+    plan, _, _ = _plan(directory, document, report)
+    return [
+        TradeRow(
+            excess_height_m=row.excess_height_m,
+            waypoints=row.waypoints,
+            items=row.items,
+            duration_s=row.duration_s,
+        )
+        for row in decimation_trade(plan.path, plan.mission.home, plan.request.mission, plan.request.profile, plan.dsm, plan.request.pois)
+    ]
+
+
+def export_plan(
+    directory: Path, document: PlanDoc, names: list[str], created_utc: str, *, report: Progress
+) -> dict[str, bytes]:
+    """The files of the plan, computed from the very document that is exported."""
+    plan, source, timer = _plan(directory, document, report)
+    seconds = timer.seconds()
+    return {
+        name: export_file(
+            name, plan, source, title=document.name, created_utc=created_utc, seconds=seconds
+        ).encode()
+        for name in names
+    }
+
+
+def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, StepTimer]:
+    timer = StepTimer(report)
+    timer(READ_STEP, 0.0)
+    source = _terrain(directory)
+    return plan_mission(source, request_from_doc(document, source), report=timer), source, timer
+
+
+def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float]) -> ResultDoc:
+    """A plan's figures as the console shows them."""
+    certificate, summary = plan.certificate, plan_summary(plan, source)
+    worst = summary["worst"]
+    gsd_min, gsd_max = _gsd_range_cm(plan)
+    return ResultDoc(
+        **{key: summary[key] for key in _SUMMARY_KEYS},
+        worst=None if worst is None else WorstDoc(**worst, s_m=certificate.worst.s_m),
+        max_height_above_ground_m=finite_or_none(certificate.max_height_above_ground_m),
+        reasons=[ReasonDoc(code=r.code, text=r.text, mend=r.mend) for r in certificate.reasons],
+        gsd_min_cm=gsd_min,
+        gsd_max_cm=gsd_max,
+        home_alt_dsm_m=plan.line.home_alt_dsm_m,
+        vertical_datum=source.vertical_datum,
+        trade=[],
+        chart=chart(plan),
+        seconds=seconds,
+    )
+
+
+_SUMMARY_KEYS = (
+    "certified",
+    "min_distance_m",
+    "min_vertical_m",
+    "required_clearance_m",
+    "rtl_height_needed_m",
+    "rtl_height_m",
+    "home_column_clear",
+    "warnings",
+    "length_m",
+    "duration_s",
+    "lspb_duration_s",
+    "endurance_s",
+    "usable_endurance_s",
+    "samples",
+    "waypoints",
+    "items",
+    "max_items",
+    "excess_height_m",
+)
+
+
+def _gsd_range_cm(plan: Plan) -> tuple[float | None, float | None]:
+    """Ground sampling distance from the lowest to the highest place above ground (eq 1)."""
+    camera = plan.request.profile.camera
+    above_m = (plan.path.alt_dsm_m - plan.path.ground_alt_dsm_m)[np.isfinite(plan.path.ground_alt_dsm_m)]
+    if camera is None or above_m.size == 0:
+        return None, None
+    return gsd_cm(camera, float(above_m.min())), gsd_cm(camera, float(above_m.max()))

@@ -1,0 +1,32 @@
+"""Melita 2020, eq. 2, written slowly."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+
+def dilate_slowly(elevation_m: NDArray[np.float32], *, radius_px: float, height_m: float) -> F64:
+    """``max{A(x - x', y - y') + B(x', y')}`` cell by cell in float64; NaN where no known cell is within R."""
+    rows, cols = elevation_m.shape
+    reach = math.floor(radius_px)
+    out_m = np.full((rows, cols), -math.inf)
+    for y in range(rows):
+        for x in range(cols):
+            for y2 in range(max(0, y - reach), min(rows, y + reach + 1)):
+                for x2 in range(max(0, x - reach), min(cols, x + reach + 1)):
+                    r = math.hypot(y2 - y, x2 - x)
+                    a = float(elevation_m[y2, x2])
+                    if r <= radius_px and not math.isnan(a):
+                        out_m[y, x] = max(out_m[y, x], a + height_m * math.sqrt(1 - (r / radius_px) ** 2))
+    return np.where(np.isinf(out_m), math.nan, out_m)
+
+
+def ball_structure(radius_px: float, height_m: float) -> tuple[NDArray[np.bool_], F64]:
+    """Footprint and heights of the ball as ``scipy.ndimage.grey_dilation`` takes them."""
+    reach = math.floor(radius_px)
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    ratio2 = (x**2 + y**2) / radius_px**2
+    return ratio2 <= 1, height_m * np.sqrt(np.maximum(1 - ratio2, 0))

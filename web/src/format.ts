@@ -1,0 +1,83 @@
+/** Numbers as the operator reads them: unit beside each, a dash where nothing is known. */
+
+export const DASH = "–";
+const MINUS = "\u2212";
+const THIN = "\u202f";
+
+function known(value: number | null | undefined): value is number {
+  return value !== null && value !== undefined && Number.isFinite(value);
+}
+
+/** Fixed decimals, true minus sign, thousands apart. */
+export function number(value: number | null | undefined, decimals = 0): string {
+  if (!known(value)) return DASH;
+  const [whole = "0", fraction] = Math.abs(value).toFixed(decimals).split(".");
+  const digits = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, THIN) : whole;
+  const text = fraction ? `${digits}.${fraction}` : digits;
+  const isZero = Number(`${whole}.${fraction ?? 0}`) === 0;
+  return value < 0 && !isZero ? MINUS + text : text;
+}
+
+export function withUnit(value: number | null | undefined, unit: string, decimals = 0): string {
+  return known(value) ? `${number(value, decimals)}\u00a0${unit}` : DASH;
+}
+
+export const metres = (value: number | null | undefined, decimals = 1) => withUnit(value, "m", decimals);
+
+/** Long lengths in kilometres. */
+export function length(value_m: number | null | undefined): string {
+  if (!known(value_m)) return DASH;
+  return value_m >= 10_000 ? withUnit(value_m / 1000, "km", 2) : metres(value_m, value_m < 100 ? 1 : 0);
+}
+
+/** Minutes and seconds: 0:07, 12:30, 1:05:00. */
+export function duration(value_s: number | null | undefined): string {
+  if (!known(value_s)) return DASH;
+  const total = Math.round(value_s);
+  const two = (part: number) => String(part).padStart(2, "0");
+  const [hours, minutes, seconds] = [Math.floor(total / 3600), Math.floor(total / 60) % 60, total % 60];
+  return hours > 0 ? `${hours}:${two(minutes)}:${two(seconds)}` : `${minutes}:${two(seconds)}`;
+}
+
+export const percent = (share: number | null | undefined, decimals = 0) =>
+  withUnit(known(share) ? share * 100 : null, "%", decimals);
+
+/** Latitude or longitude to 7 decimals (about a centimetre), with a plain minus so that it can be pasted. */
+export const degrees = (value: number) => value.toFixed(7);
+
+export const latLon = (place: { lat_deg: number; lon_deg: number }) =>
+  `${degrees(place.lat_deg)}, ${degrees(place.lon_deg)}`;
+
+/** The time of day here of a UTC timestamp. */
+export function clock(utc: string): string {
+  const date = new Date(utc);
+  return Number.isNaN(date.getTime()) ? DASH : date.toLocaleTimeString("en-GB");
+}
+
+export function day(utc: string): string {
+  const date = new Date(utc);
+  if (Number.isNaN(date.getTime())) return DASH;
+  return `${date.toLocaleDateString("en-CA")} ${date.toLocaleTimeString("en-GB").slice(0, 5)}`;
+}
+
+/** How long ago, coarsely: "now", "8 s", "3 min". */
+export function age(value_ms: number): string {
+  const seconds = Math.max(0, Math.floor(value_ms / 1000));
+  if (seconds < 1) return "now";
+  return seconds < 100 ? `${seconds} s` : `${Math.floor(seconds / 60)} min`;
+}
+
+export function count(value: number, singular: string, plural = `${singular}s`): string {
+  return `${number(value)} ${value === 1 ? singular : plural}`;
+}
+
+/** A number as typed by people: comma or point, any minus, spaces; null when it is none. */
+export function parseNumber(text: string): number | null {
+  const plain = text.replace(/[\s\u202f\u00a0]/g, "").replace(MINUS, "-").replace(",", ".");
+  if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain)) return null;
+  const value = Number(plain);
+  return Number.isFinite(value) ? value : null;
+}
+
+/** A number for an input: as many decimals as it has, at most 7. */
+export const editable = (value: number) => String(Number(value.toFixed(7)));

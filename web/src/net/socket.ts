@@ -1,0 +1,83 @@
+import type { ClientMessage, ServerMessage } from "../messages";
+import { PROTOCOL_VERSION } from "../messages";
+
+export type LinkState = "connecting" | "open" | "lost";
+
+export interface SocketEvents {
+  message: (message: ServerMessage) => void;
+  link: (state: LinkState) => void;
+  /** The session has ended. */
+  signIn: () => void;
+  /** Something arrived that this page cannot read. */
+  unreadable: (why: string) => void;
+}
+
+const SIGN_IN_CLOSE_CODE = 4401;
+const FIRST_RETRY_MS = 300;
+const LONGEST_RETRY_MS = 5000;
+
+/** How long to wait before the n-th retry: doubling, with some spread so that pages do not come all at once. */
+export function retryDelay_ms(attempt: number, random: number): number {
+  const full = Math.min(LONGEST_RETRY_MS, FIRST_RETRY_MS * 2 ** attempt);
+  return full * (0.75 + 0.25 * random);
+}
+
+/** The `/ws` stream; it reconnects by itself and the server's snapshot brings the page up to date. */
+export class Stream {
+  private socket: WebSocket | null = null;
+  private attempt = 0;
+
+  constructor(
+    private readonly url: string,
+    private readonly events: SocketEvents,
+  ) {}
+
+  connect(): void {
+    const socket = new WebSocket(this.url);
+    this.socket = socket;
+    socket.onmessage = (event) => this.read(event.data);
+    socket.onclose = (event) => this.closed(event.code);
+  }
+
+  /** Messages of a lost link are dropped: they are pointers and view settings, stale by the time it is back. */
+  send(message: ClientMessage): boolean {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  private read(data: unknown): void {
+    let message: ServerMessage;
+    try {
+      message = JSON.parse(String(data)) as ServerMessage;
+    } catch {
+      this.events.unreadable("a message that is not JSON");
+      return;
+    }
+    if (message.v !== PROTOCOL_VERSION) {
+      this.events.unreadable(`protocol version ${message.v}; this page speaks ${PROTOCOL_VERSION}`);
+      return;
+    }
+    if (message.type === "snapshot") {
+      this.attempt = 0;
+      this.events.link("open");
+    }
+    this.events.message(message);
+  }
+
+  private closed(code: number): void {
+    this.socket = null;
+    if (code === SIGN_IN_CLOSE_CODE) {
+      this.events.signIn();
+      return;
+    }
+    this.events.link("lost");
+    setTimeout(() => this.connect(), retryDelay_ms(this.attempt, Math.random()));
+    this.attempt += 1;
+  }
+}
+
+/** The stream's address beside this page's own. */
+export function streamUrl(location: { protocol: string; host: string }): string {
+  return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`;
+}

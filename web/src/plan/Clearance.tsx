@@ -1,0 +1,99 @@
+import { degrees, metres } from "../format";
+import type { ResultDoc } from "../messages";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+import { frame } from "../store/stream";
+import { CopyPlace } from "./CopyPlace";
+
+type Level = "good" | "near" | "bad" | "neutral";
+
+const MARKS = { good: "check", near: "warning", bad: "cross", neutral: null } as const;
+
+/** One figure with its verdict as sign and colour. */
+function Figure(props: { label: string; value: string; level?: Level; note?: string; testid?: string }) {
+  const { level = "neutral" } = props;
+  const mark = MARKS[level];
+  return (
+    <div class={`figure ${level}`}>
+      <dt>{props.label}</dt>
+      <dd data-testid={props.testid}>
+        {mark && <Icon name={mark} size={16} />}
+        {props.value}
+        {props.note && <span class="muted"> {props.note}</span>}
+      </dd>
+    </div>
+  );
+}
+
+/** Inside or touching is red, below the requirement orange. */
+export function clearanceLevel(distance_m: number | null, required_m: number): Level {
+  if (distance_m === null) return "bad";
+  if (distance_m <= 0) return "bad";
+  return distance_m < required_m ? "near" : "good";
+}
+
+function Worst({ result }: { result: ResultDoc }) {
+  const { worst } = result;
+  if (!worst) return null;
+  return (
+    <div class="worst">
+      <div>
+        <span class="muted">Nearest place, leg {worst.leg + 1}</span>
+        <span class="place">
+          {degrees(worst.lat_deg)}, {degrees(worst.lon_deg)}
+          <CopyPlace place={worst} name="the nearest place" />
+        </span>
+        <span>{metres(worst.alt_rel_home_m)} above home</span>
+      </div>
+      <Button icon="target" testid="show-worst" onClick={() => frame("worst")}>
+        Show
+      </Button>
+    </div>
+  );
+}
+
+function Return({ result }: { result: ResultDoc }) {
+  const needed = result.rtl_height_needed_m;
+  const isHighEnough = needed !== null && result.rtl_height_m >= needed;
+  return (
+    <dl class="figures-list">
+      <Figure
+        label="Return height needed"
+        value={needed === null ? "none is safe" : metres(needed)}
+        level={isHighEnough ? "good" : "bad"}
+        testid="rtl-needed"
+      />
+      <Figure label="Return height set" value={metres(result.rtl_height_m)} testid="rtl-set" />
+      <Figure
+        label="Column over home"
+        value={result.home_column_clear ? "clear" : "blocked"}
+        level={result.home_column_clear ? "good" : "bad"}
+      />
+      <Figure label="Highest above ground" value={metres(result.max_height_above_ground_m)} />
+    </dl>
+  );
+}
+
+export function Clearance({ result }: { result: ResultDoc }) {
+  const level = clearanceLevel(result.min_distance_m, result.required_clearance_m);
+  return (
+    <section class="facts">
+      <h2>Clearance</h2>
+      <div class={`big-figure ${level}`}>
+        <span class="value" data-testid="min-distance">
+          {metres(result.min_distance_m, 2)}
+        </span>
+        <span class="muted">smallest distance</span>
+        <span class="required" data-testid="required-clearance">
+          {metres(result.required_clearance_m, 2)} required
+        </span>
+      </div>
+      <dl class="figures-list">
+        <Figure label="Smallest height above" value={metres(result.min_vertical_m, 2)} testid="min-vertical" />
+      </dl>
+      <Worst result={result} />
+      <h2>Return and home</h2>
+      <Return result={result} />
+    </section>
+  );
+}

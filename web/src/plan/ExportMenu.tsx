@@ -1,0 +1,128 @@
+import { signal } from "@preact/signals";
+import { ErrorBox } from "../ui/ErrorBox";
+import { Icon, type IconName } from "../ui/Icon";
+import { Menu } from "../ui/Menu";
+import { asErrorDoc, request } from "../net/api";
+import { allSent } from "../store/plan";
+import { computation, isFresh, plan, setError } from "../store/state";
+import { verdictOf } from "../store/results";
+
+const FILES: readonly { file: string; label: string; note: string; icon: IconName }[] = [
+  { file: "all.zip", label: "Everything", note: ".zip", icon: "folder" },
+  { file: "mission.waypoints", label: "Mission", note: ".waypoints", icon: "route" },
+  { file: "mission.plan", label: "QGroundControl plan", note: ".plan", icon: "route" },
+  { file: "trajectory.csv", label: "Trajectory table", note: ".csv", icon: "chart" },
+  { file: "trajectory.kml", label: "Trajectory for maps", note: ".kml", icon: "terrain" },
+  { file: "mission.geojson", label: "Mission for maps", note: ".geojson", icon: "terrain" },
+  { file: "certificate.json", label: "Certificate", note: ".json", icon: "check" },
+];
+
+const busy = signal(false);
+const REPORT = "/api/plan/export/report.html?inline=1";
+
+function fileName(response: Response, fallback: string): string {
+  const header = response.headers.get("Content-Disposition") ?? "";
+  return /filename="?([^";]+)"?/.exec(header)?.[1] ?? fallback;
+}
+
+async function download(file: string): Promise<void> {
+  busy.value = true;
+  setError("export", null);
+  try {
+    await allSent();
+    const response = await request("GET", `/api/plan/export/${file}`);
+    const address = URL.createObjectURL(await response.blob());
+    const anchor = document.createElement("a");
+    anchor.href = address;
+    anchor.download = fileName(response, file);
+    anchor.click();
+    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  } catch (error) {
+    setError("export", asErrorDoc(error));
+  } finally {
+    busy.value = false;
+  }
+}
+
+function openReport(print: boolean): void {
+  const opened = window.open(REPORT, "_blank");
+  if (!opened) {
+    const what = "The browser did not open the report in a new tab.";
+    setError("export", { code: "popup", what, where: "", advice: "Allow pop-ups for this page and try again." });
+  } else if (print) opened.addEventListener("load", () => opened.print());
+}
+
+function Item(props: { label: string; note: string; icon: IconName; testid: string; onClick: () => void }) {
+  return (
+    <button type="button" role="menuitem" class="menu-item" data-testid={props.testid} onClick={props.onClick}>
+      <Icon name={props.icon} />
+      <span>{props.label}</span>
+      <span class="muted">{props.note}</span>
+    </button>
+  );
+}
+
+function Warning() {
+  const kind = verdictOf(plan.value, isFresh.value);
+  if (kind !== "not_certified") return null;
+  return (
+    <p class="menu-warning">
+      <Icon name="warning" /> This plan is NOT CERTIFIED. The files say so.
+    </p>
+  );
+}
+
+/** Why there is nothing to export yet. */
+function obstacle(): string | null {
+  const now = computation.value;
+  if (!now || now.state === "empty") return now?.hint || "Nothing to export yet";
+  if (now.state === "error") return "The plan has an error: see the right panel";
+  return now.state === "running" && !now.result ? "Computing…" : null;
+}
+
+export function ExportMenu() {
+  const why = obstacle();
+  return (
+    <footer class="primary-action">
+      <ErrorBox place="export" />
+      {why && <p class="muted action-hint">{why}</p>}
+      <Menu
+        label="Export"
+        class="export"
+        testid="export-list"
+        trigger={({ open, toggle }) => (
+          <button
+            type="button"
+            class="button primary wide"
+            aria-expanded={open}
+            disabled={why !== null || busy.value}
+            data-testid="export-menu"
+            onClick={toggle}
+          >
+            <Icon name="export" />
+            {busy.value ? "Exporting…" : "Export"}
+            <Icon name={open ? "down" : "up"} size={16} />
+          </button>
+        )}
+      >
+        {(close) => {
+          const then = (go: () => void) => () => {
+            close();
+            go();
+          };
+          return (
+            <>
+              <Warning />
+              {FILES.map(({ file, ...item }) => (
+                <Item key={file} {...item} testid={`export-${file}`} onClick={then(() => void download(file))} />
+              ))}
+              <hr />
+              <Item label="Report" note="new tab" icon="chart" testid="export-report" onClick={then(() => openReport(false))} />
+              <Item label="Print the report" note="" icon="print" testid="export-print" onClick={then(() => openReport(true))} />
+            </>
+          );
+        }}
+      </Menu>
+    </footer>
+  );
+}

@@ -1,0 +1,34 @@
+import { ErrorBox } from "../ui/ErrorBox";
+import { document_ } from "../store/state";
+import { ExportMenu } from "./ExportMenu";
+import { MissionSection } from "./sections/Mission";
+import { PointsSection } from "./sections/Points";
+import { SpeedsSection } from "./sections/Speeds";
+import { SurfaceSection } from "./sections/Surface";
+import { TerrainSection } from "./sections/Terrain";
+import { VehicleSection } from "./sections/Vehicle";
+
+/** What the operator does: from the terrain down to the mission, and the export as the one primary action. */
+export function PlanLeft() {
+  const plan = document_.value;
+  return (
+    <>
+      <div class="panel-scroll">
+        <ErrorBox place="plan" />
+        {plan ? (
+          <>
+            <TerrainSection plan={plan} />
+            <PointsSection plan={plan} />
+            <VehicleSection plan={plan} />
+            <SurfaceSection plan={plan} />
+            <SpeedsSection plan={plan} />
+            <MissionSection plan={plan} />
+          </>
+        ) : (
+          <p class="muted panel-empty">Loading the plan…</p>
+        )}
+      </div>
+      <ExportMenu />
+    </>
+  );
+}

@@ -1,0 +1,143 @@
+import { useEffect, useState } from "preact/hooks";
+import { age, count, duration, length, metres, number, percent } from "../format";
+import type { ResultDoc } from "../messages";
+import { Bar } from "../ui/Bar";
+import { ErrorPanel } from "../ui/ErrorBox";
+import { Icon } from "../ui/Icon";
+import { computation, isFresh, known, result } from "../store/state";
+import { Clearance } from "./Clearance";
+import { verdict, VerdictShape, verdictWord } from "./Verdict";
+
+/** "Computed 12 s ago", counting by itself. */
+function Age() {
+  const [, tick] = useState(0);
+  useEffect(() => {
+    const timer = setInterval(() => tick((n) => n + 1), 1000);
+    return () => clearInterval(timer);
+  }, []);
+  const at_ms = known.value?.at_ms;
+  if (at_ms === undefined) return null;
+  const text = age(Date.now() - at_ms);
+  const ago = text === "now" ? "just now" : `${text} ago`;
+  return <span class="muted">{isFresh.value ? `Computed ${ago}` : `Older figures, ${ago}`}</span>;
+}
+
+function Headline() {
+  const kind = verdict();
+  const hint = computation.value?.state === "empty" ? computation.value.hint : "";
+  return (
+    <div class={`verdict ${kind}`} data-testid="verdict" data-verdict={kind} role="status" aria-live="polite">
+      <VerdictShape kind={kind} size={40} />
+      <div>
+        <strong>{verdictWord(kind)}</strong>
+        <span class="verdict-note">{hint || <Age />}</span>
+      </div>
+    </div>
+  );
+}
+
+function Reasons({ result: { reasons } }: { result: ResultDoc }) {
+  if (reasons.length === 0) return null;
+  return (
+    <ul class="reasons" data-testid="reasons">
+      {reasons.map((reason) => (
+        <li key={reason.code + reason.text} data-code={reason.code}>
+          <Icon name="cross" />
+          <div>
+            <p>{reason.text}</p>
+            {reason.mend && <p class="mend">{reason.mend}</p>}
+          </div>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+const fill = (share: number) => (share > 1 ? "bad" : share > 0.9 ? "near" : "neutral");
+
+function Flight({ result }: { result: ResultDoc }) {
+  const share = result.duration_s / result.endurance_s;
+  const usable = result.usable_endurance_s / result.endurance_s;
+  const items = result.items / result.max_items;
+  return (
+    <section class="facts">
+      <h2>Flight</h2>
+      <dl>
+        <dt>Length</dt>
+        <dd data-testid="length">{length(result.length_m)}</dd>
+        <dt>Duration</dt>
+        <dd data-testid="duration">{duration(result.duration_s)}</dd>
+      </dl>
+      <Bar label="Duration against endurance" share={share} mark={usable} level={fill(result.duration_s / result.usable_endurance_s)} />
+      <p class="bar-note">
+        of {duration(result.usable_endurance_s)} usable · {percent(1 - usable)} reserve
+      </p>
+      <dl>
+        <dt>Mission items</dt>
+        <dd data-testid="items">
+          {number(result.items)} <span class="muted">of {number(result.max_items)}</span>
+        </dd>
+      </dl>
+      <Bar label="Mission items against the vehicle's limit" share={items} level={fill(items)} />
+      <p class="bar-note">
+        {count(result.waypoints, "waypoint")} · {metres(result.excess_height_m)} excess height
+      </p>
+      {result.gsd_min_cm !== null && (
+        <dl>
+          <dt>Ground sampling</dt>
+          <dd data-testid="gsd">
+            {number(result.gsd_min_cm, 2)} to {number(result.gsd_max_cm, 2)} cm
+          </dd>
+        </dl>
+      )}
+    </section>
+  );
+}
+
+function Warnings({ result: { warnings } }: { result: ResultDoc }) {
+  if (warnings.length === 0) return null;
+  return (
+    <section class="facts">
+      <h2>Please note</h2>
+      <ul class="warnings">
+        {warnings.map((warning) => (
+          <li key={warning}>
+            <Icon name="warning" />
+            <span>{warning}</span>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+/** What is true about the plan. Old figures stay in place, greyed, while new ones are computed. */
+export function PlanRight() {
+  const now = computation.value;
+  const shown = result.value;
+  return (
+    <div class="panel-scroll truth">
+      <Headline />
+      {now?.state === "error" && now.error && <ErrorPanel error={now.error} />}
+      {shown ? (
+        <div class={`figures ${isFresh.value ? "" : "stale"}`} aria-busy={!isFresh.value}>
+          <Reasons result={shown} />
+          <Clearance result={shown} />
+          <Flight result={shown} />
+          <Warnings result={shown} />
+        </div>
+      ) : (
+        now?.state !== "error" && <Teaching />
+      )}
+    </div>
+  );
+}
+
+function Teaching() {
+  return (
+    <div class="teaching">
+      <p>The certificate states the smallest distance between the line that will be flown and the surface model.</p>
+      <p>It appears here as soon as there is a terrain and at least two points.</p>
+    </div>
+  );
+}

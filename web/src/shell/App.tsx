@@ -1,0 +1,42 @@
+import { Scene } from "../scene/Scene";
+import { ProfilePane } from "../chart/ProfilePane";
+import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
+import { FileDrop } from "./FileDrop";
+import { HelpSheet } from "./HelpSheet";
+import { StatusBar } from "./StatusBar";
+import { useKeyboard } from "./keyboard";
+import { drawer, openDialog } from "./ui_state";
+import { activeView } from "./views";
+
+export function App() {
+  useKeyboard();
+  const { Left, Right } = activeView.value;
+  const open = drawer.value;
+  return (
+    <div class="app" data-drawer={open ?? "none"}>
+      <StatusBar />
+      <aside class="panel left" aria-label="What I do" data-testid="panel-left">
+        <Left />
+      </aside>
+      <main class="centre">
+        <Scene />
+        <ProfilePane />
+      </main>
+      <aside class="panel right" aria-label="What is true" data-testid="panel-right">
+        <Right />
+      </aside>
+      {open && (
+        <button
+          type="button"
+          class="drawer-veil"
+          aria-label="Close panel"
+          onClick={() => (drawer.value = null)}
+        />
+      )}
+      <FileDrop />
+      {openDialog.value === "help" && <HelpSheet />}
+      {openDialog.value === "plans" && <PlansDialog />}
+      {openDialog.value === "save_as" && <SaveAsDialog />}
+    </div>
+  );
+}

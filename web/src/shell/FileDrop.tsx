@@ -1,0 +1,48 @@
+import { useEffect } from "preact/hooks";
+import { Icon } from "../ui/Icon";
+import { takeFiles } from "../store/files";
+import { dragging } from "./ui_state";
+
+export const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+
+/** Files may be dropped anywhere. While one is dragged a veil covers the page, the 3D view included, and takes
+ * the drop. */
+export function FileDrop() {
+  useEffect(() => {
+    const enter = (event: DragEvent) => {
+      if (!carriesFiles(event)) return;
+      event.preventDefault();
+      dragging.value = true;
+    };
+    window.addEventListener("dragenter", enter);
+    window.addEventListener("dragover", enter);
+    return () => {
+      window.removeEventListener("dragenter", enter);
+      window.removeEventListener("dragover", enter);
+    };
+  }, []);
+  if (!dragging.value) return null;
+  const end = () => (dragging.value = false);
+  const drop = (event: DragEvent) => {
+    event.preventDefault();
+    end();
+    takeFiles(event.dataTransfer?.files ?? []);
+  };
+  return (
+    <div
+      class="drop-veil"
+      data-testid="drop-veil"
+      onDragOver={(event) => event.preventDefault()}
+      onDragLeave={end}
+      onDrop={drop}
+      onClick={end}
+    >
+      <div class="drop-card">
+        <Icon name="import" size={40} />
+        <p class="drop-title">Drop to open</p>
+        <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
+        <p>Points or polygon: CSV, GeoJSON, KML, .waypoints, .plan</p>
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,74 @@
+import { Dialog } from "../ui/Dialog";
+import { productVersion } from "../store/state";
+import { SHORTCUTS } from "./shortcuts";
+import { openDialog } from "./ui_state";
+
+const STEPS = [
+  "Give a surface model: drop a GeoTIFF anywhere, or use the demo.",
+  "Add points: press A and click the surface, or drop a file of points.",
+  "Choose the vehicle, then tune R and H until the verdict on the right says CERTIFIED.",
+  "Export the mission and the report.",
+];
+
+const TERMS = [
+  ["R, H", "The safe surface keeps this far away sideways (R) and this high above (H) from everything."],
+  ["Clearance", "Smallest distance in space between the line that will be flown and the surface model."],
+  ["m above home", "Heights count from the surface model at the home point."],
+];
+
+function Keys({ keys }: { keys: string }) {
+  const parts = keys.split(" ");
+  return (
+    <>{parts.map((part) => (part === "or" || part === "to" ? <i> {part} </i> : <kbd key={part}>{part}</kbd>))}</>
+  );
+}
+
+export function HelpSheet() {
+  return (
+    <Dialog title="Help" testid="help-sheet" onClose={() => (openDialog.value = null)}>
+      <div class="help">
+        <section>
+          <h3>From terrain to mission</h3>
+          <ol>
+            {STEPS.map((step) => (
+              <li key={step}>{step}</li>
+            ))}
+          </ol>
+          <h3>Words</h3>
+          <dl>
+            {TERMS.map(([term, text]) => (
+              <div key={term}>
+                <dt>{term}</dt>
+                <dd>{text}</dd>
+              </div>
+            ))}
+          </dl>
+          <h3>3D view</h3>
+          <p>Drag turns, right-drag moves, the wheel zooms.</p>
+        </section>
+        <section>
+          <h3>Keys</h3>
+          <table>
+            <tbody>
+              {SHORTCUTS.map((shortcut) => (
+                <tr key={shortcut.id}>
+                  <th scope="row">
+                    <Keys keys={shortcut.keys} />
+                  </th>
+                  <td>{shortcut.text}</td>
+                </tr>
+              ))}
+              <tr>
+                <th scope="row">
+                  <Keys keys="Alt ↑ or Alt ↓" />
+                </th>
+                <td>Move the focused point up or down the list</td>
+              </tr>
+            </tbody>
+          </table>
+          <p class="muted">Hedgehop {productVersion.value}</p>
+        </section>
+      </div>
+    </Dialog>
+  );
+}

@@ -1,0 +1,89 @@
+import { signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { clock } from "../format";
+import { Button } from "../ui/Button";
+import { ErrorText } from "../ui/ErrorBox";
+import { Icon } from "../ui/Icon";
+import { Menu } from "../ui/Menu";
+import { notices, type Notice } from "../store/state";
+
+const SHOWN_MS = 7000;
+const lastSeen = signal(0);
+const dismissed = signal(0);
+
+function NoticeIcon({ notice }: { notice: Notice }) {
+  return (
+    <span class={`notice-icon ${notice.level}`}>
+      <Icon name={notice.level === "info" ? "info" : "warning"} />
+    </span>
+  );
+}
+
+/** The latest notices for a moment, at the top of the 3D view, where no control lies beneath. */
+export function Toasts() {
+  const latest = notices.value.filter((notice) => notice.id > dismissed.value).slice(0, 2);
+  const newest = latest[0]?.id ?? 0;
+  const staysOpen = latest.some((notice) => notice.level === "error");
+  useEffect(() => {
+    if (newest === 0 || staysOpen) return undefined;
+    const timer = setTimeout(() => (dismissed.value = newest), SHOWN_MS);
+    return () => clearTimeout(timer);
+  }, [newest, staysOpen]);
+  return (
+    <div class="toasts" role="status" aria-live="polite">
+      {latest.map((notice) => (
+        <div class={`toast ${notice.level}`} key={notice.id} data-testid="toast">
+          <NoticeIcon notice={notice} />
+          <ErrorText error={notice.error} />
+          <Button kind="quiet" icon="cross" title="Dismiss" onClick={() => (dismissed.value = newest)} />
+        </div>
+      ))}
+    </div>
+  );
+}
+
+/** All notices since the page was opened. */
+export function NoticeMenu() {
+  const all = notices.value;
+  const unseen = all.filter((notice) => notice.id > lastSeen.value && notice.level !== "info").length;
+  return (
+    <Menu
+      label="Notices"
+      class="notices"
+      testid="notices-list"
+      trigger={({ open, toggle }) => (
+        <button
+          type="button"
+          class="button quiet bare"
+          aria-expanded={open}
+          aria-label={`Notices, ${unseen} new`}
+          title="Notices"
+          data-testid="notices"
+          onClick={() => {
+            lastSeen.value = all[0]?.id ?? 0;
+            toggle();
+          }}
+        >
+          <Icon name="bell" />
+          {unseen > 0 && <span class="badge-count">{unseen}</span>}
+        </button>
+      )}
+    >
+      {() =>
+        all.length === 0 ? (
+          <p class="muted menu-empty">No notices yet.</p>
+        ) : (
+          <ul>
+            {all.map((notice) => (
+              <li key={notice.id}>
+                <NoticeIcon notice={notice} />
+                <ErrorText error={notice.error} />
+                <time>{clock(new Date(notice.at_ms).toISOString())}</time>
+              </li>
+            ))}
+          </ul>
+        )
+      }
+    </Menu>
+  );
+}

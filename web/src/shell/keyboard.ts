@@ -1,0 +1,86 @@
+import { useEffect } from "preact/hooks";
+import { sectionIsOpen, setSection } from "../ui/Section";
+import { redo, removeSelectedPoi, undo } from "../plan/commands";
+import { takeFiles } from "../store/files";
+import { document_, selection } from "../store/state";
+import { frame, setSelection } from "../store/stream";
+import { drawer, openDialog } from "./ui_state";
+import { shortcutOf, type Hit } from "./shortcuts";
+
+/** The sections of the plan's left panel by their number key. */
+const SECTION_IDS = ["terrain", "points", "vehicle", "surface", "speeds", "mission"];
+
+/** Asks for files of this computer. */
+export function chooseFiles(accept = "", take: (files: File[]) => void = takeFiles): void {
+  const input = document.createElement("input");
+  input.type = "file";
+  input.accept = accept;
+  input.onchange = () => take([...(input.files ?? [])]);
+  input.click();
+}
+
+function toggleSection(number: number): void {
+  const id = SECTION_IDS[number - 1];
+  if (!id) return;
+  const open = !sectionIsOpen(id, id === "terrain" || id === "points");
+  setSection(id, open);
+  const header = document.querySelector<HTMLElement>(`[data-section=${id}] > h2 > button`);
+  header?.focus();
+  header?.scrollIntoView({ block: "nearest" });
+}
+
+function stop(): void {
+  if (drawer.value) drawer.value = null;
+  else setSelection({ tool: "select" });
+}
+
+function act(hit: Hit): void {
+  switch (hit.id) {
+    case "undo":
+      return void undo();
+    case "redo":
+      return void redo();
+    case "save":
+      openDialog.value = "save_as";
+      return;
+    case "open":
+      return chooseFiles();
+    case "add":
+      if (document_.value?.terrain_id) setSelection({ tool: "add_poi" });
+      return;
+    case "select":
+      return stop();
+    case "delete":
+      return removeSelectedPoi(selection.value.poi_id);
+    case "fit":
+      return void frame("plan");
+    case "top":
+      return void frame("top");
+    case "section":
+      return toggleSection(hit.section ?? 0);
+    case "help":
+      openDialog.value = "help";
+  }
+}
+
+function isInput(target: EventTarget | null): boolean {
+  const element = target as HTMLElement | null;
+  return /^(INPUT|TEXTAREA|SELECT)$/.test(element?.tagName ?? "") || Boolean(element?.isContentEditable);
+}
+
+/** Listens on our page, and through the 3D view on its page as well. */
+export function onKey(event: KeyboardEvent): void {
+  if (openDialog.value !== null || event.altKey || event.defaultPrevented) return;
+  const key = { key: event.key, mod: event.ctrlKey || event.metaKey, shift: event.shiftKey };
+  const hit = shortcutOf(key, isInput(event.target));
+  if (!hit) return;
+  event.preventDefault();
+  act(hit);
+}
+
+export function useKeyboard(): void {
+  useEffect(() => {
+    document.addEventListener("keydown", onKey);
+    return () => document.removeEventListener("keydown", onKey);
+  }, []);
+}

@@ -1,0 +1,133 @@
+import { signal } from "@preact/signals";
+import type { Imported, JobDoc } from "../messages";
+import { ApiError, asErrorDoc, request, upload, type Upload } from "../net/api";
+import { allSent, queue, showPlan } from "./plan";
+import { document_, jobs, notifyText, setError, terrain } from "./state";
+
+/** A file on its way to the server, before there is a job for it. */
+export interface Sending {
+  id: number;
+  name: string;
+  share: number;
+  cancel: () => void;
+}
+
+/** What the operator declares about a surface model whose file does not say it. */
+export interface RasterHints {
+  crs: string;
+  z_scale: string;
+  vertical_datum: string;
+  remove_spikes: boolean;
+}
+
+export const NO_HINTS: RasterHints = { crs: "", z_scale: "", vertical_datum: "", remove_spikes: false };
+
+export const sending = signal<Sending[]>([]);
+/** Files by the job that reads them: kept so that a file can be sent again with what was missing. */
+export const sentFiles = signal<ReadonlyMap<string, { file: File; hints: RasterHints }>>(new Map());
+
+const POINT_FILES = /\.(csv|geojson|json|kml|waypoints|plan|txt)$/i;
+const MOST_POINT_BYTES = 20e6;
+let nextId = 1;
+
+async function sendFile(path: string, file: File): Promise<string> {
+  const id = nextId++;
+  const show = (share: number) => {
+    sending.value = sending.value.map((entry) => (entry.id === id ? { ...entry, share } : entry));
+  };
+  const running: Upload = upload(path, file, show);
+  sending.value = [...sending.value, { id, name: file.name, share: 0, cancel: running.cancel }];
+  try {
+    return await running.done;
+  } finally {
+    sending.value = sending.value.filter((entry) => entry.id !== id);
+  }
+}
+
+function report(place: string, error: unknown): void {
+  const cancelled = error instanceof ApiError && error.doc.code === "cancelled";
+  if (!cancelled) setError(place, asErrorDoc(error));
+}
+
+/** Sends a surface model; reading it becomes a job. */
+export async function sendTerrain(file: File, hints: RasterHints = NO_HINTS): Promise<void> {
+  setError("terrain", null);
+  const query = new URLSearchParams({ filename: file.name });
+  if (hints.crs) query.set("crs", hints.crs);
+  if (hints.z_scale) query.set("z_scale", hints.z_scale);
+  if (hints.vertical_datum) query.set("vertical_datum", hints.vertical_datum);
+  if (hints.remove_spikes) query.set("remove_spikes", "true");
+  try {
+    const job = JSON.parse(await sendFile(`/api/terrains?${query}`, file)) as JobDoc;
+    sentFiles.value = new Map(sentFiles.value).set(job.id, { file, hints });
+    addJob(job);
+  } catch (error) {
+    report("terrain", error);
+  }
+}
+
+export async function sendOrthophoto(file: File): Promise<void> {
+  setError("terrain", null);
+  const query = new URLSearchParams({ filename: file.name, terrain_id: terrain.value?.id ?? "" });
+  try {
+    addJob(JSON.parse(await sendFile(`/api/orthophotos?${query}`, file)) as JobDoc);
+  } catch (error) {
+    report("terrain", error);
+  }
+}
+
+/** Points, or the polygon of a survey, from a file. */
+export async function sendPoints(file: File): Promise<void> {
+  setError("points", null);
+  if (file.size > MOST_POINT_BYTES) {
+    const what = `"${file.name}" is larger than 20 MB.`;
+    setError("points", { code: "too_large", what, where: file.name, advice: "Split it or thin it out." });
+    return;
+  }
+  try {
+    await allSent();
+    const path = `/api/plan/import?${new URLSearchParams({ filename: file.name })}`;
+    const imported = JSON.parse(await sendFile(path, file)) as Imported;
+    queue.takeAnswer(imported.state);
+    showPlan();
+    imported.warnings.forEach((warning) => notifyText("warning", warning, `Check ${file.name}.`));
+    const { source, pois, survey } = document_.value ?? imported.state.document;
+    const what = source === "pois" ? `${pois.length} points` : `${survey.polygon.length} corners`;
+    notifyText("info", `${what} read from ${file.name}.`);
+  } catch (error) {
+    report("points", error);
+  }
+}
+
+/** Any dropped file: points by their ending, everything else is tried as a surface model. */
+export function takeFiles(files: Iterable<File>): void {
+  for (const file of files) void (POINT_FILES.test(file.name) ? sendPoints(file) : sendTerrain(file));
+}
+
+export function forgetJob(id: string): void {
+  const [left, files] = [new Map(jobs.value), new Map(sentFiles.value)];
+  left.delete(id);
+  files.delete(id);
+  jobs.value = left;
+  sentFiles.value = files;
+}
+
+function addJob(job: JobDoc): void {
+  if (!jobs.value.has(job.id)) jobs.value = new Map(jobs.value).set(job.id, job);
+}
+
+export async function cancelJob(id: string): Promise<void> {
+  await act("POST", `/api/jobs/${id}/cancel`, "jobs");
+}
+
+/** A request without an answer to keep; its error appears at `place`. */
+export async function act(method: string, path: string, place: string): Promise<boolean> {
+  try {
+    await request(method, path);
+    setError(place, null);
+    return true;
+  } catch (error) {
+    setError(place, asErrorDoc(error));
+    return false;
+  }
+}

@@ -1,0 +1,40 @@
+import { effect, signal, type Signal } from "@preact/signals";
+
+/** A setting of this browser, kept in its local storage. A storage that is full or forbidden is no error: the
+ * setting then lasts as long as the page. */
+function remembered<T>(key: string, initial: T, isValid: (value: unknown) => value is T): Signal<T> {
+  const name = `hedgehop.${key}`;
+  const setting = signal(read(name, initial, isValid));
+  effect(() => {
+    try {
+      localStorage.setItem(name, JSON.stringify(setting.value));
+    } catch {
+      return;
+    }
+  });
+  return setting;
+}
+
+function read<T>(name: string, initial: T, isValid: (value: unknown) => value is T): T {
+  try {
+    const value: unknown = JSON.parse(localStorage.getItem(name) ?? "null");
+    return isValid(value) ? value : initial;
+  } catch {
+    return initial;
+  }
+}
+
+export type Theme = "dark" | "light";
+
+const isTheme = (value: unknown): value is Theme => value === "dark" || value === "light";
+const isHeight = (value: unknown): value is number => typeof value === "number" && value >= 120 && value <= 900;
+const isOpenMap = (value: unknown): value is Record<string, boolean> =>
+  typeof value === "object" && value !== null && !Array.isArray(value);
+
+export const theme = remembered<Theme>("theme", "dark", isTheme);
+export const chartHeight_px = remembered<number>("chartHeight", 216, isHeight);
+export const openSections = remembered<Record<string, boolean>>("sections", {}, isOpenMap);
+
+effect(() => {
+  document.documentElement.dataset["theme"] = theme.value;
+});

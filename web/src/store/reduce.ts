@@ -1,0 +1,44 @@
+import type { ServerMessage } from "../messages";
+import { queue, showPlan } from "./plan";
+import * as state from "./state";
+
+/** Takes one message of the stream into the page's state. */
+export function receive(message: ServerMessage): void {
+  switch (message.type) {
+    case "snapshot":
+      queue.snapshot(message.plan);
+      state.productVersion.value = message.product_version;
+      state.pageId.value = message.page_id;
+      state.library.value = message.library;
+      state.view.value = message.view;
+      state.selection.value = message.selection;
+      state.jobs.value = new Map(message.jobs.map((job) => [job.id, job]));
+      showPlan();
+      return;
+    case "plan":
+      queue.pushed(message.plan);
+      showPlan();
+      return;
+    case "library":
+      state.library.value = message.library;
+      return;
+    case "view":
+      state.view.value = message.view;
+      return;
+    case "selection":
+      state.selection.value = message.selection;
+      return;
+    case "job":
+      state.jobs.value = new Map(state.jobs.value).set(message.job.id, message.job);
+      return;
+    case "cursor":
+      state.cursor.value = message;
+      return;
+    case "notice":
+      state.notify(message.level, message.error);
+      return;
+    default:
+      message satisfies never;
+      state.notifyText("warning", "The server sent a message this page does not know.", "Reload the page.");
+  }
+}

@@ -1,0 +1,83 @@
+import { computed, signal } from "@preact/signals";
+import type {
+  CursorMessage,
+  ErrorDoc,
+  JobDoc,
+  LibraryState,
+  PlanDoc,
+  PlanState,
+  SelectionDoc,
+  TerrainDoc,
+  ViewDoc,
+} from "../messages";
+import type { LinkState } from "../net/socket";
+import { rememberResult, type KnownResult } from "./results";
+
+export interface Notice {
+  id: number;
+  level: "info" | "warning" | "error";
+  error: ErrorDoc;
+  at_ms: number;
+}
+
+/** What the server last said about the plan, and the document as this page shows it. */
+export const plan = signal<PlanState | null>(null);
+export const document_ = signal<PlanDoc | null>(null);
+export const saving = signal(false);
+export const library = signal<LibraryState>({ terrains: [], orthophotos: [], plans: [], profiles: [] });
+export const view = signal<ViewDoc>({
+  shading: "height",
+  show_surface: true,
+  show_path: true,
+  show_unknown: true,
+  vertical_exaggeration: 1,
+  legend_min_m: null,
+  legend_max_m: null,
+});
+export const selection = signal<SelectionDoc>({ tool: "select", poi_id: null });
+export const jobs = signal<ReadonlyMap<string, JobDoc>>(new Map());
+export const cursor = signal<CursorMessage | null>(null);
+export const link = signal<LinkState>("connecting");
+export const pageId = signal<string | null>(null);
+export const productVersion = signal("");
+export const notices = signal<Notice[]>([]);
+/** Errors by the part of the page where they happened. */
+export const errors = signal<Readonly<Record<string, ErrorDoc>>>({});
+export const known = signal<KnownResult | null>(null);
+
+export const computation = computed(() => plan.value?.computation ?? null);
+export const result = computed(() => known.value?.result ?? null);
+/** Whether the figures on the page belong to the document on the page. */
+export const isFresh = computed(() => {
+  const now = computation.value;
+  return now?.state === "ready" && now.revision === plan.value?.revision && !saving.value;
+});
+export const terrain = computed<TerrainDoc | null>(() => {
+  const id = document_.value?.terrain_id;
+  return library.value.terrains.find((entry) => entry.id === id) ?? null;
+});
+export const runningJobs = computed(() => [...jobs.value.values()].filter((job) => job.state === "running"));
+
+export function setPlan(state: PlanState | null, shown: PlanDoc | null, dirty: boolean): void {
+  plan.value = state;
+  document_.value = shown;
+  saving.value = dirty;
+  if (state) known.value = rememberResult(known.value, state, Date.now());
+}
+
+export function setError(place: string, error: ErrorDoc | null): void {
+  const { [place]: _, ...others } = errors.value;
+  errors.value = error ? { ...others, [place]: error } : others;
+}
+
+let nextNotice = 1;
+const MOST_NOTICES = 100;
+
+export function notify(level: Notice["level"], error: ErrorDoc): void {
+  const notice = { id: nextNotice++, level, error, at_ms: Date.now() };
+  notices.value = [notice, ...notices.value].slice(0, MOST_NOTICES);
+}
+
+export function notifyText(level: Notice["level"], what: string, advice = ""): void {
+  notify(level, { code: "page", what, where: "", advice });
+}

@@ -1,0 +1,33 @@
+import type { ClientMessage, SelectionDoc, ViewDoc } from "../messages";
+import { goToSignIn } from "../net/api";
+import { Stream, streamUrl } from "../net/socket";
+import { receive } from "./reduce";
+import { cursor, link, notifyText, selection, view } from "./state";
+
+const stream = new Stream(streamUrl(location), {
+  message: receive,
+  link: (state) => {
+    link.value = state;
+    if (state === "lost") cursor.value = null;
+  },
+  signIn: goToSignIn,
+  unreadable: (why) => notifyText("error", `The server sent ${why}.`, "Reload the page."),
+});
+
+export const connect = () => stream.connect();
+
+export const send = (message: ClientMessage) => stream.send(message);
+
+export function setView(fields: Partial<ViewDoc>): void {
+  view.value = { ...view.value, ...fields };
+  send({ type: "set_view", view: view.value });
+}
+
+export function setSelection(fields: Partial<SelectionDoc>): void {
+  selection.value = { ...selection.value, ...fields };
+  send({ type: "set_selection", selection: selection.value });
+}
+
+export type FrameTarget = "terrain" | "plan" | "top" | "worst" | "poi";
+
+export const frame = (target: FrameTarget) => send({ type: "frame_view", target });

@@ -1,0 +1,35 @@
+import type { ComponentChildren } from "preact";
+import { useEffect, useId, useRef } from "preact/hooks";
+import { Button } from "./Button";
+
+interface Props {
+  title: string;
+  testid: string;
+  onClose: () => void;
+  children: ComponentChildren;
+}
+
+/** A modal dialog: the browser keeps the focus inside, and Esc closes it. */
+export function Dialog({ title, testid, onClose, children }: Props) {
+  const id = useId();
+  const ref = useRef<HTMLDialogElement>(null);
+  useEffect(() => {
+    const dialog = ref.current;
+    if (dialog && !dialog.open) dialog.showModal();
+    return () => dialog?.close();
+  }, []);
+  const onBackdrop = (event: MouseEvent) => {
+    if (event.target === ref.current) onClose();
+  };
+  return (
+    <dialog ref={ref} aria-labelledby={id} data-testid={testid} onClose={onClose} onMouseDown={onBackdrop}>
+      <div class="dialog-body">
+        <header>
+          <h2 id={id}>{title}</h2>
+          <Button kind="quiet" icon="cross" title="Close" onClick={onClose} />
+        </header>
+        {children}
+      </div>
+    </dialog>
+  );
+}

@@ -1,0 +1,49 @@
+import type { ComponentChildren } from "preact";
+import { errors } from "../store/state";
+import { openSections } from "../store/prefs";
+import { ErrorBox } from "./ErrorBox";
+import { Icon, type IconName } from "./Icon";
+
+interface Props {
+  id: string;
+  title: string;
+  icon: IconName;
+  /** What the section holds, in a few words, read while it is closed. */
+  summary?: string;
+  startsOpen?: boolean;
+  children: ComponentChildren;
+}
+
+export const sectionIsOpen = (id: string, startsOpen: boolean) => openSections.value[id] ?? startsOpen;
+
+export function setSection(id: string, open: boolean): void {
+  openSections.value = { ...openSections.value, [id]: open };
+}
+
+/** A collapsible part of the left panel; errors of its edits appear at its top, and open it. */
+export function Section({ id, title, icon, summary, startsOpen = false, children }: Props) {
+  const open = sectionIsOpen(id, startsOpen) || errors.value[id] !== undefined;
+  return (
+    <section class={`section ${open ? "open" : ""}`} data-section={id} data-testid={`section-${id}`}>
+      <h2>
+        <button
+          type="button"
+          aria-expanded={open}
+          aria-controls={`section-${id}`}
+          onClick={() => setSection(id, !open)}
+        >
+          <Icon name={icon} />
+          <span class="title">{title}</span>
+          {summary && <span class="summary">{summary}</span>}
+          <Icon name="down" size={16} />
+        </button>
+      </h2>
+      {open && (
+        <div class="section-body" id={`section-${id}`}>
+          <ErrorBox place={id} />
+          {children}
+        </div>
+      )}
+    </section>
+  );
+}
