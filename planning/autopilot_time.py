@@ -9,7 +9,7 @@ import numpy as np
 from planning.corner_speeds import corner_leg_times
 from planning.dsm import Dsm
 from planning.errors import MissionError
-from planning.model import F64, Mission, VehicleProfile
+from planning.model import F64, Home, Mission, MissionItem, VehicleProfile
 from planning.scurve import Axes, leg, overlap_s
 
 TAKEOFF, WAYPOINT, LAND, RTL, CHANGE_SPEED = 22, 16, 21, 20, 178
@@ -71,7 +71,7 @@ def predict_duration(
     axes = _axes(profile)
     times = _ardupilot_legs if mission.firmware == "ardupilot" else corner_leg_times
     reached_s = times(flight.points_m, flight.hold_s, flight.speed_m_s, axes, waypoint_radius_m)
-    takeoff_s = _rest_to_rest(np.array([0.0, 0.0, flight.takeoff_m[2]]), axes)
+    takeoff_s = _rest_to_rest(flight.takeoff_m, axes)
     takeoff_s += _rest_to_rest(flight.points_m[0] - flight.takeoff_m, axes) + float(flight.hold_s[0])
     last = flight.transit_from
     return_s = float(reached_s[-1] - reached_s[last]) + _way_home(flight, profile, axes)
@@ -105,21 +105,14 @@ def _read(mission: Mission, profile: VehicleProfile, dsm: Dsm) -> _Flight:
     for item in mission.items:
         if item.command == CHANGE_SPEED and item.params[1] > 0:
             speed_m_s = item.params[1]
-        if item.command not in (TAKEOFF, WAYPOINT, LAND):
-            continue
-        if item.frame not in FRAME_AMSL + FRAME_RELATIVE:
-            raise MissionError(
-                f"The duration of a mission with positions in frame {item.frame} cannot be predicted.",
-                advice="Use heights relative to home.",
-            )
-        alt_m = item.alt_m - (mission.home.alt_dsm_m if item.frame in FRAME_AMSL else 0.0)
-        if item.command == TAKEOFF:
-            takeoff_m = np.array([0.0, 0.0, alt_m])
+        elif item.command == TAKEOFF:
+            takeoff_m = np.array([0.0, 0.0, _above_home(item, mission.home)])
         elif item.command == WAYPOINT:
-            xy = dsm.xy_from_lat_lon(np.array([[item.lat_deg, item.lon_deg]]))[0] - home_xy
-            rows.append((*xy, alt_m, max(0.0, np.nan_to_num(item.params[0]))))
+            hold_s = item.params[0] if item.params[0] > 0 else 0.0
+            rows.append((item.lat_deg, item.lon_deg, _above_home(item, mission.home), hold_s))
             speeds.append(speed_m_s)
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    table[:, :2] = dsm.xy_from_lat_lon(table[:, :2]) - home_xy
     if not len(table) or not np.isfinite(table).all():
         raise MissionError("The mission has no waypoint whose time could be predicted.", advice="Add waypoints.")
     return _Flight(
@@ -130,6 +123,15 @@ def _read(mission: Mission, profile: VehicleProfile, dsm: Dsm) -> _Flight:
         transit_from=_last_before_return(table, mission),
         lands_by_rtl=mission.items[-1].command == RTL,
     )
+
+
+def _above_home(item: MissionItem, home: Home) -> float:
+    if item.frame not in FRAME_AMSL + FRAME_RELATIVE:
+        raise MissionError(
+            f"The duration of a mission with positions in frame {item.frame} cannot be predicted.",
+            advice="Use heights relative to home.",
+        )
+    return item.alt_m - (home.alt_dsm_m if item.frame in FRAME_AMSL else 0.0)
 
 
 def _last_before_return(table: F64, mission: Mission) -> int:
@@ -144,8 +146,10 @@ def _last_before_return(table: F64, mission: Mission) -> int:
 def _ardupilot_legs(points_m: F64, hold_s: F64, speed_m_s: F64, axes: Axes, radius_m: float) -> F64:
     """Seconds (K,) from the first waypoint's departure to each waypoint reached and its hold over."""
     deltas = np.diff(points_m, axis=0)
-    moving = np.linalg.norm(deltas, axis=1) > 1e-6
-    legs = [leg(d, replace(axes, speed_m_s=v)) if m else None for d, v, m in zip(deltas, speed_m_s, moving, strict=True)]
+    legs = [
+        leg(delta, replace(axes, speed_m_s=speed)) if np.any(np.abs(delta) > 1e-6) else None
+        for delta, speed in zip(deltas, speed_m_s.tolist(), strict=True)
+    ]
     reached, start_s = [0.0], 0.0
     for i, this in enumerate(legs):
         end_s = start_s + (this.duration_s if this else 0.0)
@@ -165,7 +169,7 @@ def _rest_to_rest(delta_m: F64, axes: Axes) -> float:
 
 def _way_home(flight: _Flight, profile: VehicleProfile, axes: Axes) -> float:
     """Climb to the return height, straight home, a wait, down, and slowly for the last ten metres."""
-    x, y, alt_m = flight.points_m[-1]
+    x, y, alt_m = flight.points_m[-1].tolist()
     if not flight.lands_by_rtl:
         return _rest_to_rest(np.array([x, y, 0.0]), axes) + _descent(alt_m, axes)
     # A vehicle above its return height keeps its own.

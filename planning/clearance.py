@@ -8,14 +8,14 @@ the model are columns of infinite height; the line is straight between its point
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pyproj import Proj
 
 import planning
+from planning.certificate.as_json import certificate_json
 from planning.certificate.columns import FREE_RISE_M, FREE_SLOPE, column_obstacle
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
@@ -30,6 +30,7 @@ from planning.certificate.reasons import (
     unjudged_reasons,
 )
 from planning.certificate.returns import return_altitude
+from planning.certificate.threads import threads_for
 from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
 from planning.model import (
@@ -39,14 +40,16 @@ from planning.model import (
     LegClearance,
     Reason,
     WorstPoint,
-    finite_or_none,
 )
+
+__all__ = ["certificate_json", "certify"]
 
 F64 = NDArray[np.float64]
 
-WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")
 RETURN_STEP_M = 0.5
 """Ways home are judged from places at most this far apart, and from every vertex."""
+LONGEST_LINE_M = 100_000.0
+"""Farther than any battery: a longer line is a mistaken coordinate."""
 SCALE_TOLERANCE = 0.01
 """Largest deviation of the CRS's metre from the true one."""
 
@@ -66,6 +69,12 @@ def certify(
     a line with a point that is not finite.
     """
     _check(line, params, trend_step_m)
+    with threads_for(dsm.elevation_m.size):
+        certificate = _judged(dsm, line, params, trend_step_m)
+    return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))
+
+
+def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Certificate:
     pyramid = max_pyramid(dsm.elevation_m, dsm.resolution_m)
     points_m = _from_corner(line.points_m, dsm)
     start_m, end_m = points_m[:-1], points_m[1:]
@@ -79,9 +88,11 @@ def certify(
     home_obstacle, landing_obstacle = _columns(dsm, line, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
+    too_near = not float(distance_m.min()) >= params.required_clearance_m
+    worst_is_unknown = too_near and _is_unknown_near(pyramid, dsm, worst, distance_m)
     found = [
         *unjudged_reasons(line),
-        *line_reasons(legs, worst, params, worst_is_unknown=_is_unknown_near(pyramid, dsm, worst, distance_m)),
+        *line_reasons(legs, worst, params, worst_is_unknown=worst_is_unknown),
         return_reason(needed_m, needed_from, dsm, params),
         *column_reasons(home_obstacle, landing_obstacle),
         height_reason(float(highest_m[highest_leg]), highest_leg, int(line.leg_item[highest_leg]), params),
@@ -101,39 +112,8 @@ def certify(
         reasons=reasons,
         trend_s_m=trend_s_m,
         trend_distance_m=trend_m,
-        assumptions=_assumptions(dsm, line, params, scale) | (assumptions or {}),
+        assumptions=_assumptions(dsm, line, params, scale),
     )
-
-
-def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """The certificate as plain JSON values; infinite and undefined numbers become null."""
-    plain = {
-        "certified": certificate.certified,
-        "min_distance_m": certificate.min_distance_m,
-        "min_vertical_m": certificate.min_vertical_m,
-        "required_clearance_m": certificate.required_clearance_m,
-        "worst": {key: getattr(certificate.worst, key) for key in WORST_KEYS},
-        "rtl_height_needed_m": certificate.rtl_height_needed_m,
-        "home_column_clear": certificate.home_column_clear,
-        "max_height_above_ground_m": certificate.max_height_above_ground_m,
-        "reasons": [asdict(reason) for reason in certificate.reasons],
-        "legs": [asdict(leg) for leg in certificate.legs],
-        "trend": {"s_m": certificate.trend_s_m, "distance_m": certificate.trend_distance_m},
-        "assumptions": certificate.assumptions,
-    }
-    return {key: _jsonable(value) for key, value in plain.items()}
-
-
-def _jsonable(value: object) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _jsonable(inner) for key, inner in value.items()}
-    if isinstance(value, np.ndarray):
-        return _jsonable(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_jsonable(inner) for inner in value]
-    if isinstance(value, np.generic):
-        return _jsonable(value.item())
-    return finite_or_none(value) if isinstance(value, float) else value
 
 
 def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> None:
@@ -152,13 +132,17 @@ def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Non
     flown = np.append(line.points_m.ravel(), [*line.home_xy_m, line.home_alt_dsm_m])
     if len(line.points_m) < 2 or not np.isfinite(flown).all():
         raise MissionError("A flown line needs two points or more, all of them finite numbers, and a home.")
+    length_m = float(np.linalg.norm(np.diff(line.points_m, axis=0), axis=1).sum())
+    if length_m > LONGEST_LINE_M:
+        raise MissionError(
+            f"The line is {length_m / 1000:.0f} km long; at most {LONGEST_LINE_M / 1000:.0f} km are judged.",
+            advice="Check that the mission belongs to this surface model.",
+        )
 
 
 def _from_corner(points_m: F64, dsm: Dsm) -> F64:
     """Projected (K, 3) points -> metres east and SOUTH of the model's north-west corner, altitude as it is."""
-    return np.column_stack(
-        [points_m[:, 0] - dsm.transform.c, dsm.transform.f - points_m[:, 1], points_m[:, 2]]
-    )
+    return np.column_stack([points_m[:, 0] - dsm.transform.c, dsm.transform.f - points_m[:, 1], points_m[:, 2]])
 
 
 def _legs(line: FlownLine, distance_m: F64, share: F64, lowest_m: F64) -> tuple[LegClearance, ...]:

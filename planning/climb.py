@@ -46,5 +46,5 @@ def speed_caps(s_m: F64, alt_m: F64, params: PathParams) -> F64:
     """Largest horizontal speed (N - 1,) on each step at which the vertical speeds hold."""
     rise_m, step_m = np.diff(alt_m), np.diff(s_m)
     vertical_m_s = np.where(rise_m > 0, params.max_climb_m_s, params.max_descent_m_s)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.minimum(params.max_speed_m_s, vertical_m_s * step_m / np.abs(rise_m))

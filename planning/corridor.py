@@ -13,8 +13,8 @@ HEIGHT_UNIT_M = 0.01
 """Autopilots keep whole centimetres (measured on ArduCopter, which truncates)."""
 LATERAL_ROUNDING_M = 0.008
 """Half of 1e-7 degree in latitude and in longitude together: how far rounding moves a waypoint."""
-BENDS_PER_LEG = 40
-LEVELS = 20
+BENDS_PER_LEG = 32
+LEVELS = 16
 SLACK = 1e-9
 
 
@@ -90,7 +90,7 @@ def _levels(band: Corridor, lowest_m: F64, middle_m: F64, sample: I64) -> F64:
     first = np.floor((lowest_m - band.grid_origin_m) / step_m + SLACK) + 1
     common = band.grid_origin_m + (first[:, None] + np.arange(LEVELS)) * step_m
     common[common > band.top_m[sample, None] + SLACK] = np.inf
-    return np.sort(np.column_stack([lowest_m, middle_m, common]), axis=1)
+    return np.sort(np.column_stack([lowest_m, middle_m, common]).astype(np.float64), axis=1)
 
 
 @njit(cache=True, nogil=True)

@@ -45,7 +45,8 @@ def demo_dsm(seed: int = 7) -> Dsm:
     """The scene: 1000 x 1000 cells of 0.5 m, UTM zone 33N, heights above the EGM2008 geoid."""
     random = np.random.default_rng(seed)
     metres = (np.arange(_SIZE_PX) + 0.5) * _RESOLUTION_M
-    east, north = np.meshgrid(metres, metres[::-1])
+    east: F64 = np.tile(metres, (_SIZE_PX, 1)).astype(np.float64)
+    north: F64 = np.tile(metres[::-1, None], (1, _SIZE_PX)).astype(np.float64)
     surface = _hillside(east, north, random)
     surface += _lava(east, north, random) + _gullies(east, north)
     _build_ruin(surface, east, north, random)

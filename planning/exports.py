@@ -6,11 +6,14 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from planning.camera import gsd_cm
 from planning.clearance import certificate_json
 from planning.dsm import Dsm
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
-from planning.plan import Plan
-from planning.report import ReportInput, render_report
+from planning.plan import Plan, effective_profile, plan_trade
+from planning.report import ReportInput, TradeRow, render_report
 from planning.summary import plan_summary
 
 FILES = (
@@ -27,9 +30,7 @@ FILES = (
 def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: str, seconds: dict[str, float]) -> str:
     """One of ``FILES`` as text; ``source`` is the surface model as read."""
     writers: dict[str, Callable[[], str]] = {
-        "trajectory.csv": lambda: trajectory_csv.write_trajectory(
-            plan.path, plan.timing, plan.mission.home, plan.dsm
-        ),
+        "trajectory.csv": lambda: trajectory_csv.write_trajectory(plan.path, plan.timing, plan.mission.home, plan.dsm),
         "trajectory.kml": lambda: kml.write_kml(plan.path, plan.mission, plan.dsm, title=title),
         "mission.waypoints": lambda: wpl.write_wpl(plan.mission),
         "mission.plan": lambda: qgc_plan.write_plan(plan.mission),
@@ -48,7 +49,34 @@ def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: 
 
 def report_input(plan: Plan, *, title: str, created_utc: str, seconds: dict[str, float]) -> ReportInput:
     """What the HTML report shows."""
-    raise NotImplementedError
+    request, camera = plan.request, plan.request.profile.camera
+    above_m = plan.path.alt_dsm_m - plan.path.ground_alt_dsm_m
+    return ReportInput(
+        title=title,
+        dsm=plan.dsm,
+        path=plan.path,
+        timing=plan.timing,
+        mission=plan.mission,
+        line=plan.line,
+        certificate=plan.certificate,
+        profile=effective_profile(request.profile, request.path),
+        surface=request.surface,
+        predicted_duration_s=plan.predicted.total_s,
+        max_items=request.mission.max_items,
+        created_utc=created_utc,
+        gsd_cm=None if camera is None else gsd_cm(camera, float(np.nanmax(above_m))),
+        trade=[
+            TradeRow(
+                waypoints=choice.waypoints,
+                excess_height_m=choice.excess_height_m,
+                duration_s=choice.duration_s,
+                chosen=choice.excess_height_m == request.mission.excess_height_m,
+            )
+            for choice in plan_trade(plan)
+        ],
+        warnings=plan.warnings,
+        seconds=seconds,
+    )
 
 
 def _plain(summary: dict[str, Any]) -> dict[str, Any]:

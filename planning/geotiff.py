@@ -18,7 +18,7 @@ from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
 
 from planning.dsm import Dsm
-from planning.errors import ParameterError
+from planning.errors import ParameterError, RasterError
 from planning.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
 from planning.rasters import georef, sandbox
 from planning.rasters.assemble import ReadReport, assemble
@@ -120,7 +120,6 @@ def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
     target = Path(path)
     with sandbox.private_directory() as directory:
         heights, written = directory / token_hex(8), target.parent / f".{token_hex(8)}.tif"
-        np.ascontiguousarray(dsm.elevation_m).tofile(heights)
         job = {
             "job": "write_grid",
             "source": str(heights),
@@ -131,8 +130,11 @@ def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
             "vertical_datum": dsm.vertical_datum,
         }
         try:
+            np.ascontiguousarray(dsm.elevation_m).tofile(heights)
             sandbox.run_job(job, directory=directory, limits=_write_limits(dsm), where=target.name)
             written.replace(target)
+        except OSError as error:
+            raise RasterError(f"The surface model cannot be written: {error.strerror}.", where=str(target)) from error
         finally:
             written.unlink(missing_ok=True)
 

@@ -85,9 +85,9 @@ def lspb(length_m: float, params: PathParams) -> Lspb:
 def check_speeds(params: PathParams) -> None:
     """Raise ``ParameterError`` unless ``v_mean < v_max <= 2 v_mean`` and the acceleration is positive."""
     mean, top, accel = params.mean_speed_m_s, params.max_speed_m_s, params.max_accel_m_s2
-    for name, value, unit in (("mean speed", mean, "m/s"), ("maximum speed", top, "m/s"), ("acceleration", accel, "m/s²")):
+    for name, value in (("mean speed", mean), ("maximum speed", top), ("acceleration limit", accel)):
         if not (math.isfinite(value) and value > 0):
-            raise ParameterError(f"The {name} is {value} {unit}.", advice="Give a positive number.")
+            raise ParameterError(f"The {name} is {value}.", advice="Give a positive number.")
     if not mean < top <= 2 * mean:
         raise ParameterError(
             f"A mean speed of {mean:g} m/s and a maximum speed of {top:g} m/s contradict each other:"

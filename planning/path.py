@@ -73,7 +73,7 @@ def sample_segments(vertices_xy_m: F64, step_m: float) -> tuple[F64, F64, I64]:
 def _steps(length_m: float, step_m: float) -> F64:
     """Distances from a segment's start, its end left out; no step much shorter than the rounding of metres."""
     count = max(1, int(np.ceil(length_m / step_m - 1e-6)))
-    return np.arange(count) * step_m
+    return np.arange(count, dtype=np.float64) * step_m
 
 
 def _refuse_short(lengths_m: F64) -> None:

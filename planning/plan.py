@@ -20,11 +20,13 @@ from planning.errors import MissionError
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
 from planning.holes import fill_holes
-from planning.mission import BuiltMission, build_mission, home_from_dsm
+from planning.home import home_from_dsm
+from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import (
     Certificate,
     FlownLine,
     Mission,
+    MissionParams,
     PathParams,
     SampledPath,
     Surfaces,
@@ -81,9 +83,7 @@ def plan_mission(dsm: Dsm, request: PlanRequest, *, report: Progress = lambda st
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
     surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
     report(PATH_STEP, 0.5)
-    path = sampled_path(
-        filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path
-    )
+    path = sampled_path(filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path)
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
     built = _mission(filled, request, profile, path)
@@ -101,7 +101,7 @@ def plan_mission(dsm: Dsm, request: PlanRequest, *, report: Progress = lambda st
         line=line,
         certificate=certificate,
         predicted=predicted,
-        warnings=(*built.warnings, *_warnings(request, certificate, predicted)),
+        warnings=(*built.warnings, *_warnings(request, predicted)),
     )
 
 
@@ -135,6 +135,14 @@ def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfi
     )
 
 
+def plan_trade(plan: Plan) -> list[Choice]:
+    """Waypoints and flight time for a ladder of excess heights over the same path."""
+    request = plan.request
+    profile = effective_profile(request.profile, request.path)
+    params = replace(request.mission, end="rtl")
+    return decimation_trade(plan.path, plan.mission.home, params, profile, plan.dsm, request.pois)
+
+
 def _vertices(dsm: Dsm, request: PlanRequest) -> tuple[np.ndarray, tuple[int | None, ...]]:
     lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in request.pois])
     xy_m = dsm.xy_from_lat_lon(lat_lon)
@@ -156,15 +164,14 @@ def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: Samp
     """Items of the mission; a landing at home first learns how high the way back must be."""
     home = home_from_dsm(dsm, request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg))
 
-    def build(params):
-        return build_mission(path, home, params, profile, dsm, request.pois)
+    def build(params: MissionParams, needed_m: float | None = None) -> BuiltMission:
+        return build_mission(path, home, params, profile, dsm, request.pois, rtl_height_needed_m=needed_m)
 
     if request.mission.end == "rtl" or request.mission.land_transit_height_m is not None:
         return build(request.mission)
-    scout = build(replace(request.mission, end="rtl"))
-    needed = certify(dsm, flown_line(scout.mission, dsm), request.clearance()).rtl_height_needed_m
-    transit = max(needed, profile.rtl_height_m) if math.isfinite(needed) else profile.rtl_height_m
-    return build(replace(request.mission, land_transit_height_m=math.ceil(transit)))
+    scout = build(replace(request.mission, end="rtl")).mission
+    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance()).rtl_height_needed_m
+    return build(request.mission, needed_m if math.isfinite(needed_m) else profile.rtl_height_m)
 
 
 def _assumptions(request: PlanRequest, surfaces: Surfaces) -> dict[str, object]:
@@ -180,7 +187,7 @@ def _assumptions(request: PlanRequest, surfaces: Surfaces) -> dict[str, object]:
     }
 
 
-def _warnings(request: PlanRequest, certificate: Certificate, predicted: PredictedTime) -> list[str]:
+def _warnings(request: PlanRequest, predicted: PredictedTime) -> list[str]:
     usable_s = request.profile.endurance_s * (1 - request.profile.reserve_share)
     warnings = []
     if predicted.total_s > usable_s:

@@ -10,6 +10,9 @@ import numpy as np
 from planning.dsm import Dsm
 from planning.errors import PoiError
 from planning.model import F64, Poi
+from planning.visiting_order import shortest_order
+
+__all__ = ["check_pois", "shortest_order"]
 
 MIN_APART_M = 0.1
 
@@ -80,5 +83,5 @@ def _too_close(pois: Sequence[Poi], xy_m: F64) -> list[str]:
     apart_m = np.hypot(*np.diff(xy_m, axis=0).T) if len(xy_m) > 1 else np.empty(0)
     return [
         f"{_label(i, pois[i])} and {_label(i + 1, pois[i + 1])} are {apart_m[i]:.2f} m apart: delete one of them."
-        for i in np.flatnonzero(apart_m < MIN_APART_M)
+        for i in np.flatnonzero(apart_m < MIN_APART_M).tolist()
     ]

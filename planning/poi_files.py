@@ -52,7 +52,7 @@ def warn_swapped(pois: Sequence[Poi | MissionItem], dsm: Dsm) -> tuple[str, ...]
     """A warning when the places miss the surface model but would lie on it with latitude and longitude exchanged."""
     if not looks_swapped(pois, dsm):
         return ()
-    first = pois[0]
+    first = next(p for p in pois if p.lat_deg or p.lon_deg)
     return (
         f"Latitude and longitude look swapped: {first.lat_deg:.5f}, {first.lon_deg:.5f} lies outside the surface "
         f"model, {first.lon_deg:.5f}, {first.lat_deg:.5f} on it. Exchange the two columns.",

@@ -89,8 +89,8 @@ def _walk(
     in_row, out_row = _slab(start[1], step[1], rows)
     t, t_end = max(0.0, in_col, in_row), min(out_col, out_row)
     if t < t_end and t <= t_floor:
-        col = min(max(int(math.floor(start[0] + t * step[0])), 0), cols - 1)
-        row = min(max(int(math.floor(start[1] + t * step[1])), 0), rows - 1)
+        col = min(max(math.floor(start[0] + t * step[0]), 0), cols - 1)
+        row = min(max(math.floor(start[1] + t * step[1]), 0), rows - 1)
         while 0 <= row < rows and 0 <= col < cols:
             t_col, t_row = _border(start[0], step[0], col), _border(start[1], step[1], row)
             leave = min(t_col, t_row, t_end)

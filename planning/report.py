@@ -28,7 +28,7 @@ from planning.model import (
     Timing,
     VehicleProfile,
 )
-from planning.report_words import COMMAND_NAMES, assumption_rows, duration, metres
+from planning.report_words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up
 
 TIGHTEST_LEGS = 8
 
@@ -112,7 +112,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"metres": metres, "duration": duration}
+    environment.filters |= {"metres": metres, "metres_up": metres_up, "duration": duration}
     return environment
 
 
@@ -125,19 +125,19 @@ def _tiles(plan: ReportInput) -> list[tuple[str, str, str, bool]]:
         (
             "Smallest distance",
             metres(certificate.min_distance_m),
-            f"required {metres(need)}",
+            f"required {metres_up(need)}",
             certificate.min_distance_m < need,
         ),
         (
-            "Smallest height above",
+            "Height above",
             metres(certificate.min_vertical_m),
             "straight down",
             certificate.min_vertical_m < need,
         ),
         (
-            "Return height needed",
-            metres(rtl_m, 1),
-            f"set {metres(profile.rtl_height_m, 1)}",
+            "Return height",
+            metres_up(rtl_m, 1),
+            f"set to {metres(profile.rtl_height_m, 1)}",
             rtl_m > profile.rtl_height_m,
         ),
         ("Length", metres(float(plan.path.s_m[-1]), 0), f"{len(plan.path.s_m)} samples", False),
@@ -161,18 +161,18 @@ def _certificate_rows(plan: ReportInput) -> list[tuple[str, str, bool | None]]:
     return [
         (
             "Distance to the surface model along the whole flown line",
-            f"at least {metres(c.min_distance_m)}, required {metres(c.required_clearance_m)}",
+            f"at least {metres(c.min_distance_m)}, required {metres_up(c.required_clearance_m)}",
             c.min_distance_m >= c.required_clearance_m,
         ),
         ("Height above the cell below", f"at least {metres(c.min_vertical_m)}", None),
         ("Worst point", place if math.isfinite(c.worst.lat_deg) else "unknown", None),
         (
             "Straight return from every sample",
-            f"needs {metres(c.rtl_height_needed_m, 1)} above home, the autopilot is set to {metres(rtl_set_m, 1)}",
+            f"needs {metres_up(c.rtl_height_needed_m, 1)} above home, the autopilot is set to {metres(rtl_set_m, 1)}",
             c.rtl_height_needed_m <= rtl_set_m,
         ),
         ("Take-off and landing column over home", "clear" if c.home_column_clear else "blocked", c.home_column_clear),
-        ("Greatest height above ground", metres(c.max_height_above_ground_m, 1), None),
+        ("Greatest height above ground", metres_up(c.max_height_above_ground_m, 1), None),
     ]
 
 
@@ -188,7 +188,7 @@ def _mission_rows(plan: ReportInput) -> list[tuple[str, str]]:
         ("Home", f"{home.lat_deg:.7f}°, {home.lon_deg:.7f}°"),
         ("Home altitude", home_altitude_note(home).removeprefix("home altitude ")),
         ("Vehicle", f"{clean_name(plan.profile.name)}, {plan.profile.firmware}"),
-        ("Items", ", ".join(f"{n} × {name}" for name, n in counts.most_common())),
+        ("Items", ", ".join(f"{n} \u00d7 {name}" for name, n in counts.most_common())),
         ("Cruise speed", "as set in the vehicle" if speed is None else f"{speed:.1f} m/s"),
         ("Predicted duration", duration(plan.predicted_duration_s)),
         ("Duration by the timing law", duration(float(plan.timing.t_s[-1]))),
@@ -200,10 +200,16 @@ def _parameter_rows(plan: ReportInput) -> list[tuple[str, str]]:
     sigma_m = surface.radius_m / 10 if surface.smooth_sigma_m is None else surface.smooth_sigma_m
     known = float(np.isfinite(dsm.elevation_m).mean())
     return [
-        ("Surface model", f"{dsm.width_px} × {dsm.height_px} cells of {dsm.resolution_m:.4g} m, {known:.1%} known"),
+        (
+            "Surface model",
+            f"{dsm.width_px} \u00d7 {dsm.height_px} cells of {dsm.resolution_m:.4g} m, {known:.1%} known",
+        ),
         ("Vertical datum", clean_name(dsm.vertical_datum or "not declared")),
         ("Dilation", f"ball of radius {metres(surface.radius_m, 1)}, height {metres(surface.height_m, 1)}"),
-        ("Smoothing", f"σ {metres(sigma_m)}{', kept above the floor' if surface.floor else ', without floor'}"),
+        (
+            "Smoothing",
+            f"standard deviation {metres(sigma_m)}{', kept above the floor' if surface.floor else ', without floor'}",
+        ),
         ("Speed", f"mean {profile.mean_speed_m_s:g}, at most {profile.max_speed_m_s:g} m/s"),
         ("Climb, descent", f"at most {profile.max_climb_m_s:g} m/s up, {profile.max_descent_m_s:g} m/s down"),
         ("Position error", metres(profile.position_error_m)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from planning.formats.safe_text import clean_name
 
@@ -43,12 +44,22 @@ _ABBREVIATIONS = {"dsm": "DSM", "crs": "CRS", "rtl": "RTL", "poi": "POI", "sha25
 
 def metres(value_m: float, decimals: int = 2) -> str:
     """A length, or a word where there is none; rounded down, so that no clearance is flattered."""
+    scale = 10**decimals
+    return _length(value_m, lambda m: math.floor(m * scale + 1e-6) / scale, decimals)
+
+
+def metres_up(value_m: float, decimals: int = 2) -> str:
+    """A length rounded up: for what is demanded, and for what should be small."""
+    scale = 10**decimals
+    return _length(value_m, lambda m: math.ceil(m * scale - 1e-6) / scale, decimals)
+
+
+def _length(value_m: float, rounded: Callable[[float], float], decimals: int) -> str:
     if math.isnan(value_m):
         return "unknown"
     if math.isinf(value_m):
-        return "unlimited" if value_m > 0 else "unknown terrain"
-    scale = 10**decimals
-    return f"{math.floor(value_m * scale + 1e-6) / scale:.{decimals}f} m"
+        return "unlimited" if value_m > 0 else "over unknown terrain"
+    return f"{rounded(value_m) + 0.0:.{decimals}f} m"
 
 
 def duration(seconds: float) -> str:
@@ -56,12 +67,17 @@ def duration(seconds: float) -> str:
     if not math.isfinite(seconds):
         return "unknown"
     minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+    if not minutes:
+        return f"{rest} s"
+    return f"{minutes} min {rest:02d} s" if rest else f"{minutes} min"
 
 
 def assumption_rows(assumptions: dict[str, object]) -> list[tuple[str, str]]:
-    """The certificate's assumptions as (words, value with unit)."""
-    return [_row(key, value) for key, value in assumptions.items()]
+    """The certificate's assumptions as (words, value with unit); nested ones are laid flat."""
+    rows: list[tuple[str, str]] = []
+    for key, value in assumptions.items():
+        rows += assumption_rows(value) if isinstance(value, dict) else [_row(key, value)]
+    return rows
 
 
 def _row(key: str, value: object) -> tuple[str, str]:
@@ -79,6 +95,8 @@ def _value(value: object, unit: str) -> str:
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return "; ".join(_value(v, unit) for v in value) or "none"
     if isinstance(value, float):
         return f"{value:.6g}{unit}"
     if isinstance(value, int):

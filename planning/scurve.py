@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
+from planning.model import F64
 
 INPUT_TIME_CONSTANT_S = 0.15
 """ArduCopter's ATC_INPUT_TC; half its snap is what the S-curves use, so jerk ramps take twice as long."""
-BISECTIONS = 60
+NEWTON_STEPS = 12
+OVERLAP_STEPS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,22 +91,38 @@ def _constant_jerk(x: float, v: float, a: float, jerk: float, t: float) -> tuple
 
 def speed_up(half_length_m: float, limits: Limits) -> Speeding:
     """The fastest rise from rest within the limits that takes at most ``half_length_m``."""
-
-    def fits(rise: Speeding) -> bool:
-        return rise.distance_m <= half_length_m and rise.speed_m_s <= limits.speed_m_s
-
+    accel = min(_accel_to_speed(limits), _accel_to_distance(half_length_m, limits))
+    if accel < limits.accel_m_s2:
+        return _pulse(accel, limits.jerk_m_s3)
     strongest = _pulse(limits.accel_m_s2, limits.jerk_m_s3)
-    if not fits(strongest):
-        low, high = 0.0, limits.accel_m_s2
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if fits(_pulse(middle, limits.jerk_m_s3)) else (low, middle)
-        return _pulse(low, limits.jerk_m_s3)
     a, p = strongest.accel_m_s2, strongest.pulse_s
     by_speed_s = limits.speed_m_s / a - p
     # a (p + t) (2 p + t) / 2 = half length, solved for the steady time t.
     by_length_s = (-3 * p + math.sqrt(p**2 + 8 * half_length_m / a)) / 2
     return Speeding(strongest.jerk_m_s3, strongest.ramp_s, strongest.flat_s, max(0.0, min(by_speed_s, by_length_s)))
+
+
+def _accel_to_speed(limits: Limits) -> float:
+    """Acceleration at which two pulses alone reach the set speed: ``v = a (a / j + r)``, or a weak pulse's ``v``."""
+    jerk, ramp_s = limits.jerk_m_s3, 2 * INPUT_TIME_CONSTANT_S
+    if limits.speed_m_s < 2 * jerk * ramp_s**2:
+        snap = jerk / ramp_s
+        return snap * (limits.speed_m_s / (2 * snap)) ** (2 / 3)
+    return jerk * (math.sqrt(ramp_s**2 + 4 * limits.speed_m_s / jerk) - ramp_s) / 2
+
+
+def _accel_to_distance(length_m: float, limits: Limits) -> float:
+    """Acceleration at which two pulses alone take ``length_m = a (a / j + r)^2``, or a weak pulse's."""
+    jerk, ramp_s = limits.jerk_m_s3, 2 * INPUT_TIME_CONSTANT_S
+    if length_m < 4 * jerk * ramp_s**3:
+        snap = jerk / ramp_s
+        return snap * math.sqrt(length_m / (4 * snap))
+    accel = (length_m * jerk**2) ** (1 / 3)
+    # The cube is convex and the start lies above the root, so Newton's method descends to it.
+    for _ in range(NEWTON_STEPS):
+        p = accel / jerk + ramp_s
+        accel -= (accel * p**2 - length_m) / (p**2 + 2 * accel * p / jerk)
+    return accel
 
 
 def _pulse(accel_m_s2: float, jerk_m_s3: float) -> Speeding:
@@ -122,8 +139,8 @@ def _pulse(accel_m_s2: float, jerk_m_s3: float) -> Speeding:
 class Leg:
     """A leg from rest to rest: ``rise``, cruise, and ``rise`` backwards."""
 
-    direction: np.ndarray
-    """(3,) unit vector, x y z"""
+    direction: tuple[float, float, float]
+    """Unit vector, x y z"""
     limits: Limits
     rise: Speeding
     cruise_s: float
@@ -146,10 +163,11 @@ class Axes:
     jerk_m_s3: float
 
 
-def leg(delta_m: np.ndarray, axes: Axes) -> Leg:
+def leg(delta_m: F64, axes: Axes) -> Leg:
     """The leg along ``delta_m`` (3,), its limits those of the axis that binds first."""
-    length_m = float(np.linalg.norm(delta_m))
-    flat, up = math.hypot(delta_m[0], delta_m[1]) / length_m, float(delta_m[2]) / length_m
+    x, y, z = delta_m.tolist()
+    length_m = math.hypot(x, y, z)
+    flat, up = math.hypot(x, y) / length_m, z / length_m
 
     def along(horizontal: float, vertical: float) -> float:
         return min(horizontal / flat if flat else math.inf, vertical / abs(up) if up else math.inf)
@@ -158,7 +176,7 @@ def leg(delta_m: np.ndarray, axes: Axes) -> Leg:
     limits = Limits(speed, along(axes.accel_m_s2, axes.vertical_accel_m_s2), axes.jerk_m_s3)
     rise = speed_up(length_m / 2, limits)
     cruise_s = max(0.0, length_m - 2 * rise.distance_m) / rise.speed_m_s
-    return Leg(delta_m / length_m, limits, rise, cruise_s)
+    return Leg((x / length_m, y / length_m, up), limits, rise, cruise_s)
 
 
 def overlap_s(this: Leg, following: Leg, axes: Axes, *, radius_m: float) -> float:
@@ -168,18 +186,22 @@ def overlap_s(this: Leg, following: Leg, axes: Axes, *, radius_m: float) -> floa
     both legs' limits and the acceleration within the corner's. The autopilot tries at every
     control step, from the latest of this leg's braking and as long as the next takes to speed up.
     """
-    longest = min(this.rise.duration_s, following.rise.duration_s)
-    for tried_s in longest * np.linspace(1.0, 0.0, 200, endpoint=False):
+    longest_s = min(this.rise.duration_s, following.rise.duration_s)
+    slower_m_s = min(this.limits.speed_m_s, following.limits.speed_m_s)
+    for step in range(OVERLAP_STEPS, 0, -1):
+        tried_s = longest_s * step / OVERLAP_STEPS
         x0, v0, a0 = this.rise.at(tried_s / 2)
         x1, v1, a1 = following.rise.at(tried_s / 2)
-        place = following.direction * x1 - this.direction * x0
-        speed = following.direction * v1 + this.direction * v0
-        accel = following.direction * a1 - this.direction * a0
         if (
-            np.linalg.norm(place) < radius_m
-            and np.linalg.norm(speed) <= min(this.limits.speed_m_s, following.limits.speed_m_s) + 1e-6
-            and math.hypot(accel[0], accel[1]) < axes.corner_accel_m_s2
+            math.hypot(*_sum(this, -x0, following, x1)) < radius_m
+            and math.hypot(*_sum(this, v0, following, v1)) <= slower_m_s + 1e-6
+            and math.hypot(*(accel := _sum(this, -a0, following, a1))[:2]) < axes.corner_accel_m_s2
             and abs(accel[2]) < axes.vertical_accel_m_s2
         ):
-            return float(tried_s)
+            return tried_s
     return 0.0
+
+
+def _sum(this: Leg, a: float, following: Leg, b: float) -> tuple[float, float, float]:
+    (x0, y0, z0), (x1, y1, z1) = this.direction, following.direction
+    return x0 * a + x1 * b, y0 * a + y1 * b, z0 * a + z1 * b

@@ -74,7 +74,5 @@ def crs_name(dsm: Dsm) -> str:
 def unknown_share(dsm: Dsm) -> float:
     """Share of unknown cells, counted row block by row block (a model may be larger than spare memory)."""
     rows = max(1, 4_000_000 // dsm.width_px)
-    unknown = sum(
-        int(np.count_nonzero(np.isnan(dsm.elevation_m[r : r + rows]))) for r in range(0, dsm.height_px, rows)
-    )
+    unknown = sum(int(np.count_nonzero(np.isnan(dsm.elevation_m[r : r + rows]))) for r in range(0, dsm.height_px, rows))
     return unknown / dsm.elevation_m.size

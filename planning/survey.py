@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,10 +38,10 @@ class SurveyPlan:
 
 
 def survey_lines(
-    polygon_lat_lon: F64,
+    polygon_lat_lon: F64 | Sequence[tuple[float, float]],
     dsm: Dsm,
     *,
-    camera: Camera,
+    camera: Camera | None,
     side_overlap: float,
     front_overlap: float,
     gsd_cm: float | None = None,
@@ -54,6 +56,8 @@ def survey_lines(
     None takes the edge direction with the fewest turns. In a concave polygon a line may have
     several parts. Raises ``PoiError`` for an unusable polygon or unknown terrain.
     """
+    if camera is None:
+        raise ParameterError("A survey needs a camera.", advice="Give the vehicle profile a [camera] table.")
     height = _height(camera, gsd_cm, height_m)
     across_m, along_m = footprint_m(camera, height)
     widest_m = across_m * (1 - _overlap("side", side_overlap))
@@ -64,7 +68,7 @@ def survey_lines(
     count = _line_count(turned, widest_m)
     y0_m, y1_m = float(turned[:, 1].min()), float(turned[:, 1].max())
     spacing_m = (y1_m - y0_m) / count
-    ends = _back_and_forth(turned, y0_m + (np.arange(count) + 0.5) * spacing_m) @ _turn(angle)
+    ends = _back_and_forth(turned, y0_m + (np.arange(count, dtype=np.float64) + 0.5) * spacing_m) @ _turn(angle)
     if not len(ends):
         raise PoiError("No survey line fits into the polygon.", advice="Draw a larger polygon or another angle.")
     _refuse_unknown(ends, dsm)
@@ -101,7 +105,7 @@ def _finite_angle(angle_deg: float) -> float:
     return angle_deg % 180.0
 
 
-def _corners(polygon_lat_lon: F64, dsm: Dsm) -> F64:
+def _corners(polygon_lat_lon: F64 | Sequence[tuple[float, float]], dsm: Dsm) -> F64:
     degrees = np.asarray(polygon_lat_lon, dtype=np.float64).reshape(-1, 2)
     if len(degrees) > 1 and np.array_equal(degrees[0], degrees[-1]):
         degrees = degrees[:-1]
@@ -161,7 +165,7 @@ def _back_and_forth(turned: F64, rows_m: F64) -> F64:
 
 def _refuse_unknown(ends: F64, dsm: Dsm) -> None:
     """The legs between lines count too: they are flown as well."""
-    for i, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(ends)):
         length_m = float(np.hypot(*(b - a)))
         along = np.linspace(0.0, 1.0, max(2, math.ceil(length_m / max(dsm.resolution_m, 0.25)) + 1))
         points = a + along[:, None] * (b - a)

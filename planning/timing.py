@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from planning.climb import speed_caps
-from planning.errors import PoiError
+from planning.errors import ParameterError
 from planning.lspb import lspb
-from planning.model import F64, PathParams, Poi, SampledPath, Timing
+from planning.model import F64, PathParams, SampledPath, Timing
 
 
-def time_path(path: SampledPath, params: PathParams, pois: Sequence[Poi] = ()) -> Timing:
-    """LSPB from vertex to vertex (Melita 2020, section 6), waiting at each vertex for its POI's loiter time.
+def path_timing(path: SampledPath, params: PathParams, *, loiter_s: F64 | None = None) -> Timing:
+    """LSPB from vertex to vertex (Melita 2020, section 6), waiting ``loiter_s`` (V,) at each vertex.
 
     With ``on_steep`` "slow" the speed also stays below what the vertical limits allow on each
     step, and approaches those caps within the acceleration limit.
     """
-    loiter_s = _loiter(path, pois)
+    waits_s = _waits(path, loiter_s)
     step_s, speed_m_s = np.zeros(len(path.s_m)), np.zeros(len(path.s_m))
     for first, last in zip(path.vertex[:-1], path.vertex[1:], strict=True):
         part = slice(int(first), int(last) + 1)
         t_s, speed_m_s[part] = _segment(path.s_m[part], path.alt_dsm_m[part], params)
         step_s[first + 1 : last + 1] = np.diff(t_s)
-    return Timing(t_s=np.cumsum(step_s + loiter_s), speed_m_s=speed_m_s, loiter_s=loiter_s)
+    return Timing(t_s=np.cumsum(step_s + waits_s), speed_m_s=speed_m_s, loiter_s=waits_s)
 
 
 def _segment(s_m: F64, alt_m: F64, params: PathParams) -> tuple[F64, F64]:
@@ -55,17 +54,19 @@ def _slowed(s_m: F64, alt_m: F64, speed_m_s: F64, params: PathParams) -> tuple[F
     return np.concatenate([[0.0], np.cumsum(2 * np.diff(s_m) / both)]), speed
 
 
-def _loiter(path: SampledPath, pois: Sequence[Poi]) -> F64:
-    loiter_s = np.zeros(len(path.s_m))
-    for sample, poi in zip(path.vertex, path.vertex_poi, strict=True):
-        if poi is None or not pois:
-            continue
-        wait_s = pois[poi].loiter_s
-        if not (math.isfinite(wait_s) and wait_s >= 0):
-            raise PoiError(
-                f"The loiter time is {wait_s} s.",
-                where=f"point {poi + 1} {pois[poi].name}".rstrip(),
-                advice="Give zero or a positive number of seconds.",
-            )
-        loiter_s[sample] = wait_s
-    return loiter_s
+def _waits(path: SampledPath, loiter_s: F64 | None) -> F64:
+    waits_s = np.zeros(len(path.s_m))
+    if loiter_s is None:
+        return waits_s
+    given_s = np.asarray(loiter_s, dtype=np.float64)
+    if given_s.shape != path.vertex.shape:
+        raise ParameterError(f"{len(path.vertex)} vertices came with {given_s.size} loiter times.")
+    bad = np.flatnonzero(~(np.isfinite(given_s) & (given_s >= 0)))
+    if bad.size:
+        raise ParameterError(
+            f"The loiter time is {given_s[bad[0]]} s.",
+            where=f"vertex {bad[0] + 1} of the path",
+            advice="Give zero or a positive number of seconds.",
+        )
+    waits_s[path.vertex] = given_s
+    return waits_s

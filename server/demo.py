@@ -6,9 +6,10 @@ import asyncio
 
 from planning.demo import demo_pois, demo_survey_polygon
 from planning.vehicle_profile import load_profile
-from server import tasks
+from server import file_tasks
 from server.documents import doc_from_profile
 from server.edits import new_poi_id
+from server.history import History
 from server.jobs import Lane, Progress
 from server.library import Library
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SurfaceDoc, SurveyDoc, TerrainDoc
@@ -23,12 +24,11 @@ async def ensure(library: Library, lane: Lane, progress: Progress | None = None)
     """The demo's surface model and the id of its plan; what is missing is made."""
     terrain = next((doc for doc in library.terrains() if doc.name == TERRAIN_NAME), None)
     if terrain is None:
-        manifest = await lane.call(tasks.make_demo_terrain, library.data_dir, TERRAIN_NAME, progress=progress)
-        terrain = library.take_terrain(manifest)
+        terrain = await lane.call(file_tasks.make_demo_terrain, library.data_dir, TERRAIN_NAME, progress=progress)
+        await asyncio.to_thread(library.refresh)
     plan_id = await asyncio.to_thread(library.read_note, _NOTE)
     if plan_id is None or plan_id not in {entry.id for entry in library.plans()}:
-        plan_id = library.new_plan_id()
-        await asyncio.to_thread(library.save_plan, plan_id, _document(terrain))
+        plan_id, _ = await asyncio.to_thread(library.create_plan, History([_document(terrain)]))
         await asyncio.to_thread(library.write_note, _NOTE, plan_id)
     return terrain, plan_id
 
@@ -42,9 +42,7 @@ def _document(terrain: TerrainDoc) -> PlanDoc:
             PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
             for p in demo_pois()
         ],
-        survey=SurveyDoc(
-            polygon=[PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]
-        ),
+        survey=SurveyDoc(polygon=[PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]),
         profile=profile.model_copy(update={"rtl_height_m": _RTL_HEIGHT_M}),
         surface=SurfaceDoc(),
     )

@@ -9,6 +9,7 @@ ServerError
 │   ├── StaleRevisionError     an edit of a plan that has changed meanwhile
 │   ├── NotReadyError          an export without a finished plan
 │   └── InUseError             deleting what something else needs
+├── BadRequestError        a query or body that makes no sense
 ├── TooLargeError          a body beyond its limit
 ├── SlowRequestError       a body that stopped arriving
 ├── StorageError           the data directory cannot be read or written
@@ -85,6 +86,10 @@ class InUseError(ConflictError):
     code = "in_use"
 
 
+class BadRequestError(ServerError):
+    code = "invalid"
+
+
 class TooLargeError(ServerError):
     code = "too_large"
 
@@ -122,6 +127,7 @@ STATUS: dict[type[Exception], int] = {
     ForbiddenError: 403,
     NotFoundError: 404,
     ConflictError: 409,
+    BadRequestError: 422,
     TooLargeError: 413,
     SlowRequestError: 408,
     StorageError: 500,

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TypeVar
 
-from server import tasks
+from server import file_tasks
 from server.job_board import JobBoard
 from server.jobs import Lane, Progress
 from server.library import Library
@@ -50,8 +50,8 @@ class FileJobs:
             terrain: TerrainDoc = await self._consume(
                 upload,
                 lane.call(
-                    tasks.import_terrain,
-                    self._library.root,
+                    file_tasks.import_terrain,
+                    self._library.data_dir,
                     upload,
                     filename,
                     crs=crs,
@@ -68,13 +68,19 @@ class FileJobs:
 
     def add_orthophoto(self, upload: Path, filename: str, terrain_id: str) -> JobDoc:
         """Reads an uploaded orthomosaic and drapes it on its surface model."""
-        self._library.terrain_dir(terrain_id)
+        terrain_dir = self._library.terrain_dir(terrain_id)
 
         async def work(lane: Lane, progress: Progress) -> None:
             photo = await self._consume(
                 upload,
                 lane.call(
-                    tasks.import_orthophoto, self._library.root, terrain_id, upload, filename, progress=progress
+                    file_tasks.import_orthophoto,
+                    self._library.data_dir,
+                    terrain_dir,
+                    upload,
+                    filename,
+                    terrain_id=terrain_id,
+                    progress=progress,
                 ),
             )
             self._show_orthophoto()
@@ -86,10 +92,10 @@ class FileJobs:
 
     def remove_spikes(self, terrain_id: str) -> JobDoc:
         """Makes a copy of a surface model without its isolated spikes and pits, and uses it."""
-        self._library.terrain_dir(terrain_id)
+        terrain_dir = self._library.terrain_dir(terrain_id)
 
         async def work(lane: Lane, progress: Progress) -> None:
-            terrain = await lane.call(tasks.without_spikes, self._library.root, terrain_id, progress=progress)
+            terrain = await lane.call(file_tasks.without_spikes, self._library.data_dir, terrain_dir, progress=progress)
             await asyncio.to_thread(self._library.refresh)
             self._library_changed()
             await self._change("Remove spikes", lambda document: _on_terrain(document, terrain.id))

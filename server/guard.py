@@ -122,7 +122,11 @@ class Guard:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                _dress(scope, headers.get("host", ""), MutableHeaders(scope=message))
+                answer_headers = MutableHeaders(scope=message)
+                _dress(scope, headers.get("host", ""), answer_headers)
+                if status in (408, 413):
+                    # The rest of the body will not be read.
+                    answer_headers["connection"] = "close"
             await send(message)
 
         try:

@@ -32,7 +32,7 @@ SEND_TIMEOUT_S = 5.0
 MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
-CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY = 1008, 4401, 4408, 1001
+CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
 
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
 _CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view")
@@ -93,6 +93,11 @@ class Hub:
 
     def __init__(self) -> None:
         self._pages: dict[str, Page] = {}
+        self._greetings: list[schemas.NoticeMessage] = []
+
+    def greet_with(self, notices: list[schemas.NoticeMessage]) -> None:
+        """Notices that every page gets after its first snapshot."""
+        self._greetings = list(notices)
 
     def page(self, page_id: str) -> Page | None:
         return self._pages.get(page_id)
@@ -143,6 +148,8 @@ class Hub:
         try:
             # Taken in the same step as the registration: no change can fall between snapshot and deltas.
             self.send(page.page_id, snapshot(page.page_id))
+            for notice in self._greetings:
+                self.send(page.page_id, notice)
             await until_first(
                 self._sender(websocket, page),
                 self._receiver(websocket, page, on_message),

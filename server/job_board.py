@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from planning.errors import PlanningError
-from server.errors import ServerError, NotFoundError, error_doc
+from server.errors import NotFoundError, ServerError, error_doc
 from server.jobs import JobCancelledError, Lane, Progress
 from server.schemas import JobDoc, JobMessage, ServerMessage
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from planning.dsm import Dsm
 from planning.errors import PlanningError
+from server import tasks
 from server.errors import ServerError
 from server.jobs import JobCancelledError, Lane
 from server.library import Library
 from server.scene.payload import PlanScene, SceneState, TerrainScene
-from server.scene.terrain_task import terrain_scene
 from server.schemas import CursorMessage, FrameView, PlanDoc, SelectionDoc, ViewDoc
 
 
@@ -90,7 +89,7 @@ class Picture:
         photo = None if key[1] is None else self._library.orthophoto_dir(key[1])
         self._dsm = await asyncio.to_thread(self._library.load_terrain, terrain_id)
         try:
-            self._terrain = await self._lane.call(terrain_scene, terrain_id, directory, photo, shading)
+            self._terrain = await self._lane.call(tasks.draw_terrain, terrain_id, directory, photo, shading)
         except JobCancelledError:
             self._terrain_key = None
             self._wake.set()
@@ -119,5 +118,3 @@ class Picture:
 
     async def frame(self, message: FrameView, page_id: str) -> None:
         await self._view.frame(page_id, message.target)
-
-

@@ -74,7 +74,7 @@ class Settings(BaseSettings):
     )
 
     host: str = "127.0.0.1"
-    """Address to listen on. Anything but loopback opens Hedgehop to the network: set a password and put TLS before it."""
+    """Address to listen on. Anything but loopback opens Hedgehop to the network: put a proxy with TLS before it."""
     port: Annotated[int, Field(ge=1, le=65535)] = 8000
     """Port of the console, the API and the 3D view."""
     data_dir: Path = Field(default_factory=default_data_dir)

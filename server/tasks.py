@@ -11,22 +11,34 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.autopilot_time import predict_duration
+from planning import __version__
 from planning.camera import gsd_cm
+from planning.demo import demo_dsm, demo_pois
 from planning.dsm import Dsm
 from planning.exports import export_file
-from planning.mission import decimation_trade
-from planning.model import finite_or_none
-from planning.plan import Plan, effective_profile, plan_mission
+from planning.model import VehicleProfile, finite_or_none
+from planning.plan import Plan, plan_mission, plan_trade
+from planning.request import PlanRequest
 from planning.summary import plan_summary
 from server.charts import chart
 from server.documents import request_from_doc
 from server.jobs import Progress
+from server.library.orthophotos import load_orthophoto
 from server.library.terrains import load_terrain
-from server.scene.payload import PlanScene
+from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
+from server.scene.terrain_payload import Shading, build_terrain_scene
 from server.schemas import PlanDoc, ReasonDoc, ResultDoc, TradeRow, WorstDoc
 from server.stopwatch import READ_STEP, StepTimer
+
+PRODUCT_VERSION = __version__
+
+
+def warm_up(*, report: Progress) -> None:
+    """Compiles or loads the kernels with a tiny plan, so that the first edit is answered as fast as the next."""
+    report("Getting ready", None)
+    dsm, pois = demo_dsm(), demo_pois()
+    plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up")))
 
 
 @lru_cache(maxsize=2)
@@ -45,12 +57,12 @@ def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> li
     plan, _, _ = _plan(directory, document, report)
     return [
         TradeRow(
-            excess_height_m=row.excess_height_m,
-            waypoints=row.waypoints,
-            items=row.items,
-            duration_s=row.duration_s,
+            excess_height_m=choice.excess_height_m,
+            waypoints=choice.waypoints,
+            items=choice.items,
+            duration_s=choice.duration_s,
         )
-        for row in decimation_trade(plan.path, plan.mission.home, plan.request.mission, plan.request.profile, plan.dsm, plan.request.pois)
+        for choice in plan_trade(plan)
     ]
 
 
@@ -61,11 +73,17 @@ def export_plan(
     plan, source, timer = _plan(directory, document, report)
     seconds = timer.seconds()
     return {
-        name: export_file(
-            name, plan, source, title=document.name, created_utc=created_utc, seconds=seconds
-        ).encode()
+        name: export_file(name, plan, source, title=document.name, created_utc=created_utc, seconds=seconds).encode()
         for name in names
     }
+
+
+def draw_terrain(
+    terrain_id: str, directory: Path, photo_directory: Path | None, shading: Shading, *, report: Progress
+) -> TerrainScene:
+    """The surface model as the 3D view draws it."""
+    photo = None if photo_directory is None else load_orthophoto(photo_directory)
+    return build_terrain_scene(terrain_id, _terrain(directory), shading=shading, orthophoto=photo, report=report)
 
 
 def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, StepTimer]:

@@ -58,11 +58,11 @@ def _reachable(*annotations: object) -> set[type[BaseModel]]:
 
 
 def _interface(model: type[BaseModel], *, optional: bool) -> str:
-    lines = _comment(model.__doc__, "") + [f"export interface {model.__name__} {{"]
+    lines = [*_comment(model.__doc__, ""), f"export interface {model.__name__} {{"]
     for name, field in model.model_fields.items():
         # A page may leave out what has a default, but never the tag that tells messages apart.
         mark = "?" if optional and not field.is_required() and name != "type" else ""
-        lines += _comment(field.description, "  ") + [f"  {name}{mark}: {_field_type(field)};"]
+        lines += [*_comment(field.description, "  "), f"  {name}{mark}: {_field_type(field)};"]
     return "\n".join([*lines, "}", ""])
 
 

@@ -242,7 +242,9 @@ class Workspace:
         """Reorders the points to the shortest route that keeps the first one."""
         dsm = self._picture.dsm
         if dsm is None or len(self.document.pois) < 3:
-            raise PoiError("There is nothing to reorder.", advice="Choose a surface model and add three points or more.")
+            raise PoiError(
+                "There is nothing to reorder.", advice="Choose a surface model and add three points or more."
+            )
 
         def reorder(document: PlanDoc) -> PlanDoc:
             xy_m = dsm.xy_from_lat_lon(np.array([(p.lat_deg, p.lon_deg) for p in document.pois]))

@@ -10,7 +10,7 @@ Coordinates: metres from the model's north-west corner, x to the east, y to the 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -72,9 +72,9 @@ def _range_in_row(elevation_m, res, row, ax, az, dx, dz, t0, t1, lowest, highest
     return lowest, highest
 
 
-@njit(cache=True, parallel=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _ranges(elevation_m, res, start_m, end_m, lowest_m, highest_m):
-    for k in prange(start_m.shape[0]):
+    for k in range(start_m.shape[0]):
         ax, ay, az = start_m[k, 0], start_m[k, 1], start_m[k, 2]
         dx, dy, dz = end_m[k, 0] - ax, end_m[k, 1] - ay, end_m[k, 2] - az
         first, last = _touched(min(ay, ay + dy), max(ay, ay + dy), res)

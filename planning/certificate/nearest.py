@@ -114,9 +114,7 @@ def _nearest_in_leaf(elevation_m, row0, col0, res, ax, ay, az, dx, dy, dz, best_
             above = lowest - top
             if above > 0.0 and above * above >= best_sq:
                 continue
-            sq, t = column_distance_sq(
-                ax, ay, az, dx, dy, dz, c * res, r * res, (c + 1) * res, (r + 1) * res, top
-            )
+            sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, c * res, r * res, (c + 1) * res, (r + 1) * res, top)
             if sq < best_sq:
                 best_sq, best_t = sq, t
     return best_sq, best_t

@@ -29,7 +29,9 @@ def line_reasons(
     if hit:
         deepest = min(hit, key=lambda leg: leg.min_vertical_m)
         text = f"The line enters the terrain: {-deepest.min_vertical_m:.2f} m deep on {_leg(deepest)}."
-        mend = f"Raise the line there by at least {_up(params.required_clearance_m - deepest.min_vertical_m, 0.1):.1f} m."
+        mend = (
+            f"Raise the line there by at least {_up(params.required_clearance_m - deepest.min_vertical_m, 0.1):.1f} m."
+        )
         reasons.append(Reason("terrain_hit", text, mend))
     short = [leg for leg in legs if not leg.min_distance_m >= params.required_clearance_m]
     if short:
@@ -54,7 +56,9 @@ def _clearance_reason(
     mend = f"Raise H by at least {missing_m:.2f} m or take a larger R."
     with_rtk_m = required_m - params.position_error_m + RTK_ERROR_M
     if params.position_error_m > RTK_ERROR_M and nearest.min_distance_m >= with_rtk_m:
-        mend += f" With RTK ({RTK_ERROR_M} m) in place of {params.position_error_m} m position error it would be enough."
+        mend += (
+            f" With RTK ({RTK_ERROR_M} m) in place of {params.position_error_m} m position error it would be enough."
+        )
     return Reason("clearance", text, mend)
 
 
@@ -100,7 +104,9 @@ def height_reason(highest_m: float, leg: int, item: int, params: ClearanceParams
         f"The line flies {_up(highest_m, 0.01):.2f} m above ground on leg {leg + 1} (item {item + 1});"
         f" the limit is {limit_m:.2f} m."
     )
-    return Reason("height_above_ground", text, "Lower H or R, allow steeper climbs and descents, or use more waypoints.")
+    return Reason(
+        "height_above_ground", text, "Lower H or R, allow steeper climbs and descents, or use more waypoints."
+    )
 
 
 def scale_reason(scale: float, tolerance: float) -> Reason | None:

@@ -89,9 +89,7 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearan
             continue
         level, i, j = node[size, 0], node[size, 1], node[size, 2]
         if level == 0:
-            needed = _leaf_altitude(
-                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, dx, dy, clearance_m, needed
-            )
+            needed = _leaf_altitude(elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, dx, dy, clearance_m, needed)
             continue
         offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
         side = LEAF_PX * 2.0 ** (level - 1) * res
@@ -123,9 +121,7 @@ def _search(elevation_m, maxima_m, layout, res, places_m, home_x, home_y, cleara
         for k in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
             bar = max(best, z)
-            found = _needed_altitude(
-                elevation_m, maxima_m, layout, res, x, y, home_x - x, home_y - y, clearance_m, bar
-            )
+            found = _needed_altitude(elevation_m, maxima_m, layout, res, x, y, home_x - x, home_y - y, clearance_m, bar)
             if found > bar:
                 best, best_place = found, k
         needed_m[chunk] = best

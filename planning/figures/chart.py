@@ -40,6 +40,7 @@ class Mark:
     y: float | None
     text: str
     color: str = MUTED
+    text_at_foot: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,8 @@ def _axes(chart: Chart) -> _Axes:
     x, y = x[np.isfinite(x)], y[np.isfinite(y)]
     x_low, x_high = (float(x.min()), float(x.max())) if len(x) else (0.0, 1.0)
     y_low, y_high = (float(y.min()), float(y.max())) if len(y) else (0.0, 1.0)
-    y_low, y_high = padded(min(0.0, y_low) if chart.y_from_zero else y_low, y_high, _y_count(chart))
+    headroom = 0.04 * (y_high - y_low)
+    y_low, y_high = padded(min(0.0, y_low) if chart.y_from_zero else y_low, y_high + headroom, _y_count(chart))
     return _Axes(x_low, x_high if x_high > x_low else x_low + 1.0, y_low, y_high, chart)
 
 
@@ -179,21 +181,32 @@ def _line(series: Series, axes: _Axes) -> str:
 
 def _vertical(mark: Mark, axes: _Axes) -> str:
     px, foot = axes.px(mark.x), axes.chart.height - BOTTOM
+    anchor, shift = _side(float(px), axes, 4)
     return (
         f'<path d="M{px:.1f} {TOP}V{foot}" stroke="{mark.color}" stroke-dasharray="3 4" opacity="0.7"/>'
-        f'<text x="{px + 4:.1f}" y="{TOP + 12}" fill="{mark.color}">{escape(mark.text)}</text>'
+        f'<text x="{px + shift:.1f}" y="{TOP + 12}" text-anchor="{anchor}" fill="{mark.color}">'
+        f"{escape(mark.text)}</text>"
     )
 
 
 def _point(mark: Mark, axes: _Axes) -> str:
+    """A ring, and its text at the edge of the plot where no curve hides it."""
     px, py = axes.px(mark.x), axes.py(mark.y or 0.0)
-    right = px > axes.chart.width - 160
-    anchor, shift = ("end", -9) if right else ("start", 9)
+    anchor, shift = _side(float(px), axes, 5)
+    foot = axes.chart.height - BOTTOM
+    text_y, edge = (foot - 8, foot) if mark.text_at_foot else (TOP + 14, TOP)
     return (
-        f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5" fill="none" stroke="{mark.color}" stroke-width="2.2"/>'
-        f'<text x="{px + shift:.1f}" y="{py + 17:.1f}" text-anchor="{anchor}" fill="{mark.color}" class="halo">'
+        f'<path d="M{px:.1f} {py:.1f}V{edge}" stroke="{mark.color}" stroke-width="1.2"/>'
+        f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5.5" fill="none" stroke="#fff" stroke-width="4.5"/>'
+        f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5.5" fill="none" stroke="{mark.color}" stroke-width="2.2"/>'
+        f'<text x="{px + shift:.1f}" y="{text_y}" text-anchor="{anchor}" fill="{mark.color}" class="halo">'
         f"{escape(mark.text)}</text>"
     )
+
+
+def _side(px: float, axes: _Axes, gap: int) -> tuple[str, int]:
+    """Text goes to the right of its place, to the left near the right edge."""
+    return ("end", -gap) if px > axes.chart.width - RIGHT - 130 else ("start", gap)
 
 
 def _legend(chart: Chart) -> list[str]:

@@ -31,7 +31,7 @@ def altitude_profile(path: SampledPath, line: FlownLine, certificate: Certificat
     worst = certificate.worst
     marks = [
         *_poi_marks(path, pois),
-        *_worst_mark(certificate, worst.s_m, worst.alt_rel_home_m),
+        *_worst_mark(certificate, worst.s_m, worst.alt_rel_home_m, at_foot=True),
     ]
     return render_chart(Chart(DISTANCE, "Height above home (m)", series, marks, height=360))
 
@@ -83,11 +83,11 @@ def short_name(poi: Poi, index: int) -> str:
     return name if len(name) <= _LONGEST_MARK else f"{name[: _LONGEST_MARK - 1]}…"
 
 
-def _worst_mark(certificate: Certificate, s_m: float, y: float) -> list[Mark]:
+def _worst_mark(certificate: Certificate, s_m: float, y: float, *, at_foot: bool = False) -> list[Mark]:
     if not (np.isfinite(s_m) and np.isfinite(y)):
         return []
     text = f"worst point, {certificate.min_distance_m:.2f} m"
-    return [Mark(s_m, y, text, BAD)]
+    return [Mark(s_m, y, text, BAD, at_foot)]
 
 
 def _finite(values: F64) -> F64:

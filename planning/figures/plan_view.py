@@ -39,7 +39,7 @@ def plan_view(dsm: Dsm, line: FlownLine, certificate: Certificate, pois: Sequenc
 
     width, height = size
     parts = [
-        f'<svg class="map" viewBox="0 0 {width + LEGEND_PX:.0f} {height:.0f}" role="img" aria-label="Map of the mission">',
+        f'<svg class="map" viewBox="0 0 {width + LEGEND_PX:.0f} {height:.0f}" role="img" aria-label="Map">',
         f'<image href="{_relief(shown)}" width="{width:.1f}" height="{height:.1f}" preserveAspectRatio="none"/>',
         _track(pixels(line.points_m[:, :2])),
         *_pois(pixels(_poi_xy(dsm, pois)), pois),
@@ -77,10 +77,15 @@ def _relief(dsm: Dsm) -> str:
     shade = 0.35 + 0.75 * hillshade(dsm, exaggeration=exaggeration)[..., None] / 255.0
     known = np.isfinite(dsm.elevation_m)
     colors = height_colors(dsm) if known.any() else np.full((*known.shape, 3), 200, np.uint8)
-    rgb = np.clip(np.where(known[..., None], (0.55 * colors + 0.45 * 235) * shade, colors), 0, 255).astype(np.uint8)
+    rgb = np.clip(np.where(known[..., None], _pale(colors) * shade, colors), 0, 255).astype(np.uint8)
     out = io.BytesIO()
     Image.fromarray(rgb).quantize(_IMAGE_COLORS, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(out.getvalue()).decode()
+
+
+def _pale(colors: NDArray[np.uint8]) -> F64:
+    """Height colours as a background that lines and labels stand out from."""
+    return 0.55 * colors.astype(np.float64) + 0.45 * 235
 
 
 def _poi_xy(dsm: Dsm, pois: Sequence[Poi]) -> F64:
@@ -89,13 +94,13 @@ def _poi_xy(dsm: Dsm, pois: Sequence[Poi]) -> F64:
 
 def _track(px: F64) -> str:
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in px)
-    dots = (
-        "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2" fill="#fff"/>' for x, y in px)
-        if len(px) <= _MOST_DOTS
-        else ""
+    shape = f'<polyline points="{points}" fill="none" stroke-linejoin="round" stroke-linecap="round"'
+    lines = f'{shape} stroke="#fff" stroke-width="6" opacity="0.85"/>{shape} stroke="{PATH}" stroke-width="3"/>'
+    if len(px) > _MOST_DOTS:
+        return lines
+    return lines + "".join(
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.3" fill="#fff" stroke="{PATH}" stroke-width="1.2"/>' for x, y in px
     )
-    shape = f'points="{points}" fill="none" stroke-linejoin="round" stroke-linecap="round"'
-    return f'<polyline {shape} stroke="#fff" stroke-width="6" opacity="0.85"/><polyline {shape} stroke="{PATH}" stroke-width="3"/>{dots}'
 
 
 def _pois(px: F64, pois: Sequence[Poi]) -> list[str]:
@@ -152,7 +157,7 @@ def _height_legend(dsm: Dsm, width: float, height: float) -> str:
     known = dsm.elevation_m[np.isfinite(dsm.elevation_m)]
     if not len(known):
         return ""
-    low, high, colors = float(known.min()), float(known.max()), scale_rgb(9)
+    low, high, colors = float(known.min()), float(known.max()), _pale(scale_rgb(9)).round().astype(int)
     stops = "".join(f'<stop offset="{k / 8:.3f}" stop-color="rgb({r},{g},{b})"/>' for k, (r, g, b) in enumerate(colors))
     x, top, tall = width + 14, 26.0, min(220.0, height - 60)
     return (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,5 @@ def keep_extremes(y: F64, max_points: int = 1200) -> I64:
         return np.arange(len(y))
     edges = np.linspace(0, len(y), max(2, max_points // 2) + 1).astype(np.int64)
     low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
-    picked = [
-        a + k for a, b in zip(edges[:-1], edges[1:], strict=True) for k in (np.argmin(low[a:b]), np.argmax(high[a:b]))
-    ]
+    picked = [a + k for a, b in itertools.pairwise(edges) for k in (np.argmin(low[a:b]), np.argmax(high[a:b]))]
     return np.unique(np.array([0, len(y) - 1, *picked], dtype=np.int64))

@@ -28,4 +28,5 @@ def label(value: float, step: float) -> str:
 def padded(low: float, high: float, count: int = 6) -> tuple[float, float]:
     """The range widened to whole ticks."""
     step = round_step(max(high - low, 1e-9), count)
-    return math.floor(low / step + 1e-9) * step, max(math.ceil(high / step - 1e-9), math.floor(low / step) + 1) * step
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return first * step, max(last, first + 1) * step

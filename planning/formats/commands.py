@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from planning.dsm import is_amsl
+from planning.formats.safe_text import clean_name
 from planning.model import Home, MissionItem
 
 POSITIONED = frozenset({16, 17, 18, 19, 21, 22, 31, 33, 36, 80, 82, 84, 85, 94, 179, 189, 192, 195, 201, 206})
@@ -38,12 +39,12 @@ def home_altitude_note(home: Home) -> str:
     if not math.isfinite(home.alt_dsm_m):
         return "home altitude unknown"
     if is_amsl(home.vertical_datum):
-        return f"home altitude {home.alt_dsm_m:.2f} m above mean sea level ({home.vertical_datum})"
+        return f"home altitude {home.alt_dsm_m:.2f} m above mean sea level ({clean_name(home.vertical_datum)})"
     if home.vertical_datum is None:
         return (
             f"home altitude {home.alt_dsm_m:.2f} m in the surface model's undeclared vertical datum, not known as AMSL"
         )
-    return f"home altitude {home.alt_dsm_m:.2f} m, datum {home.vertical_datum}, not AMSL"
+    return f"home altitude {home.alt_dsm_m:.2f} m, datum {clean_name(home.vertical_datum)}, not AMSL"
 
 
 def home_or_first_place(home: Home | None, items: list[MissionItem], warnings: list[str]) -> Home:

@@ -21,7 +21,7 @@ _BRACKETS_OUTSIDE_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"|[\[{]|[\]}]', re.DOTA
 def decode_text(name: str, data: bytes | str) -> str:
     """Bytes of an imported file -> text: UTF-8 with or without byte order mark, otherwise Latin-1.
 
-    Text that is text already only has its size checked.
+    Text that is text already passes as it is.
 
     Raises FormatError for too many bytes, UTF-16 and binary content.
     """

@@ -26,6 +26,7 @@ class _Place(Protocol):
 def looks_swapped(places: Iterable[_Place], dsm: Dsm) -> bool:
     """Whether no place lies on the surface model as given, but most would with latitude and longitude exchanged."""
     lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in places], dtype=np.float64).reshape(-1, 2)
+    lat_lon = lat_lon[lat_lon.any(axis=1)]  # 0, 0 in a mission item is no place
     if not len(lat_lon) or _on_model(lat_lon, dsm).any():
         return False
     return bool(_on_model(lat_lon[:, ::-1], dsm).mean() > 0.5)

@@ -48,7 +48,7 @@ def _notes(mission: Mission) -> list[str]:
         f"# vertical_datum: {clean_name(home.vertical_datum or 'unknown')}",
         f"# firmware: {mission.firmware}",
         *([f"# cruise_speed_m_s: {speed:g}"] if speed is not None else []),
-        f"# note: row 0 is home, {clean_name(home_altitude_note(home))}",
+        f"# note: row 0 is home, {home_altitude_note(home)}",
     ]
 
 

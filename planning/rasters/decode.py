@@ -6,7 +6,7 @@ import hashlib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import rasterio
@@ -24,7 +24,7 @@ Send = Callable[..., None]
 Ask = Callable[[Json], Json]
 
 DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
-_BAND_PX = 4_000_000
+_PART_PX = 4_000_000
 _DIGEST_BYTES = 2**22
 # A file's own georeference is judged by the parent, in its own words.
 warnings.simplefilter("ignore", NotGeoreferencedWarning)
@@ -37,9 +37,9 @@ def read_grid(job: Json, send: Send, ask: Ask) -> None:
         digest = _digest(Path(job["source"]))
         stats = HeightStats()
         with Path(job["target"]).open("wb") as target:
-            for window in _row_bands(source):
-                rows = _known_heights(source.read(1, window=window, masked=True), stats)
-                target.write(rows)
+            for window in _windows(source):
+                rows = stats.add(_known_heights(source, window))
+                _place(target, rows, window, source.width)
                 send("progress", stage="decode", share=(window.row_off + window.height) / source.height)
     send("done", sha256=digest, stats=stats.as_json())
 
@@ -117,20 +117,36 @@ def header_of(source: Any) -> RasterHeader:
     )
 
 
-def _row_bands(source: Any) -> list[Window]:
-    block_height = source.block_shapes[0][0]
-    rows = max(1, _BAND_PX // (source.width * block_height)) * block_height
+def _windows(source: Any) -> list[Window]:
+    """Parts of about ``_PART_PX`` that cut no block: whole rows, or less of them where blocks are tall."""
+    block_height, block_width = source.block_shapes[0]
+    rows = max(1, _PART_PX // (source.width * block_height)) * block_height
+    columns = source.width
+    if rows * columns > _PART_PX:
+        columns = max(1, _PART_PX // (rows * block_width)) * block_width
     return [
-        Window(0, row, source.width, min(rows, source.height - row))  # pyright: ignore[reportCallIssue]
+        Window(column, row, min(columns, source.width - column), min(rows, source.height - row))  # pyright: ignore[reportCallIssue]
         for row in range(0, source.height, rows)
+        for column in range(0, source.width, columns)
     ]
 
 
-def _known_heights(block: np.ma.MaskedArray[Any, Any], stats: HeightStats) -> NDArray[np.float32]:
+def _place(target: BinaryIO, part: NDArray[np.float32], window: Window, width: int) -> None:
+    """Write a part where it belongs in a file of rows of ``width`` float32."""
+    lines = part.reshape(1, -1) if part.shape[1] == width else part
+    for line, heights in enumerate(lines):
+        target.seek(4 * ((window.row_off + line) * width + window.col_off))
+        target.write(np.ascontiguousarray(heights).data)
+
+
+def _known_heights(source: Any, window: Window) -> NDArray[np.float32]:
+    block = source.read(1, window=window, masked=True)
     with np.errstate(over="ignore", invalid="ignore"):
         heights = block.data.astype(np.float32)
         heights[np.ma.getmaskarray(block)] = np.nan
-    return stats.add(heights)
+    if source.count == 2:  # GDAL masks by an alpha band only where it is of whole numbers
+        heights[source.read(2, window=window) == 0] = np.nan
+    return heights
 
 
 def _digest(path: Path) -> str:

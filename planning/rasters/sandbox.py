@@ -21,6 +21,7 @@ Json = dict[str, Any]
 Progress = Callable[[str, float], None]
 
 _ROOT = Path(__file__).resolve().parents[2]
+_COMMAND = [sys.executable, "-P", "-m", "planning.rasters.worker"]
 _LONGEST_MESSAGE = 2**20
 _ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
 # GDAL reads these before Python can set them through rasterio.Env: drivers register on import.
@@ -43,7 +44,15 @@ _FOREIGN_SETTINGS = ("GDAL_", "CPL_", "VSI_", "AWS_", "GTIFF_", "PYTHONWARNINGS"
 @contextmanager
 def private_directory() -> Iterator[Path]:
     """A directory of our own (mode 0700): what lies beside a user's file is not beside it here."""
-    with tempfile.TemporaryDirectory(prefix="hedgehop-raster-") as name:
+    try:
+        directory = tempfile.TemporaryDirectory(prefix="hedgehop-raster-")
+    except OSError as error:
+        raise RasterError(
+            f"There is no room for temporary files: {error.strerror}.",
+            where=tempfile.gettempdir(),
+            advice="Free some space, or point TMPDIR to a larger disk.",
+        ) from error
+    with directory as name:
         yield Path(name)
 
 
@@ -91,7 +100,7 @@ def run_job(
 
 def _start(directory: Path, stderr: IO[bytes]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "planning.rasters.worker"],
+        _COMMAND,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=stderr,
@@ -116,9 +125,12 @@ def _send(worker: subprocess.Popen[bytes], message: Json) -> None:
 def _messages(worker: subprocess.Popen[bytes]) -> Iterator[Json]:
     assert worker.stdout is not None
     while line := worker.stdout.readline(_LONGEST_MESSAGE):
-        if not line.endswith(b"\n"):
+        try:
+            message = json.loads(line)
+        except ValueError:
+            worker.kill()
             return
-        yield json.loads(line)
+        yield message
 
 
 def _end(worker: subprocess.Popen[bytes]) -> None:

@@ -12,30 +12,34 @@ import os
 import resource
 import sys
 import threading
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TextIO
 
 Json = dict[str, Any]
 
 
 def main() -> None:
     """Carry out one job, then exit; every failure becomes one "error" message."""
+    to_parent = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # decoders may print: only messages go to the parent
+    send = partial(_send, to_parent)
     job = _receive()
     _confine(job)
     try:
         from planning.rasters import decode  # after the limits: GDAL registers its drivers on import
 
-        decode.JOBS[job["job"]](job, send, ask)
+        decode.JOBS[job["job"]](job, send, partial(_ask, send))
     except Exception as error:
-        send("error", **_explain(error))
+        send("error", **_explain(error, job["job"]))
 
 
-def send(kind: str, **fields: Any) -> None:
-    """One message to the parent."""
-    sys.stdout.write(json.dumps({"type": kind, **fields}) + "\n")
-    sys.stdout.flush()
+def _send(to_parent: TextIO, kind: str, /, **fields: Any) -> None:
+    to_parent.write(json.dumps({"type": kind, **fields}) + "\n")
+    to_parent.flush()
 
 
-def ask(header: Json) -> Json:
+def _ask(send: Callable[..., None], header: Json) -> Json:
     """Show the header to the parent and wait for the rest of the order."""
     send("header", **header)
     order = _receive()
@@ -61,7 +65,7 @@ def _confine(job: Json) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (job["memory_bytes"], job["memory_bytes"]))
 
 
-def _explain(error: Exception) -> Json:
+def _explain(error: Exception, job: str) -> Json:
     cause = str(error.__cause__ or error) or type(error).__name__
     if isinstance(error, MemoryError) or "memory" in cause.lower() or "allocat" in cause.lower():
         return {
@@ -69,11 +73,17 @@ def _explain(error: Exception) -> Json:
             "what": f"Decoding needs more memory than allowed ({cause}).",
             "advice": "Rewrite it as a tiled GeoTIFF.",
         }
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return {
             "kind": "disk",
-            "what": "The disk is full: there is no room for the decoded heights.",
+            "what": "The disk is full: there is no room for the heights.",
             "advice": "Free some space, or point TMPDIR to a larger disk.",
+        }
+    if job == "write_grid":
+        return {
+            "kind": "write",
+            "what": f"It cannot be written ({cause}).",
+            "advice": "Check the folder and its rights.",
         }
     return {
         "kind": "format",

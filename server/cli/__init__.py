@@ -32,9 +32,13 @@ def _options(version: bool = typer.Option(False, "--version", help="Print the ve
 
 
 app.command(epilog="Example: `hedgehop serve --demo`")(serve)
-app.command(epilog="Example: `hedgehop plan dsm.tif pois.csv --out flight --profile f450-paper --rtl-height-m 60`")(plan)
+app.command(epilog="Example: `hedgehop plan dsm.tif pois.csv --out flight --profile f450-paper --rtl-height-m 60`")(
+    plan
+)
 app.command(epilog="Example: `hedgehop certify dsm.tif mission.waypoints --position-error-m 0.1`")(certify)
-app.command(epilog="Example: `hedgehop survey dsm.tif area.geojson --out flight --profile mapper-rtk --gsd-cm 1`")(survey)
+app.command(epilog="Example: `hedgehop survey dsm.tif area.geojson --out flight --profile mapper-rtk --gsd-cm 1`")(
+    survey
+)
 app.command(epilog="Example: `hedgehop bench`")(bench)
 
 

@@ -38,9 +38,8 @@ def read_model(
     for warning in report.warnings:
         say(f"Note: {warning}")
     for spike in report.spikes:
-        kind = "spike" if spike.height_m > 0 else "pit"
         say(
-            f"Note: isolated {kind} of {abs(spike.height_m):.1f} m, {spike.size_m:.1f} m wide, "
+            f"Note: isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
             f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: kept as terrain."
         )
     return dsm

@@ -24,7 +24,7 @@ from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
 from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
 
-_LAST_PLAN = "last-plan.txt"
+_LAST_PLAN = "last-plan"
 _PROFILES = "profiles"
 
 
@@ -154,16 +154,12 @@ class Library:
 
     def remember_plan(self, plan_id: str) -> None:
         """Notes which plan is open, for the next start."""
-        with self._change:
-            write_atomically(self.root / _LAST_PLAN, plan_id.encode())
+        self.write_note(_LAST_PLAN, plan_id)
 
     def last_plan(self) -> str | None:
         """The plan that was open last, if it can still be read."""
-        try:
-            plan_id = (self.root / _LAST_PLAN).read_text(encoding="ascii", errors="replace")
-        except FileNotFoundError:
-            return None
-        if plan_id not in self._plans.manifests:
+        plan_id = self.read_note(_LAST_PLAN)
+        if plan_id not in self._plans.manifests or plan_id is None:
             return None
         try:
             self.load_plan(plan_id)
@@ -171,7 +167,17 @@ class Library:
             return None
         return plan_id
 
-    # Vehicle profiles
+    # Notes and vehicle profiles
+
+    def read_note(self, name: str) -> str | None:
+        """A line that was noted under this name."""
+        path = self.root / f"{name}.txt"
+        with storage_errors(path):
+            return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
+
+    def write_note(self, name: str, text: str) -> None:
+        with self._change:
+            write_atomically(self.root / f"{name}.txt", text.encode())
 
     def profiles(self) -> list[ProfileEntry]:
         """Those shipped with Hedgehop and the user's own, from TOML files in ``profiles/``, as of the start."""

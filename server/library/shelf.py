@@ -121,6 +121,7 @@ def read_manifest(folder: Path, model: type[M]) -> M:
         place = ".".join(str(part) for part in fault["loc"])
         raise _damaged(folder, f"{MANIFEST} is damaged ({place or 'the whole'}: {fault['msg']})") from error
 
+
 def _read_if_there(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
 

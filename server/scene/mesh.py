@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,17 @@ def _triangles(a: _Corner, b: _Corner, c: _Corner, absent: _Corner | None) -> U3
     if absent is not None:
         drawn = drawn & ~absent[1]
     return np.column_stack([corner[0][drawn] for corner in (a, b, c)])
+
+
+def gap_mesh(grid: HeightGrid, plates: HeightGrid, frame: LocalFrame) -> Mesh | None:
+    """The triangles that `grid_mesh` leaves out, at the plates' heights and down to them; None without gaps."""
+    known = np.isfinite(grid.alt_dsm_m)
+    whole = grid_mesh(replace(grid, alt_dsm_m=np.where(known, grid.alt_dsm_m, plates.alt_dsm_m)), frame)
+    faces = whole.faces[~known.ravel()[whole.faces].all(axis=1)]
+    if not len(faces):
+        return None
+    used, faces = np.unique(faces, return_inverse=True)
+    return Mesh(whole.vertices[used], faces.reshape(-1, 3).astype(np.uint32), whole.uv[used])
 
 
 def drawn_alt_dsm_m(grid: HeightGrid, xy_m: F64, otherwise_m: float) -> F64:

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 from functools import lru_cache
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request, WebSocket
 from fastapi.responses import RedirectResponse, Response
@@ -35,6 +36,8 @@ VIEW_POLICY = (
     "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; connect-src 'self' {sockets} data: blob:; "
     "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
 )
+# viser has no switch for its control panel and its own notices; the console has both.
+HIDDEN_PARTS = b"<style>[data-floating-window], .mantine-Notifications-root { display: none !important; }</style>"
 PASSED_ON_QUERY = frozenset({"fixedDpr"})
 CLOSE_TIMEOUT_S = 5.0
 
@@ -43,9 +46,9 @@ CLOSE_TIMEOUT_S = 5.0
 async def view_page(page_id: str, request: Request) -> Response:
     """viser's client, with a query that cannot point it at a foreign server."""
     _page(request, page_id)
-    unknown = [key for key in request.query_params if key not in PASSED_ON_QUERY]
-    if unknown:
-        return RedirectResponse(request.url.remove_query_params(unknown).replace(scheme="", netloc=""), 303)
+    known = [(key, value) for key, value in request.query_params.multi_items() if key in PASSED_ON_QUERY]
+    if len(known) != len(request.query_params.multi_items()):
+        return RedirectResponse(f"{request.url.path}?{urlencode(known)}".rstrip("?"), 303)
     sockets = f"{'wss' if request.url.scheme == 'https' else 'ws'}://{request.headers['host']}"
     policy = VIEW_POLICY.format(sockets=sockets)
     return Response(_client_html(), media_type="text/html", headers={"content-security-policy": policy})
@@ -111,10 +114,10 @@ async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: 
         if received["type"] == "websocket.disconnect":
             return
         raw = received.get("bytes")
-        if raw is not None and messages.lets_through(raw):
+        if messages.lets_through(raw) and raw is not None:
             await upstream.send(raw)
 
 
 @lru_cache(maxsize=1)
 def _client_html() -> bytes:
-    return CLIENT_HTML.read_bytes()
+    return CLIENT_HTML.read_bytes().replace(b"</head>", HIDDEN_PARTS + b"</head>", 1)

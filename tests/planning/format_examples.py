@@ -40,11 +40,12 @@ def make_timing(path: SampledPath, speed_m_s: float = 3.0) -> Timing:
 
 def make_mission(dsm: Dsm, path: SampledPath, names: tuple[str, ...] = ("P1", "P2", "P3")) -> Mission:
     lat_lon = dsm.lat_lon_from_xy(path.xy_m[path.vertex])
-    pois = tuple(Poi(lat, lon, name, 2.0) for (lat, lon), name in zip(lat_lon.tolist(), names, strict=True))
+    places = [(float(lat), float(lon)) for lat, lon in lat_lon]
+    pois = tuple(Poi(lat, lon, name, 2.0) for (lat, lon), name in zip(places, names, strict=True))
     home_alt = float(path.ground_alt_dsm_m[0])
-    home = Home(*lat_lon[0].tolist(), home_alt, dsm.vertical_datum)
+    home = Home(*places[0], home_alt, dsm.vertical_datum)
     up = [math.ceil(z * 100) / 100 for z in (path.alt_dsm_m[path.vertex] - home_alt)]
-    takeoff = MissionItem(22, 3, (0.0, 0.0, 0.0, 0.0), *lat_lon[0].tolist(), up[0])
+    takeoff = MissionItem(22, 3, (0.0, 0.0, 0.0, 0.0), *places[0], up[0])
     speed = MissionItem(178, 2, (1.0, 3.0, -1.0, 0.0))
-    places = [MissionItem(16, 3, (1.5, 0.0, 0.0, 0.0), *ll, z) for ll, z in zip(lat_lon.tolist(), up, strict=True)]
-    return Mission(home, (takeoff, speed, *places, MissionItem(20, 2)), "ardupilot", pois, 3.0)
+    waypoints = [MissionItem(16, 3, (1.5, 0.0, 0.0, 0.0), *ll, z) for ll, z in zip(places, up, strict=True)]
+    return Mission(home, (takeoff, speed, *waypoints, MissionItem(20, 2)), "ardupilot", pois, 3.0)

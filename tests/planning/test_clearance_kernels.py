@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import get_num_threads
 
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.places import distance_flown, places_along
 from planning.certificate.pyramid import LEAF_PX, max_pyramid
 from planning.certificate.returns import return_altitude
+from planning.certificate.threads import SMALL_MODEL_PX, threads_for
 from tests.reference import clearance as oracle
 
 
@@ -23,14 +25,20 @@ def rough_terrain(seed: int, *, rows: int, cols: int, holes: int = 0) -> np.ndar
     return elevation_m.astype(np.float32)
 
 
-def random_segment(seed: int, *, width_m: float, height_m: float, margin_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def random_segment(
+    seed: int, *, width_m: float, height_m: float, margin_m: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     low, high = [-margin_m, -margin_m, -4.0], [width_m + margin_m, height_m + margin_m, 15.0]
     return rng.uniform(low, high), rng.uniform(low, high)
 
 
 CASES = st.tuples(
-    st.integers(0, 2**32 - 1), st.integers(1, 30), st.integers(1, 30), st.sampled_from([0, 0, 3]), st.sampled_from([0.3, 1.0])
+    st.integers(0, 2**32 - 1),
+    st.integers(1, 30),
+    st.integers(1, 30),
+    st.sampled_from([0, 0, 3]),
+    st.sampled_from([0.3, 1.0]),
 )
 
 
@@ -54,7 +62,7 @@ def test_the_distance_is_a_tight_lower_bound_of_dense_samples(case):
     terrain = rough_terrain(seed, rows=rows, cols=cols, holes=holes)
     start, end = random_segment(seed, width_m=cols * res, height_m=rows * res)
     distance_m, _ = nearest_distances(max_pyramid(terrain, res), start[None], end[None])
-    step_m = np.linalg.norm(end - start) / 100
+    step_m = float(np.linalg.norm(end - start)) / 100
     sampled_m = oracle.sampled_distance(terrain, res, oracle.sampled_segment(start, end, step_m))
     assert sampled_m - step_m / 2 - 1e-9 <= distance_m[0] <= sampled_m + 1e-9
 
@@ -182,3 +190,12 @@ def test_places_include_every_vertex_and_are_close_enough():
     assert distance_flown(points) == pytest.approx([0.0, 5.0, 5.0, 5.1])
     assert (np.diff(s_m) >= 0).all()
     assert s_m[-1] == pytest.approx(5.1)
+
+
+def test_small_models_take_one_thread_and_give_the_others_back():
+    before = get_num_threads()
+    with threads_for(SMALL_MODEL_PX - 1):
+        assert get_num_threads() == 1
+    assert get_num_threads() == before
+    with threads_for(SMALL_MODEL_PX):
+        assert get_num_threads() == before

@@ -12,7 +12,7 @@ from pyproj import CRS
 from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flown import flown_line
-from planning.model import FlownLine, Home, Mission, MissionItem
+from planning.model import Firmware, FlownLine, Home, Mission, MissionItem
 
 NAN = math.nan
 GROUND_M = 120.0
@@ -20,7 +20,9 @@ GROUND_M = 120.0
 
 def flat_dsm(*, vertical_datum: str | None = None, elevation_m: np.ndarray | None = None) -> Dsm:
     cells = np.full((100, 100), GROUND_M, np.float32) if elevation_m is None else elevation_m
-    return Dsm(cells, Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 5_000_100.0), CRS.from_epsg(32633), vertical_datum, "0" * 64)
+    return Dsm(
+        cells, Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 5_000_100.0), CRS.from_epsg(32633), vertical_datum, "0" * 64
+    )
 
 
 def at(east_m: float, north_m: float) -> tuple[float, float]:
@@ -37,7 +39,7 @@ def item(command: int, east_m: float = NAN, north_m: float = NAN, alt_m: float =
     return MissionItem(command, frame, lat_deg=lat, lon_deg=lon, alt_m=alt_m)
 
 
-def fly(*items: MissionItem, dsm: Dsm | None = None, home: Home = HOME, firmware="ardupilot") -> FlownLine:
+def fly(*items: MissionItem, dsm: Dsm | None = None, home: Home = HOME, firmware: Firmware = "ardupilot") -> FlownLine:
     return flown_line(Mission(home, items, firmware=firmware), dsm or flat_dsm())
 
 

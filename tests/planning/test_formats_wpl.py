@@ -93,7 +93,8 @@ def test_dronekits_mission_is_read(shared_data):
 
 
 def test_windows_lines_blank_lines_spaces_and_comments_do_no_harm():
-    text = "QGC WPL 110\r\n# by hand\r\n\r\n0 1 0 16 0 0 0 0 47 8 400 1\r\n1\t0\t3\t16\t0\t0\t0\t0\t47.001\t8.001\t20\t1\r\n\r\n"
+    rows = ("0 1 0 16 0 0 0 0 47 8 400 1", "1\t0\t3\t16\t0\t0\t0\t0\t47.001\t8.001\t20\t1")
+    text = "\r\n".join(("QGC WPL 110", "# by hand", "", *rows, "", ""))
     mission = read_mission("a.waypoints", b"\xef\xbb\xbf" + text.encode())
     assert mission.items == (MissionItem(16, 3, (0, 0, 0, 0), 47.001, 8.001, 20.0),)
 

@@ -83,6 +83,7 @@ def test_swapped_points_are_noticed_only_where_the_swap_would_mend_them():
     swapped = [Poi(p.lon_deg, p.lat_deg) for p in right]
     assert not looks_swapped(right, dsm)
     assert looks_swapped(swapped, dsm)
+    assert looks_swapped([*swapped, *[Poi(0.0, 0.0)] * 9], dsm)
     assert not looks_swapped([Poi(10.0, 10.0)], dsm)
     assert not looks_swapped([], dsm)
     assert "swapped" in warn_swapped(swapped, dsm)[0]
@@ -126,7 +127,8 @@ def test_bad_geojson_is_refused(document):
 
 def test_kml_points_lines_and_polygons():
     body = (
-        "<Folder><Placemark><name>&lt;b&gt;</name><Point><coordinates>\n8.2,47.1,0 </coordinates></Point></Placemark></Folder>"
+        "<Folder><Placemark><name>&lt;b&gt;</name><Point><coordinates>\n8.2,47.1,0 </coordinates></Point></Placemark>"
+        "</Folder>"
         "<Placemark><LineString><coordinates>1,2 3,4</coordinates></LineString></Placemark>"
         "<Placemark><Polygon><innerBoundaryIs/><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47"
         "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark><Placemark/>"
@@ -178,9 +180,13 @@ def test_a_waypoint_files_places_become_points():
     assert [p.loiter_s for p in found] == [1.5, 1.5, 1.5]
 
 
-@given(st.binary(max_size=400))
-def test_noise_is_read_or_refused_but_never_crashes(data):
+def is_readable(data: bytes) -> bool:
     try:
-        assert read_pois("noise", data).pois
-    except FormatError as error:
-        assert error.what
+        return len(read_pois("noise", data).pois) > 0
+    except FormatError:
+        return False
+
+
+@given(st.binary(max_size=400))
+def test_noise_is_refused_and_never_crashes(data):
+    assert not is_readable(data) or b"," in data or b";" in data or b"\t" in data

@@ -5,6 +5,8 @@ Coordinates: metres east and SOUTH of the model's north-west corner, z up.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,18 +34,18 @@ def sampled_distance(elevation_m: NDArray[np.float32], res_m: float, places_m: F
     return min(point_distance(elevation_m, res_m, place) for place in places_m)
 
 
-def height_range(
-    elevation_m: NDArray[np.float32], res_m: float, start_m: F64, end_m: F64
-) -> tuple[float, float]:
+def height_range(elevation_m: NDArray[np.float32], res_m: float, start_m: F64, end_m: F64) -> tuple[float, float]:
     """Smallest and largest height above the cells below, between all crossings of grid lines."""
     crossings = [0.0, 1.0]
     for axis, count in ((0, elevation_m.shape[1]), (1, elevation_m.shape[0])):
         crossings += [(k * res_m - start_m[axis]) / (end_m[axis] - start_m[axis]) for k in range(count + 1)]
     ts = np.unique(np.clip(crossings, 0.0, 1.0))
     lowest, highest = np.inf, -np.inf
-    for t0, t1 in zip(ts[:-1], ts[1:], strict=True):
+    for t0, t1 in itertools.pairwise(ts):
         middle = start_m + (t0 + t1) / 2 * (end_m - start_m)
-        heights = [_height_above(elevation_m, res_m, np.array([*middle[:2], z])) for z in _altitudes(start_m, end_m, t0, t1)]
+        heights = [
+            _height_above(elevation_m, res_m, np.array([*middle[:2], z])) for z in _altitudes(start_m, end_m, t0, t1)
+        ]
         lowest, highest = min(lowest, *heights), max(highest, *heights)
     return lowest, highest
 

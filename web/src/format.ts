@@ -73,7 +73,10 @@ export function count(value: number, singular: string, plural = `${singular}s`):
 
 /** A number as typed by people: comma or point, any minus, spaces; null when it is none. */
 export function parseNumber(text: string): number | null {
-  const plain = text.replace(/[\s\u202f\u00a0]/g, "").replace(MINUS, "-").replace(",", ".");
+  const plain = text
+    .replace(/[\s\u202f\u00a0]/g, "")
+    .replace(MINUS, "-")
+    .replace(",", ".");
   if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain)) return null;
   const value = Number(plain);
   return Number.isFinite(value) ? value : null;

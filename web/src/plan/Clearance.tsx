@@ -1,4 +1,4 @@
-import { degrees, metres } from "../format";
+import { latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -37,17 +37,22 @@ function Worst({ result }: { result: ResultDoc }) {
   if (!worst) return null;
   return (
     <div class="worst">
-      <div>
+      <span class="row">
         <span class="muted">Nearest place, leg {worst.leg + 1}</span>
-        <span class="place">
-          {degrees(worst.lat_deg)}, {degrees(worst.lon_deg)}
-          <CopyPlace place={worst} name="the nearest place" />
-        </span>
-        <span>{metres(worst.alt_rel_home_m)} above home</span>
-      </div>
-      <Button icon="target" testid="show-worst" onClick={() => frame("worst")}>
-        Show
-      </Button>
+        <Button
+          icon="target"
+          testid="show-worst"
+          title="Show it in the 3D view"
+          onClick={() => frame("worst")}
+        >
+          Show
+        </Button>
+      </span>
+      <span class="row place">
+        {latLon(worst)}
+        <CopyPlace place={worst} name="the nearest place" />
+      </span>
+      <span>{metres(worst.alt_rel_home_m)} above home</span>
     </div>
   );
 }
@@ -89,7 +94,11 @@ export function Clearance({ result }: { result: ResultDoc }) {
         </span>
       </div>
       <dl class="figures-list">
-        <Figure label="Smallest height above" value={metres(result.min_vertical_m, 2)} testid="min-vertical" />
+        <Figure
+          label="Smallest height above"
+          value={metres(result.min_vertical_m, 2)}
+          testid="min-vertical"
+        />
       </dl>
       <Worst result={result} />
       <h2>Return and home</h2>

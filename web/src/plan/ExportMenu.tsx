@@ -48,13 +48,24 @@ function openReport(print: boolean): void {
   const opened = window.open(REPORT, "_blank");
   if (!opened) {
     const what = "The browser did not open the report in a new tab.";
-    setError("export", { code: "popup", what, where: "", advice: "Allow pop-ups for this page and try again." });
+    setError("export", {
+      code: "popup",
+      what,
+      where: "",
+      advice: "Allow pop-ups for this page and try again.",
+    });
   } else if (print) opened.addEventListener("load", () => opened.print());
 }
 
 function Item(props: { label: string; note: string; icon: IconName; testid: string; onClick: () => void }) {
   return (
-    <button type="button" role="menuitem" class="menu-item" data-testid={props.testid} onClick={props.onClick}>
+    <button
+      type="button"
+      role="menuitem"
+      class="menu-item"
+      data-testid={props.testid}
+      onClick={props.onClick}
+    >
       <Icon name={props.icon} />
       <span>{props.label}</span>
       <span class="muted">{props.note}</span>
@@ -75,7 +86,7 @@ function Warning() {
 /** Why there is nothing to export yet. */
 function obstacle(): string | null {
   const now = computation.value;
-  if (!now || now.state === "empty") return now?.hint || "Nothing to export yet";
+  if (!now || now.state === "empty") return "Nothing to export yet";
   if (now.state === "error") return "The plan has an error: see the right panel";
   return now.state === "running" && !now.result ? "Computing…" : null;
 }
@@ -114,11 +125,28 @@ export function ExportMenu() {
             <>
               <Warning />
               {FILES.map(({ file, ...item }) => (
-                <Item key={file} {...item} testid={`export-${file}`} onClick={then(() => void download(file))} />
+                <Item
+                  key={file}
+                  {...item}
+                  testid={`export-${file}`}
+                  onClick={then(() => void download(file))}
+                />
               ))}
               <hr />
-              <Item label="Report" note="new tab" icon="chart" testid="export-report" onClick={then(() => openReport(false))} />
-              <Item label="Print the report" note="" icon="print" testid="export-print" onClick={then(() => openReport(true))} />
+              <Item
+                label="Report"
+                note="new tab"
+                icon="chart"
+                testid="export-report"
+                onClick={then(() => openReport(false))}
+              />
+              <Item
+                label="Print the report"
+                note=""
+                icon="print"
+                testid="export-print"
+                onClick={then(() => openReport(true))}
+              />
             </>
           );
         }}

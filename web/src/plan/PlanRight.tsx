@@ -68,7 +68,12 @@ function Flight({ result }: { result: ResultDoc }) {
         <dt>Duration</dt>
         <dd data-testid="duration">{duration(result.duration_s)}</dd>
       </dl>
-      <Bar label="Duration against endurance" share={share} mark={usable} level={fill(result.duration_s / result.usable_endurance_s)} />
+      <Bar
+        label="Duration against endurance"
+        share={share}
+        mark={usable}
+        level={fill(result.duration_s / result.usable_endurance_s)}
+      />
       <p class="bar-note">
         of {duration(result.usable_endurance_s)} usable · {percent(1 - usable)} reserve
       </p>
@@ -136,7 +141,10 @@ export function PlanRight() {
 function Teaching() {
   return (
     <div class="teaching">
-      <p>The certificate states the smallest distance between the line that will be flown and the surface model.</p>
+      <p>
+        The certificate states the smallest distance between the line that will be flown and the surface
+        model.
+      </p>
       <p>It appears here as soon as there is a terrain and at least two points.</p>
     </div>
   );

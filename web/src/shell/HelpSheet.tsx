@@ -19,7 +19,9 @@ const TERMS = [
 function Keys({ keys }: { keys: string }) {
   const parts = keys.split(" ");
   return (
-    <>{parts.map((part) => (part === "or" || part === "to" ? <i> {part} </i> : <kbd key={part}>{part}</kbd>))}</>
+    <>
+      {parts.map((part) => (part === "or" || part === "to" ? <i> {part} </i> : <kbd key={part}>{part}</kbd>))}
+    </>
   );
 }
 

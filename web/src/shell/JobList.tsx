@@ -40,7 +40,13 @@ export function JobList() {
           </span>
           <Bar label={job.label} share={job.share} />
           <span class="job-share">{job.share === null ? "" : percent(job.share)}</span>
-          <Button kind="quiet" icon="cross" title={`Cancel: ${job.label}`} testid="job-cancel" onClick={job.cancel} />
+          <Button
+            kind="quiet"
+            icon="cross"
+            title={`Cancel: ${job.label}`}
+            testid="job-cancel"
+            onClick={job.cancel}
+          />
         </div>
       ))}
       {all.length > 1 && <span class="muted">and {all.length - 1} more</span>}

@@ -39,8 +39,20 @@ function PlanName() {
   const rename = (name: string) => name && edit("Rename plan", "plan", (doc) => ({ ...doc, name }));
   return (
     <div class="plan-name">
-      <TextField bare label="Plan name" testid="plan-name" value={document_.value?.name ?? ""} onChange={rename} />
-      <Button kind="quiet" icon="folder" title="Plans: open, new, save as" testid="plans-button" onClick={() => (openDialog.value = "plans")} />
+      <TextField
+        bare
+        label="Plan name"
+        testid="plan-name"
+        value={document_.value?.name ?? ""}
+        onChange={rename}
+      />
+      <Button
+        kind="quiet"
+        icon="folder"
+        title="Plans: open, new, save as"
+        testid="plans-button"
+        onClick={() => (openDialog.value = "plans")}
+      />
       <SavedState />
     </div>
   );
@@ -52,8 +64,22 @@ function UndoRedo() {
   const redoTitle = `Redo ${state?.redo_label ?? ""}`.trim();
   return (
     <div class="group">
-      <Button kind="quiet" icon="undo" title={`${undoTitle} (Ctrl+Z)`} testid="undo" disabled={!state?.can_undo && !saving.value} onClick={undo} />
-      <Button kind="quiet" icon="redo" title={`${redoTitle} (Ctrl+Shift+Z)`} testid="redo" disabled={!state?.can_redo} onClick={redo} />
+      <Button
+        kind="quiet"
+        icon="undo"
+        title={`${undoTitle} (Ctrl+Z)`}
+        testid="undo"
+        disabled={!state?.can_undo && !saving.value}
+        onClick={undo}
+      />
+      <Button
+        kind="quiet"
+        icon="redo"
+        title={`${redoTitle} (Ctrl+Shift+Z)`}
+        testid="redo"
+        disabled={!state?.can_redo}
+        onClick={redo}
+      />
     </div>
   );
 }
@@ -73,7 +99,13 @@ function ThemeToggle() {
   const isDark = theme.value === "dark";
   const title = isDark ? "Daylight colours" : "Dark colours";
   return (
-    <Button kind="quiet" icon={isDark ? "sun" : "moon"} title={title} testid="theme-toggle" onClick={() => (theme.value = isDark ? "light" : "dark")} />
+    <Button
+      kind="quiet"
+      icon={isDark ? "sun" : "moon"}
+      title={title}
+      testid="theme-toggle"
+      onClick={() => (theme.value = isDark ? "light" : "dark")}
+    />
   );
 }
 
@@ -95,10 +127,24 @@ function Tabs() {
   );
 }
 
-function DrawerButton({ side, label, icon }: { side: "left" | "right"; label: string; icon: "menu" | "check" }) {
+function DrawerButton({
+  side,
+  label,
+  icon,
+}: {
+  side: "left" | "right";
+  label: string;
+  icon: "menu" | "check";
+}) {
   const open = drawer.value === side;
   return (
-    <button type="button" class="drawer-button" aria-expanded={open} data-testid={`drawer-${side}`} onClick={() => (drawer.value = open ? null : side)}>
+    <button
+      type="button"
+      class="drawer-button"
+      aria-expanded={open}
+      data-testid={`drawer-${side}`}
+      onClick={() => (drawer.value = open ? null : side)}
+    >
       <Icon name={icon} />
       <span>{label}</span>
     </button>
@@ -127,7 +173,13 @@ export function StatusBar() {
       <div class="group">
         <NoticeMenu />
         <ThemeToggle />
-        <Button kind="quiet" icon="help" title="Help and keys (?)" testid="help" onClick={() => (openDialog.value = "help")} />
+        <Button
+          kind="quiet"
+          icon="help"
+          title="Help and keys (?)"
+          testid="help"
+          onClick={() => (openDialog.value = "help")}
+        />
       </div>
     </header>
   );

@@ -39,7 +39,10 @@ export function editGroup<K extends "survey" | "profile" | "surface" | "path" | 
   fields: Partial<PlanDoc[K]>,
   coalesce = false,
 ): void {
-  const change = (document: PlanDoc): PlanDoc => ({ ...document, [group]: { ...document[group], ...fields } });
+  const change = (document: PlanDoc): PlanDoc => ({
+    ...document,
+    [group]: { ...document[group], ...fields },
+  });
   edit(label, place, change, { coalesce });
 }
 

@@ -27,12 +27,13 @@ function read<T>(name: string, initial: T, isValid: (value: unknown) => value is
 export type Theme = "dark" | "light";
 
 const isTheme = (value: unknown): value is Theme => value === "dark" || value === "light";
-const isHeight = (value: unknown): value is number => typeof value === "number" && value >= 120 && value <= 900;
+const isHeight = (value: unknown): value is number =>
+  typeof value === "number" && value >= 120 && value <= 900;
 const isOpenMap = (value: unknown): value is Record<string, boolean> =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 
 export const theme = remembered<Theme>("theme", "dark", isTheme);
-export const chartHeight_px = remembered<number>("chartHeight", 216, isHeight);
+export const chartHeight_px = remembered<number>("chartHeight", 244, isHeight);
 export const openSections = remembered<Record<string, boolean>>("sections", {}, isOpenMap);
 
 effect(() => {

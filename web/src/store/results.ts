@@ -16,7 +16,8 @@ export function rememberResult(
 ): KnownResult | null {
   const { result, revision, state: stage } = state.computation;
   if (result) {
-    const same = before?.result === result || (before?.planId === state.plan_id && before.revision === revision);
+    const same =
+      before?.result === result || (before?.planId === state.plan_id && before.revision === revision);
     return { planId: state.plan_id, revision, at_ms: same && before ? before.at_ms : now_ms, result };
   }
   const isSamePlan = before?.planId === state.plan_id;

@@ -1,0 +1,43 @@
+"""The certificate as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from planning.model import Certificate, finite_or_none
+
+WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """The certificate as plain JSON values; infinite and undefined numbers become null."""
+    plain = {
+        "certified": certificate.certified,
+        "min_distance_m": certificate.min_distance_m,
+        "min_vertical_m": certificate.min_vertical_m,
+        "required_clearance_m": certificate.required_clearance_m,
+        "worst": {key: getattr(certificate.worst, key) for key in WORST_KEYS},
+        "rtl_height_needed_m": certificate.rtl_height_needed_m,
+        "home_column_clear": certificate.home_column_clear,
+        "max_height_above_ground_m": certificate.max_height_above_ground_m,
+        "reasons": [asdict(reason) for reason in certificate.reasons],
+        "legs": [asdict(leg) for leg in certificate.legs],
+        "trend": {"s_m": certificate.trend_s_m, "distance_m": certificate.trend_distance_m},
+        "assumptions": certificate.assumptions,
+    }
+    return {key: _jsonable(value) for key, value in plain.items()}
+
+
+def _jsonable(value: object) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _jsonable(inner) for key, inner in value.items()}
+    if isinstance(value, np.ndarray):
+        return _jsonable(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_jsonable(inner) for inner in value]
+    if isinstance(value, np.generic):
+        return _jsonable(value.item())
+    return finite_or_none(value) if isinstance(value, float) else value

@@ -1,0 +1,1 @@
+"""What browsers and programs may ask: one router per subject."""

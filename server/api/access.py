@@ -1,0 +1,75 @@
+"""What every route needs: the parts of the running app, the session behind a request, answers as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import Depends, Request
+from fastapi.responses import Response
+from pydantic import BaseModel
+from starlette.requests import HTTPConnection
+
+from server.auth import Auth
+from server.errors import SignInError
+from server.hub import Hub
+from server.library import Library
+from server.scene.host import SceneHost
+from server.schemas import ErrorDoc
+from server.settings import Settings
+
+if TYPE_CHECKING:
+    from server.workspace import Workspace
+
+
+@dataclass(slots=True)
+class Parts:
+    """The running app, from start to stop."""
+
+    settings: Settings
+    auth: Auth
+    hub: Hub
+    library: Library
+    scene_host: SceneHost
+    workspace: Workspace
+
+
+def parts_of(connection: HTTPConnection) -> Parts:
+    return connection.app.state.parts
+
+
+def cookie_name(connection: HTTPConnection) -> str:
+    """With the port, because browsers share the cookies of all ports of a host."""
+    prefix = "__Host-" if connection.scope["scheme"] in ("https", "wss") else ""
+    return f"{prefix}hedgehop-{parts_of(connection).settings.port}"
+
+
+def session_of(connection: HTTPConnection) -> str:
+    """The id of the live session that the request belongs to; raises ``SignInError``."""
+    session_id = connection.cookies.get(cookie_name(connection), "")
+    if parts_of(connection).auth.remaining_s(session_id) <= 0:
+        raise SignInError(
+            "You are not signed in, or your session has ended.",
+            advice="Open the sign-in link that Hedgehop printed, or sign in with the password.",
+        )
+    return session_id
+
+
+def signed_in(request: Request) -> str:
+    return session_of(request)
+
+
+def workspace_of(request: Request) -> Workspace:
+    return parts_of(request).workspace
+
+
+SignedIn = Depends(signed_in)
+Work = Annotated["Workspace", Depends(workspace_of)]
+ERROR_RESPONSES: dict[int | str, dict[str, object]] = {
+    status: {"model": ErrorDoc} for status in (401, 403, 404, 409, 413, 422, 507)
+}
+
+
+def answer(document: BaseModel, status_code: int = 200) -> Response:
+    """A checked document as JSON, written once; NaN and infinity become null."""
+    return Response(document.model_dump_json(), status_code=status_code, media_type="application/json")

@@ -1,0 +1,84 @@
+"""The console's files, the documentation of the API, and the sign of life."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
+
+from planning import __version__
+from server.api.access import SignedIn, parts_of, session_of
+from server.api.session import inline_policy
+from server.api.templates import render
+from server.errors import NotFoundError, SignInError
+
+router = APIRouter(include_in_schema=False)
+
+_FOR_EVER = "public, max-age=31536000, immutable"
+
+
+@router.get("/api/health", include_in_schema=True, tags=["health"])
+async def health() -> dict[str, str]:
+    """Answers without a session."""
+    return {"status": "ok", "version": __version__}
+
+
+@router.get("/")
+async def console(request: Request) -> Response:
+    try:
+        session_of(request)
+    except SignInError:
+        return _to_sign_in(request)
+    index = parts_of(request).settings.console_dir / "index.html"
+    if not index.is_file():
+        page = render("no_console.html")
+        return HTMLResponse(page, 503, {"content-security-policy": inline_policy(page)})
+    return FileResponse(index, media_type="text/html", headers={"cache-control": "no-cache"})
+
+
+@router.get("/assets/{path:path}", dependencies=[SignedIn])
+async def asset(path: str, request: Request) -> Response:
+    """Built files carry a digest in their names, so browsers may keep them."""
+    return FileResponse(_console_file(request, "assets/" + path), headers={"cache-control": _FOR_EVER})
+
+
+@router.get("/favicon.svg")
+async def favicon(request: Request) -> Response:
+    return FileResponse(_console_file(request, "favicon.svg"), headers={"cache-control": "no-cache"})
+
+
+@router.get("/api/openapi.json", dependencies=[SignedIn])
+async def openapi(request: Request) -> Response:
+    return JSONResponse(request.app.openapi())
+
+
+@router.get("/api/docs", dependencies=[SignedIn])
+async def docs(request: Request) -> Response:
+    """The operations on one page, without anyone else's scripts."""
+    page = render("api.html", title=request.app.title, version=__version__, operations=_operations(request.app))
+    return HTMLResponse(page, headers={"content-security-policy": inline_policy(page)})
+
+
+def _to_sign_in(request: Request) -> Response:
+    # Whoever follows a link from another site arrives without the strict cookie; a step of our own brings it along.
+    if request.headers.get("sec-fetch-site") == "cross-site":
+        return HTMLResponse('<!doctype html><meta http-equiv="refresh" content="0;url=/"><title>Hedgehop</title>')
+    return RedirectResponse("/signin", 303)
+
+
+def _console_file(request: Request, path: str) -> Path:
+    root = parts_of(request).settings.console_dir.resolve()
+    file = (root / path).resolve() if "\0" not in path else root
+    if not file.is_relative_to(root) or not file.is_file():
+        raise NotFoundError("There is no such file.")
+    return file
+
+
+def _operations(app: Any) -> list[dict[str, str]]:
+    return [
+        {"method": method.upper(), "path": path, "text": operation.get("description") or operation["summary"]}
+        for path, methods in app.openapi()["paths"].items()
+        for method, operation in methods.items()
+    ]

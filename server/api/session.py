@@ -1,0 +1,90 @@
+"""Signing in and out."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import hashlib
+import re
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+
+from server.api.access import cookie_name, parts_of, session_of
+from server.api.templates import render
+from server.auth import session_key
+from server.errors import SignInError, status_of
+from server.schemas import SignIn
+
+router = APIRouter(tags=["session"])
+
+
+@router.get("/login", include_in_schema=False)
+async def login(request: Request, token: str = "") -> Response:
+    """The one-time link. Opened again by who is in already, it simply leads to the console."""
+    auth = parts_of(request).auth
+    try:
+        session_of(request)
+        return RedirectResponse("/", 303)
+    except SignInError:
+        pass
+    try:
+        session_id = await asyncio.to_thread(auth.redeem, token)
+    except SignInError as error:
+        return sign_in_page(request, str(error), status_of(error))
+    return _with_cookie(request, RedirectResponse("/", 303), session_id)
+
+
+@router.get("/signin", include_in_schema=False)
+async def sign_in_form(request: Request) -> Response:
+    return sign_in_page(request, "", 200)
+
+
+@router.post("/api/session", status_code=204)
+async def sign_in(body: SignIn, request: Request) -> Response:
+    """Signs in with the password; at most five wrong ones a minute."""
+    session_id = await asyncio.to_thread(parts_of(request).auth.sign_in, body.password)
+    return _with_cookie(request, Response(status_code=204), session_id)
+
+
+@router.delete("/api/session", status_code=204)
+async def sign_out(request: Request) -> Response:
+    """Ends the session and closes all its pages."""
+    session_id = session_of(request)
+    parts = parts_of(request)
+    await asyncio.to_thread(parts.auth.sign_out, session_id)
+    parts.hub.close_session(session_key(session_id))
+    response = Response(status_code=204)
+    response.delete_cookie(cookie_name(request))
+    return response
+
+
+def sign_in_page(request: Request, message: str, status_code: int) -> Response:
+    page = render("signin.html", message=message, has_password=parts_of(request).auth.has_password)
+    return HTMLResponse(page, status_code, {"content-security-policy": inline_policy(page)})
+
+
+def inline_policy(page: str) -> str:
+    """Lets exactly the page's own script and style run, nothing else."""
+    return (
+        f"default-src 'none'; script-src {_hashes(page, 'script')}; style-src {_hashes(page, 'style')}; "
+        "img-src data:; connect-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+def _hashes(page: str, tag: str) -> str:
+    texts = re.findall(rf"<{tag}>(.*?)</{tag}>", page, flags=re.DOTALL)
+    digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts)
+    return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+
+
+def _with_cookie(request: Request, response: Response, session_id: str) -> Response:
+    response.set_cookie(
+        cookie_name(request),
+        session_id,
+        max_age=int(parts_of(request).auth.lifetime_s),
+        httponly=True,
+        samesite="strict",
+        secure=request.url.scheme == "https",
+    )
+    return response

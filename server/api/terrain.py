@@ -1,0 +1,93 @@
+"""Surface models and orthophotos: raw bytes in, jobs that read them, deletion."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import Response
+
+from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
+from server.api.uploads import display_name, stream_to_disk, suffix_of
+from server.errors import BadRequestError
+from server.schemas import JobDoc, TerrainDoc
+
+router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["terrain"], responses=ERROR_RESPONSES)
+
+FileName = Annotated[str, Query(max_length=1000)]
+Declared = Annotated[str, Query(max_length=10_000)]
+RAW_BODY: dict[str, Any] = {"requestBody": {"content": {"application/octet-stream": {}}, "required": True}}
+
+
+@router.post("/terrains", response_model=JobDoc, status_code=202, openapi_extra=RAW_BODY)
+async def add_terrain(
+    request: Request,
+    workspace: Work,
+    filename: FileName,
+    crs: Declared = "",
+    z_scale: Annotated[str, Query(max_length=20, pattern=r"^[0-9.eE+-]*$")] = "",
+    vertical_datum: Declared = "",
+    remove_spikes: bool = False,
+) -> Response:
+    """A GeoTIFF or ESRI ASCII grid; what the file does not say can be declared. Empty: nothing is."""
+    scale = _positive(z_scale)
+    name = display_name(filename)
+    upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(name)))
+    job = workspace.files.add_terrain(
+        upload,
+        name,
+        crs=crs.strip() or None,
+        z_scale=scale,
+        vertical_datum=vertical_datum.strip() or None,
+        remove_spikes=remove_spikes,
+    )
+    return answer(job, 202)
+
+
+@router.post("/terrains/demo", response_model=TerrainDoc)
+async def add_demo_terrain(workspace: Work) -> Response:
+    """The generated demo model; opens the demo plan."""
+    return answer(await workspace.add_demo_terrain())
+
+
+@router.post("/terrains/{terrain_id}/remove_spikes", response_model=JobDoc, status_code=202)
+async def remove_spikes(terrain_id: str, workspace: Work) -> Response:
+    """Makes a new surface model without the isolated spikes and pits of this one."""
+    return answer(workspace.files.remove_spikes(terrain_id), 202)
+
+
+@router.delete("/terrains/{terrain_id}", status_code=204)
+async def delete_terrain(terrain_id: str, workspace: Work) -> Response:
+    """409 while a plan uses it."""
+    await workspace.delete_terrain(terrain_id)
+    return Response(status_code=204)
+
+
+@router.post("/orthophotos", response_model=JobDoc, status_code=202, openapi_extra=RAW_BODY)
+async def add_orthophoto(
+    request: Request, workspace: Work, filename: FileName, terrain_id: Annotated[str, Query(max_length=32)]
+) -> Response:
+    """An orthomosaic GeoTIFF, draped on a surface model."""
+    library = parts_of(request).library
+    library.terrain_dir(terrain_id)
+    name = display_name(filename)
+    upload = await stream_to_disk(request, library.new_upload(suffix_of(name)))
+    return answer(workspace.files.add_orthophoto(upload, name, terrain_id), 202)
+
+
+@router.post("/jobs/{job_id}/cancel", status_code=204)
+async def cancel_job(job_id: str, workspace: Work) -> Response:
+    await workspace.cancel_job(job_id)
+    return Response(status_code=204)
+
+
+def _positive(text: str) -> float | None:
+    """The z-scale; the reader itself refuses what makes no sense as one."""
+    if not text:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise BadRequestError(
+            f"{text!r} is no number.", where="z_scale", advice="Give metres per stored unit, such as 0.01."
+        ) from None

@@ -1,0 +1,36 @@
+"""The ``/ws`` stream of a page."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, WebSocket
+
+from server.api.access import parts_of, session_of
+from server.auth import session_key
+from server.errors import BusyError, SignInError
+from server.hub import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
+
+router = APIRouter()
+
+
+@router.websocket("/ws")
+async def stream(websocket: WebSocket) -> None:
+    """A snapshot, then what changes. The guard has refused foreign origins before this."""
+    parts = parts_of(websocket)
+    try:
+        session_id = session_of(websocket)
+    except SignInError:
+        # Only an open socket can tell the console's script why: 4401 leads it to the sign-in page.
+        await websocket.accept()
+        await websocket.close(CLOSE_SIGNED_OUT)
+        return
+    await websocket.accept()
+    try:
+        await parts.hub.serve(
+            websocket,
+            session_key=session_key(session_id),
+            session_remaining_s=parts.auth.remaining_s(session_id),
+            snapshot=parts.workspace.snapshot,
+            on_message=parts.workspace.on_client_message,
+        )
+    except BusyError:
+        await websocket.close(CLOSE_TRY_LATER)

@@ -1,0 +1,103 @@
+"""The process of ``hedgehop serve``: its socket, its log, its sign-in link."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import socket
+import sys
+
+import uvicorn
+from fastapi import FastAPI
+
+from server.errors import ServerError, StartError
+from server.logs import configure_logging
+from server.settings import Settings
+from server.web import create_app
+
+log = logging.getLogger("hedgehop.app")
+
+WEBSOCKET_LIMIT_BYTES = 1024**2
+"""From browsers; what goes to them has no limit."""
+STALLED_AFTER_MS = 30_000
+SHUTDOWN_S = 5
+
+
+def run(settings: Settings, *, demo: bool = False) -> None:
+    """Serves until interrupted. Raises ``StartError`` or ``DataDirError`` with what to do."""
+    from server.wiring import make_workspace
+
+    configure_logging(settings.log_level)
+    with bound_socket(settings.host, settings.port) as listening:
+        app = create_app(settings, make_workspace, demo=demo)
+        AnnouncingServer(app, settings).run(sockets=[listening])
+
+
+class AnnouncingServer(uvicorn.Server):
+    """Prints the sign-in link once the console answers."""
+
+    def __init__(self, app: FastAPI, settings: Settings) -> None:
+        super().__init__(server_config(app, settings))
+        self._app, self._settings = app, settings
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            sys.stdout.write(f"Hedgehop is ready. Open this link, which signs you in once:\n  {self.link()}\n")
+            sys.stdout.flush()
+
+    def link(self) -> str:
+        token = self._app.state.parts.auth.new_link_token()
+        return f"http://{_reachable(self._settings.host)}:{self._settings.port}/login?token={token}"
+
+
+def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        # The guard writes one line per request, without the queries that hold sign-in tokens.
+        access_log=False,
+        server_header=False,
+        # Meshes deflate slowly and little: a 36 MB one took 2.2 s with, 0.3 s without.
+        ws_per_message_deflate=False,
+        ws_max_size=WEBSOCKET_LIMIT_BYTES,
+        timeout_graceful_shutdown=SHUTDOWN_S,
+    )
+
+
+def bound_socket(host: str, port: int) -> socket.socket:
+    """The listening socket, bound before anything slow happens; raises ``StartError`` when that cannot be."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            # Connections inherit it: a browser that takes no bytes any more does not hold its buffers for ever.
+            listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, STALLED_AFTER_MS)
+        listening.bind((host, port))
+    except OSError as error:
+        listening.close()
+        raise _cannot_bind(host, port, error) from error
+    return listening
+
+
+def _cannot_bind(host: str, port: int, error: OSError) -> ServerError:
+    if error.errno == errno.EADDRINUSE:
+        return StartError(
+            f"Port {port} is in use: perhaps another Hedgehop runs already.",
+            advice=f"Open http://{_reachable(host)}:{port} or start this one with another --port.",
+        )
+    if error.errno == errno.EACCES:
+        return StartError(f"Port {port} is reserved by the system.", advice="Choose a --port of 1024 or more.")
+    return StartError(
+        f"Hedgehop cannot listen on {host}: {error.strerror}.",
+        advice="Choose one of this machine's addresses as --host.",
+    )
+
+
+def _reachable(host: str) -> str:
+    if host in ("0.0.0.0", "::"):
+        return "127.0.0.1"
+    return f"[{host}]" if ":" in host else host

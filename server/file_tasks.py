@@ -1,0 +1,93 @@
+"""What the file lane's worker does: reads rasters, cleans them, generates the demo; results go to the library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from planning.demo import demo_dsm
+from planning.geotiff import read_dsm_reported, read_orthophoto
+from planning.spikes import Spike, find_spikes
+from planning.spikes import remove_spikes as without
+from server.jobs import Progress
+from server.library.orthophotos import store_orthophoto
+from server.library.shelf import read_manifest
+from server.library.terrains import TerrainManifest, load_terrain, store_terrain
+from server.schemas import OrthophotoDoc, SpikeDoc, TerrainDoc
+
+_STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
+_MAX_SPIKES = 100
+
+
+def import_terrain(
+    root: Path,
+    upload: Path,
+    filename: str,
+    *,
+    crs: str | None,
+    z_scale: float | None,
+    vertical_datum: str | None,
+    remove_spikes: bool,
+    report: Progress,
+) -> TerrainDoc:
+    """Reads an uploaded surface model into the library. Raises RasterError."""
+    dsm, found = read_dsm_reported(
+        upload,
+        crs=crs,
+        z_scale=z_scale,
+        vertical_datum=vertical_datum,
+        remove_spikes=remove_spikes,
+        progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
+    )
+    report("Storing", None)
+    spikes = () if found.spikes_removed else found.spikes
+    return store_terrain(root, dsm, name=filename, spikes=spike_docs(spikes), warnings=found.warnings)
+
+
+def import_orthophoto(
+    root: Path, terrain_dir: Path, upload: Path, filename: str, *, terrain_id: str, report: Progress
+) -> OrthophotoDoc:
+    """Reads an uploaded orthomosaic, brought onto its surface model's grid. Raises RasterError."""
+    dsm = load_terrain(terrain_dir)
+    photo = read_orthophoto(
+        upload,
+        bounds_m=dsm.bounds_m,
+        crs=dsm.crs,
+        progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
+    )
+    report("Storing", None)
+    return store_orthophoto(root, photo, name=filename, terrain_id=terrain_id)
+
+
+def without_spikes(root: Path, terrain_dir: Path, *, report: Progress) -> TerrainDoc:
+    """A copy of a surface model without its isolated spikes and pits."""
+    dsm, before = load_terrain(terrain_dir), read_manifest(terrain_dir, TerrainManifest).doc
+    report("Looking for spikes", None)
+    spikes = find_spikes(dsm)
+    report("Storing", None)
+    return store_terrain(
+        root,
+        without(dsm, spikes),
+        name=f"{before.name} without spikes",
+        warnings=[*before.warnings, f"{len(spikes)} isolated spikes and pits were removed."],
+    )
+
+
+def make_demo_terrain(root: Path, name: str, *, report: Progress) -> TerrainDoc:
+    """Generates the demo's surface model."""
+    report("Generating the demo surface model", None)
+    return store_terrain(root, demo_dsm(), name=name)
+
+
+def spike_docs(spikes: Sequence[Spike]) -> list[SpikeDoc]:
+    """The tallest ones, enough for a list that somebody reads."""
+    tallest = sorted(spikes, key=lambda spike: -spike.height_m)[:_MAX_SPIKES]
+    return [
+        SpikeDoc(
+            lat_deg=spike.lat_deg,
+            lon_deg=spike.lon_deg,
+            size_m=spike.size_m,
+            height_m=spike.height_m if spike.kind == "spike" else -spike.height_m,
+        )
+        for spike in tallest
+    ]

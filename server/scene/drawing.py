@@ -1,0 +1,64 @@
+"""What every layer of the 3D view draws from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from planning.dsm import Dsm
+from server.scene.frame import LocalFrame
+from server.scene.mesh import drawn_alt_dsm_m
+from server.scene.payload import F64, HeightGrid, SceneState, TerrainScene
+from server.scene.unknown import plates
+
+
+class _Place(Protocol):
+    @property
+    def lat_deg(self) -> float: ...
+    @property
+    def lon_deg(self) -> float: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A state together with the model and the frame it is drawn in."""
+
+    dsm: Dsm
+    terrain: TerrainScene
+    state: SceneState
+    frame: LocalFrame
+    plates: HeightGrid
+    """What stands for unknown terrain."""
+
+    @staticmethod
+    def of(dsm: Dsm | None, state: SceneState, before: Drawing | None = None) -> Drawing | None:
+        """None when there is no terrain to draw on; ``before`` saves work when its terrain is the same."""
+        if dsm is None or state.terrain is None or not np.isfinite(state.terrain.grid.alt_dsm_m).any():
+            return None
+        frame = LocalFrame.of(dsm, state.terrain.grid, state.view.vertical_exaggeration)
+        same = before is not None and before.terrain is state.terrain
+        return Drawing(dsm, state.terrain, state, frame, before.plates if same else plates(state.terrain.grid))
+
+    @property
+    def mark_m(self) -> float:
+        """Radius of a mark that is seen from afar and does not hide what it marks."""
+        return 0.011 * self.frame.half_diagonal_m
+
+    def places_xy_m(self, places: Sequence[_Place]) -> F64:
+        """(N, 2) projected"""
+        lat_lon = np.array([[place.lat_deg, place.lon_deg] for place in places], dtype=np.float64).reshape(-1, 2)
+        return self.dsm.xy_from_lat_lon(lat_lon)
+
+    def on_ground(self, xy_m: F64) -> F64:
+        """Projected (N, 2) -> scene (N, 3) on the terrain as it is drawn; places without a projection left out."""
+        xy = xy_m[np.isfinite(xy_m).all(axis=1)]
+        alt = drawn_alt_dsm_m(self.terrain.grid, xy, self.frame.floor_alt_dsm_m)
+        return self.frame.scene_from_model(np.column_stack([xy, alt]))
+
+    def ground_of(self, place: _Place) -> F64 | None:
+        """(3,) scene; None for a place that the model's projection does not know."""
+        points = self.on_ground(self.places_xy_m([place]))
+        return points[0] if len(points) else None

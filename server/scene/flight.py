@@ -1,0 +1,114 @@
+"""Layer of the flight: the sampled path, the legs as they will be flown, take-off, and the place nearest to terrain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from server.scene import palette
+from server.scene.drawing import Drawing
+from server.scene.nodes import Node
+from server.scene.payload import F64, U8, PlanScene
+from server.scene.shapes import BALL, GEM, label_node, line_node, many_node, raised, shape_node
+
+_MOST_WAYPOINT_MARKS = 1500
+_CURTAIN_OPACITY = 0.42
+
+
+def flight_nodes(drawing: Drawing) -> list[Node]:
+    plan = drawing.state.plan
+    if plan is None or not drawing.state.view.show_path or len(plan.path_m) < 2:
+        return []
+    return [*_path(drawing, plan), *_flown(drawing, plan), *_takeoff(drawing, plan), *_worst(drawing, plan)]
+
+
+def path_clearance_m(plan: PlanScene) -> F64:
+    """(N - 1,) of each piece of the path, as the certificate would put it: the smaller of its height above the
+    cell below and the distance of the leg that is flown there. A piece never looks safer than its leg."""
+    above_m = plan.path_m[:, 2] - plan.path_ground_alt_dsm_m
+    above_m = np.where(np.isnan(above_m), -np.inf, above_m)
+    piece_m = np.minimum(above_m[:-1], above_m[1:])
+    if not len(plan.flown_distance_m):
+        return piece_m
+    leg_end_s_m = np.cumsum(np.hypot(*np.diff(plan.flown_m[:, :2], axis=0).T))
+    middle_s_m = (plan.path_s_m[:-1] + plan.path_s_m[1:]) / 2
+    leg = np.minimum(np.searchsorted(leg_end_s_m, middle_s_m), len(leg_end_s_m) - 1)
+    return np.minimum(piece_m, plan.flown_distance_m[leg])
+
+
+def _colors(drawing: Drawing, clearance_m: F64, plan: PlanScene) -> U8:
+    rgb = palette.clearance_rgb(clearance_m, plan.required_clearance_m)
+    return palette.dimmed(rgb, stale=drawing.state.plan_is_stale)
+
+
+def _path(drawing: Drawing, plan: PlanScene) -> list[Node]:
+    points = drawing.frame.scene_from_model(plan.path_m)
+    colors = _colors(drawing, path_clearance_m(plan), plan)
+    return [line_node("/path", _in_sight(drawing, points), colors, width_px=5.0), *_curtain(drawing, plan, points)]
+
+
+def _in_sight(drawing: Drawing, points: F64) -> F64:
+    """Lifted off the safe surface, which the path touches and which would veil it."""
+    return raised(points, 0.25 * drawing.mark_m)
+
+
+def _curtain(drawing: Drawing, plan: PlanScene, points: F64) -> list[Node]:
+    """A dark veil from the path to the ground: it shows how high the path is, and sets the line off."""
+    foot = drawing.on_ground(plan.path_m[:, :2])
+    if len(foot) != len(points):
+        return []
+    foot[:, 2] = np.minimum(foot[:, 2], points[:, 2])
+    vertices = np.concatenate([points, foot]).astype(np.float32)
+    a = np.arange(len(points) - 1)
+    b = a + len(points)
+    props = {
+        "vertices": vertices,
+        "faces": np.concatenate([np.column_stack([a, b, a + 1]), np.column_stack([a + 1, b, b + 1])]).astype(np.uint32),
+        "color": palette.CURTAIN,
+        "opacity": _CURTAIN_OPACITY,
+        "side": "double",
+        "flat_shading": True,
+        "cast_shadow": False,
+        "receive_shadow": False,
+    }
+    return [Node("/curtain", "mesh_simple", props)]
+
+
+def _flown(drawing: Drawing, plan: PlanScene) -> list[Node]:
+    if len(plan.flown_m) < 2:
+        return []
+    points = drawing.frame.scene_from_model(plan.flown_m)
+    nodes = [
+        line_node("/flown", _in_sight(drawing, points), _colors(drawing, plan.flown_distance_m, plan), width_px=2.0)
+    ]
+    if len(points) <= _MOST_WAYPOINT_MARKS:
+        rgb = tuple(palette.dimmed(palette.POI, stale=drawing.state.plan_is_stale).tolist())
+        nodes.append(many_node("/waypoints", BALL, _in_sight(drawing, points), 0.3 * drawing.mark_m, rgb))
+    return nodes
+
+
+def _takeoff(drawing: Drawing, plan: PlanScene) -> list[Node]:
+    foot, top = plan.home_m, np.array([plan.home_m[0], plan.home_m[1], plan.takeoff_alt_dsm_m])
+    if not np.isfinite([foot, top]).all():
+        return []
+    column = drawing.frame.scene_from_model(np.stack([foot, top]))
+    return [line_node("/takeoff", column, palette.HOME, width_px=3.0)]
+
+
+def _worst(drawing: Drawing, plan: PlanScene) -> list[Node]:
+    if not np.isfinite(plan.worst_m).all() or not len(plan.flown_distance_m):
+        return []
+    at = drawing.frame.scene_from_model(plan.worst_m)
+    nearest_m = float(np.min(plan.flown_distance_m))
+    color = tuple(_colors(drawing, np.array([nearest_m]), plan)[0].tolist())
+    return [
+        shape_node("/worst", GEM, at, 0.9 * drawing.mark_m, color),
+        label_node("/worst_label", _distance_words(nearest_m), raised(at, 2.5 * drawing.mark_m)),
+    ]
+
+
+def _distance_words(nearest_m: float) -> str:
+    if not math.isfinite(nearest_m):
+        return "Unknown terrain"
+    return f"Nearest {nearest_m:.2f} m" if nearest_m > 0 else "Inside terrain"

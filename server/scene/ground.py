@@ -1,0 +1,66 @@
+"""Layers of the ground: the terrain with its texture, unknown terrain, the safe surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from server.scene import palette
+from server.scene.drawing import Drawing
+from server.scene.glb import textured_glb
+from server.scene.mesh import gap_mesh, grid_mesh
+from server.scene.nodes import Node
+from server.scene.payload import U8, HeightGrid
+
+_SURFACE_OPACITY = 0.3
+_HATCH_PX = 14
+_HATCH_TEXTURE_PX = 1200
+_HATCH_ALPHA = (120, 225)
+
+
+def terrain_nodes(drawing: Drawing) -> list[Node]:
+    glb = textured_glb(grid_mesh(drawing.terrain.grid, drawing.frame), drawing.terrain.texture_rgb)
+    return [_glb_node("/terrain", glb, drawing)]
+
+
+def unknown_nodes(drawing: Drawing) -> list[Node]:
+    """Hatched plates where the model knows nothing: no one takes them for ground."""
+    grid = drawing.terrain.grid
+    if not drawing.state.view.show_unknown or np.isfinite(grid.alt_dsm_m).all():
+        return []
+    mesh = gap_mesh(grid, drawing.plates, drawing.frame)
+    return [] if mesh is None else [_glb_node("/unknown", textured_glb(mesh, _hatching(grid)), drawing)]
+
+
+def surface_nodes(drawing: Drawing) -> list[Node]:
+    plan = drawing.state.plan
+    if plan is None or not drawing.state.view.show_surface or not np.isfinite(plan.safe_surface.alt_dsm_m).any():
+        return []
+    mesh = grid_mesh(plan.safe_surface, drawing.frame)
+    color = palette.dimmed(palette.SURFACE, stale=drawing.state.plan_is_stale)
+    props = {
+        "vertices": mesh.vertices,
+        "faces": mesh.faces,
+        "color": tuple(int(channel) for channel in color),
+        "opacity": _SURFACE_OPACITY,
+        "side": "double",
+        "scale": (1.0, 1.0, drawing.frame.exaggeration),
+        "cast_shadow": False,
+        "receive_shadow": False,
+    }
+    return [Node("/surface", "mesh_simple", props)]
+
+
+def _glb_node(name: str, glb: bytes, drawing: Drawing) -> Node:
+    scale = (1.0, 1.0, drawing.frame.exaggeration)
+    return Node(name, "glb", {"glb_data": glb, "scale": scale, "cast_shadow": False, "receive_shadow": False})
+
+
+def _hatching(grid: HeightGrid) -> U8:
+    """(h', w', 4) diagonal stripes in the shape of the grid's extent."""
+    rows, cols = grid.alt_dsm_m.shape
+    zoom = _HATCH_TEXTURE_PX / max(rows, cols)
+    row, col = np.indices((max(1, round(rows * zoom)), max(1, round(cols * zoom))))
+    out = np.empty((*row.shape, 4), dtype=np.uint8)
+    out[:, :, :3] = palette.UNKNOWN
+    out[:, :, 3] = np.array(_HATCH_ALPHA, dtype=np.uint8)[(row + col) // _HATCH_PX % 2]
+    return out

@@ -1,0 +1,61 @@
+"""The layers of the 3D view: what each draws, and on what it depends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from server.scene.drawing import Drawing
+from server.scene.flight import flight_nodes
+from server.scene.ground import surface_nodes, terrain_nodes, unknown_nodes
+from server.scene.marks import place_nodes, poi_nodes
+from server.scene.nodes import Node, Ready
+from server.scene.payload import PlanScene, TerrainScene
+
+POIS = "pois"
+Key = tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    name: str
+    build: Callable[[Drawing], list[Node]]
+    key: Callable[[Drawing], Key]
+    """Equal keys: nothing to draw again."""
+
+
+def layers(gizmo_ready: Ready) -> tuple[Layer, ...]:
+    return (
+        Layer("terrain", terrain_nodes, lambda d: (d.terrain, d.frame)),
+        Layer("unknown", unknown_nodes, lambda d: (d.terrain, d.frame, d.state.view.show_unknown)),
+        Layer("surface", surface_nodes, lambda d: (*_plan_key(d), d.state.view.show_surface)),
+        Layer("flight", flight_nodes, lambda d: (*_plan_key(d), d.state.view.show_path)),
+        Layer("places", place_nodes, _places_key),
+        Layer(POIS, lambda d: poi_nodes(d, gizmo_ready), _pois_key),
+    )
+
+
+def unchanged(old: Key | None, new: Key) -> bool:
+    """Payloads are compared by identity: a worker's answer is a new object, and comparing arrays takes long."""
+    if old is None or len(old) != len(new):
+        return False
+    return all(
+        a is b or (not isinstance(a, TerrainScene | PlanScene) and a == b) for a, b in zip(old, new, strict=True)
+    )
+
+
+def _plan_key(drawing: Drawing) -> Key:
+    return drawing.state.plan, drawing.state.plan_is_stale, drawing.frame
+
+
+def _places_key(drawing: Drawing) -> Key:
+    document, plan = drawing.state.document, drawing.state.plan
+    planned_home = None if document.home is not None or plan is None else tuple(plan.home_m)
+    mission = document.mission
+    places = document.home, document.source, document.survey.polygon, mission.look_at, mission.heading, planned_home
+    return drawing.terrain, drawing.frame, *places
+
+
+def _pois_key(drawing: Drawing) -> Key:
+    return drawing.terrain, drawing.frame, drawing.state.document.pois, drawing.state.selection

@@ -1,0 +1,151 @@
+"""Layers of what the operator placed: points of interest, home, the look-at point, the survey polygon."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from server.scene import palette
+from server.scene.drawing import Drawing
+from server.scene.nodes import Node, Ready
+from server.scene.payload import F64
+from server.scene.shapes import BALL, CONE, label_node, line_node, many_node, raised, shape_node
+from server.schemas import PlanDoc
+
+GIZMO = "/gizmo"
+"""The selected point of interest hangs below it, so that browsers move it with the pointer themselves."""
+_GIZMO_PX = 90.0
+_MOST_LABELS = 150
+_EDGE_POINTS = 48
+
+
+def poi_places(drawing: Drawing) -> tuple[list[str], F64]:
+    """Ids and (P, 3) scene places of the points of interest that the model's projection knows."""
+    pois = drawing.state.document.pois
+    xy = drawing.places_xy_m(pois)
+    ids = [poi.id for poi, place in zip(pois, xy, strict=True) if np.isfinite(place).all()]
+    return ids, drawing.on_ground(xy)
+
+
+def poi_nodes(drawing: Drawing, moved: Ready) -> list[Node]:
+    """Balls with labels; the selected one in the accent colour, with handles that move it over the ground."""
+    ids, places = poi_places(drawing)
+    chosen = drawing.state.selection.poi_id
+    others = [index for index, poi_id in enumerate(ids) if poi_id != chosen]
+    nodes = [many_node("/pois", BALL, places[others], drawing.mark_m, palette.POI)] if others else []
+    for index, poi_id in enumerate(ids):
+        if poi_id == chosen:
+            nodes += _selected(drawing, poi_id, places[index], moved)
+        elif len(ids) <= _MOST_LABELS:
+            nodes.append(label_node(f"/poi_label/{poi_id}", _label(drawing, poi_id), places[index] + _above(drawing)))
+    return nodes
+
+
+def _selected(drawing: Drawing, poi_id: str, at: F64, moved: Ready) -> list[Node]:
+    origin, text = np.zeros(3), _label(drawing, poi_id)
+    if drawing.state.selection.tool == "select":
+        return [
+            _gizmo(at, moved),
+            shape_node(f"{GIZMO}/ball", BALL, origin, 1.15 * drawing.mark_m, palette.ACCENT),
+            label_node(f"{GIZMO}/label", text, _above(drawing), size=1.15),
+        ]
+    return [
+        shape_node("/selected", BALL, at, 1.15 * drawing.mark_m, palette.ACCENT),
+        label_node("/selected_label", text, at + _above(drawing), size=1.15),
+    ]
+
+
+def _gizmo(at: F64, moved: Ready) -> Node:
+    far = (-1e6, 1e6)
+    props = {
+        "position": (float(at[0]), float(at[1]), float(at[2])),
+        "scale": _GIZMO_PX,
+        "fixed": True,
+        "active_axes": (True, True, False),
+        "disable_rotations": True,
+        # Red and green arrows would speak of safety.
+        "disable_axes": True,
+        "translation_limits": (far, far, far),
+        "depth_test": False,
+    }
+    return Node(GIZMO, "transform_controls", props, ready=moved)
+
+
+def _label(drawing: Drawing, poi_id: str) -> str:
+    """Number in flying order and name; the number alone where the name repeats it."""
+    number, poi = next((n, p) for n, p in enumerate(drawing.state.document.pois, 1) if p.id == poi_id)
+    text = f"{number}  {poi.name}" if poi.name not in ("", str(number), f"P{number}") else poi.name or str(number)
+    return f"{text}  (home)" if number == 1 and _first_is_home(drawing.state.document) else text
+
+
+def _first_is_home(document: PlanDoc) -> bool:
+    return document.home is None and document.source == "pois"
+
+
+def _above(drawing: Drawing) -> F64:
+    return np.array([0.0, 0.0, 1.6 * drawing.mark_m])
+
+
+def place_nodes(drawing: Drawing) -> list[Node]:
+    return [*_home(drawing), *_look_at(drawing), *_polygon(drawing)]
+
+
+def _home(drawing: Drawing) -> list[Node]:
+    """Home as set, or where the computed plan begins; a first point that is home says so in its label."""
+    home, plan = drawing.state.document.home, drawing.state.plan
+    if home is not None:
+        at = drawing.ground_of(home)
+    elif plan is not None and not _first_is_home(drawing.state.document):
+        at = drawing.on_ground(plan.home_m[None, :2])[0]
+    else:
+        at = None
+    if at is None:
+        return []
+    return [
+        shape_node("/home", CONE, at, 1.2 * drawing.mark_m, palette.HOME),
+        label_node("/home_label", "Home", at + 2.4 * _above(drawing)),
+    ]
+
+
+def _look_at(drawing: Drawing) -> list[Node]:
+    mission = drawing.state.document.mission
+    at = None if mission.look_at is None or mission.heading != "point" else drawing.ground_of(mission.look_at)
+    if at is None:
+        return []
+    post = np.stack([at, at + 4 * _above(drawing)])
+    return [
+        line_node("/look_at", post, palette.LOOK_AT, width_px=3.0),
+        shape_node("/look_at_ball", BALL, post[1], 0.8 * drawing.mark_m, palette.LOOK_AT),
+        label_node("/look_at_label", "Look at", post[1] + _above(drawing)),
+    ]
+
+
+def _polygon(drawing: Drawing) -> list[Node]:
+    """The survey's outline laid over the terrain."""
+    document = drawing.state.document
+    corners = drawing.places_xy_m(document.survey.polygon)
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if document.source != "survey" or not len(corners):
+        return []
+    nodes = [many_node("/polygon_corners", BALL, drawing.on_ground(corners), 0.8 * drawing.mark_m, palette.SURVEY)]
+    if len(corners) > 1:
+        outline = raised(drawing.on_ground(_outline(corners)), 0.25 * drawing.mark_m)
+        nodes.append(line_node("/polygon", outline, palette.SURVEY, width_px=4.0))
+    return nodes
+
+
+def _outline(corners: F64) -> F64:
+    """(N, 2) a ring through the corners, fine enough to follow the terrain."""
+    ring = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
+    share = np.linspace(0.0, 1.0, _EDGE_POINTS, endpoint=False)[None, :, None]
+    pieces = ring[:-1, None] + share * (ring[1:] - ring[:-1])[:, None]
+    return np.vstack([pieces.reshape(-1, 2), ring[-1:]])
+
+
+def cursor_nodes(drawing: Drawing, at_m: F64) -> list[Node]:
+    """The hovered place, (3,) x, y, alt_dsm, with a plumb line to the ground."""
+    at = drawing.frame.scene_from_model(at_m)
+    foot = drawing.on_ground(at_m[None, :2])[0]
+    return [
+        shape_node("/cursor", BALL, at, 0.8 * drawing.mark_m, palette.ACCENT),
+        line_node("/cursor_plumb", np.stack([foot, at]), palette.ACCENT, width_px=2.0),
+    ]

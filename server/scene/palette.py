@@ -1,0 +1,36 @@
+"""Colours of the 3D view. Red, orange and green mean clearance and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from server.scene.payload import F64, U8
+
+SAFE = (0, 190, 70)
+CLOSE = (255, 145, 0)
+INSIDE = (235, 20, 40)
+ACCENT = (186, 85, 255)
+"""Selection, hover and the tool in hand."""
+POI = (250, 250, 250)
+HOME = (255, 255, 255)
+CURTAIN = (16, 20, 28)
+SURFACE = (96, 165, 250)
+SURVEY = (240, 240, 250)
+LOOK_AT = (200, 205, 220)
+UNKNOWN = (116, 92, 140)
+_DIM = (128, 132, 140)
+_DIM_SHARE = 0.65
+
+
+def clearance_rgb(clearance_m: F64, required_m: float) -> U8:
+    """(N,) metres -> (N, 3); inside, on or over unknown terrain is red, below the requirement orange."""
+    clearance = np.where(np.isnan(clearance_m), -np.inf, clearance_m)
+    bands = np.array([INSIDE, CLOSE, SAFE], dtype=np.uint8)
+    return bands[(clearance > 0).astype(np.intp) + ((clearance > 0) & (clearance >= required_m))]
+
+
+def dimmed(rgb: NDArray[np.uint8] | tuple[int, int, int], *, stale: bool) -> U8:
+    """Greyed while a newer answer is being computed."""
+    color = np.asarray(rgb, dtype=np.float64)
+    return (color + _DIM_SHARE * (np.array(_DIM) - color) if stale else color).astype(np.uint8)

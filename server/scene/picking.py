@@ -1,0 +1,73 @@
+"""What a click in the 3D view hits: a point of interest, known terrain, unknown terrain or nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planning.raycast import TerrainHit, raycast
+from server.scene.camera import SCREEN_HEIGHT_PX
+from server.scene.drawing import Drawing
+from server.scene.marks import poi_places
+from server.scene.payload import F64
+from server.scene.unknown import as_model
+
+_POI_REACH_PX = 18.0
+
+
+@dataclass(frozen=True, slots=True)
+class PoiHit:
+    poi_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceHit:
+    lat_deg: float
+    lon_deg: float
+    known: bool
+
+
+def pick(drawing: Drawing, origin: F64, direction: F64, *, fov_rad: float) -> PoiHit | PlaceHit | None:
+    """``origin`` and ``direction`` are the ray of sight, scene coordinates.
+
+    Points of interest are hit only with the select tool: other tools place things, also beside a point.
+    """
+    ray = direction / np.linalg.norm(direction)
+    frame = drawing.frame
+    hit = _touched(drawing, frame.model_from_scene(origin), frame.model_direction(ray))
+    if drawing.state.selection.tool == "select":
+        poi_id = _poi_under(drawing, origin, ray, math.inf if hit is None else hit.distance, fov_rad)
+        if poi_id is not None:
+            return PoiHit(poi_id)
+    if hit is None:
+        return None
+    lat_deg, lon_deg = drawing.dsm.lat_lon_from_xy(np.array([[hit.x_m, hit.y_m]]))[0]
+    if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
+        return None
+    return PlaceHit(float(lat_deg), float(lon_deg), hit.known)
+
+
+def _touched(drawing: Drawing, origin_m: F64, direction: F64) -> TerrainHit | None:
+    """The model at full resolution, or the plate that is drawn over a hole in it, whichever comes first."""
+    floor_m = drawing.frame.floor_alt_dsm_m
+    hit = raycast(drawing.dsm, origin_m, direction, floor_alt_dsm_m=floor_m)
+    plate = raycast(as_model(drawing.plates, drawing.dsm), origin_m, direction, floor_alt_dsm_m=floor_m)
+    if plate is not None and plate.known and (hit is None or plate.distance < hit.distance):
+        return replace(plate, known=False)
+    return hit
+
+
+def _poi_under(drawing: Drawing, origin: F64, ray: F64, terrain_at: float, fov_rad: float) -> str | None:
+    """The point of interest nearest to the ray on the screen, unless terrain stands well before it."""
+    ids, places = poi_places(drawing)
+    if not ids:
+        return None
+    depth = (places - origin) @ ray
+    aside = np.linalg.norm(places - origin - depth[:, None] * ray, axis=1)
+    reach = depth * math.tan(fov_rad / 2) / (SCREEN_HEIGHT_PX / 2) * _POI_REACH_PX
+    seen = (depth > 0) & (depth <= terrain_at + 6 * drawing.mark_m)
+    misses = np.where(seen, aside / np.maximum(reach, 1.3 * drawing.mark_m), np.inf)
+    best = int(np.argmin(misses))
+    return ids[best] if misses[best] <= 1.0 else None

@@ -1,0 +1,71 @@
+"""Small shapes that marks are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from server.scene.mesh import U32
+from server.scene.nodes import Node
+from server.scene.payload import F32, F64, U8
+
+Rgb = tuple[int, int, int]
+_UNSHADED = {"cast_shadow": False, "receive_shadow": False}
+
+
+def _shape(mesh: trimesh.Trimesh) -> tuple[F32, U32]:
+    return np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.uint32)
+
+
+BALL = _shape(trimesh.creation.icosphere(subdivisions=2, radius=1.0))
+GEM = _shape(trimesh.creation.icosphere(subdivisions=0, radius=1.0))
+CONE = _shape(trimesh.creation.cone(radius=1.0, height=2.4, sections=24))
+
+
+def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> Node:
+    """A polyline through (N, 3) scene points; ``color`` is one, or (N - 1, 3): one per segment."""
+    segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+    colors = np.asarray(color, dtype=np.uint8)
+    if colors.ndim == 2:
+        colors = np.repeat(colors[:, None, :], 2, axis=1)
+    props = {"points": segments, "colors": colors, "thickness": width_px, "thickness_units": "screen"}
+    return Node(name, "line_segments", props)
+
+
+def shape_node(name: str, shape: tuple[F32, U32], at: F64, size: float, color: Rgb) -> Node:
+    props = {"vertices": shape[0], "faces": shape[1], "scale": size, "color": color, "position": _triple(at)}
+    return Node(name, "mesh_simple", {**props, **_UNSHADED})
+
+
+def many_node(name: str, shape: tuple[F32, U32], at: F64, size: float, colors: Rgb | U8) -> Node:
+    """The same shape at (N, 3) scene points."""
+    positions = np.asarray(at, dtype=np.float32)
+    upright = np.tile(np.array([1.0, 0.0, 0.0, 0.0], dtype=np.float32), (len(positions), 1))
+    props: Mapping[str, Any] = {
+        "vertices": shape[0],
+        "faces": shape[1],
+        "batched_positions": positions,
+        "batched_wxyzs": upright,
+        "batched_scales": np.full(len(positions), size, dtype=np.float32),
+        "batched_colors": np.broadcast_to(np.asarray(colors, dtype=np.uint8), positions.shape).copy(),
+        "lod": "off",
+    }
+    return Node(name, "batched_meshes_simple", {**props, **_UNSHADED})
+
+
+def label_node(name: str, text: str, at: F64, *, size: float = 1.0) -> Node:
+    """A label that stands on its place and hides behind nothing."""
+    props = {"text": text, "position": _triple(at), "anchor": "bottom-center", "font_screen_scale": size}
+    return Node(name, "label", props)
+
+
+def raised(at: F64, by: float) -> F64:
+    """(..., 3) scene points, higher by so much."""
+    return at + np.array([0.0, 0.0, by])
+
+
+def _triple(at: F64) -> tuple[float, float, float]:
+    return float(at[0]), float(at[1]), float(at[2])

@@ -1,0 +1,34 @@
+"""Where the model knows nothing: flat plates in the holes, so that what is drawn there is not taken for ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from affine import Affine
+from scipy import ndimage
+
+from planning.dsm import Dsm
+from server.scene.payload import HeightGrid
+
+
+def plates(grid: HeightGrid) -> HeightGrid:
+    """The height at which each unknown cell is drawn and clicked, NaN where the ground is known.
+
+    Each connected hole is one level plate at its lowest rim: inside the terrain, below the ground that may be there.
+    """
+    known = np.isfinite(grid.alt_dsm_m)
+    region, count = ndimage.label(~known, structure=np.ones((3, 3)))
+    alt = np.full(grid.alt_dsm_m.shape, np.nan, dtype=np.float32)
+    if count and known.any():
+        rim_m = ndimage.minimum_filter(np.where(known, grid.alt_dsm_m, np.inf), size=3)
+        # A hole without a rim is the whole model; that has been ruled out.
+        level_m = np.asarray(ndimage.minimum(rim_m, region, np.arange(1, count + 1)), dtype=np.float32)
+        alt[~known] = level_m[region[~known] - 1]
+    return replace(grid, alt_dsm_m=alt)
+
+
+def as_model(grid: HeightGrid, like: Dsm) -> Dsm:
+    """A grid as a surface model of its own, to cast rays at."""
+    transform = Affine(grid.cell_m, 0.0, grid.west_m, 0.0, -grid.cell_m, grid.north_m)
+    return replace(like, elevation_m=np.ascontiguousarray(grid.alt_dsm_m), transform=transform)

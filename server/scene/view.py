@@ -1,0 +1,217 @@
+"""The 3D view: draws what changed, moves cameras, and turns clicks and drags into intents.
+
+Runs on the application's event loop; viser's callbacks, which come from viser's own thread, only hand over to it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
+
+import numpy as np
+import viser
+
+from planning.dsm import Dsm
+from server.scene.camera import FOV_RAD, Lens, Pose, nearest_on_path
+from server.scene.drawing import Drawing
+from server.scene.layers import POIS, Key, layers, unchanged
+from server.scene.marks import cursor_nodes
+from server.scene.nodes import Canvas, Node
+from server.scene.payload import F64, SceneState
+from server.scene.picking import PlaceHit, PoiHit, pick
+from server.scene.shots import Target, background, shot
+
+_POINTER_REACH_PX = 24.0
+
+TerrainClick = Callable[[str | None, float, float, bool], Awaitable[None]]
+PoiClick = Callable[[str], Awaitable[None]]
+PoiMove = Callable[[str, float, float], Awaitable[None]]
+
+
+class SceneView:
+    """One scene for all pages; each page has its own camera."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        *,
+        on_terrain_click: TerrainClick,
+        on_poi_click: PoiClick,
+        on_poi_moved: PoiMove,
+        page_of_client: Callable[[int], str | None],
+    ) -> None:
+        self._server = server
+        self._on_terrain_click, self._on_poi_click, self._on_poi_moved = on_terrain_click, on_poi_click, on_poi_moved
+        self._page_of_client = page_of_client
+        self._canvas = Canvas(server.scene)
+        self._layers = layers(self._watch_gizmo)
+        self._keys: dict[str, Key] = {}
+        self._wanted: tuple[Dsm | None, SceneState] | None = None
+        self._drawn: Drawing | None = None
+        self._dragged: str | None = None
+        self._cursor_m: F64 | None = None
+        self._one_at_a_time = asyncio.Lock()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        server.scene.world_axes.visible = False
+        server.scene.set_background_image(background(), format="png")
+        server.initial_camera.fov = FOV_RAD
+        # Awaited by viser although its signature does not say so.
+        server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
+
+    async def show(self, dsm: Dsm | None, state: SceneState) -> None:
+        """Draws the difference to what is shown. Of calls that come while one is at work the last one counts."""
+        self._loop = asyncio.get_running_loop()
+        self._wanted = (dsm, state)
+        async with self._one_at_a_time:
+            if self._wanted is not None:
+                wanted, self._wanted = self._wanted, None
+                await self._draw(await asyncio.to_thread(Drawing.of, *wanted, self._drawn))
+
+    async def cursor(self, at_m: F64 | None) -> None:
+        """Marks the hovered place, (3,) x, y, alt_dsm in the model's coordinates; None takes the mark away."""
+        self._cursor_m = None if at_m is None or not np.isfinite(at_m).all() else np.asarray(at_m, dtype=np.float64)
+        self._put({"cursor": self._cursor_nodes()})
+
+    async def frame(self, page_id: str, target: Target) -> None:
+        """Moves the camera of one page: to the terrain, the plan, from above, the worst point, the selected POI."""
+        client = self._client(page_id)
+        if client is not None and self._drawn is not None:
+            _move(client, shot(self._drawn, target, aspect=client.camera.aspect), self._drawn)
+
+    def sample_under(self, page_id: str, x: float, y: float) -> float | None:
+        """The distance flown ``s_m`` at the path's place under a page's pointer; None when it points elsewhere.
+
+        ``x`` and ``y`` are shares of the page's 3D view, from its top left.
+        """
+        client, drawn = self._client(page_id), self._drawn
+        plan = None if drawn is None else drawn.state.plan
+        if client is None or drawn is None or plan is None or len(plan.path_m) < 2 or not drawn.state.view.show_path:
+            return None
+        path = drawn.frame.scene_from_model(plan.path_m)
+        pointer = np.array([x, y])
+        return nearest_on_path(_lens(client), path, plan.path_s_m, pointer, within_px=_POINTER_REACH_PX)
+
+    async def _draw(self, drawing: Drawing | None) -> None:
+        if drawing is None:
+            self._keys.clear()
+            self._put({layer.name: [] for layer in self._layers} | {"cursor": []})
+            self._drawn = None
+            return
+        keys = {layer.name: layer.key(drawing) for layer in self._layers}
+        if self._dragged is not None:
+            # Drawn when the hand lets go: the browser that drags moves its mark itself.
+            keys.pop(POIS)
+        todo = [
+            layer
+            for layer in self._layers
+            if layer.name in keys and not unchanged(self._keys.get(layer.name), keys[layer.name])
+        ]
+        built = await asyncio.to_thread(lambda: {layer.name: layer.build(drawing) for layer in todo})
+        before, self._drawn = self._drawn, drawing
+        self._put(built)
+        self._keys |= keys
+        if before is None or before.terrain.terrain_id != drawing.terrain.terrain_id:
+            self._aim_all(drawing)
+        if before is None or before.frame != drawing.frame:
+            self._put({"cursor": self._cursor_nodes()})
+
+    def _put(self, built: dict[str, list[Node]]) -> None:
+        if not built:
+            return
+        with self._server.atomic():
+            for name, nodes in built.items():
+                self._canvas.put(name, nodes)
+        self._server.flush()
+
+    def _cursor_nodes(self) -> list[Node]:
+        return [] if self._cursor_m is None or self._drawn is None else cursor_nodes(self._drawn, self._cursor_m)
+
+    # Cameras
+
+    def _aim_all(self, drawing: Drawing) -> None:
+        """A new terrain: every page sees all of it, and pages that come later begin there."""
+        pose = shot(drawing, "terrain", aspect=1.6)
+        camera = self._server.initial_camera
+        camera.position, camera.look_at = tuple(pose.position), tuple(pose.look_at)
+        camera.near, camera.far = _planes(drawing)
+        for client in self._server.get_clients().values():
+            _move(client, shot(drawing, "terrain", aspect=client.camera.aspect), drawing)
+
+    def _client(self, page_id: str) -> viser.ClientHandle | None:
+        """The newest client of a page: a reloaded view may leave an old one behind for a moment."""
+        clients = self._server.get_clients()
+        own = [client_id for client_id in clients if self._page_of_client(client_id) == page_id]
+        return clients[max(own)] if own else None
+
+    # Clicks and drags: on viser's thread up to ``_hand_over``
+
+    async def _hand_over(self, intent: Coroutine[Any, Any, None]) -> None:
+        """Runs ``intent`` on the application's loop; its errors are reported by viser, which waits for it."""
+        if self._loop is None or self._loop.is_closed():
+            intent.close()
+            return
+        await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(intent, self._loop))
+
+    async def _clicked(self, event: viser.SceneClickEvent) -> None:
+        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        page_id = self._page_of_client(event.client_id)
+        await self._hand_over(self._click(page_id, origin, direction, event.client.camera.fov))
+
+    async def _click(self, page_id: str | None, origin: F64, direction: F64, fov_rad: float) -> None:
+        drawn = self._drawn
+        if drawn is None:
+            return
+        match await asyncio.to_thread(pick, drawn, origin, direction, fov_rad=fov_rad):
+            case PoiHit(poi_id):
+                await self._on_poi_click(poi_id)
+            case PlaceHit(lat_deg, lon_deg, known):
+                await self._on_terrain_click(page_id, lat_deg, lon_deg, known)
+
+    def _watch_gizmo(self, gizmo: viser.TransformControlsHandle) -> None:
+        async def on_update(event: viser.TransformControlsEvent) -> None:
+            await self._hand_over(self._drag(event.phase, np.array(event.target.position)))
+
+        gizmo.on_update(on_update)
+
+    async def _drag(self, phase: str, at: F64) -> None:
+        drawn = self._drawn
+        if drawn is None:
+            return
+        at_m = drawn.frame.model_from_scene(at)
+        if phase == "start":
+            self._dragged = drawn.state.selection.poi_id
+        elif phase == "update":
+            await self.cursor(at_m)
+        elif self._dragged is not None:
+            poi_id, self._dragged = self._dragged, None
+            await self.cursor(None)
+            await self._dropped(drawn, poi_id, at_m)
+
+    async def _dropped(self, drawn: Drawing, poi_id: str, at_m: F64) -> None:
+        lat_deg, lon_deg = drawn.dsm.lat_lon_from_xy(at_m[None, :2])[0]
+        if np.isfinite([lat_deg, lon_deg]).all():
+            await self._on_poi_moved(poi_id, float(lat_deg), float(lon_deg))
+        # Puts the mark where the document says, also when the move was refused.
+        self._keys.pop(POIS, None)
+        async with self._one_at_a_time:
+            await self._draw(self._drawn)
+
+
+def _planes(drawing: Drawing) -> tuple[float, float]:
+    """Near and far plane: the far default of viser, 1 km, cuts large models off."""
+    return 0.002 * drawing.frame.half_diagonal_m, 60.0 * drawing.frame.half_diagonal_m
+
+
+def _move(client: viser.ClientHandle, pose: Pose, drawing: Drawing) -> None:
+    with client.atomic():
+        client.camera.near, client.camera.far = _planes(drawing)
+        client.camera.max_orbit_distance = 20.0 * drawing.frame.half_diagonal_m
+        client.camera.position = tuple(pose.position)
+        client.camera.look_at = tuple(pose.look_at)
+    client.flush()
+
+
+def _lens(client: viser.ClientHandle) -> Lens:
+    camera = client.camera
+    return Lens.of(camera.wxyz, camera.position, camera.fov, camera.aspect)

@@ -1,0 +1,105 @@
+"""The FastAPI app: console, REST, ``/ws`` and the 3D view on one origin, with everything they share."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack
+from typing import TYPE_CHECKING
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from starlette.exceptions import HTTPException
+
+from planning import __version__
+from planning.errors import PlanningError
+from server.api import console, plan, session, terrain, view
+from server.api.access import Parts, answer
+from server.auth import Auth
+from server.errors import ServerError, error_doc, status_of
+from server.guard import Guard
+from server.hub import Hub
+from server.library import Library
+from server.scene import proxy
+from server.scene.host import SceneHost
+from server.schemas import NoticeMessage
+from server.settings import Settings
+from server.together import Background
+
+if TYPE_CHECKING:
+    from server.workspace import Workspace
+
+log = logging.getLogger("hedgehop.app")
+
+MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
+"""Joins the open plan to its files, its pages and its 3D view."""
+
+
+def create_app(settings: Settings, make_workspace: MakeWorkspace, *, demo: bool = False) -> FastAPI:
+    """The app; it locks the data directory when it starts and lets go of it when it stops."""
+    app = FastAPI(
+        title="Hedgehop",
+        version=__version__,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+        lifespan=lambda app: _lifespan(app, settings, make_workspace, demo),
+    )
+    for router in (session.router, plan.router, terrain.router, view.router, console.router, proxy.router):
+        app.include_router(router)
+    for error in (ServerError, PlanningError, RequestValidationError, HTTPException):
+        app.add_exception_handler(error, _tell)
+    app.add_exception_handler(Exception, _tell_unforeseen)
+    app.add_middleware(Guard, settings=settings)
+    return app
+
+
+@contextlib.asynccontextmanager
+async def _lifespan(app: FastAPI, settings: Settings, make_workspace: MakeWorkspace, demo: bool) -> AsyncIterator[None]:
+    async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
+        background = Background(group)
+        stack.callback(background.stop)
+        parts = await _open(settings, make_workspace, background, stack)
+        app.state.parts = parts
+        for loop in parts.workspace.loops():
+            background.spawn(loop)
+        if demo:
+            await parts.workspace.add_demo_terrain()
+        try:
+            yield
+        finally:
+            parts.hub.close()
+            background.stop()
+
+
+async def _open(
+    settings: Settings, make_workspace: MakeWorkspace, background: Background, stack: AsyncExitStack
+) -> Parts:
+    """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
+    library = await asyncio.to_thread(Library, settings.data_dir)
+    stack.callback(library.close)
+    auth = Auth(library.root / "sessions.json", password=settings.password, lifetime_s=settings.session_days * 86400.0)
+    hub = Hub()
+    host = await asyncio.to_thread(SceneHost)
+    stack.callback(host.close)
+    workspace = make_workspace(library, hub, host, background)
+    stack.push_async_callback(workspace.close)
+    await workspace.start()
+    for notice in library.notices:
+        log.warning("%s (%s)", notice.what, notice.where)
+    hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
+    return Parts(settings, auth, hub, library, host, workspace)
+
+
+async def _tell(request: Request, error: Exception) -> Response:
+    del request
+    return answer(error_doc(error), status_of(error))
+
+
+async def _tell_unforeseen(request: Request, error: Exception) -> Response:
+    # Whoever serves the app logs the error itself, with its traceback.
+    del request
+    return answer(error_doc(error), 500)

@@ -1,0 +1,124 @@
+"""Resampling to north-up squares: no height is lost, whatever the shape of the cells."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pyproj import CRS, Transformer
+
+from planning.geotiff import read_dsm, read_dsm_reported
+from planning.rasters.regrid import plan_regridding, regrid
+from tests.planning.geotiff_samples import hill, write_raster
+
+UTM = CRS.from_epsg(32633)
+WGS84 = CRS.from_epsg(4326)
+
+
+def height_at(target: NDArray[np.float32], transform: Affine, x: float, y: float) -> float:
+    column, row = ~transform @ (x, y)
+    inside = 0 <= row < target.shape[0] and 0 <= column < target.shape[1]
+    return float(target[int(row), int(column)]) if inside else np.nan
+
+
+def assert_nothing_lost(source: NDArray[np.float32], affine: Affine, crs: CRS, seed: int, *, touched: int = 1) -> None:
+    """Slow check of every source cell: its area is nowhere lower, its height is kept, and none is invented."""
+    plan = plan_regridding(affine, source.shape, crs, UTM)
+    target = regrid(source, plan)
+    to_utm = Transformer.from_crs(crs, UTM, always_xy=True)
+    places = np.random.default_rng(seed).random((6, 2))
+    for (row, column), height in np.ndenumerate(source):
+        if np.isnan(height):
+            continue
+        for dx, dy in places:
+            x, y = to_utm.transform(*(affine @ (column + dx, row + dy)))
+            assert not height_at(target, plan.transform, x, y) < height
+    rows, columns = np.mgrid[: target.shape[0], : target.shape[1]]
+    x, y = plan.transform @ (columns.ravel() + 0.5, rows.ravel() + 0.5)
+    source_column, source_row = (np.floor(place).astype(int) for place in plan.to_source(np.asarray(x), np.asarray(y)))
+    centred = np.zeros(source.shape, dtype=bool)
+    for value, row, column in zip(target.ravel(), source_row, source_column, strict=True):
+        if not (0 <= row < source.shape[0] and 0 <= column < source.shape[1]) or np.isnan(source[row, column]):
+            assert np.isnan(value)
+            continue
+        centred[row, column] = True
+        around = source[max(0, row - touched) : row + touched + 1, max(0, column - touched) : column + touched + 1]
+        assert source[row, column] <= value <= np.nanmax(around)
+    assert centred[~np.isnan(source)].all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    angle=st.floats(-180, 180),
+    oblong=st.floats(0.3, 3.0),
+    shear=st.floats(-20, 20),
+    shape=st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_rotated_oblong_and_sheared_cells(
+    angle: float, oblong: float, shear: float, shape: tuple[int, int], seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    source = random.normal(100.0, 20.0, shape).astype(np.float32)
+    source[random.random(shape) < 0.2] = np.nan
+    turned = (
+        Affine.translation(5e5, 4.17e6) @ Affine.rotation(angle) @ Affine.shear(shear, 0) @ Affine.scale(oblong, -1.0)
+    )
+    assert_nothing_lost(source, turned, UTM, seed)
+
+
+@settings(max_examples=20, deadline=None)
+@given(lat=st.floats(-70, 70), lon=st.floats(12.5, 17.5), cell=st.floats(1e-6, 1e-3), seed=st.integers(0, 2**32 - 1))
+def test_cells_in_degrees(lat: float, lon: float, cell: float, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    source = random.normal(100.0, 20.0, (14, 11)).astype(np.float32)
+    source[random.random(source.shape) < 0.2] = np.nan
+    assert_nothing_lost(source, Affine(cell, 0, lon, 0, -cell, lat), WGS84, seed)
+
+
+@pytest.mark.parametrize("angle", [0.0, 7.0, 30.0, 45.0])
+def test_a_mast_of_one_cell_survives_a_large_rotated_model(angle: float) -> None:
+    source = np.full((1500, 1300), 100.0, dtype=np.float32)
+    source[777, 1234] = 130.0
+    affine = Affine.translation(5e5, 4.17e6) @ Affine.rotation(angle) @ Affine.scale(0.5, -0.31)
+    plan = plan_regridding(affine, source.shape, UTM, UTM)
+    target = regrid(source, plan)
+    x, y = affine @ (1234.5, 777.5)
+    assert height_at(target, plan.transform, x, y) == 130.0
+    assert 1 <= np.count_nonzero(target == 130.0) <= 16
+
+
+def test_oblong_cells_that_lie_straight_are_only_divided(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "x.tif", hill(), transform=Affine(0.5, 0, 5e5, 0, -1.0, 4.17e6))
+    dsm, report = read_dsm_reported(path)
+    assert report.resampled
+    assert dsm.resolution_m == 0.5
+    np.testing.assert_array_equal(dsm.elevation_m, np.repeat(hill(), 2, axis=0))
+
+
+def test_degrees_go_to_the_local_utm_zone(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "x.tif", hill(), crs="EPSG:4326", transform=Affine(1e-5, 0, 14.99, 0, -1e-5, 37.73))
+    dsm, report = read_dsm_reported(path)
+    assert (report.reprojected_to, dsm.crs.to_epsg()) == ("EPSG:32633", 32633)
+    assert dsm.resolution_m == pytest.approx(0.882 * 0.98, rel=0.01)
+    assert float(np.nanmax(dsm.elevation_m)) == hill().max()
+    place = dsm.xy_from_lat_lon(np.array([[37.73 - 20.5e-5, 14.99 + 25.5e-5]]))
+    assert dsm.elevation_at(place)[0] >= hill()[20, 25]
+    assert any("degrees" in warning for warning in report.warnings)
+
+
+def test_the_southern_hemisphere_and_ellipsoidal_heights(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "x.tif", hill(), crs="EPSG:4979", transform=Affine(1e-5, 0, 175.5, 0, -1e-5, -36.8))
+    dsm = read_dsm(path)
+    assert (dsm.crs.to_epsg(), dsm.vertical_datum) == (32760, "ellipsoid")
+
+
+def test_metres_that_are_not_true_are_reprojected(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "x.tif", hill(), crs="EPSG:3857", transform=Affine(1, 0, 1.67e6, 0, -1, 4.54e6))
+    dsm, report = read_dsm_reported(path)
+    assert report.reprojected_to == "EPSG:32633"
+    assert 0.75 < dsm.resolution_m < 0.8
+    assert any("off on the ground" in warning for warning in report.warnings)

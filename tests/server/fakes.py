@@ -1,0 +1,136 @@
+"""A workspace that computes nothing: what the door does is tested without what lies behind it."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from types import SimpleNamespace
+
+from server.errors import NotReadyError, StaleRevisionError
+from server.hub import Hub
+from server.library import Library
+from server.schemas import (
+    ClientMessage,
+    Computation,
+    ErrorDoc,
+    Imported,
+    JobDoc,
+    LibraryState,
+    NoticeMessage,
+    PlanDoc,
+    PlanEdit,
+    PlanMessage,
+    PlanState,
+    PoiDoc,
+    SelectionDoc,
+    SetSelection,
+    Snapshot,
+    ViewDoc,
+)
+
+
+def plan_state(revision: int = 1, document: PlanDoc | None = None) -> PlanState:
+    return PlanState(
+        plan_id="p1",
+        revision=revision,
+        document=document or PlanDoc(),
+        can_undo=False,
+        can_redo=False,
+        saved_utc="2026-01-01T00:00:00.000Z",
+        computation=Computation(revision=revision, state="empty", hint="Add points."),
+    )
+
+
+def snapshot(page_id: str = "") -> Snapshot:
+    return Snapshot(
+        product_version="0",
+        page_id=page_id,
+        plan=plan_state(),
+        library=LibraryState(terrains=[], orthophotos=[], plans=[], profiles=[]),
+        view=ViewDoc(),
+        selection=SelectionDoc(),
+        jobs=[],
+    )
+
+
+def notice(what: str) -> NoticeMessage:
+    return NoticeMessage(level="info", error=ErrorDoc(code="test", what=what))
+
+
+class FakeWorkspace:
+    """Counts what would have changed something."""
+
+    def __init__(self, library: Library, hub: Hub) -> None:
+        self.library, self.hub = library, hub
+        self.calls: list[str] = []
+        self.messages: list[tuple[str, ClientMessage]] = []
+        self.uploads: dict[str, bytes] = {}
+        self.options: dict[str, object] = {}
+        self.loop = asyncio.get_running_loop()
+        self.files = SimpleNamespace(
+            add_terrain=self._add_terrain, add_orthophoto=self._add_orthophoto, remove_spikes=self._remove_spikes
+        )
+
+    async def start(self) -> None:
+        self.calls.append("start")
+
+    def loops(self) -> list:
+        return []
+
+    async def close(self) -> None:
+        self.calls.append("close")
+
+    def snapshot(self, page_id: str) -> Snapshot:
+        return snapshot(page_id)
+
+    async def edit(self, edit: PlanEdit) -> PlanState:
+        self.calls.append("edit")
+        if edit.base_revision != 1:
+            raise StaleRevisionError("The plan has changed.", advice="Look again.")
+        state = plan_state(2, edit.document)
+        self.hub.publish(PlanMessage(plan=state))
+        return state
+
+    async def undo(self) -> PlanState:
+        self.calls.append("undo")
+        return plan_state()
+
+    async def export(self, file: str) -> bytes:
+        if file != "report.html":
+            raise NotReadyError("There is no finished plan.", advice="Wait.")
+        return b"<!doctype html><script>alert(1)</script>"
+
+    async def import_points(self, filename: str, data: bytes) -> Imported:
+        self.uploads[filename] = data
+        document = PlanDoc(pois=[PoiDoc(id="a", lat_deg=1, lon_deg=2)])
+        return Imported(state=plan_state(2, document), warnings=[])
+
+    async def add_demo_terrain(self) -> None:
+        self.calls.append("demo")
+
+    async def delete_terrain(self, terrain_id: str) -> None:
+        self.calls.append("delete_terrain")
+        self.library.delete_terrain(terrain_id)
+
+    async def cancel_job(self, job_id: str) -> None:
+        self.calls.append(f"cancel {job_id}")
+
+    async def on_client_message(self, page_id: str, message: ClientMessage) -> None:
+        self.messages.append((page_id, message))
+        if isinstance(message, SetSelection) and message.selection.poi_id == "broken":
+            raise RuntimeError("a secret detail")
+        if isinstance(message, SetSelection) and message.selection.poi_id == "refused":
+            raise NotReadyError("There is no such point.")
+
+    def _add_terrain(self, upload: Path, filename: str, **options: object) -> JobDoc:
+        self.uploads[filename] = upload.read_bytes()
+        self.options = options
+        upload.unlink()
+        return JobDoc(id="j1", label=f"Reading {filename}", state="running")
+
+    def _add_orthophoto(self, upload: Path, filename: str, terrain_id: str) -> JobDoc:
+        return self._add_terrain(upload, filename, terrain_id=terrain_id)
+
+    def _remove_spikes(self, terrain_id: str) -> JobDoc:
+        self.library.terrain_dir(terrain_id)
+        return JobDoc(id="j2", label="Removing spikes", state="running")

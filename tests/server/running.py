@@ -1,0 +1,99 @@
+"""A real uvicorn on a free loopback port, in a thread, and clients for it."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import httpx
+import uvicorn
+from fastapi import FastAPI
+from websockets.sync.client import ClientConnection, connect
+
+from server.api.access import Parts
+from server.app import bound_socket, server_config
+from server.settings import Settings
+from server.web import create_app
+from tests.server.fakes import FakeWorkspace
+
+PASSWORD = "correct horse battery"
+SIGNED_OUT = httpx.Cookies()
+
+
+@dataclass(slots=True)
+class Running:
+    """The server, and a browser of one operator who is signed in."""
+
+    settings: Settings
+    app: FastAPI
+    http: httpx.Client
+    server: uvicorn.Server
+
+    @property
+    def parts(self) -> Parts:
+        return self.app.state.parts
+
+    @property
+    def workspace(self) -> FakeWorkspace:
+        return cast(FakeWorkspace, self.parts.workspace)
+
+    @property
+    def origin(self) -> str:
+        return f"http://127.0.0.1:{self.settings.port}"
+
+    @property
+    def cookie(self) -> str:
+        return f"hedgehop-{self.settings.port}={self.http.cookies[f'hedgehop-{self.settings.port}']}"
+
+    def socket(self, path: str = "/ws", **options: Any) -> ClientConnection:
+        """A WebSocket as the operator's own page opens it."""
+        headers = {"Cookie": self.cookie, **options.pop("additional_headers", {})}
+        return connect(
+            f"ws://127.0.0.1:{self.settings.port}{path}",
+            origin=options.pop("origin", self.origin),
+            additional_headers=headers,
+            max_size=None,
+            compression=None,
+            **options,
+        )
+
+    def stranger(self, **options: Any) -> httpx.Client:
+        """A client without a session."""
+        return httpx.Client(base_url=self.origin, **options)
+
+
+@contextlib.contextmanager
+def running(data_dir: Path, **overrides: Any) -> Iterator[Running]:
+    with bound_socket("127.0.0.1", 0) as listening:
+        port = listening.getsockname()[1]
+        settings = Settings(data_dir=data_dir, port=port, **{"console_dir": data_dir / "no-console", **overrides})
+        app = create_app(settings, lambda library, hub, host, background: cast(Any, FakeWorkspace(library, hub)))
+        ready = threading.Event()
+        server = _Signalling(server_config(app, settings), ready)
+        thread = threading.Thread(target=server.run, args=([listening],))
+        thread.start()
+        try:
+            assert ready.wait(30)
+            origin = f"http://127.0.0.1:{port}"
+            with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=30) as client:
+                client.get("/login", params={"token": app.state.parts.auth.new_link_token()})
+                yield Running(settings, app, client, server)
+        finally:
+            server.should_exit = True
+            thread.join(30)
+
+
+class _Signalling(uvicorn.Server):
+    def __init__(self, config: uvicorn.Config, ready: threading.Event) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[Any] | None = None) -> None:
+        try:
+            await super().startup(sockets)
+        finally:
+            self._ready.set()

@@ -1,0 +1,180 @@
+"""Promises S1, S2, S6, S7 on a real server: foreign pages change nothing, huge and slow bodies are refused."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import time
+
+import httpx
+import pytest
+from starlette.datastructures import Headers
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from server import guard
+from server.errors import ForbiddenError
+from server.guard import Door
+from server.logs import OneLineFormatter
+from server.settings import Settings
+from tests.server.running import Running
+
+EDIT = {"base_revision": 1, "label": "Test", "document": {}}
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "http://127.0.0.1:1", "https://{own}"])
+def test_a_foreign_origin_changes_nothing(served: Running, origin: str) -> None:
+    before = list(served.workspace.calls)
+    foreign = origin.replace("{own}", f"127.0.0.1:{served.settings.port}")
+    response = served.http.put("/api/plan", json=EDIT, headers={"Origin": foreign})
+    assert (response.status_code, response.json()["code"]) == (403, "origin")
+    assert served.workspace.calls == before
+
+
+def test_a_missing_origin_changes_nothing(served: Running) -> None:
+    before = list(served.workspace.calls)
+    with served.stranger(cookies=served.http.cookies) as client:
+        assert client.post("/api/plan/undo").status_code == 403
+        assert client.delete("/api/session").status_code == 403
+    assert served.workspace.calls == before
+
+
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data; boundary=x", ""]
+)
+def test_a_body_that_needs_no_preflight_is_refused(served: Running, kind: str) -> None:
+    before = list(served.workspace.calls)
+    response = served.http.put("/api/plan", content=b'{"base_revision":1}', headers={"Content-Type": kind})
+    assert response.status_code == 403
+    assert served.workspace.calls == before
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1:1", "127.0.0.1.evil:{port}", ""])
+def test_a_foreign_host_is_refused(served: Running, host: str) -> None:
+    name = host.replace("{port}", str(served.settings.port))
+    response = served.http.get("/api/health", headers={"Host": name})
+    assert response.status_code in (400, 403)
+
+
+def test_own_names_are_answered(served: Running) -> None:
+    for name in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]"):
+        assert served.http.get("/api/health", headers={"Host": f"{name}:{served.settings.port}"}).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/ws", "/view/anything"])
+@pytest.mark.parametrize("origin", ["http://evil.example", None, "null"])
+def test_a_foreign_page_opens_no_socket(served: Running, path: str, origin: str | None) -> None:
+    with pytest.raises(InvalidStatus) as refused:
+        served.socket(path, origin=origin, subprotocols=["viser-v1.1.1"] if "view" in path else None)
+    assert refused.value.response.status_code == 403
+
+
+def test_a_rebound_name_opens_no_socket(served: Running) -> None:
+    port = served.settings.port
+    with socket.create_connection(("127.0.0.1", port)) as raw, pytest.raises(InvalidStatus) as refused:
+        connect(
+            f"ws://evil.example:{port}/ws",
+            sock=raw,
+            origin=f"http://evil.example:{port}",
+            additional_headers={"Cookie": served.cookie},
+        )
+    assert refused.value.response.status_code == 403
+
+
+def test_an_announced_huge_body_is_refused_unread(served: Running) -> None:
+    request = (
+        f"POST /api/terrains?filename=x.tif HTTP/1.1\r\nHost: 127.0.0.1:{served.settings.port}\r\n"
+        f"Origin: {served.origin}\r\nCookie: {served.cookie}\r\nContent-Type: application/octet-stream\r\n"
+        "Content-Length: 99999999999\r\n\r\n"
+    )
+    assert b" 413 " in _answer(served, request.encode())
+
+
+def test_an_unannounced_huge_body_is_cut_off(served: Running) -> None:
+    sent = 0
+
+    def endless():
+        nonlocal sent
+        for _ in range(400):
+            sent += 65536
+            yield b"x" * 65536
+
+    try:
+        status = served.http.post(
+            "/api/terrains",
+            params={"filename": "x.tif"},
+            content=endless(),
+            headers={"Content-Type": "application/octet-stream"},
+        ).status_code
+    except (httpx.WriteError, httpx.ReadError, httpx.RemoteProtocolError):
+        status = 413
+    assert status == 413
+    assert sent < 400 * 65536
+    assert "x.tif" not in served.workspace.uploads
+    assert list((served.parts.library.root / "uploads").iterdir()) == []
+
+
+def test_huge_json_is_refused(served: Running) -> None:
+    body = b'{"x":"' + b"a" * guard.JSON_LIMIT_BYTES + b'"}'
+    response = served.http.put("/api/plan", content=body, headers={"Content-Type": "application/json"})
+    assert (response.status_code, response.json()["code"]) == (413, "too_large")
+
+
+def test_a_body_that_stops_is_given_up(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "CHUNK_TIMEOUT_S", 0.2)
+    request = (
+        f"PUT /api/plan HTTP/1.1\r\nHost: 127.0.0.1:{served.settings.port}\r\nOrigin: {served.origin}\r\n"
+        f"Cookie: {served.cookie}\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{{"
+    )
+    assert b" 408 " in _answer(served, request.encode())
+
+
+@pytest.mark.parametrize("path", ["/api/health", "/signin", "/nowhere", "/api/state"])
+def test_every_answer_carries_the_headers(served: Running, path: str) -> None:
+    headers = served.http.get(path).headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cache-control"] == "no-store"
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    assert "unsafe-eval" not in headers["content-security-policy"]
+    assert "server" not in headers
+
+
+def test_one_line_per_request_and_no_token(served: Running, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, logger="hedgehop.http"), served.stranger() as client:
+        client.get("/login?token=SECRET-TOKEN")
+        client.get("/a%0d%0aINFO%20forged%1b[31m")
+        deadline = time.monotonic() + 5
+        while len(_http_records(caplog)) < 2 and time.monotonic() < deadline:
+            time.sleep(0.01)
+    lines = [OneLineFormatter("%(message)s").format(record) for record in _http_records(caplog)]
+    assert len(lines) == 2
+    assert not any("SECRET" in line or "\n" in line or "\r" in line or "\x1b" in line for line in lines)
+    assert "\\r\\nINFO forged\\x1b" in lines[1]
+
+
+def test_wildcard_hosts_are_bare_addresses_only() -> None:
+    door = Door.of(Settings(host="0.0.0.0", port=8000, allowed_hosts=("gcs.lan:8000",)))
+    assert door.knows("192.168.1.7:8000")
+    assert door.knows("[fe80::1]:8000")
+    assert door.knows("gcs.lan:8000")
+    assert not door.knows("192.168.1.7:9000")
+    assert not door.knows("rebound.example:8000")
+
+
+def test_a_configured_origin_may_differ_from_the_host() -> None:
+    settings = Settings(port=8000, allowed_hosts=("gcs.example",), allowed_origins=("https://gcs.example/",))
+    door, scope = Door.of(settings), {"type": "http", "method": "POST", "scheme": "http"}
+    door.check(scope, Headers({"host": "gcs.example", "origin": "https://gcs.example"}))
+    with pytest.raises(ForbiddenError):
+        door.check(scope, Headers({"host": "gcs.example", "origin": "https://other.example"}))
+
+
+def _http_records(caplog: pytest.LogCaptureFixture) -> list[logging.LogRecord]:
+    return [record for record in caplog.records if record.name == "hedgehop.http"]
+
+
+def _answer(served: Running, request: bytes) -> bytes:
+    with socket.create_connection(("127.0.0.1", served.settings.port), timeout=10) as raw:
+        raw.sendall(request)
+        return raw.recv(65536)

@@ -1,0 +1,265 @@
+"""Bounded queues, latest-wins, notices that arrive, and stalled pages that hold up nobody (R13, R14)."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any, cast
+
+import pytest
+from starlette.websockets import WebSocket, WebSocketState
+
+from server import hub as hub_module
+from server.hub import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Hub, parse
+from server.schemas import (
+    CursorMessage,
+    ErrorDoc,
+    HoverProfile,
+    JobDoc,
+    JobMessage,
+    NoticeMessage,
+    PlanMessage,
+    SelectionMessage,
+    SelectionDoc,
+)
+from tests.server.fakes import notice, plan_state, snapshot
+
+
+class FakeSocket:
+    """A browser's end; while ``stalled`` it takes nothing."""
+
+    def __init__(self) -> None:
+        self.application_state = self.client_state = WebSocketState.CONNECTED
+        self.sent: list[dict[str, Any]] = []
+        self.flowing = asyncio.Event()
+        self.flowing.set()
+        self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self.close_code: int | None = None
+
+    async def send_text(self, text: str) -> None:
+        await self.flowing.wait()
+        self.sent.append(json.loads(text))
+
+    async def receive(self) -> dict[str, Any]:
+        return await self.incoming.get()
+
+    async def close(self, code: int) -> None:
+        self.close_code = code
+        await self.flowing.wait()
+
+    def says(self, text: str) -> None:
+        self.incoming.put_nowait({"type": "websocket.receive", "text": text})
+
+    def leaves(self) -> None:
+        self.incoming.put_nowait({"type": "websocket.disconnect", "code": 1001})
+
+    def types(self) -> list[str]:
+        return [message["type"] for message in self.sent]
+
+
+class Bench:
+    """A hub with fake browsers on it."""
+
+    def __init__(self) -> None:
+        self.hub = Hub()
+        self.heard: list[tuple[str, object]] = []
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def join(self, *, session: str = "s", remaining_s: float = 1000.0) -> FakeSocket:
+        socket = FakeSocket()
+
+        async def on_message(page_id: str, message: object) -> None:
+            self.heard.append((page_id, message))
+
+        self._tasks.append(
+            asyncio.create_task(
+                self.hub.serve(
+                    cast(WebSocket, socket),
+                    session_key=session,
+                    session_remaining_s=remaining_s,
+                    snapshot=snapshot,
+                    on_message=on_message,
+                )
+            )
+        )
+        await settled()
+        return socket
+
+    async def end(self) -> None:
+        self.hub.close()
+        await asyncio.gather(*self._tasks)
+
+
+async def settled() -> None:
+    for _ in range(50):
+        await asyncio.sleep(0)
+
+
+def run(scenario: Callable[[Bench], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        bench = Bench()
+        try:
+            async with asyncio.timeout(20):
+                await scenario(bench)
+        finally:
+            await bench.end()
+
+    asyncio.run(whole())
+
+
+def test_a_page_starts_with_its_snapshot() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        assert socket.types() == ["snapshot"]
+        assert bench.hub.page(socket.sent[0]["page_id"]) is not None
+        socket.leaves()
+        await settled()
+        assert bench.hub.page_ids == []
+
+    run(scenario)
+
+
+def test_state_is_latest_wins_and_notices_all_arrive() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        socket.flowing.clear()
+        bench.hub.publish(SelectionMessage(selection=SelectionDoc()))
+        await settled()
+        for revision in range(100):
+            bench.hub.publish(PlanMessage(plan=plan_state(revision)))
+            bench.hub.publish(CursorMessage(s_m=revision))
+            bench.hub.publish(JobMessage(job=JobDoc(id=f"j{revision % 2}", label=str(revision), state="running")))
+            if revision % 10 == 0:
+                bench.hub.publish(notice(str(revision)))
+        socket.flowing.set()
+        await settled()
+        assert sorted(socket.types()[2:]) == ["cursor", "job", "job", *["notice"] * 10, "plan"]
+        by_type = {message["type"]: message for message in socket.sent}
+        assert by_type["plan"]["plan"]["revision"] == 99
+        assert by_type["cursor"]["s_m"] == 99
+        jobs = {m["job"]["id"]: m["job"]["label"] for m in socket.sent if m["type"] == "job"}
+        assert jobs == {"j0": "98", "j1": "99"}
+        notices = [m["error"]["what"] for m in socket.sent if m["type"] == "notice"]
+        assert notices == [str(10 * k) for k in range(10)]
+
+    run(scenario)
+
+
+def test_a_stalled_page_is_dropped_and_the_others_notice_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hub_module, "SEND_TIMEOUT_S", 0.05)
+
+    async def scenario(bench: Bench) -> None:
+        stalled, *others = [await bench.join() for _ in range(50)]
+        stalled.flowing.clear()
+        for revision in range(20):
+            bench.hub.publish(PlanMessage(plan=plan_state(revision)))
+            await settled()
+            assert all(socket.sent[-1]["plan"]["revision"] == revision for socket in others)
+        while stalled.close_code is None:
+            await asyncio.sleep(0.01)
+        assert stalled.close_code == CLOSE_SLOW
+        await asyncio.sleep(0.1)
+        assert len(bench.hub.page_ids) == 49
+
+    run(scenario)
+
+
+def test_a_page_whose_notices_pile_up_is_cut_off() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        socket.flowing.clear()
+        for index in range(hub_module.WAITING_MAX + 2):
+            bench.hub.publish(notice(str(index)))
+        socket.flowing.set()
+        await settled()
+        assert socket.close_code == CLOSE_SLOW
+
+    run(scenario)
+
+
+def test_a_message_to_one_page_reaches_only_that_one() -> None:
+    async def scenario(bench: Bench) -> None:
+        one, two = await bench.join(), await bench.join()
+        bench.hub.send(one.sent[0]["page_id"], notice("for one"))
+        bench.hub.send("gone", notice("for nobody"))
+        await settled()
+        assert (one.types(), two.types()) == (["snapshot", "notice"], ["snapshot"])
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "not a JSON object"),
+        ("[1]", "not a JSON object"),
+        ("null", "not a JSON object"),
+        ('{"type": "launch_missile"}', "'launch_missile' are unknown"),
+        ('{"type": {"a": 1}}', "are unknown"),
+        ('{"type": "hover_profile", "s_m": "x"}', "'hover_profile' was faulty"),
+        ('{"type": "hover_profile", "s_m": 1, "more": 2}', "'hover_profile' was faulty"),
+        ("[" * 5000, "not a JSON object"),
+        ("x" * 70_000, "at most"),
+    ],
+)
+def test_unreadable_messages_are_told_and_the_stream_goes_on(text: str, words: str) -> None:
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        socket.says(text)
+        socket.says('{"type": "hover_profile", "s_m": 1.5}')
+        await settled()
+        assert socket.types() == ["snapshot", "notice"]
+        assert socket.sent[1]["level"] == "error"
+        assert words in socket.sent[1]["error"]["what"]
+        assert [message for _, message in bench.heard] == [HoverProfile(s_m=1.5)]
+        assert socket.close_code is None
+
+    run(scenario)
+
+
+def test_bytes_are_no_message() -> None:
+    with pytest.raises(ValueError, match="must be text"):
+        parse(None)
+
+
+def test_a_flood_closes_the_stream() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket, calm = await bench.join(), await bench.join()
+        for _ in range(int(hub_module.BURST) + 200):
+            socket.says('{"type": "hover_profile", "s_m": 1}')
+        while socket.close_code is None:
+            await asyncio.sleep(0.01)
+        assert (socket.close_code, calm.close_code) == (CLOSE_POLICY, None)
+
+    run(scenario)
+
+
+def test_signing_out_closes_the_pages_of_that_session_only() -> None:
+    async def scenario(bench: Bench) -> None:
+        mine, other = await bench.join(session="mine"), await bench.join(session="other")
+        bench.hub.close_session("mine")
+        await settled()
+        assert (mine.close_code, other.close_code) == (CLOSE_SIGNED_OUT, None)
+
+    run(scenario)
+
+
+def test_an_expired_session_ends_its_stream() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join(remaining_s=0.02)
+        while socket.close_code is None:
+            await asyncio.sleep(0.01)
+        assert socket.close_code == CLOSE_SIGNED_OUT
+
+    run(scenario)
+
+
+def test_what_was_set_aside_is_told_to_every_page() -> None:
+    async def scenario(bench: Bench) -> None:
+        told = NoticeMessage(level="warning", error=ErrorDoc(code="storage", what="A plan could not be read."))
+        bench.hub.greet_with([told])
+        for socket in (await bench.join(), await bench.join()):
+            assert socket.types() == ["snapshot", "notice"]
+
+    run(scenario)

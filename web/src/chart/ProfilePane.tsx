@@ -1,0 +1,89 @@
+import { signal } from "@preact/signals";
+import { count } from "../format";
+import { Segmented } from "../ui/Button";
+import { throttled } from "../scene/frame_events";
+import { chartHeight_px } from "../store/prefs";
+import { computation, cursor, isFresh, result } from "../store/state";
+import { send } from "../store/stream";
+import { CursorValues } from "./CursorValues";
+import { Plot, type ChartKind } from "./Plot";
+import { ResizeHandle } from "./ResizeHandle";
+
+const kind = signal<ChartKind>("altitude");
+const tellServer = throttled<number | null>(1000 / 30, (s_m) => send({ type: "hover_profile", s_m }));
+
+/** The line follows the pointer at once; the server's answer adds the place in 3D. */
+function hover(s_m: number | null): void {
+  cursor.value =
+    s_m === null
+      ? null
+      : {
+          v: 1,
+          type: "cursor",
+          s_m,
+          lat_deg: null,
+          lon_deg: null,
+          ground_rel_home_m: null,
+          path_rel_home_m: null,
+        };
+  tellServer(s_m);
+}
+
+function Keys() {
+  if (kind.value === "distance") return <span class="muted">Distance to the surface model, in space</span>;
+  return (
+    <span class="chart-keys" aria-hidden="true">
+      <span class="key ground">Terrain</span>
+      <span class="key surface">Safe surface</span>
+      <span class="key path">Path</span>
+      <span class="key flown">Mission</span>
+    </span>
+  );
+}
+
+function Empty() {
+  const now = computation.value;
+  const text =
+    now?.state === "running" ? "Computing the profile…" : now?.hint || "The altitude profile appears here.";
+  return <p class="chart-empty muted">{text}</p>;
+}
+
+export function ProfilePane() {
+  const shown = result.value;
+  const place = cursor.value?.s_m == null ? null : cursor.value;
+  return (
+    <section
+      class="profile-pane"
+      style={{ height: `${chartHeight_px.value}px` }}
+      aria-label="Altitude profile"
+    >
+      <ResizeHandle />
+      <header>
+        <Segmented
+          label="Chart"
+          testid="chart"
+          value={kind.value}
+          options={[
+            { value: "altitude", label: "Altitude" },
+            { value: "distance", label: "Clearance" },
+          ]}
+          onChange={(next) => (kind.value = next)}
+        />
+        {shown && place ? (
+          <CursorValues result={shown} cursor={place} />
+        ) : (
+          shown && <Keys />
+        )}
+        <span class="spring" />
+        {shown && !place && <span class="muted">along path, m · {count(shown.waypoints, "waypoint")}</span>}
+      </header>
+      {shown ? (
+        <div class={`plot-holder ${isFresh.value ? "" : "stale"}`}>
+          <Plot kind={kind.value} result={shown} onHover={hover} />
+        </div>
+      ) : (
+        <Empty />
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,61 @@
+import { latLon } from "../../format";
+import type { MissionDoc } from "../../messages";
+import { Button, Segmented } from "../../ui/Button";
+import { NumberField } from "../../ui/NumberField";
+import { editGroup } from "../../store/plan";
+import { selection } from "../../store/state";
+import { setSelection } from "../../store/stream";
+
+const set = (label: string, fields: Partial<MissionDoc>) => editGroup("mission", "mission", label, fields);
+
+function choose(heading: MissionDoc["heading"], mission: MissionDoc): void {
+  set("Heading", { heading });
+  if (heading === "point" && !mission.look_at) setSelection({ tool: "look_at" });
+}
+
+/** Where the nose points: along the path, one way, or at a place. */
+export function Heading({ mission }: { mission: MissionDoc }) {
+  return (
+    <>
+      <div class="labelled">
+        <span>Nose points</span>
+        <Segmented
+          label="Nose points"
+          testid="heading"
+          value={mission.heading}
+          options={[
+            { value: "path", label: "Along path" },
+            { value: "fixed", label: "One way" },
+            { value: "point", label: "At a place" },
+          ]}
+          onChange={(heading) => choose(heading, mission)}
+        />
+      </div>
+      {mission.heading === "fixed" && (
+        <NumberField
+          label="Heading, clockwise from north"
+          unit="°"
+          min={0}
+          max={359.9}
+          step={5}
+          value={mission.heading_deg}
+          testid="heading-input"
+          onChange={(heading_deg) => set("Heading", { heading_deg })}
+        />
+      )}
+      {mission.heading === "point" && (
+        <div class="row">
+          <span class="place">{mission.look_at ? latLon(mission.look_at) : "No place yet"}</span>
+          <Button
+            icon="target"
+            testid="tool-look_at"
+            pressed={selection.value.tool === "look_at"}
+            onClick={() => setSelection({ tool: "look_at" })}
+          >
+            Click it
+          </Button>
+        </div>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,152 @@
+import { metres } from "../../format";
+import type { ClearanceDoc, MissionDoc, PlanDoc } from "../../messages";
+import { Segmented } from "../../ui/Button";
+import { NumberField } from "../../ui/NumberField";
+import { Section } from "../../ui/Section";
+import { AutoField } from "../../ui/fields";
+import { editGroup } from "../../store/plan";
+import { terrain } from "../../store/state";
+import { Heading } from "./Heading";
+import { TradeTable } from "./TradeTable";
+
+const set = (label: string, fields: Partial<MissionDoc>) => editGroup("mission", "mission", label, fields);
+const demand = (label: string, fields: Partial<ClearanceDoc>) =>
+  editGroup("clearance", "mission", label, fields);
+
+/** Position error + rotor downwash + vehicle radius, as the certificate does. */
+const DOWNWASH_M = 0.5;
+
+function Camera({ mission }: { mission: MissionDoc }) {
+  return (
+    <>
+      <AutoField
+        label="Set the gimbal"
+        auto="(left alone)"
+        unit="°"
+        min={-90}
+        max={30}
+        step={5}
+        value={mission.gimbal_pitch_deg}
+        initial={-90}
+        testid="gimbal"
+        onChange={(gimbal_pitch_deg) => set("Gimbal", { gimbal_pitch_deg })}
+      />
+      <AutoField
+        label="Photo by distance"
+        auto="(none)"
+        unit="m"
+        min={0.1}
+        max={1000}
+        step={0.5}
+        value={mission.camera_trigger_m}
+        initial={5}
+        testid="trigger"
+        onChange={(camera_trigger_m) => set("Camera trigger", { camera_trigger_m })}
+      />
+    </>
+  );
+}
+
+function Safety({ plan: { clearance, profile } }: { plan: PlanDoc }) {
+  const required_m = profile.position_error_m + DOWNWASH_M + profile.radius_m;
+  return (
+    <>
+      <AutoField
+        label="Own required clearance"
+        auto={`(${metres(required_m, 2)})`}
+        unit="m"
+        min={0}
+        max={500}
+        step={0.1}
+        value={clearance.required_clearance_m}
+        initial={Number(required_m.toFixed(2))}
+        testid="required-clearance"
+        onChange={(required_clearance_m) => demand("Required clearance", { required_clearance_m })}
+      />
+      <AutoField
+        label="Limit height above ground"
+        auto="(none)"
+        unit="m"
+        min={1}
+        max={10_000}
+        step={5}
+        value={clearance.max_height_above_ground_m}
+        initial={120}
+        testid="max-height"
+        onChange={(max_height_above_ground_m) => demand("Height limit", { max_height_above_ground_m })}
+      />
+    </>
+  );
+}
+
+export function MissionSection({ plan }: { plan: PlanDoc }) {
+  const { mission, profile } = plan;
+  const datum = terrain.value?.vertical_datum ?? null;
+  return (
+    <Section
+      id="mission"
+      title="Mission"
+      icon="flag"
+      summary={mission.end === "rtl" ? "then return" : "then land"}
+    >
+      <NumberField
+        label="Excess height"
+        unit="m"
+        min={0}
+        max={100}
+        step={0.1}
+        value={mission.excess_height_m}
+        testid="excess-input"
+        onChange={(excess_height_m) => set("Excess height", { excess_height_m })}
+      />
+      <TradeTable
+        chosen_m={mission.excess_height_m}
+        onChoose={(excess_height_m) => set("Excess height", { excess_height_m })}
+      />
+      <div class="labelled">
+        <span>At the end</span>
+        <Segmented
+          label="At the end"
+          testid="end"
+          value={mission.end}
+          options={[
+            { value: "rtl", label: "Return (RTL)" },
+            { value: "land", label: "Land at home" },
+          ]}
+          onChange={(end) => set("End of the mission", { end })}
+        />
+      </div>
+      <NumberField
+        label="Return height set in the autopilot"
+        unit="m above home"
+        min={0}
+        max={2000}
+        step={1}
+        value={profile.rtl_height_m}
+        testid="rtl-height-input"
+        onChange={(rtl_height_m) => editGroup("profile", "mission", "Return height", { rtl_height_m })}
+      />
+      <div class="labelled">
+        <span>Altitudes in the files</span>
+        <Segmented
+          label="Altitudes in the files"
+          testid="altitude-reference"
+          value={mission.altitude_reference}
+          options={[
+            { value: "home", label: "Above home" },
+            {
+              value: "amsl",
+              label: "AMSL",
+              disabled: datum === null,
+              title: datum ? `In ${datum}` : "The terrain's vertical datum is unknown",
+            },
+          ]}
+          onChange={(altitude_reference) => set("Altitude reference", { altitude_reference })}
+        />
+      </div>
+      <Heading mission={mission} />
+      <Camera mission={mission} />
+      <Safety plan={plan} />
+    </Section>
+  );
+}

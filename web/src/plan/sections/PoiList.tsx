@@ -1,0 +1,147 @@
+import { signal } from "@preact/signals";
+import { degrees } from "../../format";
+import type { PlanDoc, PoiDoc } from "../../messages";
+import { Button } from "../../ui/Button";
+import { Icon } from "../../ui/Icon";
+import { NumberField } from "../../ui/NumberField";
+import { TextField } from "../../ui/fields";
+import { poiTitle, withPoi, withPoiAt } from "../../store/poi";
+import { edit } from "../../store/plan";
+import { selection } from "../../store/state";
+import { setSelection } from "../../store/stream";
+import { removeSelectedPoi } from "../commands";
+import { CopyPlace } from "../CopyPlace";
+
+/** Which row is dragged and which it would land on. */
+const drag = signal<{ id: string; over: number } | null>(null);
+/** More rows than anyone edits by hand would only make the page slow. */
+const MOST_ROWS = 300;
+
+function move(poi: PoiDoc, from: number, to: number): void {
+  if (from !== to) edit(`Move point ${from + 1} to ${to + 1}`, "points", withPoiAt(poi.id, to));
+}
+
+function onRowKey(event: KeyboardEvent, poi: PoiDoc, index: number, last: number): void {
+  if (!event.altKey || (event.key !== "ArrowUp" && event.key !== "ArrowDown")) return;
+  event.preventDefault();
+  move(poi, index, Math.min(last, Math.max(0, index + (event.key === "ArrowUp" ? -1 : 1))));
+}
+
+function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
+  const number = index + 1;
+  const set = (label: string, fields: Partial<PoiDoc>) => edit(label, "points", withPoi(poi.id, fields));
+  return (
+    <div class="poi-fields">
+      <TextField
+        bare
+        label={`Name of point ${number}`}
+        placeholder={`Point ${number}`}
+        testid="poi-name"
+        value={poi.name}
+        onChange={(name) => set(`Rename point ${number}`, { name })}
+      />
+      <NumberField
+        bare
+        label={`Loiter at point ${number}`}
+        unit="s"
+        min={0}
+        max={3600}
+        step={1}
+        value={poi.loiter_s}
+        testid="poi-loiter"
+        onChange={(loiter_s) => set(`Loiter at point ${number}`, { loiter_s })}
+      />
+      <span class="coordinates" data-testid="poi-coordinates">
+        <span>{degrees(poi.lat_deg)}</span>
+        <span>{degrees(poi.lon_deg)}</span>
+        <CopyPlace place={poi} name={poiTitle(poi, index)} />
+      </span>
+    </div>
+  );
+}
+
+function Row({ poi, index, last }: { poi: PoiDoc; index: number; last: number }) {
+  const isSelected = selection.value.poi_id === poi.id;
+  const select = () => selection.value.poi_id !== poi.id && setSelection({ poi_id: poi.id });
+  const onDragOver = (event: DragEvent) => {
+    if (!drag.value) return;
+    event.preventDefault();
+    drag.value = { ...drag.value, over: index };
+  };
+  return (
+    <li
+      class={`poi ${isSelected ? "selected" : ""} ${drag.value?.over === index ? "drop-target" : ""}`}
+      data-testid="poi-row"
+      data-poi={poi.id}
+      aria-current={isSelected}
+      onFocusCapture={select}
+      onClick={select}
+      onKeyDown={(event) => onRowKey(event, poi, index, last)}
+      onDragOver={onDragOver}
+    >
+      <button
+        type="button"
+        class="handle"
+        draggable
+        title={`Point ${index + 1}: drag to reorder, or Alt+Up and Alt+Down`}
+        onDragStart={(event) => {
+          event.dataTransfer?.setData("text/plain", poi.id);
+          drag.value = { id: poi.id, over: index };
+        }}
+        onDragEnd={() => (drag.value = null)}
+      >
+        <Icon name="grip" size={14} />
+        <span class="badge">{index + 1}</span>
+      </button>
+      <RowFields poi={poi} index={index} />
+      <Button
+        kind="quiet"
+        class="small"
+        icon="trash"
+        testid="poi-delete"
+        title={`Delete ${poiTitle(poi, index)}`}
+        onClick={() => removeSelectedPoi(poi.id)}
+      />
+    </li>
+  );
+}
+
+function drop(plan: PlanDoc): void {
+  const now = drag.value;
+  drag.value = null;
+  const from = plan.pois.findIndex((poi) => poi.id === now?.id);
+  const poi = plan.pois[from];
+  if (now && poi) move(poi, from, now.over);
+}
+
+export function PoiList({ plan }: { plan: PlanDoc }) {
+  const { pois } = plan;
+  if (pois.length === 0) {
+    return (
+      <p class="teach">
+        {plan.terrain_id
+          ? "Press Add and click the surface, or drop a file of points. Two are enough for a path."
+          : "Points come after the terrain."}
+      </p>
+    );
+  }
+  return (
+    <>
+      <div class="poi-head" aria-hidden="true">
+        <span>Name, latitude, longitude</span>
+        <span>Loiter</span>
+      </div>
+      <ol class="poi-list" onDrop={() => drop(plan)}>
+        {pois.slice(0, MOST_ROWS).map((poi, index) => (
+          <Row key={poi.id} poi={poi} index={index} last={pois.length - 1} />
+        ))}
+      </ol>
+      {pois.length > MOST_ROWS && (
+        <p class="muted">
+          {pois.length - MOST_ROWS} more points are flown but not listed: edit them in the file, then import
+          it.
+        </p>
+      )}
+    </>
+  );
+}

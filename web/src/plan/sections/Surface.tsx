@@ -1,0 +1,70 @@
+import { metres } from "../../format";
+import type { PlanDoc, SurfaceDoc } from "../../messages";
+import { Section } from "../../ui/Section";
+import { AutoField, Check, SliderField } from "../../ui/fields";
+import { editGroup } from "../../store/plan";
+
+const set = (label: string, fields: Partial<SurfaceDoc>, dragging = false) =>
+  editGroup("surface", "surface", label, fields, dragging);
+
+export function SurfaceSection({ plan: { surface } }: { plan: PlanDoc }) {
+  const { radius_m, height_m } = surface;
+  return (
+    <Section
+      id="surface"
+      title="Safe surface"
+      icon="surface"
+      summary={`R ${metres(radius_m)}, H ${metres(height_m)}`}
+      startsOpen
+    >
+      <SliderField
+        label="R, sideways"
+        hint="How far the safe surface keeps away from walls, trees and masts."
+        unit="m"
+        min={0.1}
+        max={1000}
+        sliderMax={50}
+        step={0.1}
+        value={radius_m}
+        testid="radius"
+        onChange={(value, dragging) => set("Radius R", { radius_m: value }, dragging)}
+      />
+      <SliderField
+        label="H, upwards"
+        hint="How high it runs above the ground."
+        unit="m"
+        min={0.1}
+        max={500}
+        sliderMax={30}
+        step={0.1}
+        value={height_m}
+        testid="height"
+        onChange={(value, dragging) => set("Height H", { height_m: value }, dragging)}
+      />
+      <AutoField
+        label="Own smoothing"
+        auto={`(R / 10 = ${metres(radius_m / 10, 2)})`}
+        unit="m"
+        min={0}
+        max={200}
+        step={0.1}
+        value={surface.smooth_sigma_m}
+        initial={Number((radius_m / 10).toFixed(2))}
+        testid="smoothing"
+        onChange={(smooth_sigma_m) => set("Smoothing", { smooth_sigma_m })}
+      />
+      <Check
+        label="Never smooth below 0.8 H"
+        checked={surface.floor}
+        testid="floor"
+        onChange={(floor) => set(floor ? "Keep the floor" : "Paper's pipeline", { floor })}
+      />
+      {!surface.floor && (
+        <p class="hint">
+          As in the paper: smoothing may cut the edges of the safe surface. The certificate still judges the
+          result.
+        </p>
+      )}
+    </Section>
+  );
+}

@@ -1,0 +1,139 @@
+import { latLon, number } from "../../format";
+import type { CameraDoc, PlanDoc, SurveyDoc } from "../../messages";
+import { Button } from "../../ui/Button";
+import { AutoField } from "../../ui/fields";
+import { NumberField } from "../../ui/NumberField";
+import { editGroup } from "../../store/plan";
+import { CopyPlace } from "../CopyPlace";
+
+const DEFAULT_CAMERA: CameraDoc = {
+  image_width_px: 4000,
+  image_height_px: 3000,
+  focal_mm: 8.8,
+  sensor_width_mm: 13.2,
+  sensor_height_mm: 8.8,
+};
+
+const CAMERA_FIELDS = [
+  { key: "image_width_px", label: "Image width", unit: "px", min: 1, max: 100_000, step: 1, whole: true },
+  { key: "image_height_px", label: "Image height", unit: "px", min: 1, max: 100_000, step: 1, whole: true },
+  { key: "focal_mm", label: "Focal length", unit: "mm", min: 0.1, max: 1000, step: 0.1 },
+  { key: "sensor_width_mm", label: "Sensor width", unit: "mm", min: 0.1, max: 200, step: 0.1 },
+  { key: "sensor_height_mm", label: "Sensor height", unit: "mm", min: 0.1, max: 200, step: 0.1 },
+] as const;
+
+const set = (label: string, fields: Partial<SurveyDoc>) => editGroup("survey", "points", label, fields);
+
+function Corners({ polygon }: { polygon: SurveyDoc["polygon"] }) {
+  if (polygon.length === 0) {
+    return <p class="teach">Press Corners and click around the area, or drop a file with a polygon.</p>;
+  }
+  const remove = (index: number) =>
+    set(`Delete corner ${index + 1}`, { polygon: polygon.filter((_, at) => at !== index) });
+  return (
+    <ol class="corner-list" data-testid="corner-list">
+      {polygon.map((place, index) => (
+        <li key={`${index} ${latLon(place)}`} data-testid="corner-row">
+          <span class="badge">{index + 1}</span>
+          <span class="place">{latLon(place)}</span>
+          <CopyPlace place={place} name={`corner ${index + 1}`} />
+          <Button
+            kind="quiet"
+            class="small"
+            icon="trash"
+            title={`Delete corner ${index + 1}`}
+            onClick={() => remove(index)}
+          />
+        </li>
+      ))}
+    </ol>
+  );
+}
+
+function Camera({ camera }: { camera: CameraDoc | null }) {
+  const change = (next: CameraDoc) => editGroup("profile", "points", "Camera", { camera: next });
+  if (!camera) {
+    return (
+      <div class="callout">
+        <p>The vehicle profile has no camera: a survey needs one.</p>
+        <Button testid="camera-add" onClick={() => change(DEFAULT_CAMERA)}>
+          Add camera
+        </Button>
+      </div>
+    );
+  }
+  return (
+    <details class="details">
+      <summary>
+        Camera{" "}
+        <span class="muted">
+          {number(camera.image_width_px)} × {number(camera.image_height_px)} px, {camera.focal_mm} mm
+        </span>
+      </summary>
+      <div class="field-grid">
+        {CAMERA_FIELDS.map(({ key, ...field }) => (
+          <NumberField
+            key={key}
+            {...field}
+            value={camera[key]}
+            onChange={(value) => change({ ...camera, [key]: value })}
+          />
+        ))}
+      </div>
+    </details>
+  );
+}
+
+export function SurveyFields({ plan }: { plan: PlanDoc }) {
+  const { survey, profile } = plan;
+  return (
+    <>
+      <Corners polygon={survey.polygon} />
+      <div class="field-grid">
+        <NumberField
+          label="Ground sampling"
+          unit="cm"
+          min={0.05}
+          max={100}
+          step={0.1}
+          value={survey.gsd_cm}
+          testid="gsd-input"
+          onChange={(gsd_cm) => set("Ground sampling", { gsd_cm })}
+        />
+        <NumberField
+          label="Side overlap"
+          unit="%"
+          min={0}
+          max={94}
+          step={1}
+          value={survey.side_overlap * 100}
+          testid="side-overlap-input"
+          onChange={(percent) => set("Side overlap", { side_overlap: percent / 100 })}
+        />
+        <NumberField
+          label="Front overlap"
+          unit="%"
+          min={0}
+          max={94}
+          step={1}
+          value={survey.front_overlap * 100}
+          testid="front-overlap-input"
+          onChange={(percent) => set("Front overlap", { front_overlap: percent / 100 })}
+        />
+      </div>
+      <AutoField
+        label="Own angle of the lines"
+        auto="(along the longest side)"
+        unit="°"
+        min={0}
+        max={179}
+        step={1}
+        value={survey.angle_deg}
+        initial={0}
+        testid="angle"
+        onChange={(angle_deg) => set("Angle of the lines", { angle_deg })}
+      />
+      <Camera camera={profile.camera} />
+    </>
+  );
+}

@@ -1,0 +1,55 @@
+import { listenInside } from "./frame_events";
+import { EmptyState } from "./EmptyState";
+import { Legend } from "./Legend";
+import { ViewTools } from "./ViewTools";
+import { Toasts } from "../shell/Notices";
+import { ErrorBox } from "../ui/ErrorBox";
+import { document_, pageId, selection, terrain } from "../store/state";
+
+const HINTS = {
+  select: null,
+  add_poi: "Click the surface to add a point",
+  polygon: "Click the surface to add a corner",
+  home: "Click the surface to put home there",
+  look_at: "Click the surface where the nose shall point",
+} as const;
+
+function ToolHint() {
+  const hint = HINTS[selection.value.tool];
+  if (!hint || !terrain.value) return null;
+  return (
+    <p class="tool-hint" data-testid="tool-hint">
+      {hint} <span>·</span> <kbd>Esc</kbd> to stop
+    </p>
+  );
+}
+
+/** The 3D view with what lies on it. */
+export function Scene() {
+  const id = pageId.value;
+  const hasTerrain = terrain.value !== null;
+  return (
+    <section class={`scene tool-${selection.value.tool}`} aria-label="3D view" data-testid="scene">
+      {id && (
+        <iframe
+          src={`/view/${encodeURIComponent(id)}/`}
+          title="3D view of terrain, safe surface and path"
+          data-testid="view-frame"
+          onLoad={(event) => listenInside(event.currentTarget)}
+        />
+      )}
+      {document_.value && !hasTerrain && <EmptyState />}
+      {hasTerrain && (
+        <>
+          <Legend />
+          <ViewTools />
+        </>
+      )}
+      <ToolHint />
+      <div class="scene-messages">
+        <ErrorBox place="view" />
+        <Toasts />
+      </div>
+    </section>
+  );
+}

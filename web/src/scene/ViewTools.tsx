@@ -1,0 +1,78 @@
+import { Button } from "../ui/Button";
+import type { ViewDoc } from "../messages";
+import { result, view } from "../store/state";
+import { frame, setView } from "../store/stream";
+
+type Layer = "show_surface" | "show_path" | "show_unknown";
+
+const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
+  { layer: "show_surface", label: "Surface", title: "The safe surface" },
+  { layer: "show_path", label: "Path", title: "The path and the mission as it will be flown" },
+  { layer: "show_unknown", label: "Unknown", title: "Where the surface model knows no height" },
+];
+
+function toggle(layer: Layer): void {
+  const fields: Partial<ViewDoc> = { [layer]: !view.value[layer] };
+  setView(fields);
+}
+
+/** Layers and camera of the 3D view. */
+export function ViewTools() {
+  return (
+    <div class="view-tools">
+      <div class="overlay layers" role="group" aria-label="Layers">
+        {LAYERS.map(({ layer, label, title }) => (
+          <button
+            type="button"
+            key={layer}
+            title={title}
+            aria-pressed={view.value[layer]}
+            data-testid={`layer-${layer.slice("show_".length)}`}
+            onClick={() => toggle(layer)}
+          >
+            <span class="eye" aria-hidden="true" />
+            {label}
+          </button>
+        ))}
+      </div>
+      <div class="overlay cameras" role="group" aria-label="Camera">
+        <Button
+          kind="quiet"
+          icon="fit"
+          title="Fit the plan (F)"
+          testid="view-fit"
+          onClick={() => frame("plan")}
+        />
+        <Button
+          kind="quiet"
+          icon="terrain"
+          title="Fit the whole terrain"
+          testid="view-terrain"
+          onClick={() => frame("terrain")}
+        />
+        <button
+          type="button"
+          class="button quiet north"
+          title="From above, north up (T)"
+          data-testid="view-top"
+          onClick={() => frame("top")}
+        >
+          <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true">
+            <path class="needle" d="M12 2l4 10h-8z" />
+            <path class="tail" d="M12 22l-4-10h8z" />
+          </svg>
+          <span>N up</span>
+        </button>
+        {result.value?.worst && (
+          <Button
+            kind="quiet"
+            icon="target"
+            title="Show the nearest place"
+            testid="view-worst"
+            onClick={() => frame("worst")}
+          />
+        )}
+      </div>
+    </div>
+  );
+}

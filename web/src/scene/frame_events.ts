@@ -1,0 +1,45 @@
+import { onKey } from "../shell/keyboard";
+import { carriesFiles } from "../shell/FileDrop";
+import { dragging } from "../shell/ui_state";
+import { send } from "../store/stream";
+
+const HOVER_PERIOD_MS = 1000 / 15;
+
+/** At most one call per period; the last one always arrives. */
+export function throttled<T>(period_ms: number, act: (value: T) => void): (value: T) => void {
+  let last_ms = -Infinity;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  return (value) => {
+    clearTimeout(timer);
+    const run = () => {
+      last_ms = performance.now();
+      act(value);
+    };
+    const wait_ms = last_ms + period_ms - performance.now();
+    if (wait_ms <= 0) run();
+    else timer = setTimeout(run, wait_ms);
+  };
+}
+
+const hover = throttled<{ x: number; y: number } | null>(HOVER_PERIOD_MS, (at) => {
+  send({ type: "hover_view", x: at?.x ?? null, y: at?.y ?? null });
+});
+
+const share = (value: number, whole: number) => Math.min(1, Math.max(0, value / whole));
+
+/** The 3D view is a page of its own within ours: its pointer, keys and dragged files are passed on to us. */
+export function listenInside(frame: HTMLIFrameElement): void {
+  const inside = frame.contentWindow;
+  if (!inside) return;
+  const { document } = inside;
+  document.addEventListener("pointermove", (event) =>
+    hover({ x: share(event.clientX, inside.innerWidth), y: share(event.clientY, inside.innerHeight) }),
+  );
+  document.documentElement.addEventListener("pointerleave", () => hover(null));
+  document.addEventListener("keydown", onKey);
+  document.addEventListener("dragenter", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    dragging.value = true;
+  });
+}
