@@ -45,6 +45,11 @@ def block_max(dsm: Dsm, factor: int) -> Dsm:
     )
 
 
+def fit_within(dsm: Dsm, max_px: int) -> Dsm:
+    """The model, block maxima taken until it is at most ``max_px`` wide and high: for drawing."""
+    return block_max(dsm, max(1, math.ceil(max(dsm.height_px, dsm.width_px) / max_px)))
+
+
 def dilate(dsm: Dsm, *, radius_m: float, height_m: float, method: Method = "exact") -> Dsm:
     """Grey dilation with the upper half of an ellipsoid of radius R and height H (Melita 2020, eq. 2).
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import errno
-import logging
 import socket
 import sys
+from contextlib import closing
 
 import uvicorn
 from fastapi import FastAPI
 
 from server.errors import ServerError, StartError
+from server.library import Library
 from server.logs import configure_logging
 from server.settings import Settings
 from server.web import create_app
-
-log = logging.getLogger("hedgehop.app")
+from server.wiring import make_workspace
 
 WEBSOCKET_LIMIT_BYTES = 1024**2
 """From browsers; what goes to them has no limit."""
@@ -25,12 +25,12 @@ SHUTDOWN_S = 5
 
 def run(settings: Settings, *, demo: bool = False) -> None:
     """Serves until interrupted. Raises ``StartError`` or ``DataDirError`` with what to do."""
-    from server.wiring import make_workspace
-
     configure_logging(settings.log_level)
-    with bound_socket(settings.host, settings.port) as listening:
-        app = create_app(settings, make_workspace, demo=demo)
-        AnnouncingServer(app, settings).run(sockets=[listening])
+    with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
+        server = AnnouncingServer(create_app(settings, library, make_workspace, demo=demo), settings)
+        server.run(sockets=[listening])
+        if not server.started:
+            raise StartError("Hedgehop could not start.", advice="The log above tells why.")
 
 
 class AnnouncingServer(uvicorn.Server):

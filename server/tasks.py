@@ -49,7 +49,7 @@ def _terrain(directory: Path) -> Dsm:
 def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
     """The answer to an edit, without the trade table."""
     plan, source, timer = _plan(directory, document, report)
-    return result_doc(plan, source, timer.seconds()), plan_scene(plan, source)
+    return result_doc(plan, source, timer.seconds()), plan_scene(plan)
 
 
 def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:

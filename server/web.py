@@ -38,15 +38,15 @@ MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
 
 
-def create_app(settings: Settings, make_workspace: MakeWorkspace, *, demo: bool = False) -> FastAPI:
-    """The app; it locks the data directory when it starts and lets go of it when it stops."""
+def create_app(settings: Settings, library: Library, make_workspace: MakeWorkspace, *, demo: bool = False) -> FastAPI:
+    """The app around an open library, which stays its caller's to close."""
     app = FastAPI(
         title="Hedgehop",
         version=__version__,
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
-        lifespan=lambda app: _lifespan(app, settings, make_workspace, demo),
+        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, demo),
     )
     for router in (session.router, plan.router, terrain.router, view.router, console.router, proxy.router):
         app.include_router(router)
@@ -58,11 +58,13 @@ def create_app(settings: Settings, make_workspace: MakeWorkspace, *, demo: bool 
 
 
 @contextlib.asynccontextmanager
-async def _lifespan(app: FastAPI, settings: Settings, make_workspace: MakeWorkspace, demo: bool) -> AsyncIterator[None]:
+async def _lifespan(
+    app: FastAPI, settings: Settings, library: Library, make_workspace: MakeWorkspace, demo: bool
+) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
         stack.callback(background.stop)
-        parts = await _open(settings, make_workspace, background, stack)
+        parts = await _open(settings, library, make_workspace, background, stack)
         app.state.parts = parts
         for loop in parts.workspace.loops():
             background.spawn(loop)
@@ -76,11 +78,13 @@ async def _lifespan(app: FastAPI, settings: Settings, make_workspace: MakeWorksp
 
 
 async def _open(
-    settings: Settings, make_workspace: MakeWorkspace, background: Background, stack: AsyncExitStack
+    settings: Settings,
+    library: Library,
+    make_workspace: MakeWorkspace,
+    background: Background,
+    stack: AsyncExitStack,
 ) -> Parts:
     """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
-    library = await asyncio.to_thread(Library, settings.data_dir)
-    stack.callback(library.close)
     auth = Auth(library.root / "sessions.json", password=settings.password, lifetime_s=settings.session_days * 86400.0)
     hub = Hub()
     host = await asyncio.to_thread(SceneHost)

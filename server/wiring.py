@@ -11,7 +11,25 @@ from server.workspace import Workspace
 
 
 def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Background) -> Workspace:
-    view = SceneView(host)
+    """Clicks in the view become edits of the workspace, whose pictures the view draws."""
+    workspace: Workspace
+
+    async def on_terrain_click(page_id: str | None, lat_deg: float, lon_deg: float, known: bool) -> None:
+        del page_id
+        await workspace.on_terrain_click(lat_deg, lon_deg, known=known)
+
+    async def on_poi_click(poi_id: str) -> None:
+        await workspace.on_poi_click(poi_id)
+
+    async def on_poi_moved(poi_id: str, lat_deg: float, lon_deg: float) -> None:
+        await workspace.on_poi_moved(poi_id, lat_deg, lon_deg)
+
+    view = SceneView(
+        host.server,
+        on_terrain_click=on_terrain_click,
+        on_poi_click=on_poi_click,
+        on_poi_moved=on_poi_moved,
+        page_of_client=host.page_of_client,
+    )
     workspace = Workspace(library, hub, view, spawn=background.spawn)
-    view.attach(workspace)
     return workspace

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-from affine import Affine
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -18,6 +16,7 @@ from planning.figures.curves import BAD, PATH, short_name
 from planning.figures.ticks import label, round_step
 from planning.hillshade import height_colors, hillshade, scale_rgb
 from planning.model import Certificate, FlownLine, Poi
+from planning.surface import fit_within
 
 F64 = NDArray[np.float64]
 MAX_IMAGE_PX = 1000
@@ -29,7 +28,7 @@ _MOST_DOTS = 400
 
 def plan_view(dsm: Dsm, line: FlownLine, certificate: Certificate, pois: Sequence[Poi]) -> str:
     """The map as one ``<svg>`` with the relief as an embedded PNG; north is up."""
-    shown = reduced(_around(dsm, line.points_m[:, :2]), MAX_IMAGE_PX)
+    shown = fit_within(_around(dsm, line.points_m[:, :2]), MAX_IMAGE_PX)
     west, south, east, north = shown.bounds_m
     px_per_m = min(MAP_PX / (east - west), MAX_MAP_HEIGHT_PX / (north - south))
     size = np.array([(east - west) * px_per_m, (north - south) * px_per_m])
@@ -51,16 +50,6 @@ def plan_view(dsm: Dsm, line: FlownLine, certificate: Certificate, pois: Sequenc
         "</svg>",
     ]
     return "\n".join(parts)
-
-
-def reduced(dsm: Dsm, max_px: int) -> Dsm:
-    """The model with each block of cells replaced by its highest, at most ``max_px`` wide and high."""
-    block = math.ceil(max(dsm.height_px, dsm.width_px) / max_px)
-    if block <= 1:
-        return dsm
-    rows, cols = (np.arange(0, n, block) for n in dsm.elevation_m.shape)
-    highest = np.fmax.reduceat(np.fmax.reduceat(dsm.elevation_m, rows, axis=0), cols, axis=1)
-    return Dsm(highest, dsm.transform @ Affine.scale(block), dsm.crs, dsm.vertical_datum, dsm.sha256)
 
 
 def _around(dsm: Dsm, xy_m: F64) -> Dsm:

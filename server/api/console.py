@@ -41,12 +41,16 @@ async def console(request: Request) -> Response:
 @router.get("/assets/{path:path}", dependencies=[SignedIn])
 async def asset(path: str, request: Request) -> Response:
     """Built files carry a digest in their names, so browsers may keep them."""
-    return FileResponse(_console_file(request, "assets/" + path), headers={"cache-control": _FOR_EVER})
+    return FileResponse(
+        _file_below(parts_of(request).settings.console_dir / "assets", path), headers={"cache-control": _FOR_EVER}
+    )
 
 
 @router.get("/favicon.svg")
 async def favicon(request: Request) -> Response:
-    return FileResponse(_console_file(request, "favicon.svg"), headers={"cache-control": "no-cache"})
+    return FileResponse(
+        _file_below(parts_of(request).settings.console_dir, "favicon.svg"), headers={"cache-control": "no-cache"}
+    )
 
 
 @router.get("/api/openapi.json", dependencies=[SignedIn])
@@ -68,8 +72,8 @@ def _to_sign_in(request: Request) -> Response:
     return RedirectResponse("/signin", 303)
 
 
-def _console_file(request: Request, path: str) -> Path:
-    root = parts_of(request).settings.console_dir.resolve()
+def _file_below(folder: Path, path: str) -> Path:
+    root = folder.resolve()
     file = (root / path).resolve() if "\0" not in path else root
     if not file.is_relative_to(root) or not file.is_file():
         raise NotFoundError("There is no such file.")

@@ -28,4 +28,7 @@ class DirectoryLock:
         os.pwrite(self._handle, f"{os.getpid()}\n".encode(), 0)
 
     def release(self) -> None:
-        os.close(self._handle)
+        """The second time nothing happens: the number may belong to another file by then."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1

@@ -15,7 +15,7 @@ OBLIQUE = np.array([0.0, math.cos(math.radians(38.0)), -math.sin(math.radians(38
 """Looking north and down: maps have north up."""
 TOP = np.array([0.0, 0.02, -1.0]) / math.hypot(0.02, 1.0)
 """Straight down would leave the orbit controls without an up."""
-_MARGIN = 1.06
+_MARGIN = 1.1
 SCREEN_HEIGHT_PX = 800.0
 """Assumed: the pointer's reach need not be exact."""
 

@@ -58,8 +58,11 @@ def _curtain(drawing: Drawing, plan: PlanScene, points: F64) -> list[Node]:
     foot = drawing.on_ground(plan.path_m[:, :2])
     if len(foot) != len(points):
         return []
-    foot[:, 2] = np.minimum(foot[:, 2], points[:, 2])
-    vertices = np.concatenate([points, foot]).astype(np.float32)
+    foot[:, 2] = np.minimum(foot[:, 2], points[:, 2]) - 4 * drawing.mark_m
+    # Browsers draw see-through things in the order of their middles, farthest first. The veil must come before the
+    # safe surface that hangs over it, so one vertex without a face drags its middle deep down.
+    anchor = np.array([[0.0, 0.0, -4.0 * drawing.frame.half_diagonal_m]])
+    vertices = np.concatenate([points, foot, anchor]).astype(np.float32)
     a = np.arange(len(points) - 1)
     b = a + len(points)
     props = {
@@ -78,13 +81,11 @@ def _curtain(drawing: Drawing, plan: PlanScene, points: F64) -> list[Node]:
 def _flown(drawing: Drawing, plan: PlanScene) -> list[Node]:
     if len(plan.flown_m) < 2:
         return []
-    points = drawing.frame.scene_from_model(plan.flown_m)
-    nodes = [
-        line_node("/flown", _in_sight(drawing, points), _colors(drawing, plan.flown_distance_m, plan), width_px=2.0)
-    ]
+    points = _in_sight(drawing, drawing.frame.scene_from_model(plan.flown_m))
+    nodes = [line_node("/flown", points, _colors(drawing, plan.flown_distance_m, plan), width_px=2.0)]
     if len(points) <= _MOST_WAYPOINT_MARKS:
         rgb = tuple(palette.dimmed(palette.POI, stale=drawing.state.plan_is_stale).tolist())
-        nodes.append(many_node("/waypoints", BALL, _in_sight(drawing, points), 0.3 * drawing.mark_m, rgb))
+        nodes.append(many_node("/waypoints", BALL, points, 0.3 * drawing.mark_m, rgb))
     return nodes
 
 

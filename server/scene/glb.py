@@ -18,13 +18,12 @@ _CLAMP, _LINEAR, _MIPMAP = 33071, 9729, 9987
 
 
 def textured_glb(mesh: Mesh, texture: U8) -> bytes:
-    """``texture`` is (th, tw, 3), or (th, tw, 4) for a see-through mesh; row 0 lies at v = 0."""
-    see_through = texture.shape[2] == 4
+    """``texture`` is (th, tw, 3) sRGB; row 0 lies at v = 0."""
     parts = [
         np.ascontiguousarray(mesh.vertices, dtype="<f4").tobytes(),
         np.ascontiguousarray(mesh.uv, dtype="<f4").tobytes(),
         np.ascontiguousarray(mesh.faces, dtype="<u4").tobytes(),
-        _encoded(texture, see_through),
+        _jpeg(texture),
     ]
     views, body = _packed(parts)
     document = {
@@ -39,12 +38,12 @@ def textured_glb(mesh: Mesh, texture: U8) -> bytes:
                 "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0},
                 "extensions": {"KHR_materials_unlit": {}},
                 "doubleSided": True,
-                "alphaMode": "BLEND" if see_through else "OPAQUE",
+                "alphaMode": "OPAQUE",
             }
         ],
         "textures": [{"source": 0, "sampler": 0}],
         "samplers": [{"wrapS": _CLAMP, "wrapT": _CLAMP, "magFilter": _LINEAR, "minFilter": _MIPMAP}],
-        "images": [{"bufferView": 3, "mimeType": "image/png" if see_through else "image/jpeg"}],
+        "images": [{"bufferView": 3, "mimeType": "image/jpeg"}],
         "accessors": [
             {
                 "bufferView": 0,
@@ -63,12 +62,9 @@ def textured_glb(mesh: Mesh, texture: U8) -> bytes:
     return _container(json.dumps(document).encode(), body)
 
 
-def _encoded(texture: U8, see_through: bool) -> bytes:
+def _jpeg(texture: U8) -> bytes:
     out = BytesIO()
-    if see_through:
-        Image.fromarray(texture).save(out, "PNG", compress_level=3)
-    else:
-        Image.fromarray(texture).save(out, "JPEG", quality=88, subsampling=0)
+    Image.fromarray(texture).save(out, "JPEG", quality=88, subsampling=0)
     return out.getvalue()
 
 

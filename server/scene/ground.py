@@ -11,10 +11,9 @@ from server.scene.mesh import gap_mesh, grid_mesh
 from server.scene.nodes import Node
 from server.scene.payload import U8, HeightGrid
 
-_SURFACE_OPACITY = 0.3
+_SURFACE_OPACITY = 0.26
 _HATCH_PX = 14
 _HATCH_TEXTURE_PX = 1200
-_HATCH_ALPHA = (120, 225)
 
 
 def terrain_nodes(drawing: Drawing) -> list[Node]:
@@ -56,11 +55,8 @@ def _glb_node(name: str, glb: bytes, drawing: Drawing) -> Node:
 
 
 def _hatching(grid: HeightGrid) -> U8:
-    """(h', w', 4) diagonal stripes in the shape of the grid's extent."""
+    """(h', w', 3) diagonal stripes in the shape of the grid's extent; opaque, since what shines through misleads."""
     rows, cols = grid.alt_dsm_m.shape
     zoom = _HATCH_TEXTURE_PX / max(rows, cols)
     row, col = np.indices((max(1, round(rows * zoom)), max(1, round(cols * zoom))))
-    out = np.empty((*row.shape, 4), dtype=np.uint8)
-    out[:, :, :3] = palette.UNKNOWN
-    out[:, :, 3] = np.array(_HATCH_ALPHA, dtype=np.uint8)[(row + col) // _HATCH_PX % 2]
-    return out
+    return np.array(palette.UNKNOWN, dtype=np.uint8)[(row + col) // _HATCH_PX % 2]

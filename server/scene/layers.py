@@ -58,4 +58,6 @@ def _places_key(drawing: Drawing) -> Key:
 
 
 def _pois_key(drawing: Drawing) -> Key:
-    return drawing.terrain, drawing.frame, drawing.state.document.pois, drawing.state.selection
+    document = drawing.state.document
+    home = document.home is None
+    return drawing.terrain, drawing.frame, document.pois, document.source, home, drawing.state.selection

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 
 from server.scene import palette
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node, Ready
 from server.scene.payload import F64
-from server.scene.shapes import BALL, CONE, label_node, line_node, many_node, raised, shape_node
+from server.scene.shapes import BALL, CONE, label_node, line_node, many_node, shape_node
 from server.schemas import PlanDoc
 
 GIZMO = "/gizmo"
 """The selected point of interest hangs below it, so that browsers move it with the pointer themselves."""
-_GIZMO_PX = 90.0
+_GIZMO_PX = 130.0
 _MOST_LABELS = 150
 _EDGE_POINTS = 48
 
 
 def poi_places(drawing: Drawing) -> tuple[list[str], F64]:
-    """Ids and (P, 3) scene places of the points of interest that the model's projection knows."""
-    pois = drawing.state.document.pois
+    """Ids and (P, 3) scene places of the points of interest that are drawn: none while a survey is planned."""
+    document = drawing.state.document
+    pois = document.pois if document.source == "pois" else []
     xy = drawing.places_xy_m(pois)
     ids = [poi.id for poi, place in zip(pois, xy, strict=True) if np.isfinite(place).all()]
     return ids, drawing.on_ground(xy)
@@ -46,7 +48,7 @@ def _selected(drawing: Drawing, poi_id: str, at: F64, moved: Ready) -> list[Node
         return [
             _gizmo(at, moved),
             shape_node(f"{GIZMO}/ball", BALL, origin, 1.15 * drawing.mark_m, palette.ACCENT),
-            label_node(f"{GIZMO}/label", text, _above(drawing), size=1.15),
+            label_node(f"{GIZMO}/label", text, 2 * _above(drawing), size=1.15),
         ]
     return [
         shape_node("/selected", BALL, at, 1.15 * drawing.mark_m, palette.ACCENT),
@@ -128,7 +130,7 @@ def _polygon(drawing: Drawing) -> list[Node]:
         return []
     nodes = [many_node("/polygon_corners", BALL, drawing.on_ground(corners), 0.8 * drawing.mark_m, palette.SURVEY)]
     if len(corners) > 1:
-        outline = raised(drawing.on_ground(_outline(corners)), 0.25 * drawing.mark_m)
+        outline = _smoothed(drawing.on_ground(_outline(corners)), 0.3 * drawing.mark_m)
         nodes.append(line_node("/polygon", outline, palette.SURVEY, width_px=4.0))
     return nodes
 
@@ -139,6 +141,12 @@ def _outline(corners: F64) -> F64:
     share = np.linspace(0.0, 1.0, _EDGE_POINTS, endpoint=False)[None, :, None]
     pieces = ring[:-1, None] + share * (ring[1:] - ring[:-1])[:, None]
     return np.vstack([pieces.reshape(-1, 2), ring[-1:]])
+
+
+def _smoothed(line: F64, lift: float) -> F64:
+    """A line over the terrain that jumps over its roughness instead of tracing it."""
+    above = ndimage.maximum_filter1d(line[:, 2], 7, mode="nearest")
+    return np.column_stack([line[:, :2], ndimage.uniform_filter1d(above, 5, mode="nearest") + lift])
 
 
 def cursor_nodes(drawing: Drawing, at_m: F64) -> list[Node]:

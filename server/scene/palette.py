@@ -18,7 +18,8 @@ CURTAIN = (16, 20, 28)
 SURFACE = (96, 165, 250)
 SURVEY = (240, 240, 250)
 LOOK_AT = (200, 205, 220)
-UNKNOWN = (116, 92, 140)
+UNKNOWN = ((98, 84, 116), (142, 124, 164))
+"""Two stripes"""
 _DIM = (128, 132, 140)
 _DIM_SHARE = 0.65
 

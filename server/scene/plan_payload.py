@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.plan import Plan
-from planning.surface import block_max, safe_surface
+from planning.surface import fit_within, safe_surface
 from server.charts import thinned
 from server.scene.payload import HeightGrid, PlanScene
 
@@ -14,12 +13,12 @@ _SURFACE_CELLS = 220
 """Per side at most: the safe surface is smooth, and the mesh must travel within half a second."""
 
 
-def plan_scene(plan: Plan, source: Dsm) -> PlanScene:
+def plan_scene(plan: Plan) -> PlanScene:
     path, line, worst = plan.path, plan.line, plan.certificate.worst
     keep = thinned(path.s_m, path.alt_dsm_m, must_keep=path.vertex)
     pois = [int(sample) for sample, poi in zip(path.vertex, path.vertex_poi, strict=True) if poi is not None]
     return PlanScene(
-        safe_surface=_surface_grid(plan, source),
+        safe_surface=_surface_grid(plan),
         path_m=np.column_stack([path.xy_m[keep], path.alt_dsm_m[keep]]),
         path_s_m=path.s_m[keep],
         path_ground_alt_dsm_m=path.ground_alt_dsm_m[keep],
@@ -33,10 +32,8 @@ def plan_scene(plan: Plan, source: Dsm) -> PlanScene:
     )
 
 
-def _surface_grid(plan: Plan, source: Dsm) -> HeightGrid:
+def _surface_grid(plan: Plan) -> HeightGrid:
     """The safe surface of the whole model, coarsened by maximum before it is dilated."""
-    factor = max(1, int(np.ceil(max(source.width_px, source.height_px) / _SURFACE_CELLS)))
-    coarse = block_max(plan.dsm, factor) if factor > 1 else plan.dsm
-    safe = safe_surface(coarse, plan.request.surface).safe
+    safe = safe_surface(fit_within(plan.dsm, _SURFACE_CELLS), plan.request.surface).safe
     west, _, _, north = safe.bounds_m
     return HeightGrid(alt_dsm_m=safe.elevation_m, west_m=west, north_m=north, cell_m=safe.resolution_m)

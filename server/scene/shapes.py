@@ -28,7 +28,7 @@ CONE = _shape(trimesh.creation.cone(radius=1.0, height=2.4, sections=24))
 def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> Node:
     """A polyline through (N, 3) scene points; ``color`` is one, or (N - 1, 3): one per segment."""
     segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-    colors = np.asarray(color, dtype=np.uint8)
+    colors = _linear(np.asarray(color, dtype=np.uint8))
     if colors.ndim == 2:
         colors = np.repeat(colors[:, None, :], 2, axis=1)
     props = {"points": segments, "colors": colors, "thickness": width_px, "thickness_units": "screen"}
@@ -60,6 +60,13 @@ def label_node(name: str, text: str, at: F64, *, size: float = 1.0) -> Node:
     """A label that stands on its place and hides behind nothing."""
     props = {"text": text, "position": _triple(at), "anchor": "bottom-center", "font_screen_scale": size}
     return Node(name, "label", props)
+
+
+def _linear(srgb: U8) -> U8:
+    """viser takes the colours of lines for linear light, those of meshes for sRGB."""
+    share = srgb / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.round(255 * linear).astype(np.uint8)
 
 
 def raised(at: F64, by: float) -> F64:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from affine import Affine
 from scipy import ndimage
+from skimage import measure
 
 from planning.dsm import Dsm
 from server.scene.payload import HeightGrid
@@ -18,13 +19,14 @@ def plates(grid: HeightGrid) -> HeightGrid:
     Each connected hole is one level plate at its lowest rim: inside the terrain, below the ground that may be there.
     """
     known = np.isfinite(grid.alt_dsm_m)
-    region, count = ndimage.label(~known, structure=np.ones((3, 3)))
-    alt = np.full(grid.alt_dsm_m.shape, np.nan, dtype=np.float32)
-    if count and known.any():
-        rim_m = ndimage.minimum_filter(np.where(known, grid.alt_dsm_m, np.inf), size=3)
-        # A hole without a rim is the whole model; that has been ruled out.
-        level_m = np.asarray(ndimage.minimum(rim_m, region, np.arange(1, count + 1)), dtype=np.float32)
-        alt[~known] = level_m[region[~known] - 1]
+    alt = np.full(known.shape, np.nan, dtype=np.float32)
+    if known.all() or not known.any():
+        return replace(grid, alt_dsm_m=alt)
+    hole = np.asarray(measure.label(~known, connectivity=2))
+    rim_m = ndimage.minimum_filter(np.where(known, grid.alt_dsm_m, np.inf), size=3)
+    level_m = np.full(int(hole.max()) + 1, np.inf, dtype=np.float32)
+    np.minimum.at(level_m, hole[~known], rim_m[~known])
+    alt[~known] = level_m[hole[~known]]
     return replace(grid, alt_dsm_m=alt)
 
 

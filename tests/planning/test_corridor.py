@@ -5,7 +5,7 @@ import pytest
 
 from planning.corridor import HEIGHT_UNIT_M, bends, corridor
 
-S = np.arange(400) * 0.1
+S = np.arange(400, dtype=np.float64) * 0.1
 HILLS = 3 * np.sin(S / 4) + 0.4 * np.sin(2 * S)
 VERTEX = np.array([0, 150, 399])
 

@@ -20,7 +20,7 @@ CLIMB, DESCENT = slope_limits(PARAMS)
 
 def hills(n: int, seed: int, vertices: int = 3) -> SampledPath:
     rng = np.random.default_rng(seed)
-    s = np.arange(n) * 0.1
+    s = np.arange(n, dtype=np.float64) * 0.1
     surface = np.zeros(n)
     for wave_m, height_m in ((50, 5), (17, 1.5), (5, 0.3)):
         surface += height_m * np.sin(2 * np.pi * s / wave_m + rng.uniform(0, 6))

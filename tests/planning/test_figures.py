@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.figures.chart import Chart, Mark, Series, render_chart
-from planning.figures.plan_view import reduced
 from planning.figures.thin import keep_extremes
 from planning.figures.ticks import label, padded, round_step, ticks
+from planning.surface import fit_within
 from tests.planning.format_examples import HOSTILE, make_dsm
 
 
@@ -72,9 +72,9 @@ def test_reducing_keeps_the_highest_cell_and_the_corner():
     dsm = make_dsm()
     heights = dsm.elevation_m.copy()
     heights[31, 17] = 999.0
-    small = reduced(dsm.with_elevation(heights), 25)
+    small = fit_within(dsm.with_elevation(heights), 25)
     assert small.elevation_m.shape == (20, 20)
     assert small.elevation_m[10, 5] == 999.0
     assert small.bounds_m[0] == dsm.bounds_m[0]
     assert small.bounds_m[3] == dsm.bounds_m[3]
-    assert reduced(dsm, 60) is dsm
+    assert fit_within(dsm, 60) is dsm

@@ -1,5 +1,7 @@
 """The timing law of one segment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,7 +90,7 @@ def test_contradictory_speeds_are_refused_with_advice(mean: float, top: float) -
 @pytest.mark.parametrize("value", [0.0, -2.0, float("nan")])
 def test_numbers_must_be_positive(field: str, value: float) -> None:
     with pytest.raises(ParameterError):
-        lspb(10.0, PathParams(**{field: value}))
+        lspb(10.0, replace(PathParams(), **{field: value}))
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan"), float("inf")])

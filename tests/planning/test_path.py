@@ -47,7 +47,7 @@ def test_samples_lie_on_the_segments_no_further_apart_than_the_step(corners: lis
 def test_a_segment_of_whole_steps_has_no_sliver_at_its_end() -> None:
     _, s, vertex = sample_segments(np.array([[0.0, 0.0], [0.7, 0.0]]), 0.1)
     assert vertex.tolist() == [0, 7]
-    np.testing.assert_allclose(s, np.arange(8) * 0.1, atol=1e-12)
+    np.testing.assert_allclose(s, np.arange(8, dtype=np.float64) * 0.1, atol=1e-12)
 
 
 def test_a_hundred_thousand_samples() -> None:

@@ -1,5 +1,7 @@
 """Back-and-forth lines over a polygon."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from affine import Affine
@@ -25,10 +27,10 @@ def terrain(unknown: slice | None = None) -> Dsm:
     return Dsm(elevation, Affine(1, 0, CORNER[0], 0, -1, CORNER[1] + 120), CRS.from_epsg(32633), None, "0")
 
 
-def plan(shape_m: np.ndarray, dsm: Dsm | None = None, **asked: float | None) -> SurveyPlan:
+def plan(shape_m: np.ndarray, dsm: Dsm | None = None, **asked: Any) -> SurveyPlan:
     dsm = dsm or terrain()
     keywords = {"gsd_cm": 0.5, "side_overlap": 0.6, "front_overlap": 0.7} | asked
-    return survey_lines(dsm.lat_lon_from_xy(shape_m + CORNER), dsm, camera=CAMERA, **keywords)  # type: ignore[arg-type]
+    return survey_lines(dsm.lat_lon_from_xy(shape_m + CORNER), dsm, camera=CAMERA, **keywords)
 
 
 def ends_m(survey: SurveyPlan) -> np.ndarray:
@@ -59,9 +61,9 @@ def test_spacing_and_trigger_follow_from_eq_1_and_the_overlaps() -> None:
 
 def test_a_height_may_be_given_instead_of_a_gsd() -> None:
     assert plan(RECTANGLE, gsd_cm=None, height_m=30.0).height_m == 30.0
-    for both in ({"gsd_cm": None, "height_m": None}, {"gsd_cm": 1.0, "height_m": 30.0}):
+    for gsd_cm, height_m in ((None, None), (1.0, 30.0)):
         with pytest.raises(ParameterError, match="either"):
-            plan(RECTANGLE, **both)
+            plan(RECTANGLE, gsd_cm=gsd_cm, height_m=height_m)
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 30.0, 135.0, 200.0])

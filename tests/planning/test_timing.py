@@ -12,7 +12,7 @@ from planning.timing import path_timing
 
 
 def straight(alt_m: np.ndarray, vertex: list[int], step_m: float = 0.1) -> SampledPath:
-    s = np.arange(len(alt_m)) * step_m
+    s = np.arange(len(alt_m), dtype=np.float64) * step_m
     pois = tuple(range(len(vertex)))
     return SampledPath(np.column_stack([s, 0 * s]), s, alt_m, alt_m, alt_m, np.array(vertex), pois)
 
@@ -40,7 +40,7 @@ def test_without_loiter_times_nothing_waits() -> None:
 @settings(deadline=None)
 @given(st.integers(2, 400), st.floats(0.0, 3.0), st.floats(1.0, 40.0))
 def test_slow_mode_keeps_the_vertical_speeds_and_the_acceleration(n: int, height_m: float, wave_m: float) -> None:
-    s = np.arange(n) * 0.1
+    s = np.arange(n, dtype=np.float64) * 0.1
     path = straight(height_m * np.sin(2 * np.pi * s / wave_m), [0, n - 1])
     params = PathParams(on_steep="slow")
     timing = path_timing(path, params)

@@ -16,12 +16,12 @@ from websockets.sync.client import ClientConnection, connect
 
 from server.api.access import Parts
 from server.app import bound_socket, server_config
+from server.library import Library
 from server.settings import Settings
 from server.web import create_app
 from tests.server.fakes import FakeWorkspace
 
 PASSWORD = "correct horse battery"
-SIGNED_OUT = httpx.Cookies()
 
 
 @dataclass(slots=True)
@@ -68,10 +68,10 @@ class Running:
 
 @contextlib.contextmanager
 def running(data_dir: Path, **overrides: Any) -> Iterator[Running]:
-    with bound_socket("127.0.0.1", 0) as listening:
+    with bound_socket("127.0.0.1", 0) as listening, contextlib.closing(Library(data_dir)) as library:
         port = listening.getsockname()[1]
         settings = Settings(data_dir=data_dir, port=port, **{"console_dir": data_dir / "no-console", **overrides})
-        app = create_app(settings, lambda library, hub, host, background: cast(Any, FakeWorkspace(library, hub)))
+        app = create_app(settings, library, lambda library, hub, *_: cast(Any, FakeWorkspace(library, hub)))
         ready = threading.Event()
         server = _Signalling(server_config(app, settings), ready)
         thread = threading.Thread(target=server.run, args=([listening],))

@@ -11,6 +11,7 @@ import pytest
 from starlette.datastructures import Headers
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from server import guard
 from server.errors import ForbiddenError
@@ -75,7 +76,7 @@ def test_a_rebound_name_opens_no_socket(served: Running) -> None:
         connect(
             f"ws://evil.example:{port}/ws",
             sock=raw,
-            origin=f"http://evil.example:{port}",
+            origin=Origin(f"http://evil.example:{port}"),
             additional_headers={"Cookie": served.cookie},
         )
     assert refused.value.response.status_code == 403

@@ -20,8 +20,8 @@ from server.schemas import (
     JobMessage,
     NoticeMessage,
     PlanMessage,
-    SelectionMessage,
     SelectionDoc,
+    SelectionMessage,
 )
 from tests.server.fakes import notice, plan_state, snapshot
 

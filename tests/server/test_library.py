@@ -242,11 +242,10 @@ def _killed_after(data: Path, *, saves: int) -> int:
     """The last save that a writer acknowledged before it was killed."""
     with subprocess.Popen([sys.executable, "-c", WRITER, str(data)], stdout=subprocess.PIPE, text=True) as writer:
         assert writer.stdout is not None
-        for _ in range(saves):
-            line = writer.stdout.readline()
+        lines = [writer.stdout.readline() for _ in range(saves)]
         writer.send_signal(signal.SIGKILL)
-        rest = [text for text in writer.stdout.read().split("\n") if text]
-    return int(rest[-1] if rest else line)
+        lines += writer.stdout.readlines()
+    return int(lines[-1])
 
 
 def test_poi_documents_survive_unchanged(library: Library) -> None:

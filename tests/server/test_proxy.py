@@ -11,6 +11,8 @@ import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
+from websockets.typing import Origin, Subprotocol
 
 from server.scene.host import SUBPROTOCOL
 from tests.server.running import Running
@@ -33,7 +35,7 @@ def encoded(message: dict[str, Any]) -> bytes:
     return msgspec.msgpack.encode(message)
 
 
-def page_id_of(socket: ClientConnection) -> str:
+def page_id_of(socket: Connection) -> str:
     return msgspec.json.decode(socket.recv(timeout=10))["page_id"]
 
 
@@ -171,7 +173,7 @@ def test_visers_own_port_lets_nobody_in(served: Running) -> None:
     url = served.parts.scene_host.url
     for origin in (None, "http://evil.example", served.origin):
         with pytest.raises(InvalidStatus) as refused:
-            connect(url, origin=origin, subprotocols=[SUBPROTOCOL])
+            connect(url, origin=None if origin is None else Origin(origin), subprotocols=[Subprotocol(SUBPROTOCOL)])
         assert refused.value.response.status_code == 403
     with served.stranger() as client:
         assert client.get(url.replace("ws", "http", 1)).status_code == 403

@@ -69,11 +69,7 @@ export function ProfilePane() {
           ]}
           onChange={(next) => (kind.value = next)}
         />
-        {shown && place ? (
-          <CursorValues result={shown} cursor={place} />
-        ) : (
-          shown && <Keys />
-        )}
+        {shown && place ? <CursorValues result={shown} cursor={place} /> : shown && <Keys />}
         <span class="spring" />
         {shown && !place && <span class="muted">along path, m · {count(shown.waypoints, "waypoint")}</span>}
       </header>

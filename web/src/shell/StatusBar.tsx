@@ -27,7 +27,8 @@ function Brand() {
 function SavedState() {
   const state = plan.value;
   if (!state) return <span class="saved">Loading…</span>;
-  const text = saving.value ? "Saving…" : `Saved ${clock(state.saved_utc)}`;
+  const pending = link.value === "open" ? "Saving…" : "Not saved yet";
+  const text = saving.value ? pending : `Saved ${clock(state.saved_utc)}`;
   return (
     <span class="saved" data-testid="saved-state">
       {text}

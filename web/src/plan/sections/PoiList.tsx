@@ -13,12 +13,45 @@ import { removeSelectedPoi } from "../commands";
 import { CopyPlace } from "../CopyPlace";
 
 /** Which row is dragged and which it would land on. */
-const drag = signal<{ id: string; over: number } | null>(null);
+const drag = signal<{ id: string; from: number; over: number } | null>(null);
 /** More rows than anyone edits by hand would only make the page slow. */
 const MOST_ROWS = 300;
 
 function move(poi: PoiDoc, from: number, to: number): void {
   if (from !== to) edit(`Move point ${from + 1} to ${to + 1}`, "points", withPoiAt(poi.id, to));
+}
+
+/** The row under the pointer, which is captured by the handle meanwhile. */
+function rowAt(event: PointerEvent): number | null {
+  const row = document.elementFromPoint(event.clientX, event.clientY)?.closest<HTMLElement>("[data-index]");
+  return row ? Number(row.dataset["index"]) : null;
+}
+
+/** Drags with mouse, pen or finger. */
+function startDrag(event: PointerEvent, poi: PoiDoc, from: number): void {
+  const handle = event.currentTarget as HTMLElement;
+  handle.setPointerCapture(event.pointerId);
+  handle.onpointermove = (moveEvent) => {
+    const over = rowAt(moveEvent);
+    if (over !== null && (drag.value || over !== from)) drag.value = { id: poi.id, from, over };
+  };
+  const end = () => {
+    handle.onpointermove = handle.onpointerup = handle.onpointercancel = null;
+    drag.value = null;
+  };
+  handle.onpointercancel = end;
+  handle.onpointerup = () => {
+    const landing = drag.value;
+    end();
+    if (landing) move(poi, from, landing.over);
+  };
+}
+
+/** Where a dragged row would land: above the rows it moves up over, below those it moves down over. */
+function dropClass(index: number): string {
+  const now = drag.value;
+  if (!now || now.over !== index || now.from === index) return "";
+  return now.from < index ? "drop-below" : "drop-above";
 }
 
 function onRowKey(event: KeyboardEvent, poi: PoiDoc, index: number, last: number): void {
@@ -63,32 +96,23 @@ function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
 function Row({ poi, index, last }: { poi: PoiDoc; index: number; last: number }) {
   const isSelected = selection.value.poi_id === poi.id;
   const select = () => selection.value.poi_id !== poi.id && setSelection({ poi_id: poi.id });
-  const onDragOver = (event: DragEvent) => {
-    if (!drag.value) return;
-    event.preventDefault();
-    drag.value = { ...drag.value, over: index };
-  };
   return (
     <li
-      class={`poi ${isSelected ? "selected" : ""} ${drag.value?.over === index ? "drop-target" : ""}`}
+      class={`poi ${isSelected ? "selected" : ""} ${drag.value?.id === poi.id ? "dragged" : ""} ${dropClass(index)}`}
       data-testid="poi-row"
       data-poi={poi.id}
+      data-index={index}
       aria-current={isSelected}
       onFocusCapture={select}
       onClick={select}
       onKeyDown={(event) => onRowKey(event, poi, index, last)}
-      onDragOver={onDragOver}
     >
       <button
         type="button"
         class="handle"
-        draggable
+        data-testid="poi-handle"
         title={`Point ${index + 1}: drag to reorder, or Alt+Up and Alt+Down`}
-        onDragStart={(event) => {
-          event.dataTransfer?.setData("text/plain", poi.id);
-          drag.value = { id: poi.id, over: index };
-        }}
-        onDragEnd={() => (drag.value = null)}
+        onPointerDown={(event) => startDrag(event, poi, index)}
       >
         <Icon name="grip" size={14} />
         <span class="badge">{index + 1}</span>
@@ -104,14 +128,6 @@ function Row({ poi, index, last }: { poi: PoiDoc; index: number; last: number })
       />
     </li>
   );
-}
-
-function drop(plan: PlanDoc): void {
-  const now = drag.value;
-  drag.value = null;
-  const from = plan.pois.findIndex((poi) => poi.id === now?.id);
-  const poi = plan.pois[from];
-  if (now && poi) move(poi, from, now.over);
 }
 
 export function PoiList({ plan }: { plan: PlanDoc }) {
@@ -131,7 +147,7 @@ export function PoiList({ plan }: { plan: PlanDoc }) {
         <span>Name, latitude, longitude</span>
         <span>Loiter</span>
       </div>
-      <ol class="poi-list" onDrop={() => drop(plan)}>
+      <ol class="poi-list">
         {pois.slice(0, MOST_ROWS).map((poi, index) => (
           <Row key={poi.id} poi={poi} index={index} last={pois.length - 1} />
         ))}

@@ -1,0 +1,82 @@
+"""Uploads go to the disk under generated names; ids that are none find nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from server.api.uploads import display_name, suffix_of
+from tests.server.running import Running
+
+RAW = {"Content-Type": "application/octet-stream"}
+
+
+def test_an_upload_reaches_the_job_whole(served: Running) -> None:
+    data = bytes(range(256)) * 4000
+    response = served.http.post(
+        "/api/terrains",
+        params={"filename": "a/b/Hügel.TIF", "crs": "EPSG:32760", "z_scale": "0.01", "vertical_datum": ""},
+        content=data,
+        headers=RAW,
+    )
+    assert (response.status_code, response.json()["label"]) == (202, "Reading Hügel.TIF")
+    assert served.workspace.uploads["Hügel.TIF"] == data
+    assert served.workspace.options == {
+        "crs": "EPSG:32760",
+        "z_scale": 0.01,
+        "vertical_datum": None,
+        "remove_spikes": False,
+    }
+
+
+@pytest.mark.parametrize(("query", "where"), [({"z_scale": "1e"}, "z_scale"), ({"remove_spikes": "perhaps"}, "")])
+def test_wrong_options_are_refused_before_the_body(served: Running, query: dict, where: str) -> None:
+    response = served.http.post("/api/terrains", params={"filename": "x.tif", **query}, content=b"x", headers=RAW)
+    assert (response.status_code, response.json()["code"]) == (422, "invalid")
+    assert where in response.json()["where"]
+
+
+def test_an_empty_upload_is_refused_and_leaves_nothing(served: Running) -> None:
+    response = served.http.post("/api/terrains", params={"filename": "x.tif"}, headers=RAW)
+    assert response.status_code == 422
+    assert list((served.parts.library.root / "uploads").iterdir()) == []
+
+
+@pytest.mark.parametrize("terrain_id", ["unknown", "..%2f..%2fetc", "A", "a" * 33])
+def test_unknown_terrains_are_not_found(served: Running, terrain_id: str) -> None:
+    assert served.http.delete(f"/api/terrains/{terrain_id}").status_code == 404
+    assert served.http.post(f"/api/terrains/{terrain_id}/remove_spikes").status_code == 404
+
+
+def test_an_orthophoto_needs_its_terrain(served: Running) -> None:
+    response = served.http.post(
+        "/api/orthophotos", params={"filename": "x.tif", "terrain_id": "unknown"}, content=b"x", headers=RAW
+    )
+    assert (response.status_code, response.json()["code"]) == (404, "not_found")
+
+
+def test_a_job_can_be_cancelled(served: Running) -> None:
+    assert served.http.post("/api/jobs/j1/cancel").status_code == 204
+    assert "cancel j1" in served.workspace.calls
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("dsm.tif", "dsm.tif"),
+        ("../../etc/passwd", "passwd"),
+        ("C:\\maps\\dsm.tif", "dsm.tif"),
+        ("a\r\nb\x1b[31m\u202e.tif", "ab[31m.tif"),
+        ("", "unnamed"),
+        ("..", ".."),
+        ("x" * 300, "x" * 80),
+    ],
+)
+def test_display_names_are_one_line_without_folders(given: str, shown: str) -> None:
+    assert display_name(given) == shown
+
+
+@pytest.mark.parametrize(
+    ("name", "suffix"), [("a.TIF", ".tif"), ("a.t/../x", ""), ("a", ""), ("a.tar.gz", ".gz"), ("a.ü", ""), ("..", "")]
+)
+def test_suffixes_are_plain(name: str, suffix: str) -> None:
+    assert suffix_of(name) == suffix

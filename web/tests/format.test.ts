@@ -1,0 +1,76 @@
+import { describe, expect, it } from "vitest";
+import * as f from "../src/format";
+import { checkNumber } from "../src/ui/NumberField";
+
+describe("numbers", () => {
+  it.each([
+    [0, 0, "0"],
+    [-0.004, 2, "0.00"],
+    [-1.5, 1, "\u22121.5"],
+    [1234, 0, "1234"],
+    [1234567.8, 1, "1\u202f234\u202f567.8"],
+  ])("%d with %d decimals is %s", (value, decimals, text) => {
+    expect(f.number(value, decimals)).toBe(text);
+  });
+
+  it.each([null, undefined, NaN, Infinity])("%s is shown as a dash, never as a number", (value) => {
+    for (const format of [f.number, f.metres, f.length, f.duration, f.percent]) {
+      expect(format(value)).toBe(f.DASH);
+    }
+  });
+
+  it("carry their unit", () => {
+    expect(f.metres(3.456, 2)).toBe("3.46\u00a0m");
+    expect(f.length(12_345)).toBe("12.35\u00a0km");
+    expect(f.percent(0.034, 1)).toBe("3.4\u00a0%");
+  });
+});
+
+describe("places", () => {
+  it("have 7 decimals and can be pasted", () => {
+    expect(f.latLon({ lat_deg: -36.8421337, lon_deg: 175.5 })).toBe("-36.8421337, 175.5000000");
+  });
+});
+
+describe("times", () => {
+  it.each([
+    [7, "0:07"],
+    [59.6, "1:00"],
+    [750, "12:30"],
+    [3900, "1:05:00"],
+  ])("%d s is %s", (seconds, text) => {
+    expect(f.duration(seconds)).toBe(text);
+  });
+
+  it("ages are coarse", () => {
+    expect([200, 8_000, 200_000].map(f.age)).toEqual(["now", "8 s", "3 min"]);
+  });
+
+  it("a broken timestamp is a dash", () => {
+    expect(f.clock("yesterday")).toBe(f.DASH);
+  });
+});
+
+describe("typed numbers", () => {
+  it.each([
+    ["2,5", 2.5],
+    [" 1 000 ", 1000],
+    ["\u22123", -3],
+    [".5", 0.5],
+    ["1e2", 100],
+    ["", null],
+    ["12m", null],
+    ["NaN", null],
+    ["1e999", null],
+  ])("%j is %j", (text, value) => {
+    expect(f.parseNumber(text)).toBe(value);
+  });
+
+  it("out of range or not whole are told with the bounds", () => {
+    const range = { min: 1, max: 10, step: 1, whole: true };
+    expect(checkNumber("5", range, "m")).toBe(5);
+    expect(checkNumber("11", range, "m")).toContain("1 to 10 m");
+    expect(checkNumber("2.5", range, "m")).toContain("whole");
+    expect(checkNumber("x", range, "m")).toContain('"x" is not a number');
+  });
+});

@@ -1,0 +1,43 @@
+import { describe, expect, it } from "vitest";
+import { shortcutOf } from "../src/shell/shortcuts";
+
+const press = (key: string, mod = false, shift = false) => ({ key, mod, shift });
+
+describe("keys", () => {
+  it.each([
+    [press("z", true), "undo"],
+    [press("Z", true, true), "redo"],
+    [press("y", true), "redo"],
+    [press("s", true), "save"],
+    [press("o", true), "open"],
+    [press("a"), "add"],
+    [press("Escape"), "select"],
+    [press("Delete"), "delete"],
+    [press("f"), "fit"],
+    [press("t"), "top"],
+    [press("?", false, true), "help"],
+  ])("%j means %s", (key, id) => {
+    expect(shortcutOf(key, false)?.id).toBe(id);
+  });
+
+  it("1 to 6 are the sections", () => {
+    expect(shortcutOf(press("4"), false)).toEqual({ id: "section", section: 4 });
+    expect(shortcutOf(press("7"), false)).toBeNull();
+  });
+
+  it("inside inputs belong to the input, but for saving and opening", () => {
+    const inside = ["z", "y", "s", "o"].map((key) => shortcutOf(press(key, true), true)?.id);
+    expect(inside).toEqual([undefined, undefined, "save", "open"]);
+    expect(["a", "Delete", "1", "?"].map((key) => shortcutOf(press(key), true))).toEqual([
+      null,
+      null,
+      null,
+      null,
+    ]);
+  });
+
+  it("that mean nothing here are left to the browser", () => {
+    expect(shortcutOf(press("c", true), false)).toBeNull();
+    expect(shortcutOf(press("x"), false)).toBeNull();
+  });
+});
