@@ -38,7 +38,12 @@ def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: 
             plan.path, plan.mission, plan.dsm, summary=_plain(plan_summary(plan, source))
         ),
         "certificate.json": lambda: json.dumps(
-            {**certificate_json(plan.certificate), **plan_summary(plan, source), "created_utc": created_utc},
+            {
+                **plan_summary(plan, source),
+                **certificate_json(plan.certificate),
+                "seconds": seconds,
+                "created_utc": created_utc,
+            },
             indent=2,
             allow_nan=False,
         ),

@@ -7,19 +7,18 @@ vehicle can hold and a certificate of what it will really fly, taken from the ex
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning import __version__
 from planning.autopilot_time import PredictedTime, predict_duration
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
-from planning.holes import fill_holes
+from planning.holes import HoleReport, fill_holes
 from planning.home import home_from_dsm
 from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import (
@@ -35,7 +34,7 @@ from planning.model import (
 )
 from planning.path import sampled_path
 from planning.poi import check_pois
-from planning.request import PlanRequest, check_request
+from planning.request import PlanRequest, check_request, check_size
 from planning.surface import safe_surface, safe_surface_at
 from planning.timing import path_timing
 
@@ -69,13 +68,21 @@ class Plan:
         return self.built.mission
 
 
-def plan_mission(dsm: Dsm, request: PlanRequest, *, report: Progress = lambda step, share: None) -> Plan:
+def plan_mission(
+    dsm: Dsm,
+    request: PlanRequest,
+    *,
+    report: Progress = lambda step, share: None,
+    assumptions: Mapping[str, object] | None = None,
+) -> Plan:
     """Plans, decimates and certifies one mission.
 
+    ``assumptions`` say what was done to the model before; they join those of the certificate.
     Raises ParameterError, PoiError, DatumError or MissionError; a plan that is merely too close to the
     ground is returned with a certificate that says so.
     """
     check_request(request)
+    check_size(request, dsm)
     report(SURFACE_STEP, 0.0)
     filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
     check_pois(request.pois, filled)
@@ -89,7 +96,8 @@ def plan_mission(dsm: Dsm, request: PlanRequest, *, report: Progress = lambda st
     built = _mission(filled, request, profile, path)
     report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
-    certificate = certify(filled, line, request.clearance(), assumptions=_assumptions(request, surfaces))
+    assumed = {**_assumptions(request, surfaces, holes), **(assumptions or {})}
+    certificate = certify(filled, line, request.clearance(), assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
     return Plan(
         request=request,
@@ -174,15 +182,18 @@ def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: Samp
     return build(request.mission, needed_m if math.isfinite(needed_m) else profile.rtl_height_m)
 
 
-def _assumptions(request: PlanRequest, surfaces: Surfaces) -> dict[str, object]:
+def hole_assumptions(holes: HoleReport, max_hole_m2: float) -> dict[str, object]:
+    """What a certificate writes down about unknown cells that were given a height."""
+    return {"holes_filled": holes.count, "holes_filled_area_m2": holes.area_m2, "max_hole_m2": max_hole_m2}
+
+
+def _assumptions(request: PlanRequest, surfaces: Surfaces, holes: HoleReport) -> dict[str, object]:
     return {
-        "product_version": __version__,
         "ball_radius_m": request.surface.radius_m,
         "ball_height_m": request.surface.height_m,
         "dilation": surfaces.method,
         "paper_pipeline": not request.surface.floor,
-        "holes_filled": surfaces.holes_filled,
-        "holes_filled_area_m2": surfaces.holes_filled_area_m2,
+        **hole_assumptions(holes, request.surface.fill_hole_area_m2),
         "vehicle_profile": request.profile.name,
     }
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
+from planning.dsm import Dsm
 from planning.errors import ParameterError
 from planning.model import ClearanceParams, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
+
+LARGEST = 1e6
+"""Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class PlanRequest:
 
 
 def check_request(request: PlanRequest) -> None:
-    """Raises ParameterError, naming every value that no flight can have."""
+    """Raises ParameterError, naming the first value that no flight can have."""
     path, profile = request.path, request.profile
     _positive("Radius R", request.surface.radius_m, "m")
     _positive("Height H", request.surface.height_m, "m")
@@ -53,31 +56,57 @@ def check_request(request: PlanRequest) -> None:
         ("Sampling step", path.step_m, "m"),
         ("Vehicle radius", profile.radius_m, "m"),
         ("Endurance", profile.endurance_s, "s"),
-        ("RTL height", profile.rtl_height_m, "m"),
     ):
         _positive(name, value, unit)
+    _at_least_zero("RTL height", profile.rtl_height_m, "m")
     _at_least_zero("Position error", profile.position_error_m, "m")
     _at_least_zero("Excess height", request.mission.excess_height_m, "m")
+    check_hole_area(request.surface.fill_hole_area_m2)
     if request.surface.smooth_sigma_m is not None:
         _at_least_zero("Smoothing", request.surface.smooth_sigma_m, "m")
     if request.required_clearance_m is not None:
         _positive("Required clearance", request.required_clearance_m, "m")
     if request.max_height_above_ground_m is not None:
         _positive("Maximum height above ground", request.max_height_above_ground_m, "m")
+    if path.step_m > request.surface.radius_m:
+        raise ParameterError(
+            f"Sampling step {path.step_m:g} m is larger than radius R, {request.surface.radius_m:g} m.",
+            advice="Sample every 0.1 m as a rule: between samples the path does not follow the terrain.",
+        )
     if not 0 <= profile.reserve_share < 1:
         raise ParameterError(f"Reserve is {profile.reserve_share:g}.", advice="Give a share from 0 to below 1.")
     if not path.mean_speed_m_s < path.max_speed_m_s <= 2 * path.mean_speed_m_s:
         raise ParameterError(
-            f"Mean speed {path.mean_speed_m_s:g} m/s and maximum speed {path.max_speed_m_s:g} m/s contradict each other.",
+            f"Mean speed {path.mean_speed_m_s:g} m/s and maximum speed {path.max_speed_m_s:g} m/s contradict"
+            " each other.",
             advice="The timing law needs mean < maximum <= 2 x mean.",
         )
 
 
+def check_size(request: PlanRequest, dsm: Dsm) -> None:
+    """Raises ParameterError for a ball larger than the surface model: then units or models were mistaken."""
+    sides_m = (dsm.height_px * dsm.resolution_m, dsm.width_px * dsm.resolution_m)
+    for name, value, side_m, which in (
+        ("Radius R", request.surface.radius_m, min(sides_m), "shorter"),
+        ("Height H", request.surface.height_m, max(sides_m), "longer"),
+    ):
+        if value > side_m:
+            raise ParameterError(
+                f"{name} is {value:g} m, larger than the surface model, whose {which} side is {side_m:.4g} m.",
+                advice="Give a smaller one or a larger surface model.",
+            )
+
+
+def check_hole_area(max_area_m2: float) -> None:
+    """Raises ParameterError for an area of holes to fill that is no area."""
+    _at_least_zero("Largest hole to fill", max_area_m2, "m2")
+
+
 def _positive(name: str, value: float, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice="It must be a number above zero.")
+    if not 0 < value <= LARGEST:
+        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be above zero, at most {LARGEST:g}.")
 
 
 def _at_least_zero(name: str, value: float, unit: str) -> None:
-    if not (math.isfinite(value) and value >= 0):
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice="It must be zero or more.")
+    if not 0 <= value <= LARGEST:
+        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be zero or more, at most {LARGEST:g}.")

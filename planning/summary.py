@@ -8,7 +8,7 @@ import numpy as np
 
 from planning.clearance import certificate_json
 from planning.dsm import Dsm
-from planning.model import Certificate, finite_or_none
+from planning.model import Certificate
 from planning.plan import Plan
 
 _CERTIFICATE_KEYS = (
@@ -19,6 +19,7 @@ _CERTIFICATE_KEYS = (
     "worst",
     "rtl_height_needed_m",
     "home_column_clear",
+    "max_height_above_ground_m",
     "reasons",
 )
 
@@ -48,7 +49,6 @@ def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
     request = plan.request
     return {
         **certificate_summary(plan.certificate),
-        "max_height_above_ground_m": finite_or_none(plan.certificate.max_height_above_ground_m),
         "rtl_height_m": request.profile.rtl_height_m,
         "length_m": float(plan.path.s_m[-1]),
         "duration_s": plan.predicted.total_s,

@@ -27,10 +27,12 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     """Serves until interrupted. Raises ``StartError`` or ``DataDirError`` with what to do."""
     configure_logging(settings.log_level)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
-        server = AnnouncingServer(create_app(settings, library, make_workspace, demo=demo), settings)
+        app = create_app(settings, library, make_workspace, demo=demo)
+        server = AnnouncingServer(app, settings)
         server.run(sockets=[listening])
         if not server.started:
-            raise StartError("Hedgehop could not start.", advice="The log above tells why.")
+            fault = getattr(app.state, "start_error", None)
+            raise fault or StartError("Hedgehop could not start.", advice="The log above tells why.")
 
 
 class AnnouncingServer(uvicorn.Server):

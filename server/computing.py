@@ -27,7 +27,7 @@ class Computing:
         self._lane, self._terrain_dir, self._changed = lane, terrain_dir, changed
         self._wanted: tuple[int, PlanDoc] | None = None
         self._wake = asyncio.Event()
-        self._started_mono_s = 0.0
+        self._started_mono_s: float | None = None
         self.state = Computation(revision=0, state="empty", hint=missing(PlanDoc()))
         self.scene: PlanScene | None = None
 
@@ -42,7 +42,7 @@ class Computing:
         else:
             last = None if forget else self.state.result
             self.state = Computation(revision=revision, state="running", result=last)
-        if self._lane.running and time.monotonic() - self._started_mono_s > _SUPERSEDE_AFTER_S:
+        if self._started_mono_s is not None and time.monotonic() - self._started_mono_s > _SUPERSEDE_AFTER_S:
             self._lane.cancel()
         self._wake.set()
 
@@ -55,17 +55,25 @@ class Computing:
                 await self._answer(*self._wanted)
 
     async def _answer(self, revision: int, document: PlanDoc) -> None:
-        self._started_mono_s = time.monotonic()
         try:
             directory = self._terrain_dir(document.terrain_id or "")
-            result, scene = await self._lane.call(tasks.compute_plan, directory, document)
+            result, scene = await self._lane.call(
+                tasks.compute_plan, directory, document, progress=lambda step, share: self._note_start()
+            )
         except JobCancelledError:
             return
         except (PlanningError, ServerError) as error:
             self._settle(revision, Computation(revision=revision, state="error", error=error_doc(error)), None)
             return
+        finally:
+            self._started_mono_s = None
         self._settle(revision, Computation(revision=revision, state="ready", result=result), scene)
         await self._add_trade(revision, document, directory)
+
+    def _note_start(self) -> None:
+        """The lane may have been busy with something else until now: its time does not count."""
+        if self._started_mono_s is None:
+            self._started_mono_s = time.monotonic()
 
     def _settle(self, revision: int, state: Computation, scene: PlanScene | None) -> None:
         if self._wanted is None or self._wanted[0] != revision:

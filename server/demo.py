@@ -24,7 +24,7 @@ async def ensure(library: Library, lane: Lane, progress: Progress | None = None)
     """The demo's surface model and the id of its plan; what is missing is made."""
     terrain = next((doc for doc in library.terrains() if doc.name == TERRAIN_NAME), None)
     if terrain is None:
-        terrain = await lane.call(file_tasks.make_demo_terrain, library.data_dir, TERRAIN_NAME, progress=progress)
+        terrain = await lane.call(file_tasks.make_demo_terrain, library.root, TERRAIN_NAME, progress=progress)
         await asyncio.to_thread(library.refresh)
     plan_id = await asyncio.to_thread(library.read_note, _NOTE)
     if plan_id is None or plan_id not in {entry.id for entry in library.plans()}:

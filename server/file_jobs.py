@@ -51,7 +51,7 @@ class FileJobs:
                 upload,
                 lane.call(
                     file_tasks.import_terrain,
-                    self._library.data_dir,
+                    self._library.root,
                     upload,
                     filename,
                     crs=crs,
@@ -75,7 +75,7 @@ class FileJobs:
                 upload,
                 lane.call(
                     file_tasks.import_orthophoto,
-                    self._library.data_dir,
+                    self._library.root,
                     terrain_dir,
                     upload,
                     filename,
@@ -95,7 +95,7 @@ class FileJobs:
         terrain_dir = self._library.terrain_dir(terrain_id)
 
         async def work(lane: Lane, progress: Progress) -> None:
-            terrain = await lane.call(file_tasks.without_spikes, self._library.data_dir, terrain_dir, progress=progress)
+            terrain = await lane.call(file_tasks.without_spikes, self._library.root, terrain_dir, progress=progress)
             await asyncio.to_thread(self._library.refresh)
             self._library_changed()
             await self._change("Remove spikes", lambda document: _on_terrain(document, terrain.id))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from server.errors import ServerError
 from server.jobs import JobCancelledError, Lane
 from server.library import Library
 from server.scene.payload import PlanScene, SceneState, TerrainScene
+from server.scene.shots import Target
 from server.schemas import CursorMessage, FrameView, PlanDoc, SelectionDoc, ViewDoc
 
 
@@ -22,27 +24,39 @@ class View(Protocol):
 
     async def show(self, dsm: Dsm | None, state: SceneState) -> None: ...
 
-    async def cursor(self, xyz_m: np.ndarray | None) -> None: ...
+    async def cursor(self, at_m: np.ndarray | None) -> None: ...
 
-    async def frame(self, page_id: str, target: str) -> None: ...
+    async def frame(self, page_id: str, target: Target) -> None: ...
 
     def sample_under(self, page_id: str, x: float, y: float) -> float | None: ...
 
 
 class Picture:
-    """Draws the latest wish; wishes that come while it draws are merged into one."""
+    """Draws the latest wish; wishes that come while it draws are merged into one.
 
-    def __init__(self, view: View, library: Library, lane: Lane) -> None:
+    ``changed()`` is called when the terrain on show is another one, ``failed(error)`` when it cannot be shown.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        library: Library,
+        lane: Lane,
+        *,
+        changed: Callable[[], None],
+        failed: Callable[[Exception], None],
+    ) -> None:
         self._view, self._library, self._lane = view, library, lane
+        self._changed, self._failed = changed, failed
         self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
         self._wake = asyncio.Event()
         self._terrain: TerrainScene | None = None
         self._terrain_key: tuple[str | None, str | None, str] | None = None
         self._dsm: Dsm | None = None
-        self.failed: ServerError | PlanningError | None = None
 
     @property
     def legend_m(self) -> tuple[float, float] | None:
+        """Lowest and highest height of the colours on show."""
         return None if self._terrain is None else (self._terrain.legend_min_m, self._terrain.legend_max_m)
 
     @property
@@ -79,20 +93,29 @@ class Picture:
         await self._view.show(self._dsm, state)
 
     async def _load_terrain(self, terrain_id: str | None, orthophoto_id: str | None, shading: str) -> None:
-        key = (terrain_id, orthophoto_id if shading == "orthophoto" else None, shading)
+        """Another shading of the same model replaces the old one only when it is ready."""
+        photo_id = orthophoto_id if shading == "orthophoto" else None
+        key = (terrain_id, photo_id, shading)
         if key == self._terrain_key:
             return
-        self._terrain_key, self._terrain, self._dsm = key, None, None
-        if terrain_id is None:
-            return
-        directory = self._library.terrain_dir(terrain_id)
-        photo = None if key[1] is None else self._library.orthophoto_dir(key[1])
-        self._dsm = await asyncio.to_thread(self._library.load_terrain, terrain_id)
+        if self._terrain_key is None or self._terrain_key[0] != terrain_id:
+            self._terrain, self._dsm = None, None
+        self._terrain_key = key
+        if terrain_id is not None:
+            await self._draw_terrain(terrain_id, photo_id, shading)
+        self._changed()
+
+    async def _draw_terrain(self, terrain_id: str, photo_id: str | None, shading: str) -> None:
         try:
+            directory = self._library.terrain_dir(terrain_id)
+            photo = None if photo_id is None else self._library.orthophoto_dir(photo_id)
+            self._dsm = await asyncio.to_thread(self._library.load_terrain, terrain_id)
             self._terrain = await self._lane.call(tasks.draw_terrain, terrain_id, directory, photo, shading)
         except JobCancelledError:
             self._terrain_key = None
             self._wake.set()
+        except (PlanningError, ServerError, OSError) as error:
+            self._failed(error)
 
     async def mark(self, plan: PlanScene | None, s_m: float | None) -> CursorMessage:
         """Marks the path at a distance in 3D and says what is there."""
@@ -103,7 +126,7 @@ class Picture:
         xyz = np.array([np.interp(s_m, plan.path_s_m, plan.path_m[:, axis]) for axis in range(3)])
         await self._view.cursor(xyz)
         ground_m = float(np.interp(s_m, plan.path_s_m, plan.path_ground_alt_dsm_m))
-        lat_deg, lon_deg = (None, None) if self._dsm is None else self._dsm.lat_lon_from_xy(xyz[:2])[0]
+        lat_deg, lon_deg = (None, None) if self._dsm is None else self._dsm.lat_lon_from_xy(xyz[:2])[0].tolist()
         return CursorMessage(
             s_m=s_m,
             lat_deg=lat_deg,
@@ -112,9 +135,11 @@ class Picture:
             path_rel_home_m=float(xyz[2] - plan.home_m[2]),
         )
 
-    async def mark_under(self, plan: PlanScene | None, page_id: str, x: float, y: float) -> CursorMessage:
-        """The same for the pointer in a page's 3D view."""
-        return await self.mark(plan, self._view.sample_under(page_id, x, y))
+    async def mark_under(
+        self, plan: PlanScene | None, page_id: str, pointer: tuple[float, float] | None
+    ) -> CursorMessage:
+        """The same for the pointer in a page's 3D view, in shares of its width and height; None: it left."""
+        return await self.mark(plan, None if pointer is None else self._view.sample_under(page_id, *pointer))
 
     async def frame(self, message: FrameView, page_id: str) -> None:
         await self._view.frame(page_id, message.target)

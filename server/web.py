@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack
 from typing import TYPE_CHECKING
@@ -64,7 +65,11 @@ async def _lifespan(
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
         stack.callback(background.stop)
-        parts = await _open(settings, library, make_workspace, background, stack)
+        try:
+            parts = await _open(settings, library, make_workspace, background, stack)
+        except (ServerError, PlanningError) as error:
+            app.state.start_error = error
+            raise
         app.state.parts = parts
         for loop in parts.workspace.loops():
             background.spawn(loop)
@@ -72,6 +77,11 @@ async def _lifespan(
             await parts.workspace.add_demo_terrain()
         try:
             yield
+        except asyncio.CancelledError:
+            # One of the loops failed. Without it the pages would go on showing what is no longer true.
+            log.critical("A part of the server failed: it stops. Everything acknowledged is saved.")
+            signal.raise_signal(signal.SIGTERM)
+            raise
         finally:
             parts.hub.close()
             background.stop()

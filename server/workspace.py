@@ -7,6 +7,7 @@ acknowledged, and every page hears of it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
 import time
 import zipfile
@@ -28,7 +29,7 @@ from server.errors import InUseError, NotReadyError, ServerError, StaleRevisionE
 from server.file_jobs import FileJobs
 from server.history import History
 from server.job_board import JobBoard, Spawn
-from server.jobs import Lane
+from server.jobs import JobCancelledError, Lane
 from server.library import Library
 from server.picture import Picture, View
 from server.schemas import (
@@ -72,7 +73,7 @@ class Workspace:
         self._plan_lane, self._file_lane = Lane("plan"), Lane("files")
         self._board = JobBoard(self._file_lane, publish=streams.publish, spawn=spawn)
         self._computing = Computing(self._plan_lane, terrain_dir=library.terrain_dir, changed=self._computed)
-        self._picture = Picture(view, library, self._plan_lane, legend_changed=self._legend)
+        self._picture = Picture(view, library, self._plan_lane, changed=self._legend, failed=self._tell)
         self.files = FileJobs(
             library,
             self._board,
@@ -105,7 +106,9 @@ class Workspace:
         await self._file_lane.close()
 
     async def _warm_up(self) -> None:
-        await self._plan_lane.call(tasks.warm_up)
+        """Saves the first edit a wait; a failure here shows itself, and is told, when a plan is computed."""
+        with contextlib.suppress(JobCancelledError, ServerError):
+            await self._plan_lane.call(tasks.warm_up)
 
     # What pages see
 
@@ -187,7 +190,7 @@ class Workspace:
         try:
             self._saved_utc = await asyncio.to_thread(self._library.save_plan, self._plan_id, self._history)
         except ServerError as error:
-            self._streams.publish(NoticeMessage(level="error", error=error_doc(error)))
+            self._tell(error)
         self._revision += 1
         self._computing.request(self._revision, self.document)
         self._show()
@@ -330,8 +333,9 @@ class Workspace:
                 await self._picture.frame(message, page_id)
 
     def _set_view(self, view: ViewDoc) -> None:
-        self.view = view
-        self._streams.publish(ViewMessage(view=view))
+        low_m, high_m = self._picture.legend_m or (None, None)
+        self.view = view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
+        self._streams.publish(ViewMessage(view=self.view))
         self._show()
 
     def _select(self, selection: SelectionDoc) -> None:
@@ -345,9 +349,13 @@ class Workspace:
         self._show()
         self._streams.publish(PlanMessage(plan=self.state))
 
-    def _legend(self, low_m: float | None, high_m: float | None) -> None:
+    def _legend(self) -> None:
+        low_m, high_m = self._picture.legend_m or (None, None)
         self.view = self.view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
         self._streams.publish(ViewMessage(view=self.view))
+
+    def _tell(self, error: Exception) -> None:
+        self._streams.publish(NoticeMessage(level="error", error=error_doc(error)))
 
     def _show(self) -> None:
         stale = self._computing.state.state == "running"

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
+import numpy as np
 import typer
 
 from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
+from planning.model import MissionParams, PathParams, Poi, SurfaceParams
+from planning.poi import check_pois, shortest_order
 from planning.poi_files import read_pois, warn_swapped
 from planning.request import PlanRequest
+from planning.vehicle_profile import path_params
 from server.cli import options as o
+from server.cli.files import read_small
 from server.cli.output import refusing, say
-from server.cli.planning_run import parse_home, profile_with, run
+from server.cli.places import chosen_heading, parse_place
+from server.cli.planning_run import profile_with, run
+from server.cli.terrain import ModelOptions
 
 
 def plan(
     dsm: o.DsmFile,
     pois: Annotated[
-        Path, typer.Argument(help="Points of interest: CSV, GeoJSON, KML, .waypoints or .plan.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="POIS", help="Points of interest: CSV, GeoJSON, KML, .waypoints or .plan.", show_default=False
+        ),
     ],
     out: o.Out,
-    profile: o.Profile = "generic-quad",
+    as_json: o.AsJson = False,
+    crs: o.Crs = None,
+    z_scale: o.ZScale = None,
+    vertical_datum: o.VerticalDatum = None,
+    max_hole_m2: o.MaxHole = 4.0,
+    remove_spikes: o.RemoveSpikes = False,
     radius_m: o.Radius = 20.0,
-    height_m: Annotated[float, typer.Option("--height-m", help="Height H of the dilating ball.")] = 5.0,
+    height_m: o.Height = 5.0,
     smooth_m: o.Smooth = None,
     paper: o.Paper = False,
     mean_speed_m_s: o.MeanSpeed = None,
@@ -35,20 +51,23 @@ def plan(
     max_accel_m_s2: o.MaxAccel = None,
     step_m: o.Step = 0.1,
     on_steep: o.OnSteep = "raise",
+    profile: o.Profile = "generic-quad",
     max_items: o.MaxItems = None,
-    excess_height_m: o.Excess = 1.0,
+    position_error_m: o.PositionError = None,
+    rtl_height_m: o.RtlHeight = None,
+    required_clearance_m: o.RequiredClearance = None,
+    max_height_above_ground_m: o.MaxHeight = None,
     home: o.Home = None,
     end: o.End = "rtl",
     altitude_reference: o.AltitudeReference = "home",
+    excess_height_m: o.Excess = 1.0,
+    shortest_order: o.ShortestOrder = False,
+    loiter_s: o.Loiter = None,
+    heading: o.Heading = None,
+    heading_deg: o.HeadingDeg = None,
+    look_at: o.LookAt = None,
     gimbal_pitch_deg: o.Gimbal = None,
-    position_error_m: o.PositionError = None,
-    required_clearance_m: o.RequiredClearance = None,
-    rtl_height_m: o.RtlHeight = None,
-    max_height_above_ground_m: o.MaxHeight = None,
-    crs: o.Crs = None,
-    z_scale: o.ZScale = None,
-    vertical_datum: o.VerticalDatum = None,
-    as_json: o.AsJson = False,
+    camera_trigger_m: o.CameraTrigger = None,
 ) -> None:
     """Plan a terrain-hugging mission over points of interest and prove its clearance."""
     with refusing(as_json=as_json):
@@ -63,53 +82,55 @@ def plan(
             position_error_m=position_error_m,
             rtl_height_m=rtl_height_m,
         )
-        points = read_pois(pois.name, pois.read_bytes())
+        look_at_deg = parse_place(look_at, "--look-at")
+        mission = MissionParams(
+            max_items=vehicle.max_items,
+            excess_height_m=excess_height_m,
+            end=end,
+            altitude_reference=altitude_reference,
+            heading=chosen_heading(heading, heading_deg, look_at_deg),
+            heading_deg=heading_deg or 0.0,
+            look_at=look_at_deg,
+            gimbal_pitch_deg=gimbal_pitch_deg,
+            camera_trigger_m=camera_trigger_m,
+        )
+        request = PlanRequest(
+            pois=(),
+            profile=vehicle,
+            surface=SurfaceParams(radius_m, height_m, smooth_m, floor=not paper, fill_hole_area_m2=max_hole_m2),
+            path=path_with(path_params(vehicle), step_m, on_steep),
+            mission=mission,
+            home_lat_lon_deg=parse_place(home, "--home"),
+            required_clearance_m=required_clearance_m,
+            max_height_above_ground_m=max_height_above_ground_m,
+        )
+        points = read_pois(pois.name, read_small(pois))
+        waiting = with_loiter(points.pois, loiter_s)
 
         def request_for(model: Dsm) -> PlanRequest:
             for warning in (*points.warnings, *warn_swapped(points.pois, model)):
                 say(f"Note: {warning}")
-            return PlanRequest(
-                pois=points.pois,
-                profile=vehicle,
-                surface=SurfaceParams(radius_m, height_m, smooth_m, floor=not paper),
-                path=path_params(vehicle, step_m, on_steep),
-                mission=MissionParams(
-                    max_items=vehicle.max_items,
-                    excess_height_m=excess_height_m,
-                    end=one_of("--end", end, "rtl", "land"),  # type: ignore[arg-type]
-                    altitude_reference=one_of("--altitude-reference", altitude_reference, "home", "amsl"),  # type: ignore[arg-type]
-                    gimbal_pitch_deg=gimbal_pitch_deg,
-                ),
-                home_lat_lon_deg=parse_home(home),
-                required_clearance_m=required_clearance_m,
-                max_height_above_ground_m=max_height_above_ground_m,
-            )
+            return replace(request, pois=in_shortest_order(waiting, model) if shortest_order else waiting)
 
-        run(
-            dsm,
-            out,
-            request_for,
-            title=pois.stem,
-            as_json=as_json,
-            crs=crs,
-            z_scale=z_scale,
-            vertical_datum=vertical_datum,
-        )
+        model = ModelOptions(crs, z_scale, vertical_datum, remove_spikes)
+        run(dsm, out, request_for, title=pois.stem, as_json=as_json, model=model)
 
 
-def path_params(vehicle: VehicleProfile, step_m: float, on_steep: str) -> PathParams:
-    return PathParams(
-        mean_speed_m_s=vehicle.mean_speed_m_s,
-        max_speed_m_s=vehicle.max_speed_m_s,
-        max_climb_m_s=vehicle.max_climb_m_s,
-        max_descent_m_s=vehicle.max_descent_m_s,
-        max_accel_m_s2=vehicle.max_accel_m_s2,
-        step_m=step_m,
-        on_steep=one_of("--on-steep", on_steep, "raise", "slow"),  # type: ignore[arg-type]
-    )
+def path_with(path: PathParams, step_m: float, on_steep: Literal["raise", "slow"]) -> PathParams:
+    """The vehicle's limits with the sampling that was asked for."""
+    return replace(path, step_m=step_m, on_steep=on_steep)
 
 
-def one_of(option: str, value: str, *choices: str) -> str:
-    if value not in choices:
-        raise ParameterError(f"{value!r} is not possible.", where=option, advice=f"Choose {' or '.join(choices)}.")
-    return value
+def with_loiter(pois: Sequence[Poi], loiter_s: float | None) -> tuple[Poi, ...]:
+    """The points, those without a waiting time with this one."""
+    if loiter_s is None:
+        return tuple(pois)
+    if not 0 <= loiter_s < 86_400:
+        raise ParameterError(f"A wait of {loiter_s:g} s is not possible.", where="--loiter-s", advice="Give seconds.")
+    return tuple(poi if poi.loiter_s > 0 else replace(poi, loiter_s=loiter_s) for poi in pois)
+
+
+def in_shortest_order(pois: Sequence[Poi], model: Dsm) -> tuple[Poi, ...]:
+    """The points in the order of the shortest way that starts at the first."""
+    xy_m = np.asarray(check_pois(pois, model))
+    return tuple(pois[index] for index in shortest_order(xy_m))

@@ -9,56 +9,28 @@ from pathlib import Path
 import typer
 
 from planning.dsm import Dsm
-from planning.errors import ParameterError
 from planning.exports import FILES, export_file
-from planning.geotiff import read_dsm_reported
 from planning.model import VehicleProfile
 from planning.plan import Plan, plan_mission
+from planning.report_words import duration, metres
 from planning.request import PlanRequest
 from planning.summary import plan_summary
-from planning.vehicle_profile import load_profile
-from server.cli.output import DONE, FAILED, end_progress, print_json, progress, say, verdict_lines, write_files
+from planning.vehicle_profile import check_profile, load_profile
+from server.cli.files import check_directory, write_files
+from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, say
+from server.cli.terrain import ModelOptions, read_model
+from server.cli.verdict import verdict_lines
 from server.clock import utc_now
-from server.stopwatch import READ_STEP, StepTimer
-
-
-def read_model(
-    path: Path, timer: StepTimer, *, crs: str | None, z_scale: float | None, vertical_datum: str | None
-) -> Dsm:
-    """The surface model; what is remarkable about it goes to stderr."""
-    timer(READ_STEP, 0.0)
-    dsm, report = read_dsm_reported(
-        path,
-        crs=crs,
-        z_scale=z_scale,
-        vertical_datum=vertical_datum,
-        progress=lambda stage, share: timer(READ_STEP, share),
-    )
-    end_progress()
-    for warning in report.warnings:
-        say(f"Note: {warning}")
-    for spike in report.spikes:
-        say(
-            f"Note: isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
-            f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: kept as terrain."
-        )
-    return dsm
+from server.stopwatch import StepTimer
 
 
 def profile_with(name: str, **overrides: float | int | None) -> VehicleProfile:
     """The named profile with the options that were given."""
-    return replace(load_profile(name), **{key: value for key, value in overrides.items() if value is not None})
-
-
-def parse_home(text: str | None) -> tuple[float, float] | None:
-    """ "LAT,LON" in degrees."""
-    if text is None:
-        return None
-    try:
-        lat_deg, lon_deg = (float(part) for part in text.split(","))
-    except ValueError:
-        raise ParameterError(f"Home {text!r} is no place.", where="--home", advice="Give LAT,LON in degrees.") from None
-    return lat_deg, lon_deg
+    given = {key: value for key, value in overrides.items() if value is not None}
+    profile = replace(load_profile(name), **given)
+    if given:
+        check_profile(profile, where=f"profile {harmless(profile.name)} with the options given")
+    return profile
 
 
 def run(
@@ -68,24 +40,21 @@ def run(
     *,
     title: str,
     as_json: bool,
-    crs: str | None,
-    z_scale: float | None,
-    vertical_datum: str | None,
+    model: ModelOptions,
 ) -> None:
     """Plans, writes every file, says what came of it, and ends with 0 (certified) or 1."""
+    check_directory(out)
     timer = StepTimer(progress)
-    source = read_model(dsm_file, timer, crs=crs, z_scale=z_scale, vertical_datum=vertical_datum)
-    plan = plan_mission(source, request_for(source), report=timer)
+    source, made = read_model(dsm_file, timer, model)
+    plan = plan_mission(source, request_for(source), report=timer, assumptions=made)
     seconds = timer.seconds()
-    end_progress()
+    progress("Writing the files", None)
     created_utc = utc_now()
-    write_files(
-        out,
-        {
-            name: export_file(name, plan, source, title=title, created_utc=created_utc, seconds=seconds)
-            for name in FILES
-        },
-    )
+    files = {
+        name: export_file(name, plan, source, title=title, created_utc=created_utc, seconds=seconds) for name in FILES
+    }
+    write_files(out, files)
+    end_progress()
     _answer(plan, source, out, seconds, as_json=as_json)
     raise typer.Exit(DONE if plan.certificate.certified else FAILED)
 
@@ -97,9 +66,11 @@ def _answer(plan: Plan, source: Dsm, out: Path, seconds: dict[str, float], *, as
     if as_json:
         print_json(summary)
         return
-    typer.echo("\n".join(verdict_lines(summary)))
-    typer.echo(
-        f"  {summary['length_m']:.0f} m, {summary['duration_s']:.0f} s of {summary['usable_endurance_s']:.0f} s, "
-        f"{summary['items']} of {summary['max_items']} items"
+    lines = verdict_lines(summary)
+    lines.append(
+        f"  {metres(summary['length_m'], 0)} long, {duration(summary['duration_s'])} of the "
+        f"{duration(summary['usable_endurance_s'])} the battery gives, "
+        f"{summary['items']} of {summary['max_items']} items ({summary['waypoints']} waypoints)"
     )
-    typer.echo(f"Written to {out}: {', '.join(FILES)}")
+    lines.append(f"Written to {harmless(str(out))}: {', '.join(FILES)}")
+    typer.echo("\n".join(lines))

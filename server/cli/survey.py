@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,49 +11,78 @@ import typer
 
 from planning.dsm import Dsm
 from planning.errors import ParameterError, PoiError
+from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, SurfaceParams
 from planning.poi_files import read_pois
 from planning.request import PlanRequest
-from planning.survey import survey_lines
+from planning.survey import SurveyPlan, survey_lines
+from planning.vehicle_profile import path_params
 from server.cli import options as o
+from server.cli.files import read_small
 from server.cli.output import refusing, say
-from server.cli.plan import one_of, path_params
-from server.cli.planning_run import parse_home, profile_with, run
+from server.cli.places import parse_place
+from server.cli.plan import path_with
+from server.cli.planning_run import profile_with, run
+from server.cli.terrain import ModelOptions
+
+_PATTERN = "Pattern"
 
 
 def survey(
     dsm: o.DsmFile,
-    polygon: Annotated[Path, typer.Argument(help="Area: GeoJSON or KML polygon.", show_default=False)],
+    polygon: Annotated[
+        Path, typer.Argument(metavar="POLYGON", help="Area: GeoJSON or KML polygon.", show_default=False)
+    ],
     out: o.Out,
-    profile: o.Profile = "mapper-rtk",
+    as_json: o.AsJson = False,
     gsd_cm: Annotated[
-        float | None, typer.Option("--gsd-cm", help="Ground sampling distance; sets the height (default 1 cm).")
+        float | None,
+        typer.Option(
+            "--gsd-cm", help="Ground sampling distance; sets the height. Default 1 cm.", rich_help_panel=_PATTERN
+        ),
     ] = None,
-    height_m: Annotated[float | None, typer.Option("--height-m", help="Height above the surface instead.")] = None,
-    side_overlap: Annotated[float, typer.Option("--side-overlap", help="Share between lines.")] = 0.7,
-    front_overlap: Annotated[float, typer.Option("--front-overlap", help="Share between photos.")] = 0.8,
+    height_m: Annotated[
+        float | None, typer.Option("--height-m", help="Height above the surface instead.", rich_help_panel=_PATTERN)
+    ] = None,
+    side_overlap: Annotated[
+        float, typer.Option("--side-overlap", help="Share between lines.", rich_help_panel=_PATTERN)
+    ] = 0.7,
+    front_overlap: Annotated[
+        float, typer.Option("--front-overlap", help="Share between photos.", rich_help_panel=_PATTERN)
+    ] = 0.8,
     angle_deg: Annotated[
-        float | None, typer.Option("--angle-deg", help="Direction of the lines from grid north; default: fewest turns.")
+        float | None,
+        typer.Option(
+            "--angle-deg",
+            help="Direction of the lines from grid north; default: fewest turns.",
+            rich_help_panel=_PATTERN,
+        ),
     ] = None,
+    crs: o.Crs = None,
+    z_scale: o.ZScale = None,
+    vertical_datum: o.VerticalDatum = None,
+    max_hole_m2: o.MaxHole = 4.0,
+    remove_spikes: o.RemoveSpikes = False,
     radius_m: o.Radius = 20.0,
     smooth_m: o.Smooth = None,
     paper: o.Paper = False,
     mean_speed_m_s: o.MeanSpeed = None,
     max_speed_m_s: o.MaxSpeed = None,
+    max_climb_m_s: o.MaxClimb = None,
+    max_descent_m_s: o.MaxDescent = None,
+    max_accel_m_s2: o.MaxAccel = None,
     step_m: o.Step = 0.1,
     on_steep: o.OnSteep = "raise",
+    profile: o.Profile = "mapper-rtk",
     max_items: o.MaxItems = None,
-    excess_height_m: o.Excess = 1.0,
+    position_error_m: o.PositionError = None,
+    rtl_height_m: o.RtlHeight = None,
+    required_clearance_m: o.RequiredClearance = None,
+    max_height_above_ground_m: o.MaxHeight = None,
     home: o.Home = None,
     end: o.End = "rtl",
-    position_error_m: o.PositionError = None,
-    required_clearance_m: o.RequiredClearance = None,
-    rtl_height_m: o.RtlHeight = None,
-    max_height_above_ground_m: o.MaxHeight = None,
-    crs: o.Crs = None,
-    z_scale: o.ZScale = None,
-    vertical_datum: o.VerticalDatum = None,
-    as_json: o.AsJson = False,
+    altitude_reference: o.AltitudeReference = "home",
+    excess_height_m: o.Excess = 1.0,
 ) -> None:
     """Plan a back-and-forth survey of an area and prove its clearance."""
     with refusing(as_json=as_json):
@@ -60,19 +90,29 @@ def survey(
             profile,
             mean_speed_m_s=mean_speed_m_s,
             max_speed_m_s=max_speed_m_s,
+            max_climb_m_s=max_climb_m_s,
+            max_descent_m_s=max_descent_m_s,
+            max_accel_m_s2=max_accel_m_s2,
             max_items=max_items,
             position_error_m=position_error_m,
             rtl_height_m=rtl_height_m,
         )
         if vehicle.camera is None:
             raise ParameterError(
-                f"The profile {vehicle.name} has no camera.", where="--profile", advice="Use one with a [camera] table."
+                f"The profile {clean_name(vehicle.name)} has no camera.",
+                where="--profile",
+                advice="Use one with a [camera] table.",
             )
-        camera = vehicle.camera
-        area = read_pois(polygon.name, polygon.read_bytes())
-        if area.polygon is None:
-            raise PoiError("There is no polygon in it.", where=polygon.name, advice="Draw the area as one polygon.")
-        corners = np.array(area.polygon)
+        camera, home_deg = vehicle.camera, parse_place(home, "--home")
+        path = path_with(path_params(vehicle), step_m, on_steep)
+        mission = MissionParams(
+            max_items=vehicle.max_items,
+            excess_height_m=excess_height_m,
+            end=end,
+            altitude_reference=altitude_reference,
+            gimbal_pitch_deg=-90.0,
+        )
+        corners = _corners(polygon)
 
         def request_for(model: Dsm) -> PlanRequest:
             lines = survey_lines(
@@ -85,34 +125,39 @@ def survey(
                 front_overlap=front_overlap,
                 angle_deg=angle_deg,
             )
-            say(
-                f"Note: {lines.lines} lines {lines.line_spacing_m:.1f} m apart, {lines.height_m:.1f} m above the "
-                f"surface, a photo every {lines.trigger_distance_m:.1f} m."
-            )
+            _say_pattern(lines)
             return PlanRequest(
                 pois=lines.pois,
                 profile=vehicle,
-                surface=SurfaceParams(radius_m, lines.height_m, smooth_m, floor=not paper),
-                path=path_params(vehicle, step_m, on_steep),
-                mission=MissionParams(
-                    max_items=vehicle.max_items,
-                    excess_height_m=excess_height_m,
-                    end=one_of("--end", end, "rtl", "land"),  # type: ignore[arg-type]
-                    gimbal_pitch_deg=-90.0,
-                    camera_trigger_m=lines.trigger_distance_m,
+                surface=SurfaceParams(
+                    radius_m, lines.height_m, smooth_m, floor=not paper, fill_hole_area_m2=max_hole_m2
                 ),
-                home_lat_lon_deg=parse_home(home),
+                path=path,
+                mission=replace(mission, camera_trigger_m=lines.trigger_distance_m),
+                home_lat_lon_deg=home_deg,
                 required_clearance_m=required_clearance_m,
                 max_height_above_ground_m=max_height_above_ground_m,
             )
 
-        run(
-            dsm,
-            out,
-            request_for,
-            title=polygon.stem,
-            as_json=as_json,
-            crs=crs,
-            z_scale=z_scale,
-            vertical_datum=vertical_datum,
+        model = ModelOptions(crs, z_scale, vertical_datum, remove_spikes)
+        run(dsm, out, request_for, title=polygon.stem, as_json=as_json, model=model)
+
+
+def _corners(polygon: Path) -> np.ndarray:
+    """(N, 2) latitude and longitude in degrees."""
+    area = read_pois(polygon.name, read_small(polygon))
+    if area.polygon is None:
+        raise PoiError(
+            "There is no polygon in it.", where=clean_name(polygon.name), advice="Draw the area as one polygon."
         )
+    for warning in area.warnings:
+        say(f"Note: {warning}")
+    return np.array(area.polygon)
+
+
+def _say_pattern(lines: SurveyPlan) -> None:
+    say(
+        f"Note: {lines.lines} {'line' if lines.lines == 1 else 'lines'} {lines.line_spacing_m:.1f} m apart, "
+        f"{lines.height_m:.1f} m above the surface, {lines.gsd_cm:.2f} cm per pixel, "
+        f"a photo every {lines.trigger_distance_m:.1f} m."
+    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from planning.dsm import Dsm
 from server.scene.frame import LocalFrame
-from server.scene.mesh import drawn_alt_dsm_m
+from server.scene.mesh import drawn_alt_dsm_m, filled
 from server.scene.payload import F64, HeightGrid, SceneState, TerrainScene
 from server.scene.unknown import plates
 
@@ -39,8 +39,9 @@ class Drawing:
         if dsm is None or state.terrain is None or not np.isfinite(state.terrain.grid.alt_dsm_m).any():
             return None
         frame = LocalFrame.of(dsm, state.terrain.grid, state.view.vertical_exaggeration)
-        same = before is not None and before.terrain is state.terrain
-        return Drawing(dsm, state.terrain, state, frame, before.plates if same else plates(state.terrain.grid))
+        if before is not None and before.terrain is state.terrain:
+            return Drawing(dsm, state.terrain, state, frame, before.plates)
+        return Drawing(dsm, state.terrain, state, frame, plates(state.terrain.grid))
 
     @property
     def mark_m(self) -> float:
@@ -55,7 +56,7 @@ class Drawing:
     def on_ground(self, xy_m: F64) -> F64:
         """Projected (N, 2) -> scene (N, 3) on the terrain as it is drawn; places without a projection left out."""
         xy = xy_m[np.isfinite(xy_m).all(axis=1)]
-        alt = drawn_alt_dsm_m(self.terrain.grid, xy, self.frame.floor_alt_dsm_m)
+        alt = drawn_alt_dsm_m(filled(self.terrain.grid, self.plates), xy)
         return self.frame.scene_from_model(np.column_stack([xy, alt]))
 
     def ground_of(self, place: _Place) -> F64 | None:

@@ -57,25 +57,23 @@ def _faces(known: NDArray[np.bool_]) -> U32:
         (number[r : r - 1 or None, c : c - 1 or None], known[r : r - 1 or None, c : c - 1 or None])
         for r, c in ((0, 0), (0, 1), (1, 0), (1, 1))
     )
-    # Two triangles where all four corners are known, one where three are.
-    corners = ((nw, sw, ne, None), (ne, sw, se, None), (nw, sw, se, ne), (nw, se, ne, sw))
-    return np.concatenate([_triangles(a, b, c, absent) for a, b, c, absent in corners])
+    triangles = ((nw, sw, ne), (ne, sw, se))
+    return np.concatenate([_drawn(*corners) for corners in triangles])
 
 
 _Corner = tuple[U32, NDArray[np.bool_]]
 
 
-def _triangles(a: _Corner, b: _Corner, c: _Corner, absent: _Corner | None) -> U32:
+def _drawn(a: _Corner, b: _Corner, c: _Corner) -> U32:
+    """The triangles whose corners are all known."""
     drawn = a[1] & b[1] & c[1]
-    if absent is not None:
-        drawn = drawn & ~absent[1]
     return np.column_stack([corner[0][drawn] for corner in (a, b, c)])
 
 
 def gap_mesh(grid: HeightGrid, plates: HeightGrid, frame: LocalFrame) -> Mesh | None:
     """The triangles that `grid_mesh` leaves out, at the plates' heights and down to them; None without gaps."""
     known = np.isfinite(grid.alt_dsm_m)
-    whole = grid_mesh(replace(grid, alt_dsm_m=np.where(known, grid.alt_dsm_m, plates.alt_dsm_m)), frame)
+    whole = grid_mesh(filled(grid, plates), frame)
     faces = whole.faces[~known.ravel()[whole.faces].all(axis=1)]
     if not len(faces):
         return None
@@ -83,14 +81,16 @@ def gap_mesh(grid: HeightGrid, plates: HeightGrid, frame: LocalFrame) -> Mesh | 
     return Mesh(whole.vertices[used], faces.reshape(-1, 3).astype(np.uint32), whole.uv[used])
 
 
-def drawn_alt_dsm_m(grid: HeightGrid, xy_m: F64, otherwise_m: float) -> F64:
-    """Height of the drawn terrain under projected points (N, 2); ``otherwise_m`` where nothing is drawn.
+def filled(grid: HeightGrid, plates: HeightGrid) -> HeightGrid:
+    """The grid with plates in its holes."""
+    return replace(grid, alt_dsm_m=np.where(np.isfinite(grid.alt_dsm_m), grid.alt_dsm_m, plates.alt_dsm_m))
+
+
+def drawn_alt_dsm_m(grid: HeightGrid, xy_m: F64) -> F64:
+    """Height of a drawn grid without holes under projected points (N, 2); beside it, that of its edge.
 
     The drawing stands above the model by up to a cell's slope, and marks must not sink into it.
     """
     xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
     at = np.array([(grid.north_m - xy[:, 1]) / grid.cell_m - 0.5, (xy[:, 0] - grid.west_m) / grid.cell_m - 0.5])
-    between = map_coordinates(grid.alt_dsm_m.astype(np.float64), at, order=1, mode="nearest")
-    nearest = map_coordinates(grid.alt_dsm_m.astype(np.float64), at, order=0, mode="nearest")
-    alt = np.where(np.isfinite(between), between, nearest)
-    return np.where(np.isfinite(alt), alt, otherwise_m)
+    return map_coordinates(grid.alt_dsm_m, at, order=1, mode="nearest", output=np.float64)

@@ -46,7 +46,7 @@ def terrain_points(drawing: Drawing) -> F64:
     x_m, y_m = grid.west_m + (col + 0.5) * grid.cell_m, grid.north_m - (row + 0.5) * grid.cell_m
     if not len(row):
         return _around(drawing, np.zeros(3))
-    return drawing.frame.scene_from_model(np.column_stack([x_m, y_m, grid.alt_dsm_m[row, col].astype(np.float64)]))
+    return drawing.frame.scene_from_model(np.column_stack([x_m, y_m, grid.alt_dsm_m[row, col]]).astype(np.float64))
 
 
 def _plan_points(drawing: Drawing) -> F64 | None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import socket
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from server.app import AnnouncingServer, bound_socket, run
-from server.errors import DataDirError, StartError
+from server.errors import DataDirError, StartError, StorageFullError
 from server.library import Library
 from server.settings import Settings
 from server.web import create_app
@@ -26,7 +27,7 @@ def test_a_taken_port_is_a_clear_error() -> None:
 
 
 def test_a_foreign_address_is_a_clear_error() -> None:
-    with pytest.raises(StartError, match="cannot listen on 192.0.2.1"):
+    with pytest.raises(StartError, match=r"cannot listen on 192\.0\.2\.1"):
         bound_socket("192.0.2.1", 0)
 
 
@@ -64,6 +65,48 @@ def test_a_second_instance_is_refused_before_it_starts(tmp_path: Path, monkeypat
         free = first.settings.model_copy(update={"port": 0})
         with pytest.raises(DataDirError, match="Another Hedgehop"):
             run(free)
+
+
+def test_a_loop_that_fails_stops_the_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr("server.web.signal.raise_signal", stopped.append)
+
+    async def failing() -> None:
+        raise RuntimeError("a defect")
+
+    class Failing(FakeWorkspace):
+        def loops(self) -> list:
+            return [failing()]
+
+    library = Library(tmp_path)
+    app = create_app(Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Failing(lib, hub)))
+
+    async def whole() -> None:
+        async with app.router.lifespan_context(app):
+            await asyncio.sleep(10)
+
+    with pytest.raises(ExceptionGroup):
+        asyncio.run(whole())
+    assert stopped == [signal.SIGTERM]
+    library.close()
+
+
+def test_an_expected_fault_at_start_is_kept_for_the_command_line(tmp_path: Path) -> None:
+    class Full(FakeWorkspace):
+        async def start(self) -> None:
+            raise StorageFullError("The disk is full.")
+
+    library = Library(tmp_path)
+    app = create_app(Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Full(lib, hub)))
+
+    async def whole() -> None:
+        async with app.router.lifespan_context(app):
+            pass
+
+    with pytest.raises(ExceptionGroup):
+        asyncio.run(whole())
+    assert isinstance(app.state.start_error, StorageFullError)
+    library.close()
 
 
 def test_sessions_survive_a_restart(tmp_path: Path) -> None:

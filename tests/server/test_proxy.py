@@ -141,8 +141,12 @@ def test_the_view_ends_with_its_page(served: Running) -> None:
         socket = view(served, page_id_of(stream))
         socket.recv(timeout=10)
     with pytest.raises(ConnectionClosed):
-        while True:
-            socket.recv(timeout=10)
+        _read_to_the_end(socket)
+
+
+def _read_to_the_end(socket: ClientConnection) -> None:
+    while True:
+        socket.recv(timeout=10)
 
 
 def test_strangers_and_unknown_pages_are_refused(served: Running) -> None:

@@ -2,6 +2,7 @@ import { latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
+import { drawer } from "../shell/ui_state";
 import { frame } from "../store/stream";
 import { CopyPlace } from "./CopyPlace";
 
@@ -32,6 +33,12 @@ export function clearanceLevel(distance_m: number | null, required_m: number): L
   return distance_m < required_m ? "near" : "good";
 }
 
+/** On narrow screens the drawer would cover what is shown. */
+function showWorst(): void {
+  drawer.value = null;
+  frame("worst");
+}
+
 function Worst({ result }: { result: ResultDoc }) {
   const { worst } = result;
   if (!worst) return null;
@@ -39,12 +46,7 @@ function Worst({ result }: { result: ResultDoc }) {
     <div class="worst">
       <span class="row">
         <span class="muted">Nearest place, leg {worst.leg + 1}</span>
-        <Button
-          icon="target"
-          testid="show-worst"
-          title="Show it in the 3D view"
-          onClick={() => frame("worst")}
-        >
+        <Button icon="target" testid="show-worst" title="Show it in the 3D view" onClick={showWorst}>
           Show
         </Button>
       </span>

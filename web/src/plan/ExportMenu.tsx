@@ -1,11 +1,9 @@
-import { signal } from "@preact/signals";
 import { ErrorBox } from "../ui/ErrorBox";
 import { Icon, type IconName } from "../ui/Icon";
 import { Menu } from "../ui/Menu";
-import { asErrorDoc, request } from "../net/api";
-import { allSent } from "../store/plan";
-import { computation, isFresh, plan, setError } from "../store/state";
+import { computation, isFresh, plan } from "../store/state";
 import { verdictOf } from "../store/results";
+import { busy, download, openReport } from "./downloads";
 
 const FILES: readonly { file: string; label: string; note: string; icon: IconName }[] = [
   { file: "all.zip", label: "Everything", note: ".zip", icon: "folder" },
@@ -16,46 +14,6 @@ const FILES: readonly { file: string; label: string; note: string; icon: IconNam
   { file: "mission.geojson", label: "Mission for maps", note: ".geojson", icon: "terrain" },
   { file: "certificate.json", label: "Certificate", note: ".json", icon: "check" },
 ];
-
-const busy = signal(false);
-const REPORT = "/api/plan/export/report.html?inline=1";
-
-function fileName(response: Response, fallback: string): string {
-  const header = response.headers.get("Content-Disposition") ?? "";
-  return /filename="?([^";]+)"?/.exec(header)?.[1] ?? fallback;
-}
-
-async function download(file: string): Promise<void> {
-  busy.value = true;
-  setError("export", null);
-  try {
-    await allSent();
-    const response = await request("GET", `/api/plan/export/${file}`);
-    const address = URL.createObjectURL(await response.blob());
-    const anchor = document.createElement("a");
-    anchor.href = address;
-    anchor.download = fileName(response, file);
-    anchor.click();
-    setTimeout(() => URL.revokeObjectURL(address), 10_000);
-  } catch (error) {
-    setError("export", asErrorDoc(error));
-  } finally {
-    busy.value = false;
-  }
-}
-
-function openReport(print: boolean): void {
-  const opened = window.open(REPORT, "_blank");
-  if (!opened) {
-    const what = "The browser did not open the report in a new tab.";
-    setError("export", {
-      code: "popup",
-      what,
-      where: "",
-      advice: "Allow pop-ups for this page and try again.",
-    });
-  } else if (print) opened.addEventListener("load", () => opened.print());
-}
 
 function Item(props: { label: string; note: string; icon: IconName; testid: string; onClick: () => void }) {
   return (

@@ -121,7 +121,7 @@ export function PlanRight() {
   const now = computation.value;
   const shown = result.value;
   return (
-    <div class="panel-scroll truth">
+    <div class="panel-scroll truth" tabIndex={0}>
       <Headline />
       {now?.state === "error" && now.error && <ErrorPanel error={now.error} />}
       {shown ? (

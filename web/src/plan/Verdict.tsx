@@ -1,4 +1,4 @@
-import { isFresh, plan } from "../store/state";
+import { isFresh, link, plan } from "../store/state";
 import { verdictOf, type VerdictKind } from "../store/results";
 
 const WORDS: Record<VerdictKind, string> = {
@@ -32,7 +32,9 @@ export function VerdictShape({ kind, size = 22 }: { kind: VerdictKind; size?: nu
 }
 
 export const verdict = () => verdictOf(plan.value, isFresh.value);
-export const verdictWord = (kind: VerdictKind) => WORDS[kind];
+export function verdictWord(kind: VerdictKind): string {
+  return kind === "computing" && link.value === "lost" ? "No connection" : WORDS[kind];
+}
 
 /** The certificate in the status bar. */
 export function VerdictBadge() {
@@ -40,7 +42,7 @@ export function VerdictBadge() {
   return (
     <span class={`verdict-badge ${kind}`} data-testid="verdict-badge" data-verdict={kind}>
       <VerdictShape kind={kind} size={20} />
-      <span>{WORDS[kind]}</span>
+      <span>{verdictWord(kind)}</span>
     </span>
   );
 }

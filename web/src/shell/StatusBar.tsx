@@ -1,16 +1,16 @@
-import { clock } from "../format";
-import { TextField } from "../ui/fields";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { theme } from "../store/prefs";
-import { edit } from "../store/plan";
-import { document_, link, plan, saving } from "../store/state";
-import { redo, undo } from "../plan/commands";
+import { link } from "../store/state";
 import { VerdictBadge } from "../plan/Verdict";
 import { JobList } from "./JobList";
 import { NoticeMenu } from "./Notices";
+import { PlanName, UndoRedo } from "./PlanName";
 import { drawer, openDialog } from "./ui_state";
 import { activeView, views } from "./views";
+
+/** Below it the panels are drawers, as in layout.css. */
+const NARROW_PX = 1100;
 
 function Brand() {
   return (
@@ -21,67 +21,6 @@ function Brand() {
       </svg>
       <span class="brand-name">Hedgehop</span>
     </span>
-  );
-}
-
-function SavedState() {
-  const state = plan.value;
-  if (!state) return <span class="saved">Loading…</span>;
-  const pending = link.value === "open" ? "Saving…" : "Not saved yet";
-  const text = saving.value ? pending : `Saved ${clock(state.saved_utc)}`;
-  return (
-    <span class="saved" data-testid="saved-state">
-      {text}
-    </span>
-  );
-}
-
-function PlanName() {
-  const rename = (name: string) => name && edit("Rename plan", "plan", (doc) => ({ ...doc, name }));
-  return (
-    <div class="plan-name">
-      <TextField
-        bare
-        label="Plan name"
-        testid="plan-name"
-        value={document_.value?.name ?? ""}
-        onChange={rename}
-      />
-      <Button
-        kind="quiet"
-        icon="folder"
-        title="Plans: open, new, save as"
-        testid="plans-button"
-        onClick={() => (openDialog.value = "plans")}
-      />
-      <SavedState />
-    </div>
-  );
-}
-
-function UndoRedo() {
-  const state = plan.value;
-  const undoTitle = `Undo ${state?.undo_label ?? ""}`.trim();
-  const redoTitle = `Redo ${state?.redo_label ?? ""}`.trim();
-  return (
-    <div class="group">
-      <Button
-        kind="quiet"
-        icon="undo"
-        title={`${undoTitle} (Ctrl+Z)`}
-        testid="undo"
-        disabled={!state?.can_undo && !saving.value}
-        onClick={undo}
-      />
-      <Button
-        kind="quiet"
-        icon="redo"
-        title={`${redoTitle} (Ctrl+Shift+Z)`}
-        testid="redo"
-        disabled={!state?.can_redo}
-        onClick={redo}
-      />
-    </div>
   );
 }
 
@@ -128,34 +67,32 @@ function Tabs() {
   );
 }
 
-function DrawerButton({
-  side,
-  label,
-  icon,
-}: {
-  side: "left" | "right";
-  label: string;
-  icon: "menu" | "check";
-}) {
-  const open = drawer.value === side;
+function PlanDrawerButton() {
+  const open = drawer.value === "left";
   return (
     <button
       type="button"
       class="drawer-button"
       aria-expanded={open}
-      data-testid={`drawer-${side}`}
-      onClick={() => (drawer.value = open ? null : side)}
+      data-testid="drawer-left"
+      onClick={() => (drawer.value = open ? null : "left")}
     >
-      <Icon name={icon} />
-      <span>{label}</span>
+      <Icon name="menu" />
+      <span>{activeView.value.label}</span>
     </button>
   );
+}
+
+/** On narrow screens the right panel is a drawer; on wide ones it is there, and takes the focus. */
+function showCertificate(): void {
+  if (window.innerWidth < NARROW_PX) drawer.value = drawer.value === "right" ? null : "right";
+  else document.querySelector<HTMLElement>(".panel.right .panel-scroll")?.focus();
 }
 
 export function StatusBar() {
   return (
     <header class="status-bar">
-      <DrawerButton side="left" label="Plan" icon="menu" />
+      <PlanDrawerButton />
       <Brand />
       <Tabs />
       <PlanName />
@@ -166,8 +103,9 @@ export function StatusBar() {
       <button
         type="button"
         class="verdict-button"
-        title="Certificate"
-        onClick={() => (drawer.value = drawer.value === "right" ? null : "right")}
+        title="Show the certificate"
+        data-testid="drawer-right"
+        onClick={showCertificate}
       >
         <VerdictBadge />
       </button>

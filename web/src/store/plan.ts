@@ -7,6 +7,8 @@ import { notifyText, setError, setPlan } from "./state";
 export const queue = new EditQueue();
 
 const RETRY_MS = 1000;
+/** No answer, or one that says "not now". */
+const RETRIED = new Set([0, 502, 503, 504]);
 let timer: ReturnType<typeof setTimeout> | undefined;
 let idleWaiters: (() => void)[] = [];
 
@@ -63,8 +65,8 @@ async function send(body: object, place: string): Promise<void> {
   try {
     queue.accepted(await requestJson<PlanState>("PUT", "/api/plan", body));
   } catch (error) {
-    if (error instanceof ApiError && error.status === 409) await mergeStale(place);
-    else if (error instanceof ApiError && (error.status === 0 || error.status >= 502)) return retry();
+    if (error instanceof ApiError && error.doc.code === "stale") await mergeStale(place);
+    else if (error instanceof ApiError && RETRIED.has(error.status)) return retry();
     else {
       queue.refused();
       setError(place, asErrorDoc(error));

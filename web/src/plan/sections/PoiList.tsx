@@ -1,63 +1,24 @@
-import { signal } from "@preact/signals";
 import { degrees } from "../../format";
 import type { PlanDoc, PoiDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
 import { NumberField } from "../../ui/NumberField";
 import { TextField } from "../../ui/fields";
-import { poiTitle, withPoi, withPoiAt } from "../../store/poi";
+import { poiTitle, withPoi } from "../../store/poi";
 import { edit } from "../../store/plan";
 import { selection } from "../../store/state";
 import { setSelection } from "../../store/stream";
 import { removeSelectedPoi } from "../commands";
 import { CopyPlace } from "../CopyPlace";
+import { drag, dropClass, movePoi, startDrag } from "./poi_drag";
 
-/** Which row is dragged and which it would land on. */
-const drag = signal<{ id: string; from: number; over: number } | null>(null);
 /** More rows than anyone edits by hand would only make the page slow. */
 const MOST_ROWS = 300;
-
-function move(poi: PoiDoc, from: number, to: number): void {
-  if (from !== to) edit(`Move point ${from + 1} to ${to + 1}`, "points", withPoiAt(poi.id, to));
-}
-
-/** The row under the pointer, which is captured by the handle meanwhile. */
-function rowAt(event: PointerEvent): number | null {
-  const row = document.elementFromPoint(event.clientX, event.clientY)?.closest<HTMLElement>("[data-index]");
-  return row ? Number(row.dataset["index"]) : null;
-}
-
-/** Drags with mouse, pen or finger. */
-function startDrag(event: PointerEvent, poi: PoiDoc, from: number): void {
-  const handle = event.currentTarget as HTMLElement;
-  handle.setPointerCapture(event.pointerId);
-  handle.onpointermove = (moveEvent) => {
-    const over = rowAt(moveEvent);
-    if (over !== null && (drag.value || over !== from)) drag.value = { id: poi.id, from, over };
-  };
-  const end = () => {
-    handle.onpointermove = handle.onpointerup = handle.onpointercancel = null;
-    drag.value = null;
-  };
-  handle.onpointercancel = end;
-  handle.onpointerup = () => {
-    const landing = drag.value;
-    end();
-    if (landing) move(poi, from, landing.over);
-  };
-}
-
-/** Where a dragged row would land: above the rows it moves up over, below those it moves down over. */
-function dropClass(index: number): string {
-  const now = drag.value;
-  if (!now || now.over !== index || now.from === index) return "";
-  return now.from < index ? "drop-below" : "drop-above";
-}
 
 function onRowKey(event: KeyboardEvent, poi: PoiDoc, index: number, last: number): void {
   if (!event.altKey || (event.key !== "ArrowUp" && event.key !== "ArrowDown")) return;
   event.preventDefault();
-  move(poi, index, Math.min(last, Math.max(0, index + (event.key === "ArrowUp" ? -1 : 1))));
+  movePoi(poi, index, Math.min(last, Math.max(0, index + (event.key === "ArrowUp" ? -1 : 1))));
 }
 
 function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {

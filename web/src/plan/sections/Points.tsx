@@ -1,16 +1,16 @@
-import { count, number } from "../../format";
+import { count, latLon, number } from "../../format";
 import type { PlanDoc } from "../../messages";
 import { Button, Segmented } from "../../ui/Button";
 import { Icon, type IconName } from "../../ui/Icon";
 import { Section } from "../../ui/Section";
 import { TextField } from "../../ui/fields";
 import { chooseFiles } from "../../shell/keyboard";
+import { drawer } from "../../shell/ui_state";
 import { sendPoints } from "../../store/files";
 import { parsePlace } from "../../store/poi";
 import { edit } from "../../store/plan";
 import { selection, setError } from "../../store/state";
 import { setSelection } from "../../store/stream";
-import { latLon } from "../../format";
 import { shortestOrder } from "../commands";
 import { PoiList } from "./PoiList";
 import { SurveyFields } from "./Survey";
@@ -23,6 +23,12 @@ const TOOLS: Record<Tool, { icon: IconName; label: string; title: string }> = {
   polygon: { icon: "polygon", label: "Corners", title: "Add corners of the survey polygon on click" },
   home: { icon: "home", label: "Home", title: "Put home, where the vehicle takes off, on click" },
 };
+
+/** On narrow screens the drawer would cover what is to be clicked. */
+function take(tool: Tool): void {
+  setSelection({ tool });
+  if (tool !== "select") drawer.value = null;
+}
 
 function Tools({ plan }: { plan: PlanDoc }) {
   const tools: Tool[] = ["select", plan.source === "survey" ? "polygon" : "add_poi", "home"];
@@ -38,7 +44,7 @@ function Tools({ plan }: { plan: PlanDoc }) {
             disabled={!plan.terrain_id}
             aria-pressed={selection.value.tool === tool}
             data-testid={`tool-${tool}`}
-            onClick={() => setSelection({ tool })}
+            onClick={() => take(tool)}
           >
             <Icon name={icon} />
             {label}

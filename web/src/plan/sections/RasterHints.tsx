@@ -6,8 +6,8 @@ import { Check, SelectField } from "../../ui/fields";
 import { forgetJob, sendTerrain, sentFiles, type RasterHints } from "../../store/files";
 import { jobs } from "../../store/state";
 
-/** Errors that a declaration of the operator can mend. */
-const MENDABLE = /^raster_(no_crs|crs|units|no_datum|datum|z_scale)/;
+/** Errors that a declaration of the operator can mend, or that a wrong one has made. */
+const MENDABLE = new Set(["raster_no_crs", "raster", "parameter", "datum"]);
 
 const DATUMS = [
   { value: "", label: "unknown" },
@@ -78,7 +78,7 @@ export function FailedJobs() {
     <>
       {failed.map((job) => {
         const sent = sentFiles.value.get(job.id);
-        const asks = sent && job.error && MENDABLE.test(job.error.code);
+        const asks = sent && job.error && MENDABLE.has(job.error.code);
         return (
           <div key={job.id} data-testid="failed-job">
             {job.error && <ErrorPanel error={job.error} onClose={() => forgetJob(job.id)} />}

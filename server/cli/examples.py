@@ -1,0 +1,33 @@
+"""The examples below each command's ``--help``."""
+
+from __future__ import annotations
+
+
+def _examples(*pairs: tuple[str, str]) -> str:
+    """One paragraph per line, because the help joins the lines of a paragraph."""
+    lines = ["Examples:"]
+    for purpose, command in pairs:
+        lines += [f"{purpose}:", f"  {command}"]
+    return "\n\n".join(lines)
+
+
+EXIT_CODES = "Exit codes: 0 done, 1 not certified or failed, 2 wrong input."
+SERVE = _examples(
+    ("A first look, with the demo terrain", "hedgehop serve --demo"),
+    ("Another port and place for the data", "hedgehop serve --port 8010 --data-dir ~/flights"),
+)
+PLAN = _examples(
+    ("A mission over the points of a file", "hedgehop plan dsm.tif pois.csv --out flight --rtl-height-m 60"),
+    ("Closer to the ground, with RTK", "hedgehop plan dsm.tif pois.kml --out flight --profile mapper-rtk --height-m 3"),
+    ("For a script", "hedgehop plan dsm.tif pois.csv --out flight --json > flight.json"),
+)
+CERTIFY = _examples(
+    ("A mission from any ground station", "hedgehop certify dsm.tif mission.plan --position-error-m 0.1"),
+    ("Every leg, not only the worst", "hedgehop certify dsm.tif mission.waypoints --verbose"),
+)
+SURVEY = _examples(
+    ("An area at 1 cm per pixel", "hedgehop survey dsm.tif area.geojson --out flight --gsd-cm 1"),
+    ("25 m above the surface, lines from west to east", "hedgehop survey dsm.tif area.kml --out flight "
+     "--height-m 25 --angle-deg 90"),
+)  # fmt: skip
+BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))

@@ -1,0 +1,52 @@
+"""A certificate in a few lines for the terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from planning.report_words import metres, metres_up
+
+
+def verdict_lines(summary: dict[str, Any]) -> list[str]:
+    """What a summary says. Clearances are rounded down and demands up, so that none is flattered."""
+    lines = [
+        "CERTIFIED" if summary["certified"] else "NOT CERTIFIED",
+        f"  distance to the surface model: at least {_least(summary['min_distance_m'])}, "
+        f"required {metres_up(summary['required_clearance_m'])}",
+        f"  height above it: at least {_least(summary['min_vertical_m'])}",
+        f"  nearest {_place(summary['worst'])}",
+        f"  way home: {_way_home(summary)}",
+        f"  column over home: {'clear' if summary['home_column_clear'] else 'NOT clear'}",
+    ]
+    lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
+    return lines
+
+
+def leg_lines(legs: list[dict[str, Any]]) -> list[str]:
+    """One line per leg: where it leads, and how near it comes."""
+    return [
+        f"  leg {leg['leg'] + 1} to item {leg['item'] + 1}: {_least(leg['min_distance_m'])} from the surface model "
+        f"{leg['at_s_m']:.1f} m along the line, {_least(leg['min_vertical_m'])} above it"
+        for leg in legs
+    ]
+
+
+def _place(worst: dict[str, Any]) -> str:
+    if worst["lat_deg"] is None:
+        return f"on leg {worst['leg'] + 1}, beyond the range of the map grid"
+    place = f"at {worst['lat_deg']:.7f}, {worst['lon_deg']:.7f}"
+    return f"{place}, {worst['alt_rel_home_m']:.2f} m above home, on leg {worst['leg'] + 1}"
+
+
+def _way_home(summary: dict[str, Any]) -> str:
+    needed_m, set_m = summary["rtl_height_needed_m"], summary["rtl_height_m"]
+    if needed_m is None:
+        return "leads over unknown terrain"
+    verb = "clear" if needed_m <= set_m else "NOT clear"
+    return f"{verb} at the return height of {metres(set_m)} above home, needed {metres_up(needed_m)}"
+
+
+def _least(value_m: float | None) -> str:
+    """JSON's null stands for a height over unknown terrain."""
+    return metres(-math.inf if value_m is None else value_m)
