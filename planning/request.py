@@ -10,6 +10,8 @@ from planning.model import ClearanceParams, MissionParams, PathParams, Poi, Surf
 
 LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
+FEWEST_ITEMS = 4
+"""Take-off, two waypoints and the return."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,8 @@ class PlanRequest:
 
 def check_request(request: PlanRequest) -> None:
     """Raises ParameterError, naming the first value that no flight can have."""
-    path, profile = request.path, request.profile
+    path = request.path
+    check_demands(request)
     _positive("Radius R", request.surface.radius_m, "m")
     _positive("Height H", request.surface.height_m, "m")
     for name, value, unit in (
@@ -54,32 +57,43 @@ def check_request(request: PlanRequest) -> None:
         ("Descent limit", path.max_descent_m_s, "m/s"),
         ("Acceleration limit", path.max_accel_m_s2, "m/s2"),
         ("Sampling step", path.step_m, "m"),
-        ("Vehicle radius", profile.radius_m, "m"),
-        ("Endurance", profile.endurance_s, "s"),
     ):
         _positive(name, value, unit)
-    _at_least_zero("RTL height", profile.rtl_height_m, "m")
-    _at_least_zero("Position error", profile.position_error_m, "m")
     _at_least_zero("Excess height", request.mission.excess_height_m, "m")
     check_hole_area(request.surface.fill_hole_area_m2)
     if request.surface.smooth_sigma_m is not None:
         _at_least_zero("Smoothing", request.surface.smooth_sigma_m, "m")
-    if request.required_clearance_m is not None:
-        _positive("Required clearance", request.required_clearance_m, "m")
-    if request.max_height_above_ground_m is not None:
-        _positive("Maximum height above ground", request.max_height_above_ground_m, "m")
     if path.step_m > request.surface.radius_m:
         raise ParameterError(
             f"Sampling step {path.step_m:g} m is larger than radius R, {request.surface.radius_m:g} m.",
             advice="Sample every 0.1 m as a rule: between samples the path does not follow the terrain.",
         )
-    if not 0 <= profile.reserve_share < 1:
-        raise ParameterError(f"Reserve is {profile.reserve_share:g}.", advice="Give a share from 0 to below 1.")
     if not path.mean_speed_m_s < path.max_speed_m_s <= 2 * path.mean_speed_m_s:
         raise ParameterError(
             f"Mean speed {path.mean_speed_m_s:g} m/s and maximum speed {path.max_speed_m_s:g} m/s contradict"
             " each other.",
-            advice="The timing law needs mean < maximum <= 2 x mean.",
+            advice=f"With this mean, give a maximum above {path.mean_speed_m_s:g} and at most "
+            f"{2 * path.mean_speed_m_s:g} m/s: the timing law needs it.",
+        )
+
+
+def check_demands(request: PlanRequest) -> None:
+    """Raises ParameterError for a vehicle or a clearance that cannot be; what certifying alone needs."""
+    profile = request.profile
+    _positive("Vehicle radius", profile.radius_m, "m")
+    _positive("Endurance", profile.endurance_s, "s")
+    _at_least_zero("RTL height", profile.rtl_height_m, "m")
+    _at_least_zero("Position error", profile.position_error_m, "m")
+    if request.required_clearance_m is not None:
+        _positive("Required clearance", request.required_clearance_m, "m")
+    if request.max_height_above_ground_m is not None:
+        _positive("Maximum height above ground", request.max_height_above_ground_m, "m")
+    if not 0 <= profile.reserve_share < 1:
+        raise ParameterError(f"Reserve is {profile.reserve_share:g}.", advice="Give a share from 0 to below 1.")
+    if profile.max_items < FEWEST_ITEMS:
+        raise ParameterError(
+            f"The vehicle is said to take {profile.max_items} mission items.",
+            advice=f"A mission has {FEWEST_ITEMS} or more: give the vehicle's true limit.",
         )
 
 
@@ -104,9 +118,9 @@ def check_hole_area(max_area_m2: float) -> None:
 
 def _positive(name: str, value: float, unit: str) -> None:
     if not 0 < value <= LARGEST:
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be above zero, at most {LARGEST:g}.")
+        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be above zero, at most {LARGEST:,.0f}.")
 
 
 def _at_least_zero(name: str, value: float, unit: str) -> None:
     if not 0 <= value <= LARGEST:
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be zero or more, at most {LARGEST:g}.")
+        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be zero or more, at most {LARGEST:,.0f}.")

@@ -14,10 +14,10 @@ from planning.flown import flown_line
 from planning.formats.commands import has_position
 from planning.formats.detect import read_mission
 from planning.holes import HoleReport, fill_holes
-from planning.model import Certificate, Mission, VehicleProfile
+from planning.model import Certificate, ClearanceParams, Mission, VehicleProfile
 from planning.plan import CERTIFICATE_STEP, hole_assumptions
 from planning.poi_files import warn_swapped
-from planning.request import PlanRequest, check_hole_area
+from planning.request import PlanRequest, check_demands, check_hole_area
 from planning.summary import certificate_summary, dsm_summary
 from server.cli import options as o
 from server.cli.files import read_small
@@ -50,11 +50,13 @@ def certify(
     with refusing(as_json=as_json):
         vehicle = profile_with(profile, position_error_m=position_error_m, rtl_height_m=rtl_height_m)
         check_hole_area(max_hole_m2)
-        params = _demands(vehicle, required_clearance_m, max_height_above_ground_m).clearance()
+        params = _demands(vehicle, required_clearance_m, max_height_above_ground_m)
         flight = read_mission(mission.name, read_small(mission))
         timer = StepTimer(progress)
         source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
         warnings = [*flight.warnings, *warn_swapped([i for i in flight.items if has_position(i)], source)]
+        for warning in warnings:
+            say(f"Note: {warning}")
         timer(CERTIFICATE_STEP, None)
         filled, holes = fill_holes(source, max_area_m2=max_hole_m2)
         made |= {**hole_assumptions(holes, max_hole_m2), "vehicle_profile": vehicle.name}
@@ -65,10 +67,12 @@ def certify(
         raise typer.Exit(DONE if certificate.certified else FAILED)
 
 
-def _demands(vehicle: VehicleProfile, required_m: float | None, max_height_m: float | None) -> PlanRequest:
-    return PlanRequest(
+def _demands(vehicle: VehicleProfile, required_m: float | None, max_height_m: float | None) -> ClearanceParams:
+    request = PlanRequest(
         pois=(), profile=vehicle, required_clearance_m=required_m, max_height_above_ground_m=max_height_m
     )
+    check_demands(request)
+    return request.clearance()
 
 
 def _summary(
@@ -83,8 +87,6 @@ def _summary(
 
 
 def _answer(summary: dict[str, Any], certificate: Certificate, *, as_json: bool, verbose: bool) -> None:
-    for warning in summary["warnings"]:
-        say(f"Note: {warning}")
     whole = certificate_json(certificate) if verbose else {}
     if as_json:
         print_json(summary | {key: whole[key] for key in ("legs", "assumptions") if key in whole})

@@ -13,19 +13,24 @@ from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES
 from server.errors import StorageError, StorageFullError
 
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_ORDER = "The surface model comes first, the points, area or mission second."
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def read_small(path: Path) -> bytes:
-    """The bytes of a mission, point or polygon file. Raises FormatError for one that is too large to be one."""
-    with path.open("rb") as file:
-        data = file.read(MAX_BYTES + 1)
+    """The bytes of a mission, point or polygon file. Raises FormatError for what cannot be one."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        what = f"The file cannot be read: {error.strerror or error}."
+        raise FormatError(what, where=str(path), advice="Check the path and its permissions.") from None
+    if data.startswith(_TIFF):
+        raise FormatError("This is a TIFF.", where=str(path), advice=_ORDER)
     if len(data) > MAX_BYTES:
-        raise FormatError(
-            f"The file has more than {MAX_BYTES // 1024**2} MB, too many for points or a mission.",
-            where=path.name,
-            advice="The surface model comes first, the other file second.",
-        )
+        what = f"The file has more than {MAX_BYTES // 1024**2} MB, too many for points or a mission."
+        raise FormatError(what, where=str(path), advice=_ORDER)
     return data
 
 

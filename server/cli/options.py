@@ -65,20 +65,27 @@ Paper = Annotated[
 
 MeanSpeed = Annotated[
     float | None,
-    typer.Option("--mean-speed-m-s", help="Mean speed between points [profile: 3].", rich_help_panel=_PATH),
+    typer.Option(
+        "--mean-speed-m-s", help="Mean speed between points; default: the profile's (3).", rich_help_panel=_PATH
+    ),
 ]
 MaxSpeed = Annotated[
     float | None,
-    typer.Option("--max-speed-m-s", help="Top speed, at most twice the mean [profile: 5].", rich_help_panel=_PATH),
+    typer.Option(
+        "--max-speed-m-s", help="Top speed, at most twice the mean; default: the profile's (5).", rich_help_panel=_PATH
+    ),
 ]
 MaxClimb = Annotated[
-    float | None, typer.Option("--max-climb-m-s", help="Climb limit [profile: 2.5].", rich_help_panel=_PATH)
+    float | None,
+    typer.Option("--max-climb-m-s", help="Climb limit; default: the profile's (2.5).", rich_help_panel=_PATH),
 ]
 MaxDescent = Annotated[
-    float | None, typer.Option("--max-descent-m-s", help="Descent limit [profile: 1.5].", rich_help_panel=_PATH)
+    float | None,
+    typer.Option("--max-descent-m-s", help="Descent limit; default: the profile's (1.5).", rich_help_panel=_PATH),
 ]
 MaxAccel = Annotated[
-    float | None, typer.Option("--max-accel-m-s2", help="Acceleration limit [profile: 2.5].", rich_help_panel=_PATH)
+    float | None,
+    typer.Option("--max-accel-m-s2", help="Acceleration limit; default: the profile's (2.5).", rich_help_panel=_PATH),
 ]
 Step = Annotated[float, typer.Option("--step-m", help="Sampling distance along the path.", rich_help_panel=_PATH)]
 OnSteep = Annotated[
@@ -101,13 +108,15 @@ Profile = Annotated[
 ]
 MaxItems = Annotated[
     int | None,
-    typer.Option("--max-items", help="Mission items the vehicle takes [profile: 650].", rich_help_panel=_VEHICLE),
+    typer.Option(
+        "--max-items", help="Mission items the vehicle takes; default: the profile's (650).", rich_help_panel=_VEHICLE
+    ),
 ]
 PositionError = Annotated[
     float | None,
     typer.Option(
         "--position-error-m",
-        help="Standalone GNSS 2.5 m, RTK 0.1 m [profile: 2.5].",
+        help="Standalone GNSS 2.5 m, RTK 0.1 m; default: the profile's (2.5).",
         rich_help_panel=_VEHICLE,
     ),
 ]
@@ -115,7 +124,7 @@ RtlHeight = Annotated[
     float | None,
     typer.Option(
         "--rtl-height-m",
-        help="Return height above home, as set in the autopilot [profile: 30].",
+        help="Return height above home, as set in the autopilot; default: the profile's (30).",
         rich_help_panel=_VEHICLE,
     ),
 ]

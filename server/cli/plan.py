@@ -15,7 +15,7 @@ from planning.errors import ParameterError
 from planning.model import MissionParams, PathParams, Poi, SurfaceParams
 from planning.poi import check_pois, shortest_order
 from planning.poi_files import read_pois, warn_swapped
-from planning.request import PlanRequest
+from planning.request import PlanRequest, check_request
 from planning.vehicle_profile import path_params
 from server.cli import options as o
 from server.cli.files import read_small
@@ -104,6 +104,7 @@ def plan(
             required_clearance_m=required_clearance_m,
             max_height_above_ground_m=max_height_above_ground_m,
         )
+        check_request(request)
         points = read_pois(pois.name, read_small(pois))
         waiting = with_loiter(points.pois, loiter_s)
 

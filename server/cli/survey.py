@@ -14,7 +14,7 @@ from planning.errors import ParameterError, PoiError
 from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, SurfaceParams
 from planning.poi_files import read_pois
-from planning.request import PlanRequest
+from planning.request import PlanRequest, check_request
 from planning.survey import SurveyPlan, survey_lines
 from planning.vehicle_profile import path_params
 from server.cli import options as o
@@ -103,8 +103,7 @@ def survey(
                 where="--profile",
                 advice="Use one with a [camera] table.",
             )
-        camera, home_deg = vehicle.camera, parse_place(home, "--home")
-        path = path_with(path_params(vehicle), step_m, on_steep)
+        camera = vehicle.camera
         mission = MissionParams(
             max_items=vehicle.max_items,
             excess_height_m=excess_height_m,
@@ -112,6 +111,17 @@ def survey(
             altitude_reference=altitude_reference,
             gimbal_pitch_deg=-90.0,
         )
+        request = PlanRequest(
+            pois=(),
+            profile=vehicle,
+            surface=SurfaceParams(radius_m, smooth_sigma_m=smooth_m, floor=not paper, fill_hole_area_m2=max_hole_m2),
+            path=path_with(path_params(vehicle), step_m, on_steep),
+            mission=mission,
+            home_lat_lon_deg=parse_place(home, "--home"),
+            required_clearance_m=required_clearance_m,
+            max_height_above_ground_m=max_height_above_ground_m,
+        )
+        check_request(request)
         corners = _corners(polygon)
 
         def request_for(model: Dsm) -> PlanRequest:
@@ -126,17 +136,11 @@ def survey(
                 angle_deg=angle_deg,
             )
             _say_pattern(lines)
-            return PlanRequest(
+            return replace(
+                request,
                 pois=lines.pois,
-                profile=vehicle,
-                surface=SurfaceParams(
-                    radius_m, lines.height_m, smooth_m, floor=not paper, fill_hole_area_m2=max_hole_m2
-                ),
-                path=path,
+                surface=replace(request.surface, height_m=lines.height_m),
                 mission=replace(mission, camera_trigger_m=lines.trigger_distance_m),
-                home_lat_lon_deg=home_deg,
-                required_clearance_m=required_clearance_m,
-                max_height_above_ground_m=max_height_above_ground_m,
             )
 
         model = ModelOptions(crs, z_scale, vertical_datum, remove_spikes)
@@ -156,8 +160,8 @@ def _corners(polygon: Path) -> np.ndarray:
 
 
 def _say_pattern(lines: SurveyPlan) -> None:
+    pattern = f"{lines.lines} lines {lines.line_spacing_m:.1f} m apart" if lines.lines > 1 else "one line"
     say(
-        f"Note: {lines.lines} {'line' if lines.lines == 1 else 'lines'} {lines.line_spacing_m:.1f} m apart, "
-        f"{lines.height_m:.1f} m above the surface, {lines.gsd_cm:.2f} cm per pixel, "
+        f"Note: {pattern}, {lines.height_m:.1f} m above the surface, {lines.gsd_cm:.2f} cm per pixel, "
         f"a photo every {lines.trigger_distance_m:.1f} m."
     )

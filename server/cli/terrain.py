@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planning.dsm import Dsm
+from planning.errors import RasterFormatError
 from planning.geotiff import ReadReport, read_dsm_reported
 from server.cli.output import end_progress, say
 from server.stopwatch import READ_STEP, StepTimer
@@ -23,6 +24,8 @@ class ModelOptions:
 
 def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
     """The surface model, and what was done to its heights, for the certificate's assumptions."""
+    if path.is_dir():
+        raise RasterFormatError("This is a directory.", where=str(path), advice="Give the file of the model itself.")
     timer(READ_STEP, 0.0)
     dsm, report = read_dsm_reported(
         path,

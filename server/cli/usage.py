@@ -25,9 +25,10 @@ def run_command(app: typer.Typer, arguments: Sequence[str] | None = None) -> int
 
 
 def _refuse(error: TyperException, *, as_json: bool) -> None:
-    what = " ".join(error.format_message().split())
+    what = " ".join(error.format_message().replace("Value error, ", "").split())
     if not what:  # no arguments at all: the help was the answer
         return
+    what += "" if what.endswith((".", "?")) else "."
     context = getattr(error, "ctx", None)
     command = "hedgehop" if context is None else context.command_path
     advice = f"Try: {command} --help"

@@ -3,7 +3,6 @@ import { EmptyState } from "./EmptyState";
 import { Legend } from "./Legend";
 import { ViewTools } from "./ViewTools";
 import { Toasts } from "../shell/Notices";
-import { ErrorBox } from "../ui/ErrorBox";
 import { document_, pageId, selection, terrain } from "../store/state";
 
 const HINTS = {
@@ -47,7 +46,6 @@ export function Scene() {
       )}
       <ToolHint />
       <div class="scene-messages">
-        <ErrorBox place="view" />
         <Toasts />
       </div>
     </section>

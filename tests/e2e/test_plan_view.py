@@ -1,0 +1,144 @@
+"""The first user story in a real browser, on a real surface model."""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from planning.formats import read_mission
+from tests.e2e.conftest import Station
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+
+def test_plan_on_a_real_model_from_sign_in_to_export(
+    station: Station, page: Page, shared_data: Path, tmp_path: Path
+) -> None:
+    _sign_in(page, station)
+    _load_model(page, shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
+    _click_points(page, [(0.40, 0.50), (0.55, 0.55), (0.62, 0.45)])
+    before = _distance_m(page)
+
+    height = page.get_by_test_id("height-input")
+    height.fill("9")
+    height.press("Enter")
+    _wait_until(page, lambda: _distance_m(page) > before + 2)
+    radius = page.get_by_test_id("radius-input")
+    radius.fill("8")
+    radius.press("Enter")
+    expect(page.get_by_test_id("undo")).to_be_enabled()
+
+    page.keyboard.press("Escape")
+    page.get_by_test_id("undo").click()
+    expect(radius).to_have_value("20")
+    page.get_by_test_id("undo").click()
+    expect(height).to_have_value("5")
+    _wait_until(page, lambda: abs(_distance_m(page) - before) < 0.02)
+    page.get_by_test_id("redo").click()
+    expect(height).to_have_value("9")
+
+    archive = zipfile.ZipFile(BytesIO(_export_all(page)))
+    certificate = json.loads(archive.read("certificate.json"))
+    mission = read_mission("mission.waypoints", archive.read("mission.waypoints"))
+    assert certificate["min_distance_m"] > before + 2
+    assert len(mission.items) == certificate["items"]
+    assert b"<script" not in archive.read("report.html")
+
+
+def test_a_plan_survives_a_power_cut(station: Station, page: Page) -> None:
+    _sign_in(page, station)
+    page.get_by_test_id("empty-demo").click()
+    expect(page.get_by_test_id("poi-row")).to_have_count(6)
+    name = page.get_by_test_id("poi-name").first
+    name.fill("Cairn <b>1</b>")
+    name.press("Enter")
+    expect(page.get_by_test_id("undo")).to_be_enabled()
+    expect(page.get_by_test_id("saved-state")).to_contain_text("Saved")
+    station.kill()
+    station.start()
+    page.goto(station.link)
+    expect(page.get_by_test_id("poi-name").first).to_have_value("Cairn <b>1</b>")
+    page.get_by_test_id("undo").click()
+    expect(page.get_by_test_id("poi-name").first).not_to_have_value("Cairn <b>1</b>")
+
+
+def test_a_file_that_is_no_surface_model_is_explained_where_it_was_dropped(
+    station: Station, page: Page, shared_data: Path, tmp_path: Path
+) -> None:
+    _sign_in(page, station)
+    fake = tmp_path / "model.tif"
+    fake.write_text("<VRTDataset></VRTDataset>", encoding="utf-8")
+    _choose_file(page, fake)
+    expect(page.get_by_text("model.tif").first).to_be_visible()
+    expect(page.get_by_text(re.compile("GeoTIFF or ESRI ASCII")).first).to_be_visible()
+
+    _choose_file(page, shared_data / "dsm" / "landslide" / "pre_runout_DEM.asc")
+    crs = page.get_by_test_id("raster-crs")
+    expect(crs).to_be_visible()
+    crs.fill("EPSG:32633")
+    page.get_by_test_id("raster-retry").click()
+    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+
+
+def _sign_in(page: Page, station: Station) -> None:
+    page.goto(station.link)
+    expect(page.get_by_test_id("verdict")).to_be_visible()
+
+
+def _choose_file(page: Page, path: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        page.get_by_test_id("terrain-file").first.click()
+    chooser.value.set_files(str(path))
+
+
+def _load_model(page: Page, path: Path) -> None:
+    _choose_file(page, path)
+    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+
+
+def _click_points(page: Page, shares: list[tuple[float, float]]) -> None:
+    """Adds points by clicking the surface, at shares of the 3D view's width and height."""
+    page.get_by_test_id("tool-add_poi").click()
+    box = page.get_by_test_id("scene").bounding_box()
+    assert box is not None
+    # The surface is there once a click finds it: until then clicks meet nothing.
+    for number, (x, y) in enumerate(shares, start=1):
+        place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
+        _wait_until(page, lambda number=number, place=place: _clicked(page, place, number))
+    page.keyboard.press("Escape")
+
+
+def _clicked(page: Page, place: tuple[float, float], wanted: int) -> bool:
+    rows = page.get_by_test_id("poi-row")
+    if rows.count() < wanted:
+        page.mouse.click(*place)
+        page.wait_for_timeout(1500)
+    return rows.count() == wanted
+
+
+def _distance_m(page: Page) -> float:
+    """The smallest distance on the certificate of the finished computation; -1 until there is one."""
+    text = page.get_by_test_id("min-distance").inner_text() if page.get_by_test_id("min-distance").count() else ""
+    found = re.search(r"-?\d+\.\d+", text)
+    return float(found.group(0)) if found else -1.0
+
+
+def _wait_until(page: Page, condition, timeout_ms: int = 30_000) -> None:
+    for _ in range(timeout_ms // 200):
+        if condition():
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError("not within the time allowed")
+
+
+def _export_all(page: Page) -> bytes:
+    page.get_by_test_id("export-menu").click()
+    with page.expect_download() as download:
+        page.get_by_test_id("export-all.zip").click()
+    return Path(download.value.path()).read_bytes()
