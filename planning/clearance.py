@@ -17,6 +17,7 @@ from pyproj import Proj
 import planning
 from planning.certificate.as_json import certificate_json
 from planning.certificate.columns import FREE_RISE_M, FREE_SLOPE, column_obstacle
+from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.places import distance_flown, places_along
@@ -25,6 +26,7 @@ from planning.certificate.reasons import (
     column_reasons,
     height_reason,
     line_reasons,
+    near_return_reason,
     return_reason,
     scale_reason,
     unjudged_reasons,
@@ -47,7 +49,7 @@ __all__ = ["certificate_json", "certify"]
 F64 = NDArray[np.float64]
 
 RETURN_STEP_M = 0.5
-"""Ways home are judged from places at most this far apart, and from every vertex."""
+"""Ways home are judged from pieces of the line at most this long; inside one, the lower altitude counts."""
 LONGEST_LINE_M = 100_000.0
 """Farther than any battery: a longer line is a mistaken coordinate."""
 SCALE_TOLERANCE = 0.01
@@ -85,6 +87,7 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
     trend_places, trend_s_m = places_along(points_m, trend_step_m)
     trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
     needed_m, needed_from = _return_height(pyramid, dsm, line, points_m, params)
+    near_m, near_from = _near_return(pyramid, dsm, line, points_m, params)
     home_obstacle, landing_obstacle = _columns(dsm, line, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
@@ -94,6 +97,7 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
         *unjudged_reasons(line),
         *line_reasons(legs, worst, params, worst_is_unknown=worst_is_unknown),
         return_reason(needed_m, needed_from, dsm, params),
+        near_return_reason(near_m, near_from, needed_m, dsm, params),
         *column_reasons(home_obstacle, landing_obstacle),
         height_reason(float(highest_m[highest_leg]), highest_leg, int(line.leg_item[highest_leg]), params),
         scale_reason(scale, SCALE_TOLERANCE),
@@ -184,13 +188,35 @@ def _return_height(
 ) -> tuple[float, F64 | None]:
     """Height above home that every way home needs, 0 when none needs any, and the place that needs it."""
     places_m, _ = places_along(points_m, RETURN_STEP_M)
-    home_m = _from_corner(np.array([[*line.home_xy_m, 0.0]]), dsm)[0, :2]
-    altitude_m, place = return_altitude(pyramid, places_m, home_m, params.required_clearance_m)
+    return _needed(pyramid, dsm, line, places_m, places_m, params)
+
+
+def _near_return(
+    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, points_m: F64, params: ClearanceParams
+) -> tuple[float, F64 | None]:
+    """As `_return_height`, regarding that close to home autopilots do not climb to the return height."""
+    places_m, _ = places_along(points_m, RETURN_STEP_M)
+    raised_m = places_m.copy()
+    raised_m[:, 2] = return_altitudes(
+        places_m, _home(dsm, line), line.home_alt_dsm_m, rtl_height_m=params.rtl_height_m, step_m=RETURN_STEP_M
+    )
+    return _needed(pyramid, dsm, line, places_m, raised_m, params)
+
+
+def _needed(
+    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, places_m: F64, flown_m: F64, params: ClearanceParams
+) -> tuple[float, F64 | None]:
+    """Height above home, and the place, that returns flown at the altitudes of ``flown_m`` do not reach."""
+    altitude_m, place = return_altitude(pyramid, flown_m, _home(dsm, line), params.required_clearance_m)
     if place < 0:
         return 0.0, None
     x, y, z = places_m[place]
     at_m = np.array([x + dsm.transform.c, dsm.transform.f - y, z])
     return max(0.0, altitude_m - line.home_alt_dsm_m), at_m
+
+
+def _home(dsm: Dsm, line: FlownLine) -> F64:
+    return _from_corner(np.array([[*line.home_xy_m, 0.0]]), dsm)[0, :2]
 
 
 def _columns(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[str | None, str | None]:
@@ -227,8 +253,9 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
             f" or {FREE_SLOPE:.2f} of their distance"
         ),
         "return": (
-            f"from places every {RETURN_STEP_M} m: climb to the return height or keep a larger own height,"
-            " then straight and level to home"
+            "from every place of the line: climb to the return height or keep a larger own height,"
+            " then straight and level to home; close to home the climb is cut short (ArduPilot RTL_CONE_SLOPE"
+            f" {SLOPE:g}, PX4 RTL_CONE_ANG 45 within {NEAR_M:g} m)"
         ),
         "parameters": asdict(params),
         "notes": list(line.notes),

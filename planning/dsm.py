@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
 from planning.errors import ParameterError
+from planning.vertical_datum import is_above_sea_level
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -116,5 +117,5 @@ def _transformer(wkt: str, *, inverse: bool) -> Transformer:
 
 
 def is_amsl(vertical_datum: str | None) -> bool:
-    """Whether heights in this datum are above mean sea level (a geoid), not above the ellipsoid."""
-    return vertical_datum is not None and "ellipsoid" not in vertical_datum.lower()
+    """Whether heights in this datum are known to be above mean sea level: a geoid or a levelling network."""
+    return vertical_datum is not None and is_above_sea_level(vertical_datum)

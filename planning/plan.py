@@ -45,6 +45,8 @@ PATH_STEP = "Laying the path"
 CERTIFICATE_STEP = "Proving the clearance"
 
 _READ_BACK_TOLERANCE_M = 0.001
+_HEIGHT_UNIT_M = 0.01
+_HOME_DECIMALS = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,19 +118,31 @@ def plan_mission(
 def read_back(mission: Mission, dsm: Dsm) -> FlownLine:
     """The line that the exported files describe, read by their own readers.
 
-    Raises MissionError when the two formats do not describe the same flight: then one of them is wrong.
+    Raises MissionError when a file does not describe the flight that was planned: then a writer is wrong.
     """
-    lines = [
-        flown_line(wpl.read_wpl(wpl.write_wpl(mission)), dsm),
-        flown_line(qgc_plan.read_plan(qgc_plan.write_plan(mission)), dsm),
-    ]
-    first, second = (line.points_m for line in lines)
-    if first.shape != second.shape or not np.allclose(first, second, atol=_READ_BACK_TOLERANCE_M):
-        raise MissionError(
-            "The exported .waypoints and .plan files do not describe the same flight.",
-            advice="Do not fly this plan; report it with its files.",
-        )
-    return lines[0]
+    meant = flown_line(mission, dsm)
+    lines = {
+        "mission.waypoints": flown_line(wpl.read_wpl(wpl.write_wpl(mission)), dsm),
+        "mission.plan": flown_line(qgc_plan.read_plan(qgc_plan.write_plan(mission)), dsm),
+    }
+    for name, line in lines.items():
+        if not _same_flight(line, meant):
+            raise MissionError(
+                "The exported file does not describe the flight that was planned.",
+                where=name,
+                advice="Do not fly this plan; report it with the points and the surface model.",
+            )
+    return lines["mission.waypoints"]
+
+
+def _same_flight(line: FlownLine, meant: FlownLine) -> bool:
+    """Whether the line is the one that was meant; heights may be rounded up to the next centimetre, never down."""
+    if line.points_m.shape != meant.points_m.shape or line.ends_with_rtl != meant.ends_with_rtl:
+        return False
+    off_m = line.points_m - meant.points_m
+    off_home_m = np.abs([*np.subtract(line.home_xy_m, meant.home_xy_m), line.home_alt_dsm_m - meant.home_alt_dsm_m])
+    beside, below, above = np.abs(off_m[:, :2]).max(), -off_m[:, 2].min(), off_m[:, 2].max()
+    return bool(max(beside, below, above - _HEIGHT_UNIT_M, off_home_m.max()) <= _READ_BACK_TOLERANCE_M)
 
 
 def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfile:
@@ -170,7 +184,9 @@ def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.nd
 
 def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: SampledPath) -> BuiltMission:
     """Items of the mission; a landing at home first learns how high the way back must be."""
-    home = home_from_dsm(dsm, request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg))
+    lat_deg, lon_deg = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
+    # As files carry it: on the edge of a cell the last digits decide whose height home has.
+    home = home_from_dsm(dsm, (round(lat_deg, _HOME_DECIMALS), round(lon_deg, _HOME_DECIMALS)))
 
     def build(params: MissionParams, needed_m: float | None = None) -> BuiltMission:
         return build_mission(path, home, params, profile, dsm, request.pois, rtl_height_needed_m=needed_m)

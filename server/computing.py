@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from planning.errors import PlanningError
 from server import tasks
 from server.documents import missing
-from server.errors import ServerError, error_doc
-from server.jobs import JobCancelledError, Lane, WorkerDiedError
+from server.errors import JobCancelledError, NotFoundError, NotReadyError, reported
+from server.jobs import Lane
 from server.scene.payload import PlanScene
 from server.schemas import Computation, PlanDoc
 
-_SUPERSEDE_AFTER_S = 2.0
+log = logging.getLogger("hedgehop.plan")
+
+SUPERSEDE_AFTER_S = 2.0
 """A newer edit ends a computation that has run longer; shorter ones may finish, which is cheaper."""
-_TRADE_WHEN_IDLE_S = 0.4
+TRADE_WHEN_IDLE_S = 0.4
 
 
 class Computing:
     """One loop, one lane. ``changed()`` is called whenever ``state`` or ``scene`` is new."""
 
-    def __init__(self, lane: Lane, *, terrain_dir: Callable[[str], Path], changed: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        lane: Lane,
+        *,
+        terrain_dir: Callable[[str], Path],
+        changed: Callable[[], None],
+        supersede_after_s: float = SUPERSEDE_AFTER_S,
+        trade_when_idle_s: float = TRADE_WHEN_IDLE_S,
+    ) -> None:
         self._lane, self._terrain_dir, self._changed = lane, terrain_dir, changed
+        self._supersede_after_s, self._trade_when_idle_s = supersede_after_s, trade_when_idle_s
         self._wanted: tuple[int, PlanDoc] | None = None
         self._wake = asyncio.Event()
         self._started_mono_s: float | None = None
@@ -42,12 +54,12 @@ class Computing:
         else:
             last = None if forget else self.state.result
             self.state = Computation(revision=revision, state="running", result=last)
-        if self._started_mono_s is not None and time.monotonic() - self._started_mono_s > _SUPERSEDE_AFTER_S:
+        if self._started_mono_s is not None and time.monotonic() - self._started_mono_s > self._supersede_after_s:
             self._lane.cancel()
         self._wake.set()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Until cancelled; whatever goes wrong with one document, the next is answered."""
         while True:
             await self._wake.wait()
             self._wake.clear()
@@ -56,19 +68,30 @@ class Computing:
 
     async def _answer(self, revision: int, document: PlanDoc) -> None:
         try:
-            directory = self._terrain_dir(document.terrain_id or "")
-            result, scene = await self._lane.call(
-                tasks.compute_plan, directory, document, progress=lambda step, share: self._note_start()
-            )
+            directory = self._directory(document)
+            result, scene = await self._call(tasks.compute_plan, directory, document)
         except JobCancelledError:
             return
-        except (PlanningError, ServerError) as error:
-            self._settle(revision, Computation(revision=revision, state="error", error=error_doc(error)), None)
+        except Exception as error:
+            doc = reported(error, log, "Planning")
+            self._settle(revision, Computation(revision=revision, state="error", error=doc), None)
             return
-        finally:
-            self._started_mono_s = None
         self._settle(revision, Computation(revision=revision, state="ready", result=result), scene)
         await self._add_trade(revision, document, directory)
+
+    def _directory(self, document: PlanDoc) -> Path:
+        try:
+            return self._terrain_dir(document.terrain_id or "")
+        except NotFoundError:
+            raise NotReadyError(
+                "The surface model of this plan has been deleted.", advice="Choose another surface model."
+            ) from None
+
+    async def _call(self, function: Callable[..., Any], directory: Path, document: PlanDoc) -> Any:
+        try:
+            return await self._lane.call(function, directory, document, progress=lambda step, share: self._note_start())
+        finally:
+            self._started_mono_s = None
 
     def _note_start(self) -> None:
         """The lane may have been busy with something else until now: its time does not count."""
@@ -83,14 +106,18 @@ class Computing:
 
     async def _add_trade(self, revision: int, document: PlanDoc, directory: Path) -> None:
         try:
-            async with asyncio.timeout(_TRADE_WHEN_IDLE_S):
+            async with asyncio.timeout(self._trade_when_idle_s):
                 await self._wake.wait()
             return
         except TimeoutError:
             pass
         try:
-            trade = await self._lane.call(tasks.compute_trade, directory, document)
-        except (JobCancelledError, PlanningError, WorkerDiedError):
+            trade = await self._call(tasks.compute_trade, directory, document)
+        except JobCancelledError:
+            return
+        except Exception as error:
+            # The plan itself stands; the table of alternatives is left out.
+            reported(error, log, "The trade table")
             return
         result = self.state.result
         if result is not None and self.state.revision == revision:

@@ -8,20 +8,24 @@ ServerError
 ├── ConflictError          what was asked for does not fit the present state
 │   ├── StaleRevisionError     an edit of a plan that has changed meanwhile
 │   ├── NotReadyError          an export without a finished plan
-│   └── InUseError             deleting what something else needs
+│   ├── InUseError             deleting what something else needs
+│   └── JobCancelledError      somebody cancelled the job
 ├── BadRequestError        a query or body that makes no sense
 ├── TooLargeError          a body beyond its limit
 ├── SlowRequestError       a body that stopped arriving
 ├── StorageError           the data directory cannot be read or written
 │   ├── StorageFullError       no space left
 │   └── DataDirError           not usable at all: refused at start
-├── BusyError              too many pages, or shutting down
+├── BusyError              too many pages or jobs, or shutting down
+├── WorkerDiedError        the process that did the work ended (killed, out of memory)
 └── StartError             settings or port that Hedgehop cannot start with
 
 Like ``planning.errors``, every error says what is wrong, where, and what to do.
 """
 
 from __future__ import annotations
+
+import logging
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
@@ -86,6 +90,10 @@ class InUseError(ConflictError):
     code = "in_use"
 
 
+class JobCancelledError(ConflictError):
+    code = "cancelled"
+
+
 class BadRequestError(ServerError):
     code = "invalid"
 
@@ -114,6 +122,10 @@ class BusyError(ServerError):
     code = "busy"
 
 
+class WorkerDiedError(ServerError):
+    code = "worker_died"
+
+
 class StartError(ServerError):
     code = "start"
 
@@ -137,6 +149,7 @@ STATUS: dict[type[Exception], int] = {
 }
 """Subclasses take the status of their nearest ancestor here; all that is missing is 500."""
 
+_UNFORESEEN = "internal"
 _HTTP_CODES = {404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
 
 
@@ -155,10 +168,18 @@ def error_doc(error: Exception) -> ErrorDoc:
     if isinstance(error, HTTPException):
         return ErrorDoc(code=_HTTP_CODES.get(error.status_code, "http"), what=str(error.detail))
     return ErrorDoc(
-        code="internal",
+        code=_UNFORESEEN,
         what="Something in Hedgehop itself went wrong.",
         advice="Nothing that was saved is lost. The server's log tells what happened.",
     )
+
+
+def reported(error: Exception, log: logging.Logger, doing: str) -> ErrorDoc:
+    """What a page may read; what nobody foresaw goes to the log, with its traceback."""
+    doc = error_doc(error)
+    if doc.code == _UNFORESEEN:
+        log.error("%s failed.", doing, exc_info=error)
+    return doc
 
 
 def _invalid(error: RequestValidationError | ValidationError) -> ErrorDoc:

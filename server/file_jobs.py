@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from server import file_tasks
+from server.errors import NotFoundError
 from server.job_board import JobBoard
 from server.jobs import Lane, Progress
 from server.library import Library
-from server.schemas import JobDoc, PlanDoc, PlanState, TerrainDoc
+from server.schemas import JobDoc, OrthophotoDoc, PlanDoc, TerrainDoc
 
 T = TypeVar("T")
-Change = Callable[[str, Callable[[PlanDoc], PlanDoc]], Awaitable[PlanState]]
+Propose = Callable[[Callable[[PlanDoc], tuple[str, PlanDoc] | None]], Awaitable[object]]
+"""An edit of the document that is open when its turn comes; None: nothing to change."""
 
 
 class FileJobs:
@@ -25,13 +27,11 @@ class FileJobs:
         library: Library,
         board: JobBoard,
         *,
-        change: Change,
-        document: Callable[[], PlanDoc],
+        propose: Propose,
         library_changed: Callable[[], None],
         show_orthophoto: Callable[[], None],
     ) -> None:
-        self._library, self._board = library, board
-        self._change, self._document = change, document
+        self._library, self._board, self._propose = library, board, propose
         self._library_changed, self._show_orthophoto = library_changed, show_orthophoto
 
     def add_terrain(
@@ -47,8 +47,7 @@ class FileJobs:
         """Reads an uploaded surface model; the open plan takes it unless it has points on another one."""
 
         async def work(lane: Lane, progress: Progress) -> None:
-            terrain: TerrainDoc = await self._consume(
-                upload,
+            terrain: TerrainDoc = await self._made(
                 lane.call(
                     file_tasks.import_terrain,
                     self._library.root,
@@ -61,18 +60,17 @@ class FileJobs:
                     progress=progress,
                 ),
             )
-            if self._document().terrain_id is None or not self._document().pois:
-                await self._change(f"Use {terrain.name[:40]}", lambda document: _on_terrain(document, terrain.id))
+            await self._propose(lambda document: _use_if_free(document, terrain))
 
-        return self._board.start(f"Reading {filename}", work)
+        return self._board.start(f"Reading {filename}", work, clean=lambda: upload.unlink(missing_ok=True))
 
     def add_orthophoto(self, upload: Path, filename: str, terrain_id: str) -> JobDoc:
         """Reads an uploaded orthomosaic and drapes it on its surface model."""
         terrain_dir = self._library.terrain_dir(terrain_id)
 
         async def work(lane: Lane, progress: Progress) -> None:
-            photo = await self._consume(
-                upload,
+            self._library.terrain_dir(terrain_id)
+            photo: OrthophotoDoc = await self._made(
                 lane.call(
                     file_tasks.import_orthophoto,
                     self._library.root,
@@ -83,35 +81,60 @@ class FileJobs:
                     progress=progress,
                 ),
             )
-            self._show_orthophoto()
-            await self._change(
-                "Drape orthomosaic", lambda document: document.model_copy(update={"orthophoto_id": photo.id})
-            )
+            await self._drape(photo)
 
-        return self._board.start(f"Reading {filename}", work)
+        return self._board.start(f"Reading {filename}", work, clean=lambda: upload.unlink(missing_ok=True))
 
     def remove_spikes(self, terrain_id: str) -> JobDoc:
         """Makes a copy of a surface model without its isolated spikes and pits, and uses it."""
         terrain_dir = self._library.terrain_dir(terrain_id)
 
         async def work(lane: Lane, progress: Progress) -> None:
-            terrain = await lane.call(file_tasks.without_spikes, self._library.root, terrain_dir, progress=progress)
-            await asyncio.to_thread(self._library.refresh)
-            self._library_changed()
-            await self._change("Remove spikes", lambda document: _on_terrain(document, terrain.id))
+            self._library.terrain_dir(terrain_id)
+            terrain: TerrainDoc = await self._made(
+                lane.call(file_tasks.without_spikes, self._library.root, terrain_dir, progress=progress)
+            )
+            await self._propose(lambda document: _swap(document, terrain_id, terrain))
 
         return self._board.start("Removing spikes", work)
 
-    async def _consume(self, upload: Path, reading: Awaitable[T]) -> T:
-        """Awaits the reading of an uploaded file, which is deleted whatever comes of it."""
+    async def _drape(self, photo: OrthophotoDoc) -> None:
         try:
-            made = await reading
-        finally:
-            await asyncio.to_thread(upload.unlink, missing_ok=True)
+            self._library.terrain_dir(photo.terrain_id)
+        except NotFoundError:
+            # Its surface model was deleted while it was read.
+            await asyncio.to_thread(self._library.delete_orthophoto, photo.id)
+            self._library_changed()
+            raise
+
+        def drape(document: PlanDoc) -> tuple[str, PlanDoc] | None:
+            if document.terrain_id != photo.terrain_id:
+                return None
+            self._show_orthophoto()
+            return "Drape orthomosaic", document.model_copy(update={"orthophoto_id": photo.id})
+
+        await self._propose(drape)
+
+    async def _made(self, making: Awaitable[T]) -> T:
+        """Takes what a worker stores into the library; a worker that was killed while storing leaves nothing."""
+        try:
+            made = await making
+        except Exception:
+            await asyncio.to_thread(self._library.clear_unfinished)
+            raise
         await asyncio.to_thread(self._library.refresh)
         self._library_changed()
         return made
 
 
-def _on_terrain(document: PlanDoc, terrain_id: str) -> PlanDoc:
+def _use_if_free(document: PlanDoc, terrain: TerrainDoc) -> tuple[str, PlanDoc] | None:
+    free = document.terrain_id is None or not (document.pois or document.survey.polygon)
+    return (f"Use {terrain.name[:40]}", on_terrain(document, terrain.id)) if free else None
+
+
+def _swap(document: PlanDoc, terrain_id: str, terrain: TerrainDoc) -> tuple[str, PlanDoc] | None:
+    return ("Remove spikes", on_terrain(document, terrain.id)) if document.terrain_id == terrain_id else None
+
+
+def on_terrain(document: PlanDoc, terrain_id: str) -> PlanDoc:
     return document.model_copy(update={"terrain_id": terrain_id, "orthophoto_id": None})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from planning.demo import demo_dsm
+from planning.errors import PlanningError
 from planning.geotiff import read_dsm_reported, read_orthophoto
 from planning.spikes import Spike, find_spikes
 from planning.spikes import remove_spikes as without
@@ -17,6 +19,16 @@ from server.schemas import OrthophotoDoc, SpikeDoc, TerrainDoc
 
 _STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
 _MAX_SPIKES = 100
+
+
+@contextmanager
+def named(upload: Path, filename: str) -> Iterator[None]:
+    """Errors name the operator's file, not the place where its upload lies."""
+    try:
+        yield
+    except PlanningError as error:
+        error.where = error.where.replace(upload.name, filename)
+        raise
 
 
 def import_terrain(
@@ -31,14 +43,15 @@ def import_terrain(
     report: Progress,
 ) -> TerrainDoc:
     """Reads an uploaded surface model into the library. Raises RasterError."""
-    dsm, found = read_dsm_reported(
-        upload,
-        crs=crs,
-        z_scale=z_scale,
-        vertical_datum=vertical_datum,
-        remove_spikes=remove_spikes,
-        progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
-    )
+    with named(upload, filename):
+        dsm, found = read_dsm_reported(
+            upload,
+            crs=crs,
+            z_scale=z_scale,
+            vertical_datum=vertical_datum,
+            remove_spikes=remove_spikes,
+            progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
+        )
     report("Storing", None)
     spikes = () if found.spikes_removed else found.spikes
     return store_terrain(root, dsm, name=filename, spikes=spike_docs(spikes), warnings=found.warnings)
@@ -49,12 +62,13 @@ def import_orthophoto(
 ) -> OrthophotoDoc:
     """Reads an uploaded orthomosaic, brought onto its surface model's grid. Raises RasterError."""
     dsm = load_terrain(terrain_dir)
-    photo = read_orthophoto(
-        upload,
-        bounds_m=dsm.bounds_m,
-        crs=dsm.crs,
-        progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
-    )
+    with named(upload, filename):
+        photo = read_orthophoto(
+            upload,
+            bounds_m=dsm.bounds_m,
+            crs=dsm.crs,
+            progress=lambda stage, share: report(_STAGES.get(stage, stage), share),
+        )
     report("Storing", None)
     return store_orthophoto(root, photo, name=filename, terrain_id=terrain_id)
 

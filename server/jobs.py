@@ -2,51 +2,71 @@
 
 A lane is one worker process. Cancelling ends the process and the next call starts a fresh one, so that
 neither numba nor GDAL can hold a cancelled job. Exceptions cross as they are; a worker that dies becomes
-``WorkerDiedError``. Reading the pipe happens in a thread of the lane's own: the event loop never waits.
+``WorkerDiedError``. All waiting happens in a thread of the lane's own: the event loop never waits.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import multiprocessing
 import os
-import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, TypeVar
 
-from server.errors import ServerError
+from server.errors import BusyError, JobCancelledError, WorkerDiedError
 
 Progress = Callable[[str, float | None], None]
+T = TypeVar("T")
 
-_NICENESS = 5
-_JOIN_S = 2.0
-
-
-class WorkerDiedError(ServerError):
-    """The worker process ended without an answer (killed, out of memory)."""
-
-    code = "worker_died"
+_REAP_S = 5.0
+# Not multiprocessing's own way: that would import the server's main module, web frameworks and all, in every worker.
+_MAIN = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from server.worker import main; main()"
 
 
-class JobCancelledError(RuntimeError):
-    """Somebody cancelled the job."""
+class _Worker:
+    """One process and the pipe to it."""
+
+    def __init__(self, niceness: int) -> None:
+        self._pipe, theirs = multiprocessing.Pipe()
+        handle = theirs.fileno()
+        arguments = [json.dumps(sys.path), str(handle), str(os.getpid()), str(niceness)]
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _MAIN, *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=[handle],
+        )
+        theirs.close()
+        self.send, self.receive = self._pipe.send, self._pipe.recv
+
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def kill(self) -> None:
+        self._process.kill()
+
+    def reap(self) -> None:
+        """Only when nobody reads the pipe any more: its number may soon belong to another file."""
+        self.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_REAP_S)
+        self._pipe.close()
 
 
 class Lane:
     """One worker process that runs one call at a time."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, *, niceness: int = 5) -> None:
+        self._niceness = niceness
         self._lock = asyncio.Lock()
-        self._pipe: Connection | None = None
-        self._process: BaseProcess | None = None
-        self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix=f"lane-{name}")
-        self._cancelled = False
-        self._running = False
+        self._worker: _Worker | None = None
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix=f"lane-{name}")
+        self._running = self._cancelled = self._closed = False
 
     @property
     def running(self) -> bool:
@@ -57,97 +77,81 @@ class Lane:
     ) -> Any:
         """Runs ``function(*args, report=..., **kwargs)`` in the worker; ``report(step, share)`` feeds ``progress``."""
         async with self._lock:
+            if self._closed:
+                raise BusyError("Hedgehop is shutting down.", advice="Start it again.")
             self._cancelled, self._running = False, True
             try:
-                return await self._exchange((function, args, kwargs), progress)
-            except (EOFError, OSError) as error:
-                self._discard()
-                if self._cancelled:
-                    raise JobCancelledError("The job was cancelled.") from None
-                raise WorkerDiedError(
-                    "The process that did the work ended unexpectedly, perhaps for lack of memory.",
-                    advice="Try again; if it happens again, use a smaller model.",
-                ) from error
-            except asyncio.CancelledError:
-                self._discard()
-                raise
+                kind, payload = await self._exchange((function, args, kwargs), progress)
             finally:
                 self._running = False
-
-    async def _exchange(self, request: tuple[Any, ...], progress: Progress | None) -> Any:
-        loop = asyncio.get_running_loop()
-        pipe = await loop.run_in_executor(self._reader, self._ready_pipe)
-        await loop.run_in_executor(self._reader, pipe.send, request)
-        while True:
-            kind, payload = await loop.run_in_executor(self._reader, pipe.recv)
-            if kind == "progress":
-                if progress is not None:
-                    progress(*payload)
-            elif kind == "error":
-                raise payload
-            else:
-                return payload
-
-    def _ready_pipe(self) -> Connection:
-        if self._process is not None and self._process.is_alive() and self._pipe is not None:
-            return self._pipe
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        self._process = context.Process(
-            target=_work, args=(theirs, os.getpid()), name=f"hedgehop-{self._name}", daemon=False
-        )
-        self._process.start()
-        theirs.close()
-        self._pipe = ours
-        return ours
+        if kind == "error":
+            raise payload
+        return payload
 
     def cancel(self) -> None:
         """Ends the running call, if any, with ``JobCancelledError``."""
         if self._running:
             self._cancelled = True
-            self._kill()
-
-    def _kill(self) -> None:
-        if self._process is not None and self._process.is_alive():
-            self._process.kill()
-
-    def _discard(self) -> None:
-        self._kill()
-        if self._pipe is not None:
-            self._pipe.close()
-        self._pipe = self._process = None
+            if self._worker is not None:
+                self._worker.kill()
 
     async def close(self) -> None:
-        process = self._process
-        self._cancelled = True
-        self._kill()
-        if process is not None:
-            await asyncio.to_thread(process.join, _JOIN_S)
-        self._discard()
-        self._reader.shutdown(wait=False)
+        """Ends the worker; a running call ends with ``JobCancelledError``, later ones are refused."""
+        self._closed = self._cancelled = True
+        if self._worker is not None:
+            self._worker.kill()
+        await asyncio.to_thread(self._thread.shutdown)
+        # A worker that was being started when the lane was closed is here now.
+        if self._worker is not None:
+            await asyncio.to_thread(self._worker.reap)
+
+    async def _exchange(self, request: tuple[Any, ...], progress: Progress | None) -> tuple[str, Any]:
+        complete = False
+        try:
+            worker = await self._in_thread(self._ready_worker)
+            if self._cancelled:
+                raise _cancelled()
+            await self._in_thread(lambda: worker.send(request))
+            while not complete:
+                kind, payload = await self._in_thread(worker.receive)
+                complete = kind != "progress"
+                if not complete and progress is not None:
+                    progress(*payload)
+        except (EOFError, OSError) as error:
+            raise _cancelled() if self._cancelled else _died() from error
+        finally:
+            # Half an exchange would be answered in the next one, and a killed worker may look alive for a moment.
+            if not complete or self._cancelled:
+                self._discard()
+        return kind, payload
+
+    async def _in_thread(self, work: Callable[[], T]) -> T:
+        if self._closed:
+            raise _cancelled()
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    def _ready_worker(self) -> _Worker:
+        if self._worker is None or not self._worker.alive():
+            if self._worker is not None:
+                self._worker.reap()
+            self._worker = _Worker(self._niceness)
+        return self._worker
+
+    def _discard(self) -> None:
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.kill()
+            # After whatever still reads the pipe: the thread does one thing at a time.
+            with contextlib.suppress(RuntimeError):
+                self._thread.submit(worker.reap)
 
 
-def _work(pipe: Connection, parent_pid: int) -> None:
-    """The worker's main loop: one request, its progress, one answer."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with contextlib.suppress(OSError):
-        os.nice(_NICENESS)
-
-    def report(step: str, share: float | None) -> None:
-        if os.getppid() != parent_pid:
-            raise SystemExit(0)
-        pipe.send(("progress", (step, share)))
-
-    with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
-        while True:
-            function, args, kwargs = pipe.recv()
-            pipe.send(_answer(function, args, kwargs, report))
+def _cancelled() -> JobCancelledError:
+    return JobCancelledError("The job was cancelled.")
 
 
-def _answer(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any], report: Progress) -> Any:
-    try:
-        return "done", function(*args, report=report, **kwargs)
-    except Exception as error:
-        # Tracebacks do not survive pickling: the text does, as the cause's note.
-        error.__traceback__ = None
-        return "error", error
+def _died() -> WorkerDiedError:
+    return WorkerDiedError(
+        "The process that did the work ended unexpectedly, perhaps for lack of memory.",
+        advice="Try again; if it happens again, use a smaller model.",
+    )

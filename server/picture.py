@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+import math
 from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from planning.dsm import Dsm
-from planning.errors import PlanningError
 from server import tasks
-from server.errors import ServerError
-from server.jobs import JobCancelledError, Lane
+from server.errors import JobCancelledError, NotFoundError, reported
+from server.jobs import Lane
 from server.library import Library
 from server.scene.payload import PlanScene, SceneState, TerrainScene
 from server.scene.shots import Target
-from server.schemas import CursorMessage, FrameView, PlanDoc, SelectionDoc, ViewDoc
+from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, ViewDoc
+
+log = logging.getLogger("hedgehop.scene")
 
 
 class View(Protocol):
@@ -34,7 +37,7 @@ class View(Protocol):
 class Picture:
     """Draws the latest wish; wishes that come while it draws are merged into one.
 
-    ``changed()`` is called when the terrain on show is another one, ``failed(error)`` when it cannot be shown.
+    ``changed()`` is called when the terrain on show is another one, ``failed(error)`` when something cannot be shown.
     """
 
     def __init__(
@@ -44,7 +47,7 @@ class Picture:
         lane: Lane,
         *,
         changed: Callable[[], None],
-        failed: Callable[[Exception], None],
+        failed: Callable[[ErrorDoc], None],
     ) -> None:
         self._view, self._library, self._lane = view, library, lane
         self._changed, self._failed = changed, failed
@@ -71,12 +74,16 @@ class Picture:
         self._wake.set()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Until cancelled; what cannot be drawn is told, and the next wish is drawn."""
         while True:
             await self._wake.wait()
             self._wake.clear()
-            if self._wish is not None:
+            if self._wish is None:
+                continue
+            try:
                 await self._draw(*self._wish)
+            except Exception as error:
+                self._failed(reported(error, log, "Drawing"))
 
     async def _draw(
         self, document: PlanDoc, selection: SelectionDoc, view: ViewDoc, plan: PlanScene | None, stale: bool
@@ -94,7 +101,7 @@ class Picture:
 
     async def _load_terrain(self, terrain_id: str | None, orthophoto_id: str | None, shading: str) -> None:
         """Another shading of the same model replaces the old one only when it is ready."""
-        photo_id = orthophoto_id if shading == "orthophoto" else None
+        photo_id = self._photo_of(terrain_id, orthophoto_id) if shading == "orthophoto" else None
         key = (terrain_id, photo_id, shading)
         if key == self._terrain_key:
             return
@@ -105,6 +112,11 @@ class Picture:
             await self._draw_terrain(terrain_id, photo_id, shading)
         self._changed()
 
+    def _photo_of(self, terrain_id: str | None, photo_id: str | None) -> str | None:
+        """The photo unless it is gone or belongs to another surface model: then height colours are drawn."""
+        known = {photo.id for photo in self._library.orthophotos() if photo.terrain_id == terrain_id}
+        return photo_id if photo_id in known else None
+
     async def _draw_terrain(self, terrain_id: str, photo_id: str | None, shading: str) -> None:
         try:
             directory = self._library.terrain_dir(terrain_id)
@@ -114,12 +126,15 @@ class Picture:
         except JobCancelledError:
             self._terrain_key = None
             self._wake.set()
-        except (PlanningError, ServerError, OSError) as error:
-            self._failed(error)
+        except NotFoundError:
+            # Whoever computes the plan says that its surface model is gone.
+            pass
+        except Exception as error:
+            self._failed(reported(error, log, "Drawing the surface model"))
 
     async def mark(self, plan: PlanScene | None, s_m: float | None) -> CursorMessage:
         """Marks the path at a distance in 3D and says what is there."""
-        if plan is None or s_m is None:
+        if plan is None or s_m is None or not math.isfinite(s_m):
             await self._view.cursor(None)
             return CursorMessage(s_m=None)
         s_m = float(np.clip(s_m, plan.path_s_m[0], plan.path_s_m[-1]))

@@ -16,8 +16,9 @@ from planning.camera import gsd_cm
 from planning.demo import demo_dsm, demo_pois
 from planning.dsm import Dsm
 from planning.exports import export_file
-from planning.model import VehicleProfile, finite_or_none
+from planning.model import F64, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
+from planning.poi import shortest_order
 from planning.request import PlanRequest
 from planning.summary import plan_summary
 from server.charts import chart
@@ -41,6 +42,31 @@ def warm_up(*, report: Progress) -> None:
     plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up")))
 
 
+def order_points(xy_m: F64, *, report: Progress) -> list[int]:
+    """The shortest order of points (N, 2): minutes of work for hundreds of them."""
+    report("Ordering the points", None)
+    return shortest_order(xy_m)
+
+
+class _LastPlan:
+    """The plan made last: its trade table and its files are asked for right after it."""
+
+    def __init__(self) -> None:
+        self._key: tuple[Path, PlanDoc] | None = None
+        self._made: tuple[Plan, Dsm, dict[str, float]] | None = None
+
+    def of(self, directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, dict[str, float]]:
+        """(plan, surface model, seconds per step)"""
+        if self._made is None or self._key != (directory, document):
+            # Dropped first: two plans over a model of 132 Mpx would take twice the memory.
+            self._key = self._made = None
+            self._made, self._key = _plan(directory, document, report), (directory, document)
+        return self._made
+
+
+_last_plan = _LastPlan()
+
+
 @lru_cache(maxsize=2)
 def _terrain(directory: Path) -> Dsm:
     return load_terrain(directory)
@@ -48,13 +74,14 @@ def _terrain(directory: Path) -> Dsm:
 
 def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
     """The answer to an edit, without the trade table."""
-    plan, source, timer = _plan(directory, document, report)
-    return result_doc(plan, source, timer.seconds()), plan_scene(plan)
+    plan, source, seconds = _last_plan.of(directory, document, report)
+    return result_doc(plan, source, seconds), plan_scene(plan)
 
 
 def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:
     """Waypoints, items and duration for a ladder of excess heights."""
-    plan, _, _ = _plan(directory, document, report)
+    plan, _, _ = _last_plan.of(directory, document, report)
+    report("Comparing", None)
     return [
         TradeRow(
             excess_height_m=choice.excess_height_m,
@@ -70,8 +97,8 @@ def export_plan(
     directory: Path, document: PlanDoc, names: list[str], created_utc: str, *, report: Progress
 ) -> dict[str, bytes]:
     """The files of the plan, computed from the very document that is exported."""
-    plan, source, timer = _plan(directory, document, report)
-    seconds = timer.seconds()
+    plan, source, seconds = _last_plan.of(directory, document, report)
+    report("Exporting", None)
     return {
         name: export_file(name, plan, source, title=document.name, created_utc=created_utc, seconds=seconds).encode()
         for name in names
@@ -86,11 +113,12 @@ def draw_terrain(
     return build_terrain_scene(terrain_id, _terrain(directory), shading=shading, orthophoto=photo, report=report)
 
 
-def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, StepTimer]:
+def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, dict[str, float]]:
     timer = StepTimer(report)
     timer(READ_STEP, 0.0)
     source = _terrain(directory)
-    return plan_mission(source, request_from_doc(document, source), report=timer), source, timer
+    plan = plan_mission(source, request_from_doc(document, source), report=timer)
+    return plan, source, timer.seconds()
 
 
 def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float]) -> ResultDoc:

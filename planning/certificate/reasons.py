@@ -84,6 +84,21 @@ def return_reason(needed_m: float, from_m: np.ndarray | None, dsm: Dsm, params: 
     return Reason("return_height", text, mend)
 
 
+def near_return_reason(
+    needed_m: float, from_m: np.ndarray | None, anywhere_m: float, dsm: Dsm, params: ClearanceParams
+) -> Reason | None:
+    """The way home from close by, for which autopilots climb less; silent where the return height itself fails."""
+    if from_m is None or params.rtl_height_m < anywhere_m:
+        return None
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(from_m[None, :2])[0]
+    text = (
+        f"The way home from {lat_deg:.7f}, {lon_deg:.7f} needs {_up(needed_m, 0.01):.2f} m above home, but so close to"
+        " home autopilots do not climb to the return height (ArduPilot RTL_CONE_SLOPE, PX4 RTL_CONE_ANG)."
+    )
+    mend = "Fly higher near home, or choose a home with nothing tall between it and the line."
+    return Reason("return_near_home", text, mend)
+
+
 def column_reasons(home_obstacle: str | None, landing_obstacle: str | None) -> list[Reason]:
     mend = "Choose another place on open ground, or lower the position error."
     reasons = []

@@ -1,10 +1,12 @@
-"""How high a straight flight home must be, from every place of the line.
+"""How high a straight flight home must be, from EVERY place of the line.
 
 Return to launch climbs to the larger of the set height and the vehicle's own, then flies straight home
 on the level. It keeps a distance c to a column of elevation e at horizontal distance d < c when it is
-at least e + sqrt(c^2 - d^2) high; climbing never brings it nearer to any column. A block of cells asks
-for at most what the column over its outline with its largest elevation asks for, so branch and bound
-over the pyramid of maxima finds the exact height at full resolution.
+at least e + sqrt(c^2 - d^2) high; climbing never brings it nearer to any column. The ways home from all
+places of a straight piece of the line sweep a triangle, so d is the distance of the column to that
+triangle: no mast, however thin, stands between two ways home. A block of cells asks for at most what the
+column over its outline with its largest elevation asks for, so branch and bound over the pyramid of
+maxima finds the exact height at full resolution.
 
 Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
 """
@@ -20,17 +22,23 @@ from planning.certificate.pyramid import LEAF_PX, MaxPyramid
 
 F64 = NDArray[np.float64]
 
+_THIN = 1e-9
+"""A triangle flatter than this share of its length is judged by its sides alone: it has no inside to speak of."""
 CHUNKS = 32
-"""Pieces of the line searched independently; inside one, what was found raises the bar for the next place."""
+"""Parts of the line searched independently; inside one, what was found raises the bar for the next place."""
 
 
 def return_altitude(pyramid: MaxPyramid, places_m: F64, home_xy_m: F64, clearance_m: float) -> tuple[float, int]:
     """Smallest altitude from which every way home keeps ``clearance_m``, and the place that asks for it.
 
-    ``places_m`` (N, 3) are the places that a return may start from; a place that is high enough itself
-    asks for nothing. Returns (-inf, -1) when no place asks for anything and inf where unknown cells or
-    the model's edge lie within ``clearance_m`` of a way home.
+    ``places_m`` (N, 3) are places one after the other along the line; a return may start from them and
+    from anywhere between neighbours, whose lower altitude counts for the piece between them. A piece that
+    is high enough itself asks for nothing. Returns (-inf, -1) when no piece asks for anything, else the
+    altitude and the place at which the asking piece begins; inf where unknown cells or the model's edge
+    lie within ``clearance_m`` of a way home.
     """
+    if len(places_m) == 1:
+        places_m = np.repeat(places_m, 2, axis=0)
     needed_m = np.empty(CHUNKS)
     place = np.empty(CHUNKS, dtype=np.int64)
     _search(
@@ -50,33 +58,62 @@ def return_altitude(pyramid: MaxPyramid, places_m: F64, home_xy_m: F64, clearanc
 
 
 @njit(cache=True, nogil=True)
-def _asked(ax, ay, dx, dy, x0, y0, x1, y1, top, clearance_m):
-    """Altitude that one column asks of a level flight; -inf when it is out of reach."""
-    sq, _ = column_distance_sq(ax, ay, 0.0, dx, dy, 0.0, x0, y0, x1, y1, np.inf)
+def _holds(ax, ay, bx, by, cx, cy, x, y):
+    """Whether the triangle a b c has (x, y) inside."""
+    twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    longest_sq = max(
+        max((bx - ax) ** 2 + (by - ay) ** 2, (cx - ax) ** 2 + (cy - ay) ** 2), (cx - bx) ** 2 + (cy - by) ** 2
+    )
+    if abs(twice_area) <= _THIN * longest_sq:
+        return False
+    side = 1.0 if twice_area > 0.0 else -1.0
+    return (
+        side * ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) >= 0.0
+        and side * ((cx - bx) * (y - by) - (cy - by) * (x - bx)) >= 0.0
+        and side * ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) >= 0.0
+    )
+
+
+@njit(cache=True, nogil=True)
+def _flat_distance_sq(ax, ay, bx, by, x0, y0, x1, y1):
+    """Squared horizontal distance of the segment a b to a rectangle."""
+    sq, _ = column_distance_sq(ax, ay, 0.0, bx - ax, by - ay, 0.0, x0, y0, x1, y1, np.inf)
+    return sq
+
+
+@njit(cache=True, nogil=True)
+def _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m):
+    """Altitude that one column asks of level flights from the segment a b to h; -inf when it is out of reach."""
+    sq = _flat_distance_sq(ax, ay, hx, hy, x0, y0, x1, y1)
+    if sq > 0.0 and (ax != bx or ay != by):
+        sq = min(sq, _flat_distance_sq(bx, by, hx, hy, x0, y0, x1, y1))
+        sq = min(sq, _flat_distance_sq(ax, ay, bx, by, x0, y0, x1, y1))
+        if sq > 0.0 and _holds(ax, ay, bx, by, hx, hy, x0, y0):
+            sq = 0.0
     if sq >= clearance_m * clearance_m:
         return -np.inf
     return top + np.sqrt(clearance_m * clearance_m - sq)
 
 
 @njit(cache=True, nogil=True)
-def _leaf_altitude(elevation_m, row0, col0, res, ax, ay, dx, dy, clearance_m, needed):
+def _leaf_altitude(elevation_m, row0, col0, res, ax, ay, bx, by, hx, hy, clearance_m, needed):
     for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
         for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
             top = np.float64(elevation_m[r, c])
             if not np.isfinite(top):
                 top = np.inf
             if top + clearance_m > needed:
-                asked = _asked(ax, ay, dx, dy, c * res, r * res, (c + 1) * res, (r + 1) * res, top, clearance_m)
-                needed = max(needed, asked)
+                x0, y0, x1, y1 = c * res, r * res, (c + 1) * res, (r + 1) * res
+                needed = max(needed, _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m))
     return needed
 
 
 @njit(cache=True, nogil=True)
-def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearance_m, bar):
-    """The larger of ``bar`` and the altitude that the level flight from a to a + d needs."""
+def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, bx, by, hx, hy, clearance_m, bar):
+    """The larger of ``bar`` and the altitude that the level flights from the segment a b to h need."""
     width_m, height_m = elevation_m.shape[1] * res, elevation_m.shape[0] * res
-    to_edge = min(edge_distance(ax, ay, width_m, height_m), edge_distance(ax + dx, ay + dy, width_m, height_m))
-    if to_edge < clearance_m:
+    to_edge = min(edge_distance(ax, ay, width_m, height_m), edge_distance(bx, by, width_m, height_m))
+    if min(to_edge, edge_distance(hx, hy, width_m, height_m)) < clearance_m:
         return np.inf
     needed = bar
     bound = np.empty(STACK)
@@ -89,7 +126,9 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearan
             continue
         level, i, j = node[size, 0], node[size, 1], node[size, 2]
         if level == 0:
-            needed = _leaf_altitude(elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, dx, dy, clearance_m, needed)
+            needed = _leaf_altitude(
+                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, bx, by, hx, hy, clearance_m, needed
+            )
             continue
         offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
         side = LEAF_PX * 2.0 ** (level - 1) * res
@@ -100,7 +139,7 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearan
                 if top + clearance_m <= needed:
                     continue
                 x0, y0 = cj * side, ci * side
-                asked = _asked(ax, ay, dx, dy, x0, y0, x0 + side, y0 + side, top, clearance_m)
+                asked = _asked(ax, ay, bx, by, hx, hy, x0, y0, x0 + side, y0 + side, top, clearance_m)
                 if asked <= needed:
                     continue
                 k = size
@@ -115,13 +154,15 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, dx, dy, clearan
 
 @njit(cache=True, parallel=True, nogil=True)
 def _search(elevation_m, maxima_m, layout, res, places_m, home_x, home_y, clearance_m, needed_m, place):
-    n = places_m.shape[0]
+    n = places_m.shape[0] - 1
     for chunk in prange(CHUNKS):
         best, best_place = -np.inf, -1
         for k in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
-            x, y, z = places_m[k, 0], places_m[k, 1], places_m[k, 2]
-            bar = max(best, z)
-            found = _needed_altitude(elevation_m, maxima_m, layout, res, x, y, home_x - x, home_y - y, clearance_m, bar)
+            a, b = places_m[k], places_m[k + 1]
+            bar = max(best, min(a[2], b[2]))
+            found = _needed_altitude(
+                elevation_m, maxima_m, layout, res, a[0], a[1], b[0], b[1], home_x, home_y, clearance_m, bar
+            )
             if found > bar:
                 best, best_place = found, k
         needed_m[chunk] = best

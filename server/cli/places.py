@@ -35,6 +35,6 @@ def chosen_heading(heading: Heading | None, heading_deg: float | None, look_at: 
     chosen: Heading = heading or ("fixed" if implied["fixed"] else "point" if implied["point"] else "path")
     for kind, option in (("fixed", "--heading-deg"), ("point", "--look-at")):
         if (chosen == kind) != implied[kind]:
-            what = f"The heading {chosen!r} " + ("needs a direction." if chosen == kind else f"takes no {option}.")
+            what = f"The heading {chosen!r} " + (f"needs {option}." if chosen == kind else f"takes no {option}.")
             raise ParameterError(what, where=option, advice=f"Give {option} with --heading {kind}, and only then.")
     return chosen

@@ -61,6 +61,11 @@ class Library:
         self._terrains.refresh()
         self._orthophotos.refresh()
 
+    def clear_unfinished(self) -> None:
+        """Removes what a killed worker left half-stored; only while no worker stores anything."""
+        self._terrains.clear_unfinished()
+        self._orthophotos.clear_unfinished()
+
     def state(self) -> LibraryState:
         """From memory: quick enough for the event loop."""
         return LibraryState(

@@ -80,6 +80,10 @@ class Shelf(Generic[M]):
                 if folder.is_dir() and folder.name not in self._manifests and not folder.name.startswith(TEMPORARY):
                     self._read(folder)
 
+    def clear_unfinished(self) -> None:
+        """Removes folders that never got their names; a folder being removed goes the sooner."""
+        clean(self._path)
+
     def set_aside(self, folder: Path, reason: str) -> None:
         """Moves what cannot be read out of the way and tells so; nothing is ever deleted for being damaged."""
         stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")

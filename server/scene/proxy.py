@@ -36,8 +36,13 @@ VIEW_POLICY = (
     "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; connect-src 'self' {sockets} data: blob:; "
     "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
 )
-# viser has no switch for its control panel and its own notices; the console has both.
-HIDDEN_PARTS = b"<style>[data-floating-window], .mantine-Notifications-root { display: none !important; }</style>"
+# viser has no switch for its control panel and its own notices; the console has both. Its white page would flash
+# before the first picture, and shine through where its backdrop cannot be drawn: the page's own lies behind.
+VIEW_STYLE = b"""<style>
+[data-floating-window], .mantine-Notifications-root { display: none !important; }
+html, body { background: transparent !important; }
+#root div:has(canvas) { background: transparent !important; }
+</style>"""
 PASSED_ON_QUERY = frozenset({"fixedDpr"})
 CLOSE_TIMEOUT_S = 5.0
 
@@ -120,4 +125,4 @@ async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: 
 
 @lru_cache(maxsize=1)
 def _client_html() -> bytes:
-    return CLIENT_HTML.read_bytes().replace(b"</head>", HIDDEN_PARTS + b"</head>", 1)
+    return CLIENT_HTML.read_bytes().replace(b"</head>", VIEW_STYLE + b"</head>", 1)

@@ -76,7 +76,7 @@ def test_a_file_that_is_no_surface_model_is_explained_where_it_was_dropped(
     fake.write_text("<VRTDataset></VRTDataset>", encoding="utf-8")
     _choose_file(page, fake)
     expect(page.get_by_text("model.tif").first).to_be_visible()
-    expect(page.get_by_text(re.compile("GeoTIFF or ESRI ASCII")).first).to_be_visible()
+    expect(page.get_by_text(re.compile("virtual raster")).first).to_be_visible()
 
     _choose_file(page, shared_data / "dsm" / "landslide" / "pre_runout_DEM.asc")
     crs = page.get_by_test_id("raster-crs")

@@ -146,6 +146,21 @@ def test_a_return_from_above_the_ridge_needs_no_return_height():
     assert certificate.rtl_height_needed_m == 0.0
 
 
+def test_near_home_the_return_height_is_not_reached():
+    cells = flat()
+    cells[20, 26] = 12.0  # a lamp post between home and the line's end, 6 m from home
+    detour = ((20.5, 20.5, 8.0), (20.5, 28.5, 8.0), (30.5, 28.5, 8.0), (30.5, 20.5, 8.0))
+    certificate = certify(dsm_of(cells), line_of(*detour), PARAMS)
+    assert certificate.rtl_height_needed_m == pytest.approx(15.0)
+    assert PARAMS.rtl_height_m > 15.0
+    assert codes(certificate) == ["return_near_home"]
+    assert "15.00 m above home" in certificate.reasons[0].text
+    higher = [(x, y, 15.0) for x, y, _ in detour]
+    assert certify(dsm_of(cells), line_of(*higher), PARAMS).certified
+    farther = [(20.5 + 2 * (x - 20.5), y, z) for x, y, z in detour]
+    assert certify(dsm_of(cells), line_of(*farther), PARAMS).certified
+
+
 @pytest.mark.parametrize(
     ("row", "col", "rise_m", "clear"),
     [(20, 20, 0.0, True), (20, 21, 0.9, True), (20, 21, 1.4, False), (21, 21, 1.4, True), (20, 22, 30.0, True)],

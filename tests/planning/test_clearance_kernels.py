@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import get_num_threads
 
+from planning.certificate.cone import return_altitudes
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.places import distance_flown, places_along
@@ -157,29 +160,60 @@ def test_the_pyramid_holds_the_maxima_and_marks_the_unknown():
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 1.0, 3.0]), st.sampled_from([0, 0, 2]))
 def test_the_return_height_matches_the_oracle(seed, clearance_m, holes):
+    """From everywhere on the line, not only from its places."""
     terrain = rough_terrain(seed, rows=23, cols=30, holes=holes)
     rng = np.random.default_rng(seed)
-    places = rng.uniform([4.0, 4.0, -3.0], [26.0, 19.0, 12.0], (5, 3))
+    places = rng.uniform([4.0, 4.0, -3.0], [26.0, 19.0, 12.0], (3, 3))
     home = rng.uniform([4.0, 4.0], [26.0, 19.0])
     needed_m, place = return_altitude(max_pyramid(terrain, 1.0), places, home, clearance_m)
-    asked = [oracle.return_altitude(terrain, 1.0, p, home, clearance_m, 0.02) for p in places]
-    asking = [a for a, p in zip(asked, places, strict=True) if a > p[2]]
-    if not np.isfinite(needed_m):
-        near = [oracle.return_altitude(terrain, 1.0, p, home, clearance_m + 0.01, 0.02) for p in places]
-        assert (needed_m == np.inf and max(near) == np.inf) or (place == -1 and not asking)
-        return
-    slack = np.sqrt(2 * clearance_m * 0.01 + 0.01**2)  # a cell may be seen 1 cm farther away than it is
-    assert max(asking, default=-np.inf) <= needed_m + 1e-9
-    assert needed_m <= oracle.return_altitude(terrain, 1.0, places[place], home, clearance_m, 0.02) + slack
+    between = np.vstack([oracle.sampled_segment(a, b, 0.8) for a, b in itertools.pairwise(places)])
+    asked = [oracle.return_altitude(terrain, 1.0, p, home, clearance_m, 0.25) for p in between]
+    assert max((a for a, p in zip(asked, between, strict=True) if a > p[2]), default=-np.inf) <= needed_m + 1e-9
+    if place >= 0:
+        wider_m = clearance_m + 0.53  # what lies between two samples is within 0.4 m and 0.125 m of one of them
+        piece = oracle.sampled_segment(places[place], places[place + 1], 0.8)
+        assert needed_m <= max(oracle.return_altitude(terrain, 1.0, p, home, wider_m, 0.25) for p in piece) + 1e-9
 
 
-def test_a_place_that_is_high_enough_asks_for_nothing():
+def test_a_mast_between_two_ways_home_is_seen():
+    terrain = np.zeros((2000, 2000), dtype=np.float32)  # 1 cm
+    terrain[1000, 1024] = 25.0  # 10.24 m east: between the ways home of the first two places
+    places, home = np.array([[10.0, 10.5, 5.0], [10.5, 10.5, 5.0]]), np.array([10.25, 1.0])
+    pyramid = max_pyramid(terrain, 0.01)
+    assert return_altitude(pyramid, places[:1], home, 0.05) == (-np.inf, -1)
+    assert return_altitude(pyramid, places[1:], home, 0.05) == (-np.inf, -1)
+    assert return_altitude(pyramid, places, home, 0.05) == (pytest.approx(25.05), 0)
+
+
+def test_a_block_inside_the_swept_triangle_is_seen():
+    terrain = np.zeros((40, 40), dtype=np.float32)
+    terrain[20, 20] = 9.0
+    places, home = np.array([[35.0, 5.0, 3.0], [35.0, 35.0, 3.0]]), np.array([4.0, 20.5])
+    assert return_altitude(max_pyramid(terrain, 1.0), places, home, 1.0) == (pytest.approx(10.0), 0)
+
+
+def test_what_lies_beyond_a_line_straight_to_home_asks_for_nothing():
+    terrain = np.zeros((40, 40), dtype=np.float32)
+    terrain[10, 35] = 9.0
+    home = np.array([4.0, 10.5])
+    for jitter_m in (0.0, 1e-12, 1e-10, 1e-7):
+        places = np.array([[20.0, 10.5, 3.0], [20.5, 10.5 + jitter_m, 3.0]])
+        assert return_altitude(max_pyramid(terrain, 1.0), places, home, 1.0) == (-np.inf, -1)
+
+
+def test_a_piece_that_is_high_enough_asks_for_nothing():
     terrain = np.zeros((40, 40), dtype=np.float32)
     terrain[20, 20] = 12.0
-    places, home = np.array([[10.0, 20.5, 14.5], [10.0, 20.5, 13.9]]), np.array([30.0, 20.5])
+    places, home = np.array([[9.0, 20.5, 14.5], [9.5, 20.5, 14.5], [10.0, 20.5, 13.9]]), np.array([30.0, 20.5])
     pyramid = max_pyramid(terrain, 1.0)
-    assert return_altitude(pyramid, places[:1], home, 2.0) == (-np.inf, -1)
+    assert return_altitude(pyramid, places[:2], home, 2.0) == (-np.inf, -1)
     assert return_altitude(pyramid, places, home, 2.0) == (14.0, 1)
+
+
+def test_close_to_home_autopilots_climb_less():
+    places = np.array([[0.5, 0.0, 4.0], [8.25, 0.0, 4.0], [10.25, 0.0, 4.0], [20.0, 0.0, 4.0], [20.0, 0.0, 70.0]])
+    flown_m = return_altitudes(places, np.zeros(2), 1.0, rtl_height_m=31.0, step_m=0.5)
+    assert flown_m == pytest.approx([4.0, 9.0, 11.0, 32.0, 70.0])
 
 
 def test_places_include_every_vertex_and_are_close_enough():

@@ -5,7 +5,8 @@ import time
 import pytest
 
 from planning.errors import PoiError
-from server.jobs import JobCancelledError, Lane, WorkerDiedError
+from server.errors import JobCancelledError, WorkerDiedError
+from server.jobs import Lane
 
 
 def _double(value, *, report):

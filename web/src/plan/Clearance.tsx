@@ -33,6 +33,12 @@ export function clearanceLevel(distance_m: number | null, required_m: number): L
   return distance_m < required_m ? "near" : "good";
 }
 
+/** Zero is no height to climb to: the way home is clear at whatever height the vehicle has. */
+function neededWords(needed_m: number | null): string {
+  if (needed_m === null) return "none is safe";
+  return needed_m > 0 ? metres(needed_m) : "no particular height";
+}
+
 /** On narrow screens the drawer would cover what is shown. */
 function showWorst(): void {
   drawer.value = null;
@@ -66,7 +72,7 @@ function Return({ result }: { result: ResultDoc }) {
     <dl class="figures-list">
       <Figure
         label="Return height needed"
-        value={needed === null ? "none is safe" : metres(needed)}
+        value={neededWords(needed)}
         level={isHighEnough ? "good" : "bad"}
         testid="rtl-needed"
       />

@@ -1,6 +1,7 @@
 import { listenInside } from "./frame_events";
 import { EmptyState } from "./EmptyState";
 import { Legend } from "./Legend";
+import { Loading } from "./Loading";
 import { ViewTools } from "./ViewTools";
 import { Toasts } from "../shell/Notices";
 import { document_, pageId, selection, terrain } from "../store/state";
@@ -37,6 +38,7 @@ export function Scene() {
           onLoad={(event) => listenInside(event.currentTarget)}
         />
       )}
+      <Loading />
       {document_.value && !hasTerrain && <EmptyState />}
       {hasTerrain && (
         <>

@@ -12,6 +12,13 @@ export interface Sending {
   cancel: () => void;
 }
 
+export interface SentFile {
+  file: File;
+  hints: RasterHints;
+  /** The open plan takes the model whatever it had: it is the same one, read again. */
+  replaces: boolean;
+}
+
 /** What the operator declares about a surface model whose file does not say it. */
 export interface RasterHints {
   crs: string;
@@ -24,7 +31,7 @@ export const NO_HINTS: RasterHints = { crs: "", z_scale: "", vertical_datum: "",
 
 export const sending = signal<Sending[]>([]);
 /** Files by the job that reads them: kept so that a file can be sent again with what was missing. */
-export const sentFiles = signal<ReadonlyMap<string, { file: File; hints: RasterHints }>>(new Map());
+export const sentFiles = signal<ReadonlyMap<string, SentFile>>(new Map());
 
 const POINT_FILES = /\.(csv|geojson|json|kml|waypoints|plan|txt)$/i;
 const MOST_POINT_BYTES = 20e6;
@@ -50,7 +57,11 @@ function report(place: string, error: unknown): void {
 }
 
 /** Sends a surface model; reading it becomes a job. */
-export async function sendTerrain(file: File, hints: RasterHints = NO_HINTS): Promise<void> {
+export async function sendTerrain(
+  file: File,
+  hints: RasterHints = NO_HINTS,
+  replaces = false,
+): Promise<void> {
   setError("terrain", null);
   const query = new URLSearchParams({ filename: file.name });
   if (hints.crs) query.set("crs", hints.crs);
@@ -59,7 +70,7 @@ export async function sendTerrain(file: File, hints: RasterHints = NO_HINTS): Pr
   if (hints.remove_spikes) query.set("remove_spikes", "true");
   try {
     const job = JSON.parse(await sendFile(`/api/terrains?${query}`, file)) as JobDoc;
-    sentFiles.value = new Map(sentFiles.value).set(job.id, { file, hints });
+    sentFiles.value = new Map(sentFiles.value).set(job.id, { file, hints, replaces });
     addJob(job);
   } catch (error) {
     report("terrain", error);
@@ -102,6 +113,11 @@ export async function sendPoints(file: File): Promise<void> {
 /** Any dropped file: points by their ending, everything else is tried as a surface model. */
 export function takeFiles(files: Iterable<File>): void {
   for (const file of files) void (POINT_FILES.test(file.name) ? sendPoints(file) : sendTerrain(file));
+}
+
+/** The file that a terrain was read from, if this page sent it. */
+export function sentFileOf(name: string): SentFile | null {
+  return [...sentFiles.value.values()].reverse().find((sent) => sent.file.name === name) ?? null;
 }
 
 export function forgetJob(id: string): void {

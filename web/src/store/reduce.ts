@@ -1,4 +1,4 @@
-import type { ServerMessage } from "../messages";
+import type { ServerMessage, ViewDoc } from "../messages";
 import { queue, showPlan } from "./plan";
 import * as state from "./state";
 
@@ -10,7 +10,7 @@ export function receive(message: ServerMessage): void {
       state.productVersion.value = message.product_version;
       state.pageId.value = message.page_id;
       state.library.value = message.library;
-      state.view.value = message.view;
+      showView(message.view, message.plan.document.terrain_id);
       state.selection.value = message.selection;
       state.jobs.value = new Map(message.jobs.map((job) => [job.id, job]));
       showPlan();
@@ -23,7 +23,7 @@ export function receive(message: ServerMessage): void {
       state.library.value = message.library;
       return;
     case "view":
-      state.view.value = message.view;
+      showView(message.view, state.document_.value?.terrain_id ?? null);
       return;
     case "selection":
       state.selection.value = message.selection;
@@ -41,4 +41,10 @@ export function receive(message: ServerMessage): void {
       message satisfies never;
       state.notifyText("warning", "The server sent a message this page does not know.", "Reload the page.");
   }
+}
+
+/** The server tells the legend's ends when it has drawn a terrain. */
+function showView(view: ViewDoc, terrainId: string | null): void {
+  state.view.value = view;
+  state.pictured.value = view.legend_min_m === null ? null : terrainId;
 }

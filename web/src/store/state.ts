@@ -34,6 +34,8 @@ export const view = signal<ViewDoc>({
   legend_min_m: null,
   legend_max_m: null,
 });
+/** The terrain that the 3D view shows; null until the server says so. */
+export const pictured = signal<string | null>(null);
 export const selection = signal<SelectionDoc>({ tool: "select", poi_id: null });
 export const jobs = signal<ReadonlyMap<string, JobDoc>>(new Map());
 export const cursor = signal<CursorMessage | null>(null);

@@ -3,8 +3,17 @@ import type { JobDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { ErrorPanel } from "../../ui/ErrorBox";
 import { Check, SelectField } from "../../ui/fields";
-import { forgetJob, sendTerrain, sentFiles, type RasterHints } from "../../store/files";
-import { jobs } from "../../store/state";
+import {
+  forgetJob,
+  NO_HINTS,
+  sendOrthophoto,
+  sendTerrain,
+  sentFileOf,
+  sentFiles,
+  type RasterHints,
+} from "../../store/files";
+import { jobs, terrain } from "../../store/state";
+import { chooseFiles } from "../../shell/keyboard";
 
 /** Errors that a declaration of the operator can mend, or that a wrong one has made. */
 const MENDABLE = new Set(["raster_no_crs", "raster", "parameter", "datum"]);
@@ -22,21 +31,27 @@ const SCALES = [
   { value: "0.3048", label: "feet" },
 ];
 
-/** Asks for what the file does not say, and sends it again. */
-function HintForm({ job, file, hints }: { job: JobDoc; file: File; hints: RasterHints }) {
+interface FormProps {
+  name: string;
+  hints: RasterHints;
+  onSubmit: (hints: RasterHints) => void;
+  onLeave: () => void;
+}
+
+/** Asks for what the file does not say. */
+function HintForm({ name, hints, onSubmit, onLeave }: FormProps) {
   const [draft, setDraft] = useState(hints);
   const submit = (event: Event) => {
     event.preventDefault();
-    forgetJob(job.id);
-    void sendTerrain(file, draft);
+    onSubmit(draft);
   };
   return (
     <form class="hint-form" data-testid="raster-hints" onSubmit={submit}>
       <label class="field text">
-        <span>CRS of {file.name}</span>
+        <span title={name}>CRS</span>
         <input
           type="text"
-          placeholder="EPSG:32633"
+          placeholder="as in the file, or EPSG:32633"
           value={draft.crs}
           data-testid="raster-crs"
           onInput={(event) => setDraft({ ...draft, crs: event.currentTarget.value.trim() })}
@@ -63,11 +78,37 @@ function HintForm({ job, file, hints }: { job: JobDoc; file: File; hints: Raster
         <button type="submit" class="button accent" data-testid="raster-retry">
           Read again
         </button>
-        <Button kind="quiet" onClick={() => forgetJob(job.id)}>
+        <Button kind="quiet" onClick={onLeave}>
           Leave it
         </Button>
       </div>
     </form>
+  );
+}
+
+/** A surface model that was read, read once more with other declarations; the plan then takes the new one. */
+export function ReadAgain({ name, onDone }: { name: string; onDone: () => void }) {
+  const sent = sentFileOf(name);
+  const send = (hints: RasterHints) => {
+    onDone();
+    if (sent) void sendTerrain(sent.file, hints, true);
+    else chooseFiles(".tif,.tiff,.asc,.txt", ([file]) => file && void sendTerrain(file, hints, true));
+  };
+  return <HintForm name={name} hints={sent?.hints ?? NO_HINTS} onSubmit={send} onLeave={onDone} />;
+}
+
+/** A photo was given where a surface model belongs: it can be draped over the one in use. */
+function DrapeInstead({ job, file }: { job: JobDoc; file: File }) {
+  const entry = terrain.value;
+  if (!entry || !job.error?.what.includes("orthomosaic")) return null;
+  const drape = () => {
+    forgetJob(job.id);
+    void sendOrthophoto(file);
+  };
+  return (
+    <Button icon="plus" testid="drape-instead" onClick={drape}>
+      Drape it over {entry.name}
+    </Button>
   );
 }
 
@@ -78,11 +119,23 @@ export function FailedJobs() {
     <>
       {failed.map((job) => {
         const sent = sentFiles.value.get(job.id);
-        const asks = sent && job.error && MENDABLE.has(job.error.code);
+        const isPhoto = job.error?.what.includes("orthomosaic") ?? false;
+        const asks = sent && job.error && MENDABLE.has(job.error.code) && !isPhoto;
         return (
           <div key={job.id} data-testid="failed-job">
             {job.error && <ErrorPanel error={job.error} onClose={() => forgetJob(job.id)} />}
-            {asks && <HintForm job={job} {...sent} />}
+            {sent && <DrapeInstead job={job} file={sent.file} />}
+            {asks && (
+              <HintForm
+                name={sent.file.name}
+                hints={sent.hints}
+                onLeave={() => forgetJob(job.id)}
+                onSubmit={(hints) => {
+                  forgetJob(job.id);
+                  void sendTerrain(sent.file, hints, sent.replaces);
+                }}
+              />
+            )}
           </div>
         );
       })}

@@ -1,21 +1,44 @@
 import { withUnit } from "../../format";
 import type { PlanDoc, TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
+import { Icon } from "../../ui/Icon";
 import { Section } from "../../ui/Section";
 import { chooseFiles } from "../../shell/keyboard";
+import { offered, useTerrain } from "../../store/arrivals";
 import { sendOrthophoto, sendTerrain } from "../../store/files";
 import { edit } from "../../store/plan";
 import { library, terrain } from "../../store/state";
-import { deleteTerrain, useDemo } from "../commands";
+import { deleteTerrain, newPlan, useDemo } from "../commands";
 import { LayerControls } from "./Layers";
 import { FailedJobs } from "./RasterHints";
 import { TerrainFacts } from "./TerrainFacts";
 
 const RASTERS = ".tif,.tiff,.asc,.txt";
 
-function chooseTerrain(entry: TerrainDoc): void {
-  const change = (doc: PlanDoc): PlanDoc => ({ ...doc, terrain_id: entry.id, orthophoto_id: null });
-  edit(`Use ${entry.name}`, "terrain", change);
+/** A model that arrived while the plan had points on another one: what to do with it. */
+function Offer({ plan }: { plan: PlanDoc }) {
+  const entry = library.value.terrains.find((item) => item.id === offered.value);
+  if (!entry || entry.id === plan.terrain_id) return null;
+  const startNew = async () => {
+    if (await newPlan()) useTerrain(entry);
+  };
+  return (
+    <div class="callout offer" data-testid="terrain-offer">
+      <Icon name="terrain" />
+      <p>
+        <strong>{entry.name}</strong> is ready. This plan has points on another model.
+      </p>
+      <div class="row wrap">
+        <Button testid="offer-new" onClick={() => void startNew()}>
+          New plan on it
+        </Button>
+        <Button testid="offer-use" onClick={() => useTerrain(entry)}>
+          Use it here
+        </Button>
+        <Button kind="quiet" icon="cross" title="Not now" onClick={() => (offered.value = null)} />
+      </div>
+    </div>
+  );
 }
 
 function Row({ entry, isUsed }: { entry: TerrainDoc; isUsed: boolean }) {
@@ -25,7 +48,7 @@ function Row({ entry, isUsed }: { entry: TerrainDoc; isUsed: boolean }) {
         type="button"
         class="pick"
         aria-pressed={isUsed}
-        onClick={() => !isUsed && chooseTerrain(entry)}
+        onClick={() => !isUsed && useTerrain(entry)}
       >
         <span class="radio" aria-hidden="true" />
         <span class="name">{entry.name}</span>
@@ -105,6 +128,7 @@ export function TerrainSection({ plan }: { plan: PlanDoc }) {
   return (
     <Section id="terrain" title="Terrain" icon="terrain" summary={used?.name ?? "none yet"} startsOpen>
       <FailedJobs />
+      <Offer plan={plan} />
       {terrains.length > 0 && (
         <ul class="pick-list" aria-label="Surface models">
           {terrains.map((entry) => (

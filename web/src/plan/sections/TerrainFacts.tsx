@@ -1,8 +1,10 @@
+import { useState } from "preact/hooks";
 import { metres, number, percent } from "../../format";
 import type { TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
 import { removeSpikes } from "../commands";
+import { ReadAgain } from "./RasterHints";
 
 function Spikes({ entry }: { entry: TerrainDoc }) {
   if (entry.spikes.length === 0) return null;
@@ -21,8 +23,12 @@ function Spikes({ entry }: { entry: TerrainDoc }) {
   );
 }
 
+/** The words of the command line mean nothing here: the form below the warning does it. */
+const forConsole = (warning: string) => warning.replace(/: use --\S+ [\d.]+ if so/, "");
+
 /** What a surface model is, and what is doubtful about it. */
 export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
+  const [rereadId, setRereadId] = useState<string | null>(null);
   const [width_m, height_m] = [entry.width_px * entry.resolution_m, entry.height_px * entry.resolution_m];
   return (
     <>
@@ -53,9 +59,16 @@ export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
       <Spikes entry={entry} />
       {entry.warnings.map((warning) => (
         <p class="callout" key={warning}>
-          <Icon name="warning" /> {warning}
+          <Icon name="warning" /> {forConsole(warning)}
         </p>
       ))}
+      {rereadId === entry.id ? (
+        <ReadAgain name={entry.name} onDone={() => setRereadId(null)} />
+      ) : (
+        <Button kind="quiet" icon="import" testid="read-again" onClick={() => setRereadId(entry.id)}>
+          Declare CRS, unit or datum…
+        </Button>
+      )}
     </>
   );
 }

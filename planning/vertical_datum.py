@@ -1,0 +1,49 @@
+"""Which vertical datums count as "above mean sea level".
+
+A height above the ellipsoid taken for one above the sea is wrong by tens of metres, and so may be a height in
+a datum nobody knows. Therefore a datum counts only when its name is known to be a geoid's or a levelling
+network's; a tidal chart datum, a depth, an ellipsoid, "unknown" or a site's own datum does not.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+_NOT_SEA_LEVEL = re.compile(
+    r"ellipsoid|ellipsoïd|\bhae\b|\bdepths?\b|undulation|\bgeoid(al)? (height|separation)\b.*\babove\b"
+    r"|\b(unknown|undefined|unnamed|unspecified|local|arbitrary|assumed|relative|custom|site|not|no|non)\b"
+    r"|\b(agl|above ground|chart|low(est)?|high(est)?|tide|tidal|lat|hat|mllw|mlw|mhw|mhhw)\b"
+)
+_SEA_LEVEL = re.compile(
+    r"\begm ?-?(84|96|08|20|2008|2020)\b|\bgeoid ?-?(96|99|03|06|09|12a|12b|12|18|2022)\b"
+    r"|\b(usgg|gsigeo|ausgeoid|osgm|raf|dvr|dhhn|cgvd|navd|ngvd|evrf|evrs|nzvd|rh|igld|lhn)[ -]?(\d{2}|\d{4})[a-z]?\b"
+    r"|\b(ahd|amsl|msl|orthometric|n2000|n60|nn2000|nn1954|nn54|ln02|nap|taw|mean sea level|m\.s\.l\.)\b"
+    r"|\b(ordnance datum newlyn|odn|newlyn|normaal amsterdams peil|australian height datum|ngf-?ign ?69|ign69)\b"
+)
+
+
+@lru_cache(maxsize=64)
+def is_above_sea_level(vertical_datum: str) -> bool:
+    """Whether a datum of this name is a geoid or a levelling network, e.g. "EGM96 height", "NAVD88 height (ftUS)"."""
+    words = re.sub(r"[_\s]+", " ", vertical_datum.strip().lower())
+    if _NOT_SEA_LEVEL.search(words):
+        return False
+    return bool(_SEA_LEVEL.search(words)) or _registered(vertical_datum.strip())
+
+
+def _registered(name: str) -> bool:
+    """Whether PROJ's registry knows a vertical system of this name whose heights grow upwards, no chart datum."""
+    try:
+        system = CRS.from_user_input(name)
+    except CRSError:
+        return False
+    vertical = system.sub_crs_list[1] if system.is_compound else system
+    return (
+        vertical.is_vertical
+        and not _NOT_SEA_LEVEL.search(vertical.name.lower())
+        and all(axis.direction == "up" for axis in vertical.axis_info)
+    )

@@ -1,0 +1,121 @@
+"""Everything that crosses the door, once: REST bodies and the messages of the ``/ws`` stream.
+
+``web/src/messages.ts`` is generated from this package (``server.typescript``); a test fails when they differ.
+Numbers are SI, degrees only for latitude, longitude, heading and gimbal pitch. NaN and infinity become null.
+"""
+
+from server.schemas.base import (
+    PROTOCOL_VERSION,
+    Strict,
+)
+from server.schemas.bodies import (
+    Imported,
+    OpenPlan,
+    PlanEdit,
+    SavePlanAs,
+    SignIn,
+)
+from server.schemas.library import (
+    JobDoc,
+    LibraryState,
+    OrthophotoDoc,
+    PlanEntry,
+    ProfileEntry,
+    SpikeDoc,
+    TerrainDoc,
+)
+from server.schemas.plan import (
+    CameraDoc,
+    ClearanceDoc,
+    MissionDoc,
+    PathDoc,
+    PlaceDoc,
+    PlanDoc,
+    PoiDoc,
+    ProfileDoc,
+    SurfaceDoc,
+    SurveyDoc,
+)
+from server.schemas.results import (
+    Chart,
+    Computation,
+    ErrorDoc,
+    PlanState,
+    ReasonDoc,
+    ResultDoc,
+    TradeRow,
+    WorstDoc,
+)
+from server.schemas.stream import (
+    ClientMessage,
+    CursorMessage,
+    FrameView,
+    HoverProfile,
+    HoverView,
+    JobMessage,
+    LibraryMessage,
+    NoticeMessage,
+    PlanMessage,
+    SelectionMessage,
+    ServerMessage,
+    SetSelection,
+    SetView,
+    Snapshot,
+    ViewMessage,
+)
+from server.schemas.view import (
+    SelectionDoc,
+    ViewDoc,
+)
+
+__all__ = [
+    "PROTOCOL_VERSION",
+    "CameraDoc",
+    "Chart",
+    "ClearanceDoc",
+    "ClientMessage",
+    "Computation",
+    "CursorMessage",
+    "ErrorDoc",
+    "FrameView",
+    "HoverProfile",
+    "HoverView",
+    "Imported",
+    "JobDoc",
+    "JobMessage",
+    "LibraryMessage",
+    "LibraryState",
+    "MissionDoc",
+    "NoticeMessage",
+    "OpenPlan",
+    "OrthophotoDoc",
+    "PathDoc",
+    "PlaceDoc",
+    "PlanDoc",
+    "PlanEdit",
+    "PlanEntry",
+    "PlanMessage",
+    "PlanState",
+    "PoiDoc",
+    "ProfileDoc",
+    "ProfileEntry",
+    "ReasonDoc",
+    "ResultDoc",
+    "SavePlanAs",
+    "SelectionDoc",
+    "SelectionMessage",
+    "ServerMessage",
+    "SetSelection",
+    "SetView",
+    "SignIn",
+    "Snapshot",
+    "SpikeDoc",
+    "Strict",
+    "SurfaceDoc",
+    "SurveyDoc",
+    "TerrainDoc",
+    "TradeRow",
+    "ViewDoc",
+    "ViewMessage",
+    "WorstDoc",
+]

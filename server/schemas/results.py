@@ -1,0 +1,111 @@
+"""What the server computes from a plan document, and where that stands."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from server.schemas.base import Strict
+from server.schemas.plan import PlanDoc
+
+
+class ErrorDoc(Strict):
+    code: str
+    what: str
+    where: str = ""
+    advice: str = ""
+
+
+class ReasonDoc(Strict):
+    code: str
+    text: str
+    mend: str
+
+
+class WorstDoc(Strict):
+    lat_deg: float
+    lon_deg: float
+    alt_rel_home_m: float
+    leg: int
+    s_m: float
+
+
+class TradeRow(Strict):
+    """Fewer waypoints against excess height."""
+
+    excess_height_m: float
+    waypoints: int
+    items: int
+    duration_s: float
+
+
+class Chart(Strict):
+    """Curves over the horizontal distance flown; null where unknown."""
+
+    s_m: list[float]
+    ground_rel_home_m: list[float | None]
+    surface_rel_home_m: list[float | None]
+    path_rel_home_m: list[float | None]
+    flown_s_m: list[float]
+    """Waypoints of the mission as it will be flown."""
+    flown_rel_home_m: list[float]
+    trend_s_m: list[float]
+    trend_distance_m: list[float | None]
+    poi_s_m: list[float]
+    poi_names: list[str]
+
+
+class ResultDoc(Strict):
+    certified: bool
+    min_distance_m: float | None
+    min_vertical_m: float | None
+    required_clearance_m: float
+    worst: WorstDoc | None
+    rtl_height_needed_m: float | None
+    rtl_height_m: float
+    home_column_clear: bool
+    max_height_above_ground_m: float | None
+    reasons: list[ReasonDoc]
+    warnings: list[str]
+    length_m: float
+    duration_s: float
+    """As the autopilot will fly it: take-off to landing."""
+    lspb_duration_s: float
+    endurance_s: float
+    usable_endurance_s: float
+    """Endurance less the reserve."""
+    samples: int
+    waypoints: int
+    items: int
+    max_items: int
+    excess_height_m: float
+    gsd_min_cm: float | None
+    gsd_max_cm: float | None
+    home_alt_dsm_m: float
+    vertical_datum: str | None
+    trade: list[TradeRow]
+    chart: Chart
+    seconds: dict[str, float]
+
+
+class Computation(Strict):
+    """Where the answer to the present document stands."""
+
+    revision: int
+    """Of the document that it belongs to."""
+    state: Literal["empty", "running", "ready", "error"]
+    hint: str = ""
+    """For "empty": what to do next."""
+    error: ErrorDoc | None = None
+    result: ResultDoc | None = None
+
+
+class PlanState(Strict):
+    plan_id: str
+    revision: int
+    document: PlanDoc
+    can_undo: bool
+    can_redo: bool
+    undo_label: str = ""
+    redo_label: str = ""
+    saved_utc: str
+    computation: Computation

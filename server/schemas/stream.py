@@ -1,0 +1,127 @@
+"""The ``/ws`` stream: every message has ``v`` and ``type``. First a snapshot, then whatever changed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Strict
+from server.schemas.library import JobDoc, LibraryState
+from server.schemas.results import ErrorDoc, PlanState
+from server.schemas.view import SelectionDoc, ViewDoc
+
+
+class Snapshot(Strict):
+    v: Literal[1] = 1
+    type: Literal["snapshot"] = "snapshot"
+    product_version: str
+    page_id: str
+    """Names this page's 3D view: its address is ``/view/{page_id}/``."""
+    plan: PlanState
+    library: LibraryState
+    view: ViewDoc
+    selection: SelectionDoc
+    jobs: list[JobDoc]
+
+
+class PlanMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["plan"] = "plan"
+    plan: PlanState
+
+
+class LibraryMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["library"] = "library"
+    library: LibraryState
+
+
+class ViewMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["view"] = "view"
+    view: ViewDoc
+
+
+class SelectionMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["selection"] = "selection"
+    selection: SelectionDoc
+
+
+class JobMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["job"] = "job"
+    job: JobDoc
+
+
+class CursorMessage(Strict):
+    """The place marked in profile and 3D view at once."""
+
+    v: Literal[1] = 1
+    type: Literal["cursor"] = "cursor"
+    s_m: float | None
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    ground_rel_home_m: float | None = None
+    path_rel_home_m: float | None = None
+
+
+class NoticeMessage(Strict):
+    """Something the operator must read: a failed click, a warning."""
+
+    v: Literal[1] = 1
+    type: Literal["notice"] = "notice"
+    level: Literal["info", "warning", "error"]
+    error: ErrorDoc
+
+
+ServerMessage = Annotated[
+    Snapshot
+    | PlanMessage
+    | LibraryMessage
+    | ViewMessage
+    | SelectionMessage
+    | JobMessage
+    | CursorMessage
+    | NoticeMessage,
+    Field(discriminator="type"),
+]
+
+
+class HoverProfile(Strict):
+    """The pointer is over the altitude profile at this distance; null: it left."""
+
+    type: Literal["hover_profile"] = "hover_profile"
+    s_m: float | None
+
+
+class HoverView(Strict):
+    """The pointer is over the 3D view, in shares of its width and height from the top left."""
+
+    type: Literal["hover_view"] = "hover_view"
+    x: Annotated[float, Field(ge=0, le=1)] | None
+    y: Annotated[float, Field(ge=0, le=1)] | None
+
+
+class SetView(Strict):
+    type: Literal["set_view"] = "set_view"
+    view: ViewDoc
+
+
+class SetSelection(Strict):
+    type: Literal["set_selection"] = "set_selection"
+    selection: SelectionDoc
+
+
+class FrameView(Strict):
+    """Move this page's camera: to the whole terrain, the plan, from above, or the worst point."""
+
+    type: Literal["frame_view"] = "frame_view"
+    target: Literal["terrain", "plan", "top", "worst", "poi"]
+
+
+ClientMessage = Annotated[
+    HoverProfile | HoverView | SetView | SetSelection | FrameView,
+    Field(discriminator="type"),
+]

@@ -1,0 +1,28 @@
+"""What the 3D view shows and which tool is in hand: shared by all pages, not part of the plan."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Strict
+
+
+class ViewDoc(Strict):
+    """What the 3D view shows; shared by all pages, not part of the plan."""
+
+    shading: Literal["height", "hillshade", "orthophoto"] = "height"
+    show_surface: bool = True
+    show_path: bool = True
+    show_unknown: bool = True
+    vertical_exaggeration: Annotated[float, Field(ge=1, le=5)] = 1.0
+    legend_min_m: float | None = None
+    legend_max_m: float | None = None
+
+
+class SelectionDoc(Strict):
+    """Which tool clicks in the 3D view act through, and what is selected."""
+
+    tool: Literal["select", "add_poi", "polygon", "home", "look_at"] = "select"
+    poi_id: str | None = None

@@ -1,0 +1,31 @@
+import { effect, signal } from "@preact/signals";
+import type { TerrainDoc } from "../messages";
+import { sentFileOf } from "./files";
+import { edit } from "./plan";
+import { document_, library } from "./state";
+
+/** A surface model that this page sent and the open plan has not taken. */
+export const offered = signal<string | null>(null);
+
+export function useTerrain(entry: TerrainDoc): void {
+  edit(`Use ${entry.name}`, "terrain", (doc) => ({ ...doc, terrain_id: entry.id, orthophoto_id: null }));
+  offered.value = null;
+}
+
+let seen: ReadonlySet<string> | null = null;
+
+/** The models of a library that were not there before; the first library has none. */
+export function arrivalsOf(terrains: readonly TerrainDoc[], before: ReadonlySet<string> | null): TerrainDoc[] {
+  return before === null ? [] : terrains.filter((entry) => !before.has(entry.id));
+}
+
+effect(() => {
+  const { terrains } = library.value;
+  if (document_.peek() === null) return;
+  for (const entry of arrivalsOf(terrains, seen)) {
+    const sent = sentFileOf(entry.name);
+    if (sent?.replaces) useTerrain(entry);
+    else if (sent) offered.value = entry.id;
+  }
+  seen = new Set(terrains.map((entry) => entry.id));
+});
