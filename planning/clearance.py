@@ -228,9 +228,9 @@ def _columns(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[str | 
 
 
 def _scale(dsm: Dsm, worst: WorstPoint) -> float:
-    """The CRS's largest point scale factor at the worst point; infinite where it is not defined."""
+    """The CRS's point scale farthest from 1 in any direction at the worst point; infinite where it is not defined."""
     factors = Proj(dsm.crs).get_factors(worst.lon_deg, worst.lat_deg)
-    scales = (float(factors.meridional_scale), float(factors.parallel_scale))
+    scales = (float(factors.tissot_semimajor), float(factors.tissot_semiminor))
     return max(scales, key=lambda scale: abs(scale - 1.0))
 
 

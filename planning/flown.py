@@ -23,6 +23,8 @@ F64 = NDArray[np.float64]
 AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
 STORED_ALTITUDE_M = 0.01
 """ArduPilot keeps whole centimetres and cuts the rest off."""
+LARGEST_STORED_M = 80_000.0
+"""Beyond it centimetres do not fit the vehicle's 24 bits: no flight, left as it is for the judge to refuse."""
 HOME_TOLERANCE_M = 1.0
 PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {LAND}
 
@@ -77,6 +79,13 @@ def _given(lat_deg: float, lon_deg: float, where: str) -> tuple[float, float] | 
             advice="Latitude lies in -90..90, longitude in -180..180 degrees.",
         )
     return lat_deg, lon_deg
+
+
+def _stored_m(alt_m: float) -> float:
+    """What ArduPilot makes of an altitude: it comes as float32 and is cut to whole centimetres, towards zero."""
+    if abs(alt_m) > LARGEST_STORED_M:
+        return alt_m
+    return math.trunc(float(np.float32(alt_m) * np.float32(100.0))) / 100.0
 
 
 class _Flight:
@@ -200,7 +209,8 @@ class _Flight:
         elif item.frame not in AMSL_FRAMES + HOME_FRAMES:
             self._cannot_judge(index, item, f"uses frame {item.frame}")
         elif not (self.ardupilot and abs(item.alt_m) < STORED_ALTITUDE_M):
-            return item.alt_m if item.frame in AMSL_FRAMES else self.home_alt_m + item.alt_m
+            alt_m = _stored_m(item.alt_m) if self.ardupilot else item.alt_m
+            return alt_m if item.frame in AMSL_FRAMES else self.home_alt_m + alt_m
         return present_m
 
     def _cannot_judge(self, index: int, item: MissionItem, why: str) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from planning.dsm import Dsm, is_amsl
 from planning.errors import DatumError, MissionError, PoiError
 from planning.mission_items import FRAME_AMSL, FRAME_RELATIVE, Heights
-from planning.model import Home, MissionParams, SampledPath
+from planning.model import FlownLine, Home, MissionParams, SampledPath
 
 START_TOLERANCE_M = 0.5
 
@@ -27,6 +28,18 @@ def home_from_dsm(dsm: Dsm, lat_lon_deg: tuple[float, float]) -> Home:
             advice="Put home on a known part of the surface model; give the latitude first.",
         )
     return Home(lat_deg, lon_deg, alt_m, dsm.vertical_datum)
+
+
+def home_on_ground(line: FlownLine, unfilled: Dsm) -> FlownLine:
+    """The line, named unjudged when home lies on a cell that was unknown before holes were filled.
+
+    A filled hole has the height of its rim's highest cell, maybe a wall's; the vehicle counts its altitudes
+    from the true ground there, and the whole flight would be lower by the difference.
+    """
+    if math.isfinite(float(unfilled.elevation_at(np.array([line.home_xy_m]))[0])):
+        return line
+    why = "Home lies in a hole of the surface model that was filled: its true height is unknown."
+    return replace(line, unjudged=(*line.unjudged, why))
 
 
 def item_heights(home: Home, params: MissionParams, dsm: Dsm) -> Heights:

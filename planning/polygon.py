@@ -1,10 +1,15 @@
-"""Simple polygons in the plane: whether they are, and where lines cross them."""
+"""Simple polygons in the plane: whether they are, and how far they reach in strips."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
 from planning.model import F64
+
+TOUCHING_M = 1e-6
+"""Intervals closer than this are one."""
 
 
 def area_m2(corners_m: F64) -> float:
@@ -38,10 +43,31 @@ def _touch(p: F64, q: F64, a: F64, b: F64) -> np.ndarray:
     return across & boxes.all(axis=-1)
 
 
-def chords(corners_m: F64, y_m: float) -> list[tuple[float, float]]:
-    """Intervals of x inside the polygon along the horizontal line at ``y_m``, from left to right."""
+def extents(corners_m: F64, low_m: float, high_m: float) -> list[tuple[float, float]]:
+    """Intervals of x that the polygon covers somewhere in the strip ``low_m <= y <= high_m``, from left to right.
+
+    Between two neighbouring corners' heights the polygon falls into trapezoids; each covers the interval from
+    its leftmost to its rightmost corner, and intervals that meet are joined.
+    """
+    ys = corners_m[:, 1]
+    levels = np.unique(np.concatenate([[low_m, high_m], ys[(ys > low_m) & (ys < high_m)]]))
+    covered = [part for a, b in pairwise(levels.tolist()) for part in _trapezoids(corners_m, a, b)]
+    joined: list[tuple[float, float]] = []
+    for left, right in sorted(covered):
+        if joined and left <= joined[-1][1] + TOUCHING_M:
+            joined[-1] = (joined[-1][0], max(joined[-1][1], right))
+        else:
+            joined.append((left, right))
+    return joined
+
+
+def _trapezoids(corners_m: F64, low_m: float, high_m: float) -> list[tuple[float, float]]:
+    """Extents in x of the polygon's parts in a strip without a corner inside."""
     (x0, y0), (x1, y1) = corners_m.T, np.roll(corners_m, -1, axis=0).T
-    # Half-open edges: a corner on the line belongs to one of its two edges.
-    crosses = (y0 <= y_m) != (y1 <= y_m)
-    at = np.sort(x0[crosses] + (y_m - y0[crosses]) * (x1 - x0)[crosses] / (y1 - y0)[crosses])
-    return [(float(left), float(right)) for left, right in zip(at[::2], at[1::2], strict=True)]
+    middle_m = (low_m + high_m) / 2
+    crosses = (y0 <= middle_m) != (y1 <= middle_m)
+    x0, y0, x1, y1 = x0[crosses], y0[crosses], x1[crosses], y1[crosses]
+    low, middle, high = (x0 + (y - y0) * (x1 - x0) / (y1 - y0) for y in (low_m, middle_m, high_m))
+    order = np.argsort(middle)
+    least, most = np.minimum(low, high)[order], np.maximum(low, high)[order]
+    return list(zip(least[::2].tolist(), most[1::2].tolist(), strict=True))

@@ -14,7 +14,7 @@ from planning.camera import gsd_cm as gsd_at_height_cm
 from planning.dsm import Dsm
 from planning.errors import ParameterError, PoiError
 from planning.model import F64, Camera, Poi
-from planning.polygon import area_m2, chords, crossing_edges
+from planning.polygon import area_m2, crossing_edges, extents
 
 MIN_AREA_M2 = 1.0
 MIN_LINE_M = 0.5
@@ -52,9 +52,10 @@ def survey_lines(
 
     Melita 2020, eq. 1 gives the height from the ground sampling distance (give one of the two);
     spacing and trigger distance are the footprint less the overlap (shares in [0, 1)). The lines
-    lie evenly, at most that spacing apart and half of it from the polygon's edge. ``angle_deg``
-    None takes the edge direction with the fewest turns. In a concave polygon a line may have
-    several parts. Raises ``PoiError`` for an unusable polygon or unknown terrain.
+    lie evenly, at most that spacing apart, and are as long as the polygon is anywhere in the strip that
+    they cover: every place of it lies within half a spacing beside a line. ``angle_deg`` None takes the
+    edge direction with the fewest turns. In a concave polygon a line may have several parts.
+    Raises ``PoiError`` for an unusable polygon or unknown terrain.
     """
     if camera is None:
         raise ParameterError("A survey needs a camera.", advice="Give the vehicle profile a [camera] table.")
@@ -68,9 +69,7 @@ def survey_lines(
     count = _line_count(turned, widest_m)
     y0_m, y1_m = float(turned[:, 1].min()), float(turned[:, 1].max())
     spacing_m = (y1_m - y0_m) / count
-    ends = _back_and_forth(turned, y0_m + (np.arange(count, dtype=np.float64) + 0.5) * spacing_m) @ _turn(angle)
-    if not len(ends):
-        raise PoiError("No survey line fits into the polygon.", advice="Draw a larger polygon or another angle.")
+    ends = _back_and_forth(turned, np.linspace(y0_m, y1_m, count + 1)) @ _turn(angle)
     _refuse_unknown(ends, dsm)
     return SurveyPlan(
         pois=_pois(ends, dsm),
@@ -154,13 +153,20 @@ def _line_count(turned: F64, widest_m: float, *, limit: bool = True) -> int:
     return count
 
 
-def _back_and_forth(turned: F64, rows_m: F64) -> F64:
+def _back_and_forth(turned: F64, borders_m: F64) -> F64:
+    """Ends (N, 2) of the lines through the middle of the strips between neighbouring borders."""
     ends: list[tuple[float, float]] = []
-    for row, y in enumerate(rows_m):
-        parts = [(a, b) for a, b in chords(turned, float(y)) if b - a >= MIN_LINE_M]
+    for row, (low, high) in enumerate(pairwise(borders_m.tolist())):
+        parts = [_flyable(*part) for part in extents(turned, low, high)]
         xs = [x for part in parts for x in part]
-        ends.extend((x, float(y)) for x in (reversed(xs) if row % 2 else xs))
+        ends.extend((x, (low + high) / 2) for x in (reversed(xs) if row % 2 else xs))
     return np.array(ends, dtype=np.float64).reshape(-1, 2)
+
+
+def _flyable(left_m: float, right_m: float) -> tuple[float, float]:
+    """The interval, lengthened about its middle where it is too short to be a line."""
+    spare_m = max(0.0, MIN_LINE_M - (right_m - left_m)) / 2
+    return left_m - spare_m, right_m + spare_m
 
 
 def _refuse_unknown(ends: F64, dsm: Dsm) -> None:

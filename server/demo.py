@@ -20,17 +20,25 @@ _NOTE = "demo-plan"
 _RTL_HEIGHT_M = 60.0
 
 
-async def ensure(library: Library, lane: Lane, progress: Progress | None = None) -> tuple[TerrainDoc, str]:
-    """The demo's surface model and the id of its plan; what is missing is made."""
-    terrain = next((doc for doc in library.terrains() if doc.name == TERRAIN_NAME), None)
-    if terrain is None:
-        terrain = await lane.call(file_tasks.make_demo_terrain, library.root, TERRAIN_NAME, progress=progress)
+def terrain(library: Library) -> TerrainDoc | None:
+    """The demo's surface model, if it has been made."""
+    return next((doc for doc in library.terrains() if doc.name == TERRAIN_NAME), None)
+
+
+async def ensure_terrain(library: Library, lane: Lane, progress: Progress) -> None:
+    """Makes the surface model unless it is there: the board runs one such job after the other."""
+    if terrain(library) is None:
+        await lane.call(file_tasks.make_demo_terrain, library.root, TERRAIN_NAME, progress=progress)
         await asyncio.to_thread(library.refresh)
-    plan_id = await asyncio.to_thread(library.read_note, _NOTE)
+
+
+def ensure_plan(library: Library, model: TerrainDoc) -> str:
+    """The id of the demo's plan, made if it is missing."""
+    plan_id = library.read_note(_NOTE)
     if plan_id is None or plan_id not in {entry.id for entry in library.plans()}:
-        plan_id, _ = await asyncio.to_thread(library.create_plan, History([_document(terrain)]))
-        await asyncio.to_thread(library.write_note, _NOTE, plan_id)
-    return terrain, plan_id
+        plan_id, _ = library.create_plan(History([_document(model)]))
+        library.write_note(_NOTE, plan_id)
+    return plan_id
 
 
 def _document(terrain: TerrainDoc) -> PlanDoc:

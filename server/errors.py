@@ -150,7 +150,7 @@ STATUS: dict[type[Exception], int] = {
 """Subclasses take the status of their nearest ancestor here; all that is missing is 500."""
 
 _UNFORESEEN = "internal"
-_HTTP_CODES = {404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
+_HTTP_CODES = {400: "invalid", 404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
 
 
 def status_of(error: Exception) -> int:

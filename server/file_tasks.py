@@ -31,6 +31,12 @@ def named(upload: Path, filename: str) -> Iterator[None]:
         raise
 
 
+def warm_up(*, report: Progress) -> None:
+    """Loads what the first surface model that is dropped in would wait for."""
+    report("Getting ready", None)
+    find_spikes(demo_dsm())
+
+
 def import_terrain(
     root: Path,
     upload: Path,

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from server.schemas import PlanDoc
 
-_KEPT_STEPS = 100
+_KEPT_STEPS, _KEPT_STEPS_LEAST = 100, 10
+_KEPT_POINTS = 50_000
 _COALESCE_WITHIN_S = 2.0
 
 
@@ -25,12 +26,20 @@ class History:
         return self.documents[self.position]
 
     @property
+    def can_undo(self) -> bool:
+        return self.position > 0
+
+    @property
+    def can_redo(self) -> bool:
+        return self.position < len(self.labels)
+
+    @property
     def undo_label(self) -> str:
-        return self.labels[self.position - 1] if self.position > 0 else ""
+        return self.labels[self.position - 1] if self.can_undo else ""
 
     @property
     def redo_label(self) -> str:
-        return self.labels[self.position] if self.position < len(self.labels) else ""
+        return self.labels[self.position] if self.can_redo else ""
 
     def edit(self, label: str, document: PlanDoc, *, coalesce: bool, now_mono_s: float) -> None:
         """A new present. A dragged slider (same label, ``coalesce``) stays one step."""
@@ -43,20 +52,20 @@ class History:
         del self.documents[self.position + 1 :], self.labels[self.position :]
         self.documents.append(document)
         self.labels.append(label)
-        excess = max(0, len(self.labels) - _KEPT_STEPS)
+        excess = max(0, len(self.labels) - _steps_that_fit(document))
         del self.documents[:excess], self.labels[:excess]
         self.position = len(self.labels)
 
     def undo(self) -> bool:
         """Goes one step back; False when there is none."""
-        if self.position == 0:
+        if not self.can_undo:
             return False
         self.position -= 1
         self.last_edit_mono_s = float("-inf")
         return True
 
     def redo(self) -> bool:
-        if self.position == len(self.labels):
+        if not self.can_redo:
             return False
         self.position += 1
         self.last_edit_mono_s = float("-inf")
@@ -78,3 +87,8 @@ class History:
         if len(documents) != len(labels) + 1 or not 0 <= position <= len(labels):
             raise ValueError("history contradicts itself")
         return cls([PlanDoc.model_validate(d) for d in documents], [str(label) for label in labels], position)
+
+
+def _steps_that_fit(document: PlanDoc) -> int:
+    """Every step is a whole document, and all are written at every edit: thousands of points keep fewer."""
+    return max(_KEPT_STEPS_LEAST, min(_KEPT_STEPS, _KEPT_POINTS // max(1, len(document.pois))))

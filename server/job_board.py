@@ -97,7 +97,8 @@ class JobBoard:
         if job_id == self._running:
             self._lane.cancel()
         elif job_id in self._waiting:
-            self._waiting[job_id].cancel()
+            # Not at once: a task that has not begun yet would be gone without a word.
+            asyncio.get_running_loop().call_soon(self._waiting[job_id].cancel)
 
     async def _run(self, job_id: str, label: str, work: Work, clean: Callable[[], object]) -> None:
         try:

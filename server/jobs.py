@@ -106,7 +106,7 @@ class Lane:
             await asyncio.to_thread(self._worker.reap)
 
     async def _exchange(self, request: tuple[Any, ...], progress: Progress | None) -> tuple[str, Any]:
-        complete = False
+        kind, payload, complete = "", None, False
         try:
             worker = await self._in_thread(self._ready_worker)
             if self._cancelled:
@@ -138,12 +138,14 @@ class Lane:
         return self._worker
 
     def _discard(self) -> None:
+        if self._closed:
+            # Whoever closes the lane reaps the worker too.
+            return
         worker, self._worker = self._worker, None
         if worker is not None:
             worker.kill()
             # After whatever still reads the pipe: the thread does one thing at a time.
-            with contextlib.suppress(RuntimeError):
-                self._thread.submit(worker.reap)
+            self._thread.submit(worker.reap)
 
 
 def _cancelled() -> JobCancelledError:

@@ -89,8 +89,6 @@ class Settings(BaseSettings):
     """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
     upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
     """Largest surface model or orthophoto that can be dropped in."""
-    workers: Annotated[int, Field(ge=1, le=64)] = 2
-    """Processes for heavy work."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)
@@ -135,6 +133,33 @@ def load_settings(**overrides: Any) -> Settings:
         ) from None
     except ValueError as error:
         raise StartError(f"The settings file cannot be read: {error}.", where=str(settings_file())) from error
+
+
+def settings_document() -> str:
+    """``SETTINGS.md``: python -c "from server.settings import settings_document as d; print(d(), end='')"."""
+    return f"""# Settings
+
+Nothing has to be set: `hedgehop serve` runs with the defaults below. What is set in several places is taken from
+the first of these:
+
+1. the command line (`hedgehop serve --help`: host, port, data directory),
+2. environment variables, `HEDGEHOP_` and the setting's name in capitals,
+3. a settings file in TOML, one `name = value` per line: the file that `HEDGEHOP_SETTINGS_FILE` names, else
+   `$XDG_CONFIG_HOME/hedgehop/settings.toml`, else `~/.config/hedgehop/settings.toml`,
+4. the default.
+
+A setting that is unknown or makes no sense stops the start with a message that names it.
+
+{settings_table()}
+An example of a file:
+
+```toml
+port = 8080
+data_dir = "/srv/hedgehop"
+allowed_hosts = ["gcs.example:443"]
+allowed_origins = ["https://gcs.example"]
+```
+"""
 
 
 def settings_table() -> str:

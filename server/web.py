@@ -14,6 +14,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from planning import __version__
 from planning.errors import PlanningError
@@ -53,6 +54,7 @@ def create_app(settings: Settings, library: Library, make_workspace: MakeWorkspa
         app.include_router(router)
     for error in (ServerError, PlanningError, RequestValidationError, HTTPException):
         app.add_exception_handler(error, _tell)
+    app.add_exception_handler(ClientDisconnect, _answer_nobody)
     app.add_exception_handler(Exception, _tell_unforeseen)
     app.add_middleware(Guard, settings=settings)
     return app
@@ -66,15 +68,13 @@ async def _lifespan(
         background = Background(group)
         stack.callback(background.stop)
         try:
-            parts = await _open(settings, library, make_workspace, background, stack)
+            parts = await _open(settings, library, make_workspace, background, stack, demo)
         except (ServerError, PlanningError) as error:
             app.state.start_error = error
             raise
         app.state.parts = parts
         for loop in parts.workspace.loops():
             background.spawn(loop)
-        if demo:
-            await parts.workspace.add_demo_terrain()
         try:
             yield
         except asyncio.CancelledError:
@@ -93,6 +93,7 @@ async def _open(
     make_workspace: MakeWorkspace,
     background: Background,
     stack: AsyncExitStack,
+    demo: bool,
 ) -> Parts:
     """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
     auth = Auth(library.root / "sessions.json", password=settings.password, lifetime_s=settings.session_days * 86400.0)
@@ -101,7 +102,7 @@ async def _open(
     stack.callback(host.close)
     workspace = make_workspace(library, hub, host, background)
     stack.push_async_callback(workspace.close)
-    await workspace.start()
+    await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
@@ -111,6 +112,12 @@ async def _open(
 async def _tell(request: Request, error: Exception) -> Response:
     del request
     return answer(error_doc(error), status_of(error))
+
+
+async def _answer_nobody(request: Request, error: Exception) -> Response:
+    # An upload was broken off: no fault of the server's. The status is for the log only.
+    del request, error
+    return Response(status_code=400)
 
 
 async def _tell_unforeseen(request: Request, error: Exception) -> Response:

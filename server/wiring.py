@@ -16,13 +16,13 @@ def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Back
 
     async def on_terrain_click(page_id: str | None, lat_deg: float, lon_deg: float, known: bool) -> None:
         del page_id
-        await workspace.on_terrain_click(lat_deg, lon_deg, known=known)
+        await workspace.pointing.on_terrain(lat_deg, lon_deg, known=known)
 
     async def on_poi_click(poi_id: str) -> None:
-        await workspace.on_poi_click(poi_id)
+        workspace.pointing.on_poi(poi_id)
 
     async def on_poi_moved(poi_id: str, lat_deg: float, lon_deg: float) -> None:
-        await workspace.on_poi_moved(poi_id, lat_deg, lon_deg)
+        await workspace.pointing.on_poi_moved(poi_id, lat_deg, lon_deg)
 
     view = SceneView(
         host.server,

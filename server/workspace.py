@@ -1,37 +1,28 @@
-"""The open plan, shared by every page: edits, undo, files, and what follows from them.
+"""What all pages work on together: the open plan, its answer, its picture, and the jobs that bring files in.
 
-All methods run on the event loop; heavy work goes to worker lanes. Every edit is on disk before it is
-acknowledged, and every page hears of it.
+All methods run on the event loop; heavy work goes to worker lanes. Every page hears of every change.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import io
-import time
-import zipfile
-from collections.abc import Callable, Coroutine
+import logging
+from collections.abc import Awaitable, Coroutine
 from typing import Any, Protocol
 
-import numpy as np
-
-from planning.errors import PoiError
-from planning.exports import FILES
-from planning.poi import shortest_order
 from planning.poi_files import looks_swapped, read_pois
-from server import demo, tasks
-from server.clock import utc_now
+from server import demo, file_tasks, ordering, tasks
 from server.computing import Computing
-from server.documents import missing, with_points
-from server.edits import clicked, moved
-from server.errors import InUseError, NotReadyError, ServerError, StaleRevisionError, error_doc
+from server.documents import with_points
+from server.errors import InUseError, NotFoundError, reported
+from server.exporting import exported
 from server.file_jobs import FileJobs
-from server.history import History
 from server.job_board import JobBoard, Spawn
-from server.jobs import JobCancelledError, Lane
+from server.jobs import Lane
 from server.library import Library
 from server.picture import Picture, View
+from server.plan_desk import PlanDesk
+from server.pointing import Pointing
 from server.schemas import (
     ClientMessage,
     ErrorDoc,
@@ -56,6 +47,11 @@ from server.schemas import (
     ViewMessage,
 )
 
+log = logging.getLogger("hedgehop.plan")
+
+_FILES_NICENESS = 10
+"""Reading files leaves the processor to the answer that an operator waits for."""
+
 
 class Streams(Protocol):
     """The part of ``server.hub.Hub`` that the workspace uses."""
@@ -69,64 +65,65 @@ class Workspace:
     """One open plan at a time: a ground station has one task in hand."""
 
     def __init__(self, library: Library, streams: Streams, view: View, *, spawn: Spawn) -> None:
-        self._library, self._streams = library, streams
-        self._plan_lane, self._file_lane = Lane("plan"), Lane("files")
+        self._library, self._streams, self._spawn = library, streams, spawn
+        self._plan_lane, self._file_lane = Lane("plan"), Lane("files", niceness=_FILES_NICENESS)
         self._board = JobBoard(self._file_lane, publish=streams.publish, spawn=spawn)
         self._computing = Computing(self._plan_lane, terrain_dir=library.terrain_dir, changed=self._computed)
         self._picture = Picture(view, library, self._plan_lane, changed=self._legend, failed=self._tell)
+        self._desk = PlanDesk(library, changed=self._changed, saved=self._publish_plan, tell=streams.publish)
         self.files = FileJobs(
             library,
             self._board,
-            change=self._change,
-            document=lambda: self.document,
+            propose=self._desk.propose,
             library_changed=self._publish_library,
             show_orthophoto=lambda: self._set_view(self.view.model_copy(update={"shading": "orthophoto"})),
         )
-        self._editing = asyncio.Lock()
-        self._plan_id, self._revision, self._saved_utc = "", 0, ""
-        self._history = History()
         self.view, self.selection = ViewDoc(), SelectionDoc()
+        self.pointing = Pointing(
+            self._desk, selection=lambda: self.selection, select=self._select, tell=streams.publish
+        )
 
     # Life
 
-    async def start(self) -> None:
-        """Opens the plan that was open last, or a new one, and starts the loops."""
-        last = await asyncio.to_thread(self._library.last_plan)
-        if last is None:
-            await self._adopt(*await asyncio.to_thread(self._library.create_plan, History()))
-        else:
-            await self._adopt(last, await asyncio.to_thread(self._library.load_plan, last))
+    async def start(self, *, with_demo: bool = False) -> None:
+        """Opens the plan that was open last, or the demo's; what has to be generated for it is a job of its own."""
+        await self._desk.open_last()
+        if with_demo and not await self._open_made_demo():
+            self._spawn(self._make_demo())
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         """To be run by the application's task group until it ends."""
-        return [self._computing.run(), self._picture.run(), self._warm_up()]
+        return [self._computing.run(), self._picture.run(), self._desk.run(), self._warm_up()]
 
     async def close(self) -> None:
+        await self._desk.close()
         await self._plan_lane.close()
         await self._file_lane.close()
 
     async def _warm_up(self) -> None:
-        """Saves the first edit a wait; a failure here shows itself, and is told, when a plan is computed."""
-        with contextlib.suppress(JobCancelledError, ServerError):
-            await self._plan_lane.call(tasks.warm_up)
+        """Saves the first edit and the first file a wait. A failure shows itself again, and is told, in earnest."""
+        if self._computing.state.state != "running":
+            await _logged(self._plan_lane.call(tasks.warm_up), "Getting ready to plan")
+        await _logged(self._board.unseen(lambda lane: lane.call(file_tasks.warm_up)), "Getting ready for files")
 
     # What pages see
 
     @property
     def document(self) -> PlanDoc:
-        return self._history.present
+        return self._desk.document
 
     @property
     def state(self) -> PlanState:
+        history = self._desk.history
         return PlanState(
-            plan_id=self._plan_id,
-            revision=self._revision,
+            plan_id=self._desk.plan_id,
+            revision=self._desk.revision,
             document=self.document,
-            can_undo=bool(self._history.undo_label),
-            can_redo=bool(self._history.redo_label),
-            undo_label=self._history.undo_label,
-            redo_label=self._history.redo_label,
-            saved_utc=self._saved_utc,
+            can_undo=history.can_undo,
+            can_redo=history.can_redo,
+            undo_label=history.undo_label,
+            redo_label=history.redo_label,
+            saved_utc=self._desk.saved_utc,
             computation=self._computing.state,
         )
 
@@ -141,93 +138,40 @@ class Workspace:
             jobs=self._board.jobs,
         )
 
-    # Edits
+    # The plan
 
     async def edit(self, edit: PlanEdit) -> PlanState:
         """Raises StaleRevisionError when the plan has changed since ``base_revision``."""
-        async with self._editing:
-            if edit.base_revision != self._revision:
-                raise StaleRevisionError(
-                    f"The plan has changed meanwhile (revision {self._revision}, edit of {edit.base_revision}).",
-                    advice="Look at the present plan and make the change again.",
-                )
-            await self._commit(edit.label, edit.document, coalesce=edit.coalesce)
+        await self._desk.edit(edit)
         return self.state
 
     async def undo(self) -> PlanState:
-        return await self._travel(History.undo)
+        await self._desk.undo()
+        return self.state
 
     async def redo(self) -> PlanState:
-        return await self._travel(History.redo)
-
-    async def _travel(self, step: Callable[[History], bool]) -> PlanState:
-        async with self._editing:
-            if step(self._history):
-                await self._persist()
+        await self._desk.redo()
         return self.state
-
-    async def _change(self, label: str, change: Callable[[PlanDoc], PlanDoc]) -> PlanState:
-        """An edit that the server makes itself, on whatever is present when its turn comes."""
-        async with self._editing:
-            await self._commit(label, change(self.document))
-        return self.state
-
-    async def _commit(self, label: str, document: PlanDoc, *, coalesce: bool = False) -> None:
-        if document == self.document:
-            return
-        self._check_references(document)
-        self._history.edit(label, document, coalesce=coalesce, now_mono_s=time.monotonic())
-        await self._persist()
-
-    def _check_references(self, document: PlanDoc) -> None:
-        if document.terrain_id is not None:
-            self._library.terrain_dir(document.terrain_id)
-        if document.orthophoto_id is not None:
-            self._library.orthophoto_dir(document.orthophoto_id)
-
-    async def _persist(self) -> None:
-        """On disk first, then in sight: what is acknowledged is never lost."""
-        try:
-            self._saved_utc = await asyncio.to_thread(self._library.save_plan, self._plan_id, self._history)
-        except ServerError as error:
-            self._tell(error)
-        self._revision += 1
-        self._computing.request(self._revision, self.document)
-        self._show()
-        self._streams.publish(PlanMessage(plan=self.state))
-
-    # Plans
 
     async def new(self) -> PlanState:
-        keep = PlanDoc(terrain_id=self.document.terrain_id, profile=self.document.profile)
-        return await self._adopt(*await asyncio.to_thread(self._library.create_plan, History([keep])))
+        await self._desk.create(lambda present: PlanDoc(terrain_id=present.terrain_id, profile=present.profile))
+        return self.state
 
     async def open(self, plan_id: str) -> PlanState:
-        return await self._adopt(plan_id, await asyncio.to_thread(self._library.load_plan, plan_id))
-
-    async def save_as(self, name: str) -> PlanState:
-        copy = History([self.document.model_copy(update={"name": name})])
-        return await self._adopt(*await asyncio.to_thread(self._library.create_plan, copy))
-
-    async def delete(self, plan_id: str) -> None:
-        if plan_id == self._plan_id:
-            raise InUseError("This plan is open.", where=self.document.name, advice="Open another plan first.")
-        await asyncio.to_thread(self._library.delete_plan, plan_id)
-        self._publish_library()
-
-    async def _adopt(self, plan_id: str, history: History) -> PlanState:
-        async with self._editing:
-            self._plan_id, self._history = plan_id, history
-            await asyncio.to_thread(self._library.remember_plan, plan_id)
-            self._saved_utc = self._library.saved_utc(plan_id)
-            self._revision += 1
-            self.selection = SelectionDoc()
-            self._computing.request(self._revision, self.document, forget=True)
-            self._show()
-            self._streams.publish(SelectionMessage(selection=self.selection))
-            self._streams.publish(PlanMessage(plan=self.state))
+        try:
+            await self._desk.open(plan_id)
+        finally:
+            # A damaged one has left the list.
             self._publish_library()
         return self.state
+
+    async def save_as(self, name: str) -> PlanState:
+        await self._desk.create(lambda present: present.model_copy(update={"name": name}))
+        return self.state
+
+    async def delete(self, plan_id: str) -> None:
+        await self._desk.delete(plan_id)
+        self._publish_library()
 
     # Points
 
@@ -236,81 +180,56 @@ class Workspace:
         points = await asyncio.to_thread(read_pois, filename, data)
         warnings = list(points.warnings)
         dsm = self._picture.dsm
-        if dsm is not None and looks_swapped(points.pois, dsm):
+        if dsm is not None and await asyncio.to_thread(looks_swapped, points.pois, dsm):
             warnings.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
-        state = await self._change(f"Import {filename[:40]}", lambda document: with_points(document, points))
-        return Imported(state=state, warnings=warnings)
+        await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, points)))
+        return Imported(state=self.state, warnings=warnings)
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""
-        dsm = self._picture.dsm
-        if dsm is None or len(self.document.pois) < 3:
-            raise PoiError(
-                "There is nothing to reorder.", advice="Choose a surface model and add three points or more."
-            )
-
-        def reorder(document: PlanDoc) -> PlanDoc:
-            xy_m = dsm.xy_from_lat_lon(np.array([(p.lat_deg, p.lon_deg) for p in document.pois]))
-            return document.model_copy(update={"pois": [document.pois[i] for i in shortest_order(xy_m)]})
-
-        return await self._change("Shortest order", reorder)
-
-    async def on_terrain_click(self, lat_deg: float, lon_deg: float, *, known: bool) -> None:
-        """A click in the 3D view, through the tool in hand."""
-        async with self._editing:
-            outcome = clicked(self.document, self.selection, lat_deg, lon_deg)
-            if outcome is None:
-                return
-            if not known:
-                error = ErrorDoc(
-                    code="poi",
-                    what="The surface is unknown there.",
-                    where=f"{lat_deg:.7f}, {lon_deg:.7f}",
-                    advice="Choose a place on known ground.",
-                )
-                self._streams.publish(NoticeMessage(level="warning", error=error))
-                return
-            label, document, selection = outcome
-            await self._commit(label, document)
-        self._select(selection)
-
-    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
-        async with self._editing:
-            outcome = moved(self.document, poi_id, lat_deg, lon_deg)
-            if outcome is not None:
-                await self._commit(*outcome)
-
-    async def on_poi_click(self, poi_id: str) -> None:
-        self._select(self.selection.model_copy(update={"poi_id": poi_id}))
+        ordered = await ordering.shortest(self._plan_lane, self.document, self._picture.dsm)
+        await self._desk.propose(lambda document: ("Shortest order", ordering.reordered(document, ordered)))
+        return self.state
 
     # Files
 
     async def export(self, file: str) -> bytes:
-        """One export file, or ``all.zip``; computed from the present document. Raises NotReadyError."""
-        document = self.document
-        hint = missing(document)
-        if hint:
-            raise NotReadyError("There is no plan to export yet.", advice=hint)
-        directory = self._library.terrain_dir(document.terrain_id or "")
-        names = list(FILES) if file == "all.zip" else [file]
-        files = await self._plan_lane.call(tasks.export_plan, directory, document, names, utc_now())
-        return _zipped(files) if file == "all.zip" else files[file]
+        """One export file, or ``all.zip``, of the present document. Raises NotReadyError."""
+        return await exported(self._plan_lane, self._library, self.document, file)
 
     async def add_demo_terrain(self) -> TerrainDoc:
         """The generated demo model with its plan, made on first use, opened."""
-        terrain, plan_id = await demo.ensure(self._library, self._file_lane)
-        await self.open(plan_id)
+        await self._board.run("The demo", lambda lane, progress: demo.ensure_terrain(self._library, lane, progress))
+        self._publish_library()
+        return await self._open_demo(demo.terrain(self._library))
+
+    async def _open_made_demo(self) -> bool:
+        terrain = demo.terrain(self._library)
+        if terrain is not None:
+            await self._open_demo(terrain)
+        return terrain is not None
+
+    async def _open_demo(self, terrain: TerrainDoc | None) -> TerrainDoc:
+        if terrain is None:
+            raise NotFoundError("The demo surface model was deleted meanwhile.", advice="Try again.")
+        await self.open(await asyncio.to_thread(demo.ensure_plan, self._library, terrain))
         return terrain
 
+    async def _make_demo(self) -> None:
+        await _logged(self.add_demo_terrain(), "Making the demo")
+
     async def delete_terrain(self, terrain_id: str) -> None:
-        users = await asyncio.to_thread(self._library.plans_using, terrain_id)
-        if self.document.terrain_id == terrain_id:
-            users = [self.document.name, *users]
-        if users:
-            raise InUseError(
-                f"The surface model is used by {users[0]}.", advice="Delete that plan or give it another model first."
-            )
-        await asyncio.to_thread(self._library.delete_terrain, terrain_id)
+        """Raises InUseError while a plan needs it."""
+        async with self._desk.editing:
+            users = await asyncio.to_thread(self._library.plans_using, terrain_id)
+            if self.document.terrain_id == terrain_id:
+                users = [self.document.name, *users]
+            if users:
+                raise InUseError(
+                    f"The surface model is used by the plan {users[0]!r}.",
+                    advice="Delete that plan or give it another model first.",
+                )
+            await asyncio.to_thread(self._library.delete_terrain, terrain_id)
         self._publish_library()
 
     async def cancel_job(self, job_id: str) -> None:
@@ -333,9 +252,8 @@ class Workspace:
                 await self._picture.frame(message, page_id)
 
     def _set_view(self, view: ViewDoc) -> None:
-        low_m, high_m = self._picture.legend_m or (None, None)
-        self.view = view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
-        self._streams.publish(ViewMessage(view=self.view))
+        self.view = view
+        self._legend()
         self._show()
 
     def _select(self, selection: SelectionDoc) -> None:
@@ -345,29 +263,40 @@ class Workspace:
 
     # What follows
 
+    def _changed(self, forget: bool) -> None:
+        self._computing.request(self._desk.revision, self.document, forget=forget)
+        if forget:
+            self._select(SelectionDoc())
+            self._publish_library()
+        self._computed()
+
     def _computed(self) -> None:
         self._show()
-        self._streams.publish(PlanMessage(plan=self.state))
+        self._publish_plan()
 
     def _legend(self) -> None:
         low_m, high_m = self._picture.legend_m or (None, None)
         self.view = self.view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
         self._streams.publish(ViewMessage(view=self.view))
 
-    def _tell(self, error: Exception) -> None:
-        self._streams.publish(NoticeMessage(level="error", error=error_doc(error)))
+    def _tell(self, error: ErrorDoc) -> None:
+        self._streams.publish(NoticeMessage(level="error", error=error))
 
     def _show(self) -> None:
         stale = self._computing.state.state == "running"
         self._picture.want(self.document, self.selection, self.view, self._computing.scene, stale=stale)
 
+    def _publish_plan(self) -> None:
+        self._streams.publish(PlanMessage(plan=self.state))
+
     def _publish_library(self) -> None:
         self._streams.publish(LibraryMessage(library=self._library.state()))
 
 
-def _zipped(files: dict[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in files.items():
-            archive.writestr(name, data)
-    return buffer.getvalue()
+async def _logged(work: Awaitable[object], doing: str) -> None:
+    """For work in the background that must not end the server when it fails."""
+    try:
+        await work
+    except Exception as error:
+        doc = reported(error, log, doing)
+        log.warning("%s: %s", doing, doc.what)

@@ -25,6 +25,7 @@ OTHER_UNJUDGED = {
     176: "changes the flight mode",
     177: "jumps to another item",
     179: "moves home, to which altitudes and the return refer",
+    180: "changes a parameter, such as the return height",
     185: "ends the flight",
     186: "changes altitude",
     189: "starts a landing sequence",
@@ -32,13 +33,18 @@ OTHER_UNJUDGED = {
     192: "flies somewhere else",
     193: "pauses the mission",
     208: "releases a parachute",
+    209: "tests a motor",
+    212: "starts tuning in flight",
     218: "triggers an auxiliary function, which may change the flight mode",
+    221: "hands the vehicle over to another system",
+    222: "hands the vehicle over to another system",
+    223: "starts or stops an engine",
 }
 
 _STAY = frozenset(
-    {93, 112, 114, 115, 178, 180, 181, 182, 183, 184, 187, 188, 194, 195, 196, 197, 198}
+    {93, 112, 114, 115, 178, 181, 182, 183, 184, 187, 188, 194, 195, 196, 197, 198}
     | set(range(200, 208))
-    | {209, 211, 212, 214, 215, 216, 217, 220, 221, 222, 223}
+    | {211, 214, 215, 216, 217, 220}
     | {530, 531, 532, 533, 534, 1000, 1001}
 )
 

@@ -14,12 +14,14 @@ from planning.rasters.header import RasterHeader
 
 _MOST_DISTORTION = 0.02
 """Of a projection's metres against metres on the ground; national grids and UTM stay below 0.002."""
-_FOOT_M = 0.3048
+_FOOT_M, _US_FOOT_M = 0.3048, 1200 / 3937
 _UNIT_TAGS_M = {
     "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
     "ft": _FOOT_M, "foot": _FOOT_M, "feet": _FOOT_M,
-    "us-ft": 1200 / 3937, "us survey foot": 1200 / 3937, "ftus": 1200 / 3937,
-    "cm": 0.01, "mm": 0.001,
+    "us-ft": _US_FOOT_M, "us survey foot": _US_FOOT_M, "us survey feet": _US_FOOT_M, "us_survey_foot": _US_FOOT_M,
+    "foot_us": _US_FOOT_M, "ftus": _US_FOOT_M, "sfoot": _US_FOOT_M, "survey foot": _US_FOOT_M, "yd": 0.9144,
+    "km": 1000.0, "dm": 0.1, "decimetre": 0.1, "decimeter": 0.1,
+    "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01, "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001,
 }  # fmt: skip
 
 
@@ -41,6 +43,7 @@ def interpret(header: RasterHeader, *, crs: str | None, vertical_datum: str | No
     """What the file says, overridden by what the user declares. MissingCrsError when nobody says anything."""
     source, notes = _source_crs(header, crs, where)
     vertical = _vertical_part(source)
+    _refuse_strange_axes(source, vertical, where)
     metres, unit_notes = _height_unit(header, source, vertical)
     in_file = header.vertical_datum or _datum_name(source, vertical)
     if vertical_datum and in_file and vertical_datum != in_file:
@@ -75,6 +78,22 @@ def _source_crs(header: RasterHeader, crs: str | None, where: str) -> tuple[CRS,
     return declared, (f"The file says {in_file.name}; the declared {declared.name} is used.",)
 
 
+def _refuse_strange_axes(source: CRS, vertical: CRS | None, where: str) -> None:
+    flat = _horizontal_part(source)
+    if not (flat.is_geographic or flat.is_projected):
+        raise RasterFormatError(
+            f"{source.name} is neither a map projection nor latitude and longitude.",
+            where=where,
+            advice="Reproject it, or declare the right reference system with --crs, for example EPSG:32633.",
+        )
+    if vertical is not None and any(axis.direction == "down" for axis in vertical.axis_info):
+        raise RasterFormatError(
+            f"Its numbers are depths that grow downwards ({vertical.name}), not heights.",
+            where=where,
+            advice="Negate them (gdal_calc.py --calc=-A), or declare the right reference system with --crs.",
+        )
+
+
 def _horizontal_part(crs: CRS) -> CRS:
     return crs.sub_crs_list[0] if crs.is_compound else crs.to_2d()
 
@@ -91,20 +110,40 @@ def _datum_name(crs: CRS, vertical: CRS | None) -> str | None:
 
 def _height_unit(header: RasterHeader, crs: CRS, vertical: CRS | None) -> tuple[float, tuple[str, ...]]:
     axes = vertical.axis_info if vertical is not None else crs.axis_info[2:]
+    tag = (header.unit or "").strip().lower()
     if axes:
         factor = float(axes[0].unit_conversion_factor)
-        return factor, () if factor == 1.0 else (f"Heights were converted from {axes[0].unit_name} to metres.",)
-    if (tag := (header.unit or "").strip().lower()) in _UNIT_TAGS_M:
+        said = () if factor == 1.0 else (f"Heights were converted from {axes[0].unit_name} to metres.",)
+        return factor, said + _contradiction(tag, factor, axes[0].unit_name)
+    if tag in _UNIT_TAGS_M:
         factor = _UNIT_TAGS_M[tag]
         return factor, () if factor == 1.0 else (f'Heights were converted from "{header.unit}" to metres.',)
     horizontal = _horizontal_part(crs)
     factor = 1.0 if horizontal.is_geographic else float(horizontal.axis_info[0].unit_conversion_factor)
     if factor == 1.0:
-        return 1.0, ()
+        return 1.0, _unknown_unit(tag)
     unit = horizontal.axis_info[0].unit_name
     return factor, (
         f"The map grid is in units of {unit} and the file does not say in which unit its heights are: "
         f"they were taken as {unit} too and converted to metres. If they are metres, use --z-scale 1.",
+    )
+
+
+def _contradiction(tag: str, factor: float, unit_name: str) -> tuple[str, ...]:
+    if abs(_UNIT_TAGS_M.get(tag, factor) / factor - 1.0) < 1e-5:
+        return ()
+    return (
+        f'The file says "{tag}" of its heights, its reference system {unit_name}: {unit_name} was taken. '
+        f"If that is wrong, use --z-scale {_UNIT_TAGS_M[tag]:g}.",
+    )
+
+
+def _unknown_unit(tag: str) -> tuple[str, ...]:
+    if tag in ("", "none", "unknown", "1"):
+        return ()
+    return (
+        f'The file gives its heights in "{tag}", no unit known here: they were taken as metres. '
+        "If they are not, use --z-scale with the metres of one unit.",
     )
 
 

@@ -116,8 +116,12 @@ def _mappings(source: Affine, systems: tuple[CRS, CRS] | None) -> tuple[Inverse,
     def forward(column: F64, row: F64) -> tuple[F64, F64]:
         return there.transform(*_apply(source, column, row))
 
+    turns = systems[0].is_geographic
+
     def to_source(x: F64, y: F64) -> tuple[F64, F64]:
-        return _apply(inverse, *back.transform(x, y))
+        u, v = back.transform(x, y)
+        # Longitudes come back in -180..180; a grid across the date line, or one from 0 to 360, counts on.
+        return _apply(inverse, u + 360.0 * np.round((source.c - u) / 360.0) if turns else u, v)
 
     return forward, to_source
 

@@ -14,6 +14,8 @@ from server.scene.shapes import BALL, GEM, label_node, line_node, many_node, rai
 
 _MOST_WAYPOINT_MARKS = 1500
 _CURTAIN_OPACITY = 0.42
+_WORST_POLE = 6.0
+"""In radii of a mark: lifts the words above those of the points of interest."""
 
 
 def flight_nodes(drawing: Drawing) -> list[Node]:
@@ -45,7 +47,7 @@ def _colors(drawing: Drawing, clearance_m: F64, plan: PlanScene) -> U8:
 def _path(drawing: Drawing, plan: PlanScene) -> list[Node]:
     points = drawing.frame.scene_from_model(plan.path_m)
     colors = _colors(drawing, path_clearance_m(plan), plan)
-    return [line_node("/path", _in_sight(drawing, points), colors, width_px=5.0), *_curtain(drawing, plan, points)]
+    return [line_node("/path", _in_sight(drawing, points), colors, width_px=6.0), *_curtain(drawing, plan, points)]
 
 
 def _in_sight(drawing: Drawing, points: F64) -> F64:
@@ -101,11 +103,14 @@ def _worst(drawing: Drawing, plan: PlanScene) -> list[Node]:
     if not np.isfinite(plan.worst_m).all() or not len(plan.flown_distance_m):
         return []
     at = drawing.frame.scene_from_model(plan.worst_m)
+    top = raised(at, _WORST_POLE * drawing.mark_m)
     nearest_m = float(np.min(plan.flown_distance_m))
     color = tuple(_colors(drawing, np.array([nearest_m]), plan)[0].tolist())
     return [
-        shape_node("/worst", GEM, at, 0.9 * drawing.mark_m, color),
-        label_node("/worst_label", _distance_words(nearest_m), raised(at, 2.5 * drawing.mark_m)),
+        line_node("/worst_pole", np.stack([at, top]), color, width_px=4.0),
+        shape_node("/worst", GEM, at, 1.4 * drawing.mark_m, color),
+        # To the right of its pole: seen from above the label of a point of interest may stand on the same place.
+        label_node("/worst_label", _distance_words(nearest_m), top, anchor="center-left"),
     ]
 
 

@@ -37,10 +37,10 @@ VIEW_POLICY = (
     "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
 )
 # viser has no switch for its control panel and its own notices; the console has both. Its white page would flash
-# before the first picture, and shine through where its backdrop cannot be drawn: the page's own lies behind.
+# before the first picture: a quiet gradient lies behind all, dark enough for white labels in either theme.
 VIEW_STYLE = b"""<style>
 [data-floating-window], .mantine-Notifications-root { display: none !important; }
-html, body { background: transparent !important; }
+html, body { height: 100%; background: linear-gradient(#3a4454, #181c24) !important; }
 #root div:has(canvas) { background: transparent !important; }
 </style>"""
 PASSED_ON_QUERY = frozenset({"fixedDpr"})

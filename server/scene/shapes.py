@@ -29,9 +29,9 @@ def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> No
     """A polyline through (N, 3) scene points; ``color`` is one, or (N - 1, 3): one per segment."""
     segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
     colors = _linear(np.asarray(color, dtype=np.uint8))
-    if colors.ndim == 2:
-        colors = np.repeat(colors[:, None, :], 2, axis=1)
-    props = {"points": segments, "colors": colors, "thickness": width_px, "thickness_units": "screen"}
+    # One colour for each end of each segment: viser takes a single colour for sRGB.
+    ends = np.broadcast_to(colors[..., None, :] if colors.ndim == 2 else colors, (len(segments), 2, 3)).copy()
+    props = {"points": segments, "colors": ends, "thickness": width_px, "thickness_units": "screen"}
     return Node(name, "line_segments", props)
 
 
@@ -56,9 +56,9 @@ def many_node(name: str, shape: tuple[F32, U32], at: F64, size: float, colors: R
     return Node(name, "batched_meshes_simple", {**props, **_UNSHADED})
 
 
-def label_node(name: str, text: str, at: F64, *, size: float = 1.0) -> Node:
-    """A label that stands on its place and hides behind nothing."""
-    props = {"text": text, "position": _triple(at), "anchor": "bottom-center", "font_screen_scale": size}
+def label_node(name: str, text: str, at: F64, *, size: float = 1.0, anchor: str = "bottom-center") -> Node:
+    """A label that hides behind nothing; ``anchor`` is the part of it that stands on its place."""
+    props = {"text": text, "position": _triple(at), "anchor": anchor, "font_screen_scale": size}
     return Node(name, "label", props)
 
 

@@ -1,4 +1,4 @@
-"""The views that a page's camera can be sent to, and the backdrop behind all of them."""
+"""The views that a page's camera can be sent to."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ import numpy as np
 
 from server.scene.camera import OBLIQUE, TOP, Pose, fitted
 from server.scene.drawing import Drawing
-from server.scene.payload import F64, U8
+from server.scene.payload import F64
 
 Target = Literal["terrain", "plan", "top", "worst", "poi"]
 
 _OUTLINE_CELLS = 40
 _CLOSE_UP = 0.16
 """Half the side of a close-up, in half diagonals of the model."""
-_SKY_RGB, _GROUND_RGB = (58, 68, 84), (24, 28, 36)
 
 
 def shot(drawing: Drawing, target: Target, *, aspect: float) -> Pose:
@@ -65,10 +64,3 @@ def _plan_points(drawing: Drawing) -> F64 | None:
 def _around(drawing: Drawing, centre: F64, share: float = _CLOSE_UP) -> F64:
     reach = share * drawing.frame.half_diagonal_m
     return centre + reach * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-0.5, 0.5)])
-
-
-def background() -> U8:
-    """A quiet gradient, dark enough for white labels and lines, that sits in a light page as well as in a dark one."""
-    share = np.linspace(0.0, 1.0, 64)[:, None]
-    column = np.array(_SKY_RGB) + share * (np.array(_GROUND_RGB) - np.array(_SKY_RGB))
-    return np.repeat(column[:, None, :], 8, axis=1).round().astype(np.uint8)

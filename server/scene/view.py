@@ -20,7 +20,7 @@ from server.scene.marks import cursor_nodes
 from server.scene.nodes import Canvas, Node
 from server.scene.payload import F64, SceneState
 from server.scene.picking import PlaceHit, PoiHit, pick
-from server.scene.shots import Target, background, shot
+from server.scene.shots import Target, shot
 
 _POINTER_REACH_PX = 24.0
 
@@ -54,7 +54,6 @@ class SceneView:
         self._one_at_a_time = asyncio.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
         server.scene.world_axes.visible = False
-        server.scene.set_background_image(background(), format="png")
         server.initial_camera.fov = FOV_RAD
         # Awaited by viser although its signature does not say so.
         server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]

@@ -51,6 +51,23 @@ def local(line: FlownLine) -> list[list[float]]:
 TAKE_OFF, RTL = item(22, alt_m=10.0), item(20, frame=2)
 
 
+@pytest.mark.parametrize(
+    ("alt_m", "stored_m"), [(12.0, 12.0), (12.349, 12.34), (32.94, 32.93), (-5.499, -5.49), (32.942, 32.94)]
+)
+def test_arducopter_cuts_altitudes_to_centimetres(alt_m, stored_m):
+    assert local(fly(TAKE_OFF, item(16, 60, 50, alt_m)))[-1][2] == pytest.approx(stored_m, abs=1e-9)
+    assert local(fly(TAKE_OFF, item(16, 60, 50, alt_m), firmware="px4"))[-1][2] == pytest.approx(alt_m, abs=1e-9)
+
+
+def test_an_altitude_no_vehicle_can_store_is_left_to_the_judge():
+    assert fly(TAKE_OFF, item(16, 60, 50, 1e300)).points_m[-1, 2] == 1e300
+
+
+@pytest.mark.parametrize("command", [180, 209, 212, 221, 222, 223])
+def test_what_changes_later_items_or_the_engines_is_not_judged(command):
+    assert f"(command {command})" in fly(TAKE_OFF, item(command, frame=2), item(16, 60, 50, 12.0)).unjudged[0]
+
+
 def test_a_plain_mission_becomes_its_polyline():
     line = fly(TAKE_OFF, item(16, 60, 50, 12.0), item(178, frame=2), item(16, 60, 70, 15.0), RTL)
     assert local(line) == [[50, 50, 10], [60, 50, 12], [60, 70, 15]]

@@ -221,3 +221,18 @@ def test_writing_where_nothing_can_be_written(tmp_path: Path) -> None:
     dsm = Dsm(hill(), HALF_METRE, CRS.from_epsg(32633), None, "")
     with pytest.raises(RasterError, match="cannot be written"):
         write_dsm(tmp_path / "missing" / "x.tif", dsm)
+
+
+@pytest.mark.parametrize(("crs", "said"), [("EPSG:32610+5715", "depths"), ("EPSG:4978", "neither a map projection")])
+def test_depths_and_geocentric_systems_are_refused(tmp_path: Path, crs: str, said: str) -> None:
+    with pytest.raises(RasterFormatError, match=said):
+        read_dsm(write_raster(tmp_path / "a.tif", hill(), crs=crs))
+
+
+def test_a_survey_foot_is_known_and_an_unknown_unit_is_said(tmp_path: Path) -> None:
+    feet, _ = read_dsm_reported(write_raster(tmp_path / "a.tif", hill(), unit="sfoot"))
+    assert feet.elevation_m.max() == pytest.approx(hill().max() * 1200 / 3937, rel=1e-6)
+    _, report = read_dsm_reported(write_raster(tmp_path / "b.tif", hill(), unit="furlong"))
+    assert any("furlong" in warning for warning in report.warnings)
+    _, plain = read_dsm_reported(write_raster(tmp_path / "c.tif", hill(), unit="metre"))
+    assert plain.warnings == ()

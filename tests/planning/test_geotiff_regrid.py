@@ -122,3 +122,20 @@ def test_metres_that_are_not_true_are_reprojected(tmp_path: Path) -> None:
     assert report.reprojected_to == "EPSG:32633"
     assert 0.75 < dsm.resolution_m < 0.8
     assert any("off on the ground" in warning for warning in report.warnings)
+
+
+@pytest.mark.parametrize(
+    ("west_deg", "lat_deg", "epsg"), [(179.9998, -17, 32701), (-180.0003, -17, 32760), (359.5, 51, 32630)]
+)
+def test_longitudes_may_cross_the_date_line_or_count_to_360(tmp_path: Path, west_deg: float, lat_deg: float, epsg: int):
+    path = write_raster(
+        tmp_path / "a.tif", hill(), crs="EPSG:4326", transform=Affine(1e-5, 0, west_deg, 0, -1e-5, lat_deg)
+    )
+    dsm = read_dsm(path)
+    assert dsm.crs.to_epsg() == epsg
+    assert np.nanmax(dsm.elevation_m) == hill().max()
+    assert np.isfinite(dsm.elevation_m).mean() > 0.8
+    top = np.argwhere(dsm.elevation_m == hill().max())[0]
+    lat, lon = dsm.lat_lon_from_xy(np.array([dsm.transform @ (top[1] + 0.5, top[0] + 0.5)]))[0]
+    assert lat == pytest.approx(lat_deg - 20.5e-5, abs=2e-5)
+    assert (lon - west_deg - 25.5e-5 + 180) % 360 - 180 == pytest.approx(0, abs=2e-5)

@@ -1,5 +1,6 @@
 """Back-and-forth lines over a polygon."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,28 @@ def test_every_place_of_a_concave_polygon_is_near_a_line() -> None:
         t = np.clip(((p - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0, 1)
         gap = np.hypot(*(a + t[:, None] * (b - a) - p).T).min()
         assert gap <= survey.line_spacing_m / 2 * 1.01
+
+
+TRIANGLE = np.array([[20.0, 20.0], [140.0, 30.0], [60.0, 100.0]])
+SLIVER = np.array([[20.0, 20.0], [140.0, 60.0], [140.0, 60.4]])
+
+
+@pytest.mark.parametrize("shape", [TRIANGLE, SLIVER, U_SHAPE])
+@pytest.mark.parametrize("height_m", [5.0, 20.0, 60.0])
+@pytest.mark.parametrize("angle_deg", [None, 0.0, 77.0])
+def test_every_place_is_photographed(shape: np.ndarray, height_m: float, angle_deg: float | None) -> None:
+    """Also where the outline runs askew to the lines and a line through the strip's middle would end early."""
+    survey = plan(shape, gsd_cm=None, height_m=height_m, angle_deg=angle_deg)
+    lines = ends_m(survey)
+    steps = np.linspace(0, 1, 41)[:, None]
+    corners = np.vstack([shape, shape[:1]])
+    outline = np.concatenate([a + steps * (b - a) for a, b in pairwise(corners)])
+    for p in outline:
+        along = (lines[:, 1] - lines[:, 0]) / np.hypot(*(lines[:, 1] - lines[:, 0]).T)[:, None]
+        off = p - lines[:, 0]
+        x, y = (off * along).sum(axis=1), off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0]
+        beside = np.abs(y) <= survey.line_spacing_m / 2 + 0.02
+        assert (beside & (x >= -0.02) & (x <= np.hypot(*(lines[:, 1] - lines[:, 0]).T) + 0.02)).any()
 
 
 def test_parts_of_one_line_are_flown_in_its_direction() -> None:

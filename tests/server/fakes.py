@@ -71,8 +71,8 @@ class FakeWorkspace:
             add_terrain=self._add_terrain, add_orthophoto=self._add_orthophoto, remove_spikes=self._remove_spikes
         )
 
-    async def start(self) -> None:
-        self.calls.append("start")
+    async def start(self, *, with_demo: bool = False) -> None:
+        self.calls.append("start with demo" if with_demo else "start")
 
     def loops(self) -> list:
         return []

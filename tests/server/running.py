@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import httpx
 import uvicorn
@@ -16,11 +17,13 @@ from websockets.sync.client import ClientConnection, connect
 
 from server.api.access import Parts
 from server.app import bound_socket, server_config
+from server.hub import Hub
 from server.library import Library
 from server.settings import Settings
-from server.web import create_app
+from server.web import MakeWorkspace, create_app
 from tests.server.fakes import FakeWorkspace
 
+T = TypeVar("T")
 PASSWORD = "correct horse battery"
 
 
@@ -31,7 +34,7 @@ class Running:
     settings: Settings
     app: FastAPI
     http: httpx.Client
-    server: uvicorn.Server
+    server: _Signalling
 
     @property
     def parts(self) -> Parts:
@@ -40,6 +43,11 @@ class Running:
     @property
     def workspace(self) -> FakeWorkspace:
         return cast(FakeWorkspace, self.parts.workspace)
+
+    def on_loop(self, work: Coroutine[Any, Any, T]) -> T:
+        """Runs it where the server's own coroutines run."""
+        assert self.server.loop is not None
+        return asyncio.run_coroutine_threadsafe(work, self.server.loop).result(60)
 
     @property
     def origin(self) -> str:
@@ -66,12 +74,19 @@ class Running:
         return httpx.Client(base_url=self.origin, **options)
 
 
+def _fake_workspace(library: Library, hub: Hub, *_: object) -> Any:
+    return FakeWorkspace(library, hub)
+
+
 @contextlib.contextmanager
-def running(data_dir: Path, **overrides: Any) -> Iterator[Running]:
+def running(
+    data_dir: Path, *, make: MakeWorkspace = _fake_workspace, demo: bool = False, **overrides: Any
+) -> Iterator[Running]:
+    """With a workspace that computes nothing, unless ``make`` makes another one."""
     with bound_socket("127.0.0.1", 0) as listening, contextlib.closing(Library(data_dir)) as library:
         port = listening.getsockname()[1]
         settings = Settings(data_dir=data_dir, port=port, **{"console_dir": data_dir / "no-console", **overrides})
-        app = create_app(settings, library, lambda library, hub, *_: cast(Any, FakeWorkspace(library, hub)))
+        app = create_app(settings, library, make, demo=demo)
         ready = threading.Event()
         server = _Signalling(server_config(app, settings), ready)
         thread = threading.Thread(target=server.run, args=([listening],))
@@ -91,8 +106,10 @@ class _Signalling(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, ready: threading.Event) -> None:
         super().__init__(config)
         self._ready = ready
+        self.loop: asyncio.AbstractEventLoop | None = None
 
     async def startup(self, sockets: list[Any] | None = None) -> None:
+        self.loop = asyncio.get_running_loop()
         try:
             await super().startup(sockets)
         finally:

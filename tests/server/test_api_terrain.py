@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import logging.handlers
+import queue
+import socket
+
 import pytest
 
 from server.api.uploads import display_name, suffix_of
@@ -80,3 +84,29 @@ def test_display_names_are_one_line_without_folders(given: str, shown: str) -> N
 )
 def test_suffixes_are_plain(name: str, suffix: str) -> None:
     assert suffix_of(name) == suffix
+
+
+def test_an_upload_that_is_broken_off_leaves_nothing_and_is_no_fault(served: Running) -> None:
+    told: queue.Queue[logging.LogRecord] = queue.Queue()
+    handler = logging.handlers.QueueHandler(told)
+    watched = [logging.getLogger(name) for name in ("hedgehop.http", "uvicorn.error")]
+    watched[0].setLevel(logging.INFO)
+    for logger in watched:
+        logger.addHandler(handler)
+    head = (
+        "POST /api/terrains?filename=a.tif HTTP/1.1\r\n"
+        f"Host: 127.0.0.1:{served.settings.port}\r\nOrigin: {served.origin}\r\nCookie: {served.cookie}\r\n"
+        "Content-Type: application/octet-stream\r\nContent-Length: 1000000\r\n\r\n"
+    )
+    try:
+        with socket.create_connection(("127.0.0.1", served.settings.port)) as connection:
+            connection.sendall(head.encode() + bytes(1000))
+        record = told.get(timeout=30)
+        served.http.get("/api/health")
+        after = told.get(timeout=30)
+    finally:
+        for logger in watched:
+            logger.removeHandler(handler)
+    assert record.getMessage().startswith("POST /api/terrains 400 ")
+    assert after.getMessage().startswith("GET /api/health 200 ")
+    assert list((served.settings.data_dir / "uploads").iterdir()) == []

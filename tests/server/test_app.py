@@ -53,7 +53,7 @@ def test_the_printed_link_signs_in(tmp_path: Path, host: str, start: str) -> Non
             assert app.state.parts.auth.redeem(link.partition("=")[2])
 
     asyncio.run(whole())
-    assert made[0].calls == ["start", "demo", "close"]
+    assert made[0].calls == ["start with demo", "close"]
     library.close()
 
 
@@ -93,7 +93,7 @@ def test_a_loop_that_fails_stops_the_server(tmp_path: Path, monkeypatch: pytest.
 
 def test_an_expected_fault_at_start_is_kept_for_the_command_line(tmp_path: Path) -> None:
     class Full(FakeWorkspace):
-        async def start(self) -> None:
+        async def start(self, *, with_demo: bool = False) -> None:
             raise StorageFullError("The disk is full.")
 
     library = Library(tmp_path)

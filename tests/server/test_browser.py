@@ -83,9 +83,7 @@ def test_the_link_signs_in_and_viser_runs_framed(console_served: Running, page: 
     assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")  # type: ignore[typeddict-item]
 
 
-def test_a_link_on_another_site_still_finds_the_session(
-    console_served: Running, page: Page, tmp_path: Path
-) -> None:
+def test_a_link_on_another_site_still_finds_the_session(console_served: Running, page: Page, tmp_path: Path) -> None:
     page.goto(f"{console_served.origin}/login?token={console_served.parts.auth.new_link_token()}")
     # "localhost" and "127.0.0.1" are different sites: the strict cookie is not sent at first.
     page.goto(f"http://localhost:{console_served.settings.port}/signin")

@@ -1,11 +1,12 @@
 import asyncio
 import os
+import sys
 import time
 
 import pytest
 
 from planning.errors import PoiError
-from server.errors import JobCancelledError, WorkerDiedError
+from server.errors import BusyError, JobCancelledError, WorkerDiedError
 from server.jobs import Lane
 
 
@@ -75,3 +76,101 @@ def test_cancel_ends_the_call_at_once_and_the_lane_goes_on():
         return await lane.call(_double, 3)
 
     assert asyncio.run(_with_lane(use)) == 6
+
+
+def _raise_os_error(*, report):
+    raise FileNotFoundError(2, "No such file", "elevation.npy")
+
+
+class _StubbornError(Exception):
+    def __init__(self, one, two):
+        super().__init__(one)
+
+
+def _raise_what_does_not_unpickle(*, report):
+    raise _StubbornError(1, 2)
+
+
+def _exhaust(*, report):
+    raise MemoryError
+
+
+def _pid(*, report):
+    return os.getpid()
+
+
+def _modules(*, report):
+    return sorted(sys.modules)
+
+
+def test_an_error_of_the_job_is_not_the_death_of_the_worker():
+    async def use(lane):
+        first = await lane.call(_pid)
+        with pytest.raises(FileNotFoundError) as caught:
+            await lane.call(_raise_os_error)
+        assert any("_raise_os_error" in note for note in caught.value.__notes__)
+        with pytest.raises(RuntimeError, match="_StubbornError: 1"):
+            await lane.call(_raise_what_does_not_unpickle)
+        with pytest.raises(WorkerDiedError, match="not enough memory"):
+            await lane.call(_exhaust)
+        return first, await lane.call(_pid)
+
+    first, last = asyncio.run(_with_lane(use))
+    assert first == last
+
+
+def test_a_cancel_before_the_worker_is_up_counts():
+    async def use(lane):
+        task = asyncio.create_task(lane.call(_sleep, 60))
+        while not lane.running:
+            await asyncio.sleep(0)
+        lane.cancel()
+        with pytest.raises(JobCancelledError):
+            await asyncio.wait_for(task, 30)
+        return await lane.call(_double, 3)
+
+    assert asyncio.run(_with_lane(use)) == 6
+
+
+def test_a_failing_progress_does_not_shift_the_answers():
+    def refuse(step, share):
+        raise KeyError(step)
+
+    async def use(lane):
+        with pytest.raises(KeyError):
+            await lane.call(_double, 1, progress=refuse)
+        return await lane.call(_double, 5)
+
+    assert asyncio.run(_with_lane(use)) == 10
+
+
+def test_an_abandoned_call_does_not_shift_the_answers():
+    async def use(lane):
+        started = asyncio.Event()
+        task = asyncio.create_task(lane.call(_sleep, 60, progress=lambda *_: started.set()))
+        await started.wait()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return await lane.call(_double, 4)
+
+    assert asyncio.run(_with_lane(use)) == 8
+
+
+def test_closing_ends_the_running_call_and_refuses_the_waiting_one():
+    async def whole():
+        lane = Lane("test")
+        started = asyncio.Event()
+        running = asyncio.create_task(lane.call(_sleep, 60, progress=lambda *_: started.set()))
+        waiting = asyncio.create_task(lane.call(_double, 1))
+        await started.wait()
+        await lane.close()
+        return await asyncio.gather(running, waiting, lane.call(_double, 2), return_exceptions=True)
+
+    assert [type(error) for error in asyncio.run(whole())] == [JobCancelledError, BusyError, BusyError]
+
+
+def test_a_worker_does_not_load_what_only_the_server_needs():
+    async def use(lane):
+        return await lane.call(_modules)
+
+    assert not {"viser", "uvicorn", "typer"} & set(asyncio.run(_with_lane(use)))

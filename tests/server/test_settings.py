@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.errors import StartError
-from server.settings import PasswordHash, Settings, load_settings, settings_table
+from server.settings import PasswordHash, Settings, load_settings, settings_document, settings_table
 
 
 @pytest.fixture(autouse=True)
@@ -29,12 +29,12 @@ def test_defaults_are_private(tmp_path: Path) -> None:
 
 
 def test_options_beat_the_environment_which_beats_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _write(tmp_path, 'port = 1001\nhost = "0.0.0.0"\nworkers = 3\nallowed_hosts = ["a:1", "b:2"]\n')
+    _write(tmp_path, 'port = 1001\nhost = "0.0.0.0"\nsession_days = 3\nallowed_hosts = ["a:1", "b:2"]\n')
     monkeypatch.setenv("HEDGEHOP_PORT", "1002")
     monkeypatch.setenv("HEDGEHOP_HOST", "::1")
     monkeypatch.setenv("HEDGEHOP_ALLOWED_ORIGINS", "https://a, https://b")
     settings = load_settings(port=1003, host=None)
-    assert (settings.port, settings.host, settings.workers) == (1003, "::1", 3)
+    assert (settings.port, settings.host, settings.session_days) == (1003, "::1", 3)
     assert settings.allowed_hosts == ("a:1", "b:2")
     assert settings.allowed_origins == ("https://a", "https://b")
 
@@ -78,3 +78,19 @@ def test_the_table_lists_every_setting() -> None:
     table = settings_table()
     assert all(f"HEDGEHOP_{name.upper()}" in table for name in Settings.model_fields)
     assert "None |\n" not in table
+
+
+def test_the_documentation_is_the_present_one() -> None:
+    document = Path(__file__).resolve().parents[2] / "SETTINGS.md"
+    assert document.read_text(encoding="utf-8") == settings_document(), (
+        "run: python -c \"from server.settings import settings_document as d; print(d(), end='')\" > SETTINGS.md"
+    )
+    for name in Settings.model_fields:
+        assert f"`HEDGEHOP_{name.upper()}`" in settings_document()
+
+
+def test_the_documented_example_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    example = settings_document().partition("```toml\n")[2].partition("```")[0]
+    (tmp_path / "settings.toml").write_text(example)
+    monkeypatch.setenv("HEDGEHOP_SETTINGS_FILE", str(tmp_path / "settings.toml"))
+    assert load_settings().allowed_origins == ("https://gcs.example",)

@@ -28,7 +28,8 @@ export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
   const planned = result.value !== null;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;
-  const isEmpty = shading !== "height" && !(planned && (show_surface || show_path)) && !(show_unknown && hasUnknown);
+  const isEmpty =
+    shading !== "height" && !(planned && (show_surface || show_path)) && !(show_unknown && hasUnknown);
   if (isEmpty) return null;
   return (
     <div class="legend overlay" data-testid="legend">

@@ -14,9 +14,24 @@ const HINTS = {
   look_at: "Click the surface where the nose shall point",
 } as const;
 
+/** viser's handle for moving in the plane is a blue square beside its point: nobody would guess. */
+function MoveHint({ id }: { id: string }) {
+  const index = document_.value?.pois.findIndex((poi) => poi.id === id) ?? -1;
+  if (index < 0) return null;
+  return (
+    <p class="tool-hint" data-testid="move-hint">
+      <span class="handle-swatch" aria-hidden="true" /> Drag the blue square to move point {index + 1}
+    </p>
+  );
+}
+
 function ToolHint() {
-  const hint = HINTS[selection.value.tool];
-  if (!hint || !terrain.value) return null;
+  const { tool, poi_id } = selection.value;
+  const hint = HINTS[tool];
+  if (!terrain.value) return null;
+  if (tool === "select" && poi_id !== null && document_.value?.source === "pois")
+    return <MoveHint id={poi_id} />;
+  if (!hint) return null;
   return (
     <p class="tool-hint" data-testid="tool-hint">
       {hint} <span>·</span> <kbd>Esc</kbd> to stop

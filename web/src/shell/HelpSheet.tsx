@@ -1,4 +1,9 @@
+import { goToSignIn } from "../net/api";
+import { act } from "../store/files";
+import { allSent } from "../store/plan";
+import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
+import { ErrorBox } from "../ui/ErrorBox";
 import { productVersion } from "../store/state";
 import { SHORTCUTS } from "./shortcuts";
 import { openDialog } from "./ui_state";
@@ -25,6 +30,12 @@ function Keys({ keys }: { keys: string }) {
   );
 }
 
+/** Not before the last edit has reached the server. */
+async function signOut(): Promise<void> {
+  await allSent();
+  if (await act("DELETE", "/api/session", "session")) goToSignIn();
+}
+
 export function HelpSheet() {
   return (
     <Dialog title="Help" testid="help-sheet" onClose={() => (openDialog.value = null)}>
@@ -46,7 +57,11 @@ export function HelpSheet() {
             ))}
           </dl>
           <h3>3D view</h3>
-          <p>Drag turns, right-drag moves, the wheel zooms.</p>
+          <p>
+            Drag turns, right-drag moves, the wheel zooms. A click on a point selects it; its blue square
+            drags it.
+          </p>
+          <ErrorBox place="session" />
         </section>
         <section>
           <h3>Keys</h3>
@@ -68,7 +83,16 @@ export function HelpSheet() {
               </tr>
             </tbody>
           </table>
-          <p class="muted">Hedgehop {productVersion.value}</p>
+          <div class="row end">
+            <span class="muted">Hedgehop {productVersion.value}</span>
+            <Button
+              testid="sign-out"
+              title="Ends the session of this browser, on all its pages"
+              onClick={signOut}
+            >
+              Sign out
+            </Button>
+          </div>
         </section>
       </div>
     </Dialog>

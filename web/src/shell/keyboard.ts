@@ -26,7 +26,11 @@ function toggleSection(number: number): void {
   setSection(id, open);
   const header = document.querySelector<HTMLElement>(`[data-section=${id}] > h2 > button`);
   header?.focus();
-  header?.scrollIntoView({ block: "nearest" });
+  // Its content is there after the next frame; tall sections show their beginning.
+  requestAnimationFrame(() => {
+    header?.closest(".section")?.querySelector(".section-body")?.scrollIntoView({ block: "nearest" });
+    header?.scrollIntoView({ block: "nearest" });
+  });
 }
 
 function stop(): void {

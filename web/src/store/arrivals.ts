@@ -15,7 +15,10 @@ export function useTerrain(entry: TerrainDoc): void {
 let seen: ReadonlySet<string> | null = null;
 
 /** The models of a library that were not there before; the first library has none. */
-export function arrivalsOf(terrains: readonly TerrainDoc[], before: ReadonlySet<string> | null): TerrainDoc[] {
+export function arrivalsOf(
+  terrains: readonly TerrainDoc[],
+  before: ReadonlySet<string> | null,
+): TerrainDoc[] {
   return before === null ? [] : terrains.filter((entry) => !before.has(entry.id));
 }
 

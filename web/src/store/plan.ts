@@ -1,7 +1,7 @@
 import type { PlanDoc, PlanState } from "../messages";
 import { ApiError, asErrorDoc, requestJson } from "../net/api";
 import { EditQueue, type Edit } from "./edits";
-import { notifyText, setError, setPlan } from "./state";
+import { editedPlace, notifyText, setError, setPlan } from "./state";
 
 /** The page's one edit queue, and the requests that it leads to. */
 export const queue = new EditQueue();
@@ -29,6 +29,7 @@ export function edit(
 ): void {
   queue.edit({ label: label.slice(0, 60), place, change, coalesce: options.coalesce ?? false });
   setError(place, null);
+  editedPlace.value = place;
   showPlan();
   pump();
 }

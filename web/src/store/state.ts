@@ -45,6 +45,8 @@ export const productVersion = signal("");
 export const notices = signal<Notice[]>([]);
 /** Errors by the part of the page where they happened. */
 export const errors = signal<Readonly<Record<string, ErrorDoc>>>({});
+/** The part of the page that changed the plan last: an error of the computation is shown there as well. */
+export const editedPlace = signal("");
 export const known = signal<KnownResult | null>(null);
 
 export const computation = computed(() => plan.value?.computation ?? null);

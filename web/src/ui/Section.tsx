@@ -1,7 +1,8 @@
 import type { ComponentChildren } from "preact";
-import { errors } from "../store/state";
+import { computation, editedPlace, errors } from "../store/state";
+import type { ErrorDoc } from "../messages";
 import { openSections } from "../store/prefs";
-import { ErrorBox } from "./ErrorBox";
+import { ErrorBox, ErrorPanel } from "./ErrorBox";
 import { Icon, type IconName } from "./Icon";
 
 interface Props {
@@ -20,9 +21,15 @@ export function setSection(id: string, open: boolean): void {
   openSections.value = { ...openSections.value, [id]: open };
 }
 
+/** Why nothing can be computed since the last edit, if that edit was made in this section. */
+function consequence(id: string): ErrorDoc | null {
+  return editedPlace.value === id ? (computation.value?.error ?? null) : null;
+}
+
 /** A collapsible part of the left panel; errors of its edits appear at its top, and open it. */
 export function Section({ id, title, icon, summary, startsOpen = false, children }: Props) {
-  const open = sectionIsOpen(id, startsOpen) || errors.value[id] !== undefined;
+  const wrong = consequence(id);
+  const open = sectionIsOpen(id, startsOpen) || errors.value[id] !== undefined || wrong !== null;
   return (
     <section class={`section ${open ? "open" : ""}`} data-section={id} data-testid={`section-${id}`}>
       <h2>
@@ -41,6 +48,7 @@ export function Section({ id, title, icon, summary, startsOpen = false, children
       {open && (
         <div class="section-body" id={`section-${id}`}>
           <ErrorBox place={id} />
+          {wrong && <ErrorPanel error={wrong} />}
           {children}
         </div>
       )}

@@ -44,12 +44,7 @@ function Offer({ plan }: { plan: PlanDoc }) {
 function Row({ entry, isUsed }: { entry: TerrainDoc; isUsed: boolean }) {
   return (
     <li class={isUsed ? "current" : ""} data-testid="terrain-row">
-      <button
-        type="button"
-        class="pick"
-        aria-pressed={isUsed}
-        onClick={() => !isUsed && useTerrain(entry)}
-      >
+      <button type="button" class="pick" aria-pressed={isUsed} onClick={() => !isUsed && useTerrain(entry)}>
         <span class="radio" aria-hidden="true" />
         <span class="name">{entry.name}</span>
         <span class="muted number">

@@ -1,0 +1,69 @@
+"""Clicks and drags in the 3D view, through the tool in hand: edits that have nobody to raise errors to."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from server.edits import clicked, moved
+from server.errors import reported
+from server.plan_desk import PlanDesk, Proposal
+from server.schemas import ErrorDoc, NoticeMessage, PlanDoc, SelectionDoc
+
+log = logging.getLogger("hedgehop.plan")
+
+
+class Pointing:
+    """``selection`` says which tool is in hand, ``select`` changes it, ``tell`` reaches the operator."""
+
+    def __init__(
+        self,
+        desk: PlanDesk,
+        *,
+        selection: Callable[[], SelectionDoc],
+        select: Callable[[SelectionDoc], None],
+        tell: Callable[[NoticeMessage], None],
+    ) -> None:
+        self._desk, self._selection, self._select, self._tell = desk, selection, select, tell
+
+    async def on_terrain(self, lat_deg: float, lon_deg: float, *, known: bool) -> None:
+        """A click on the surface model."""
+        if clicked(self._desk.document, self._selection(), lat_deg, lon_deg) is None:
+            return
+        if not known:
+            self._tell(NoticeMessage(level="warning", error=_unknown_ground(lat_deg, lon_deg)))
+            return
+        selections: list[SelectionDoc] = []
+
+        def click(document: PlanDoc) -> tuple[str, PlanDoc] | None:
+            outcome = clicked(document, self._selection(), lat_deg, lon_deg)
+            if outcome is None:
+                return None
+            selections.append(outcome[2])
+            return outcome[:2]
+
+        if await self._propose(click) and selections:
+            self._select(selections[0])
+
+    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
+        await self._propose(lambda document: moved(document, poi_id, lat_deg, lon_deg))
+
+    def on_poi(self, poi_id: str) -> None:
+        self._select(self._selection().model_copy(update={"poi_id": poi_id}))
+
+    async def _propose(self, proposal: Proposal) -> bool:
+        try:
+            await self._desk.propose(proposal)
+        except Exception as error:
+            self._tell(NoticeMessage(level="error", error=reported(error, log, "An edit in the 3D view")))
+            return False
+        return True
+
+
+def _unknown_ground(lat_deg: float, lon_deg: float) -> ErrorDoc:
+    return ErrorDoc(
+        code="poi",
+        what="The surface is unknown there.",
+        where=f"{lat_deg:.7f}, {lon_deg:.7f}",
+        advice="Choose a place on known ground.",
+    )

@@ -1,0 +1,229 @@
+"""What an operator does by hand beyond the first user story: move, reorder, survey, drape, hover, two pages at once."""
+
+from __future__ import annotations
+
+import re
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from PIL import Image
+from playwright.sync_api import Locator, Page, expect
+
+from tests.e2e.conftest import Station
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+MOVE_HANDLE_RGB = (51, 145, 238)
+"""viser's handle for moving in the plane, a square beside the selected point."""
+
+
+@pytest.fixture
+def demo(station: Station, page: Page) -> Page:
+    """A page with the demo's plan, drawn and certified."""
+    page.goto(station.link)
+    page.get_by_test_id("empty-demo").click()
+    _settled(page)
+    return page
+
+
+def test_points_are_dragged_reordered_and_brought_back(demo: Page) -> None:
+    page, rows = demo, demo.get_by_test_id("poi-row")
+    order = _names(page)
+    _drag_row(page, 4, 1)
+    moved = [order[0], order[4], *order[1:4], order[5]]
+    expect(rows.nth(1).get_by_test_id("poi-name")).to_have_value(moved[1])
+    assert _names(page) == moved
+
+    page.get_by_test_id("poi-handle").nth(1).focus()
+    page.keyboard.press("Alt+ArrowDown")
+    expect(rows.nth(2).get_by_test_id("poi-name")).to_have_value(order[4])
+    expect(page.get_by_test_id("poi-handle").nth(2)).to_be_focused()
+    page.keyboard.press("Control+z")
+    expect(rows.nth(1).get_by_test_id("poi-name")).to_have_value(order[4])
+    page.keyboard.press("Control+z")
+    expect(rows.nth(1).get_by_test_id("poi-name")).to_have_value(order[1])
+    assert _names(page) == order
+
+    place = rows.nth(2).get_by_test_id("poi-coordinates")
+    before = place.inner_text()
+    page.get_by_test_id("poi-handle").nth(2).click()
+    page.get_by_test_id("view-fit").click()
+    _drag_in_view(page, dx=-50, dy=10)
+    expect(place).not_to_have_text(before, use_inner_text=True)
+    expect(page.get_by_test_id("undo")).to_have_attribute("title", re.compile("Undo Move"))
+    page.get_by_test_id("undo").click()
+    expect(place).to_have_text(before, use_inner_text=True)
+
+
+def test_profile_and_view_mark_the_same_place(demo: Page) -> None:
+    chart = demo.locator(".u-over").bounding_box()
+    assert chart is not None
+    values = demo.get_by_test_id("cursor-values")
+    demo.mouse.move(chart["x"] + 0.5 * chart["width"], chart["y"] + 0.5 * chart["height"])
+    # The place in degrees is the server's answer, which comes with the mark in 3D.
+    expect(values).to_contain_text(re.compile(r"37\.\d{7}, 14\.\d{7}"))
+
+    demo.get_by_test_id("view-worst").click()  # which also takes the pointer off the chart
+    expect(values).to_have_count(0)
+    # The camera looks at the nearest place, which lies on the path: the middle of the view points at it.
+    _wait_until(demo, lambda: _hovers(demo))
+
+
+def test_two_pages_stay_in_step(demo: Page) -> None:
+    other = demo.context.new_page()
+    other.goto(demo.url)
+    expect(other.get_by_test_id("poi-row")).to_have_count(6)
+    name = demo.get_by_test_id("poi-name").first
+    name.fill("Launch <i>pad</i>")
+    name.press("Enter")
+    expect(other.get_by_test_id("poi-name").first).to_have_value("Launch <i>pad</i>")
+    other.get_by_test_id("poi-delete").nth(5).click()
+    expect(demo.get_by_test_id("poi-row")).to_have_count(5)
+    demo.get_by_test_id("undo").click()
+    expect(other.get_by_test_id("poi-row")).to_have_count(6)
+    other.get_by_test_id("shading-hillshade").click()
+    expect(demo.get_by_test_id("shading-hillshade")).to_have_attribute("aria-pressed", "true")
+    for page in (demo, other):
+        expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
+    other.close()
+
+
+def test_a_survey_under_an_orthophoto(station: Station, page: Page, shared_data: Path, tmp_path: Path) -> None:
+    page.goto(station.link)
+    model = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
+    _choose(page, page.get_by_test_id("terrain-file"), model)
+    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+    _drawn(page)
+    photo = _photo_like(model, tmp_path / "photo.tif")
+    _choose(page, page.get_by_test_id("terrain-file"), photo)
+    expect(page.get_by_test_id("failed-job")).to_contain_text("orthomosaic")
+    page.get_by_test_id("drape-instead").click()
+    expect(page.get_by_test_id("shading-orthophoto")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("failed-job")).to_have_count(0)
+
+    page.get_by_test_id("source-survey").click()
+    page.get_by_test_id("tool-polygon").click()
+    _click_corners(page, [(0.40, 0.45), (0.55, 0.43), (0.57, 0.58), (0.42, 0.60)])
+    page.get_by_test_id("camera-add").click()
+    expect(page.get_by_test_id("gsd")).to_contain_text("cm")
+    before = page.get_by_test_id("length").inner_text()
+    overlap = page.get_by_test_id("side-overlap-input")
+    overlap.fill("85")
+    overlap.press("Enter")
+    expect(page.get_by_test_id("length")).not_to_have_text(before, use_inner_text=True)
+
+
+def _settled(page: Page) -> None:
+    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
+    _drawn(page)
+
+
+def _drawn(page: Page) -> None:
+    expect(page.get_by_test_id("scene-busy")).to_have_count(0)
+
+
+def _names(page: Page) -> list[str]:
+    return [field.input_value() for field in page.get_by_test_id("poi-name").all()]
+
+
+def _drag_row(page: Page, start: int, end: int) -> None:
+    handle = page.get_by_test_id("poi-handle").nth(start)
+    handle.scroll_into_view_if_needed()
+    source, target = handle.bounding_box(), page.get_by_test_id("poi-row").nth(end).bounding_box()
+    assert source is not None
+    assert target is not None
+    page.mouse.move(source["x"] + 10, source["y"] + 10)
+    page.mouse.down()
+    page.mouse.move(target["x"] + 40, target["y"] + 20, steps=4)
+    page.mouse.up()
+
+
+def _drag_in_view(page: Page, *, dx: float, dy: float) -> None:
+    x, y = _resting_handle(page)
+    page.mouse.move(x, y)
+    page.mouse.move(x + 1, y)
+    page.wait_for_timeout(300)
+    page.mouse.down()
+    page.mouse.move(x + dx, y + dy, steps=6)
+    page.mouse.up()
+
+
+def _resting_handle(page: Page) -> tuple[float, float]:
+    """Where the handle is on the page once two pictures show it at the same place: the camera rests."""
+    seen: list[tuple[float, float] | None] = [None]
+
+    def rests() -> bool:
+        seen.append(_handle(page))
+        return seen[-1] is not None and seen[-1] == seen[-2]
+
+    _wait_until(page, rests)
+    assert seen[-1] is not None
+    return seen[-1]
+
+
+def _handle(page: Page) -> tuple[float, float] | None:
+    box = page.get_by_test_id("scene").bounding_box()
+    assert box is not None
+    # Without the hint and the legend, which show the same colour.
+    left, top = box["x"], box["y"] + 55
+    picture = page.screenshot(clip={"x": left, "y": top, "width": box["width"], "height": box["height"] - 160})
+    rgb = np.asarray(Image.open(BytesIO(picture)).convert("RGB")).astype(int)
+    rows, cols = np.nonzero(np.abs(rgb - MOVE_HANDLE_RGB).sum(axis=2) < 40)
+    if len(rows) < 30:
+        return None
+    return left + float(np.median(cols)), top + float(np.median(rows))
+
+
+def _hovers(page: Page) -> bool:
+    scene = page.get_by_test_id("scene").bounding_box()
+    assert scene is not None
+    middle = (scene["x"] + scene["width"] / 2, scene["y"] + scene["height"] / 2)
+    for dy in (-12, 0, 12):
+        page.mouse.move(middle[0], middle[1] + dy)
+        page.wait_for_timeout(250)
+        if page.get_by_test_id("cursor-values").count():
+            return True
+    return False
+
+
+def _choose(page: Page, button: Locator, path: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        button.first.click()
+    chooser.value.set_files(str(path))
+
+
+def _photo_like(model: Path, path: Path) -> Path:
+    """An orthomosaic of the very place of a surface model."""
+    with rasterio.open(model) as dsm:
+        rgb = np.full((3, dsm.height, dsm.width), 120, dtype=np.uint8)
+        profile = {"crs": dsm.crs, "transform": dsm.transform, "width": dsm.width, "height": dsm.height}
+    with rasterio.open(path, "w", driver="GTiff", count=3, dtype="uint8", photometric="RGB", **profile) as photo:
+        photo.write(rgb)
+    return path
+
+
+def _click_corners(page: Page, shares: list[tuple[float, float]]) -> None:
+    box = page.get_by_test_id("scene").bounding_box()
+    assert box is not None
+    for number, (x, y) in enumerate(shares, start=1):
+        place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
+        _wait_until(page, lambda number=number, place=place: _corner(page, place, number))
+
+
+def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
+    rows = page.get_by_test_id("corner-row")
+    if rows.count() < wanted:
+        page.mouse.click(*place)
+        page.wait_for_timeout(1200)
+    return rows.count() == wanted
+
+
+def _wait_until(page: Page, condition, timeout_ms: int = 30_000) -> None:
+    for _ in range(timeout_ms // 200):
+        if condition():
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError("not within the time allowed")

@@ -1,0 +1,90 @@
+"""Documents to planning's types: no field is lost on the way."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+
+import pytest
+
+from planning.demo import demo_dsm, demo_pois, demo_survey_polygon
+from planning.model import Poi, VehicleProfile
+from planning.poi_files import PoiFile
+from planning.vehicle_profile import load_profile, shipped_profiles
+from server.documents import doc_from_profile, missing, profile_from_doc, request_from_doc, with_points
+from server.schemas import CameraDoc, MissionDoc, PathDoc, PlaceDoc, PlanDoc, PoiDoc, ProfileDoc, SurfaceDoc, SurveyDoc
+
+DSM = demo_dsm()
+POIS = [PoiDoc(id=f"p{i}", lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name) for i, p in enumerate(demo_pois())]
+CORNERS = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]
+
+
+@pytest.mark.parametrize("name", shipped_profiles())
+def test_profiles_come_back(name: str) -> None:
+    profile = load_profile(name)
+    assert profile_from_doc(doc_from_profile(profile)) == profile
+
+
+def test_profile_fields_are_the_same() -> None:
+    assert set(ProfileDoc.model_fields) == {field.name for field in fields(VehicleProfile)}
+
+
+def test_a_request_carries_every_choice() -> None:
+    document = PlanDoc(
+        terrain_id="t",
+        pois=POIS,
+        home=CORNERS[0],
+        profile=ProfileDoc(name="P", mean_speed_m_s=2.0, max_speed_m_s=4.0, max_climb_m_s=1.5, max_items=77),
+        surface=SurfaceDoc(radius_m=11.0, height_m=4.0, smooth_sigma_m=1.5, floor=False),
+        path=PathDoc(step_m=0.25, on_steep="slow"),
+        mission=MissionDoc(
+            excess_height_m=2.0, end="land", heading="point", look_at=CORNERS[1], gimbal_pitch_deg=-60.0
+        ),
+    )
+    request = request_from_doc(document, DSM)
+    assert request.pois == tuple(Poi(p.lat_deg, p.lon_deg, p.name, p.loiter_s) for p in POIS)
+    for key, value in document.surface.model_dump().items():
+        assert asdict(request.surface)[key] == value
+    assert (request.path.step_m, request.path.on_steep) == (0.25, "slow")
+    assert (request.path.mean_speed_m_s, request.path.max_climb_m_s) == (2.0, 1.5)
+    assert (request.mission.max_items, request.mission.end, request.mission.gimbal_pitch_deg) == (77, "land", -60.0)
+    assert request.mission.look_at == (CORNERS[1].lat_deg, CORNERS[1].lon_deg)
+    assert request.home_lat_lon_deg == (CORNERS[0].lat_deg, CORNERS[0].lon_deg)
+
+
+def test_a_survey_brings_its_lines_and_photo_distance() -> None:
+    camera = CameraDoc(
+        image_width_px=4000, image_height_px=3000, focal_mm=8.8, sensor_width_mm=13.2, sensor_height_mm=8.8
+    )
+    profile = ProfileDoc(name="P", camera=camera)
+    document = PlanDoc(terrain_id="t", source="survey", survey=SurveyDoc(polygon=CORNERS), profile=profile)
+    request = request_from_doc(document, DSM)
+    assert len(request.pois) >= 2
+    assert request.mission.camera_trigger_m is not None
+    own = document.model_copy(update={"mission": MissionDoc(camera_trigger_m=7.0)})
+    assert request_from_doc(own, DSM).mission.camera_trigger_m == 7.0
+
+
+def test_points_and_polygons_of_files() -> None:
+    pois = (Poi(1.0, 2.0, "A", 3.0), Poi(4.0, 5.0))
+    taken = with_points(PlanDoc(source="survey"), PoiFile(pois))
+    assert (taken.source, [(p.name, p.loiter_s) for p in taken.pois]) == ("pois", [("A", 3.0), ("", 0.0)])
+    assert len({p.id for p in taken.pois}) == 2
+    corners = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
+    drawn = with_points(PlanDoc(pois=POIS), PoiFile((), polygon=corners))
+    assert (drawn.source, drawn.pois) == ("survey", POIS)
+    assert [(c.lat_deg, c.lon_deg) for c in drawn.survey.polygon] == list(corners)
+
+
+@pytest.mark.parametrize(
+    ("document", "hint"),
+    [
+        (PlanDoc(), "Choose or drop"),
+        (PlanDoc(terrain_id="t", pois=POIS[:1]), "Add at least two points"),
+        (PlanDoc(terrain_id="t", source="survey", survey=SurveyDoc(polygon=CORNERS[:2])), "Draw the survey area"),
+        (PlanDoc(terrain_id="t", pois=POIS, mission=MissionDoc(heading="point")), "Choose the place to look at"),
+        (PlanDoc(terrain_id="t", pois=POIS), ""),
+    ],
+)
+def test_what_is_missing(document: PlanDoc, hint: str) -> None:
+    assert missing(document).startswith(hint)
+    assert bool(missing(document)) == bool(hint)

@@ -1,0 +1,175 @@
+"""``hedgehop serve`` as a process: a second one, a directory it cannot use, a full disk, a kill."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from server.demo import PLAN_NAME
+from tests.server.station import PATIENCE_S, ok
+
+pytestmark = pytest.mark.xdist_group("process")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def command(data_dir: Path, port: int, *more: str) -> list[str]:
+    return [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(data_dir), *more]
+
+
+class Serving:
+    """The process, and its operator's client."""
+
+    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+        self.process = process
+        origin = f"http://127.0.0.1:{port}"
+        self.http = httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=PATIENCE_S)
+        assert process.stdout is not None
+        for line in process.stdout:
+            if found := re.search(r"/login\?token=\S+", line):
+                self.http.get(found.group())
+                return
+        raise AssertionError(f"ended with {process.wait()}")
+
+    @property
+    def plan(self) -> dict:
+        return ok(self.http.get("/api/state")).json()["plan"]
+
+    def rename(self, name: str) -> httpx.Response:
+        plan = self.plan
+        document = {**plan["document"], "name": name}
+        return self.http.put("/api/plan", json={"base_revision": plan["revision"], "label": "x", "document": document})
+
+    def workers(self) -> list[int]:
+        """Process ids of its children."""
+        threads = Path(f"/proc/{self.process.pid}/task").iterdir()
+        return [int(child) for thread in threads for child in (thread / "children").read_text().split()]
+
+
+@contextlib.contextmanager
+def serving(data_dir: Path, *more: str) -> Iterator[Serving]:
+    port = free_port()
+    process = subprocess.Popen(
+        command(data_dir, port, *more), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    try:
+        station = Serving(process, port)
+        with contextlib.closing(station.http):
+            yield station
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=30)
+
+
+def refused(data_dir: Path, port: int) -> str:
+    done = subprocess.run(command(data_dir, port), capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    return done.stderr
+
+
+def test_a_second_one_is_refused_and_the_first_goes_on(tmp_path: Path) -> None:
+    with serving(tmp_path) as first:
+        port = int(first.http.base_url.port or 0)
+        assert f"Port {port} is in use" in refused(tmp_path / "other", port)
+        message = refused(tmp_path, free_port())
+        assert f"Another Hedgehop (process {first.process.pid}) uses this data directory" in message
+        assert "--data-dir" in message
+        assert first.http.get("/api/health").status_code == 200
+
+
+def test_a_data_directory_that_cannot_be_used(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    assert str(blocked) in refused(blocked, free_port())
+    assert "cannot be written" in refused(Path("/proc/hedgehop"), free_port())
+
+
+def test_a_kill_loses_nothing_and_leaves_no_process(tmp_path: Path) -> None:
+    with serving(tmp_path) as station:
+        ok(station.http.post("/api/terrains/demo"))
+        ok(station.rename("Before the power cut"))
+        handles = [os.pidfd_open(pid) for pid in station.workers()]
+        assert handles
+        station.process.kill()
+        station.process.wait(10)
+        for handle in handles:
+            assert _ended(handle)
+    with serving(tmp_path) as again:
+        assert again.plan["document"]["name"] == "Before the power cut"
+
+
+def _ended(handle: int) -> bool:
+    """A process's handle is readable once it has ended."""
+    try:
+        return bool(select.select([handle], [], [], 30)[0])
+    finally:
+        os.close(handle)
+
+
+def test_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
+    with serving(tmp_path, "--demo") as first:
+        terrain = ok(first.http.post("/api/terrains/demo")).json()
+    with serving(tmp_path, "--demo") as second:
+        plan = second.plan
+        assert (plan["document"]["name"], plan["document"]["terrain_id"]) == (PLAN_NAME, terrain["id"])
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 2 MiB of its own."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(folder)], capture_output=True, check=False
+    )
+    if mounted.returncode != 0:
+        pytest.skip("this user may not mount a small disk; test_plan_desk covers the same without")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_loses_no_edit(small_disk: Path) -> None:
+    data_dir = small_disk / "data"
+    with serving(data_dir) as station:
+        saved = ok(station.rename("Saved")).json()["saved_utc"]
+        ballast = small_disk / "ballast"
+        with contextlib.suppress(OSError), ballast.open("wb", buffering=0) as file:
+            while file.write(bytes(4096)):
+                pass
+        state = ok(station.rename("Held in memory")).json()
+        assert (state["document"]["name"], state["saved_utc"]) == ("Held in memory", saved)
+        upload = station.http.post(
+            "/api/terrains",
+            params={"filename": "a.tif"},
+            content=bytes(1_000_000),
+            headers={"Content-Type": "application/octet-stream"},
+        )
+        assert (upload.status_code, upload.json()["code"]) == (507, "disk_full")
+        left = station.http.post("/api/plan/new")
+        assert (left.status_code, left.json()["code"]) == (507, "disk_full")
+        assert station.plan["document"]["name"] == "Held in memory"
+        ballast.unlink()
+        assert ok(station.rename("Saved again")).json()["saved_utc"] > saved
+    with serving(data_dir) as again:
+        assert again.plan["document"]["name"] == "Saved again"
+        assert again.plan["can_undo"]
