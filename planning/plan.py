@@ -24,6 +24,7 @@ from planning.mission import BuiltMission, Choice, build_mission, decimation_tra
 from planning.model import (
     Certificate,
     FlownLine,
+    Home,
     Mission,
     MissionParams,
     PathParams,
@@ -45,7 +46,6 @@ PATH_STEP = "Laying the path"
 CERTIFICATE_STEP = "Proving the clearance"
 
 _READ_BACK_TOLERANCE_M = 0.001
-_HEIGHT_UNIT_M = 0.01
 _HOME_DECIMALS = 9
 
 
@@ -88,6 +88,8 @@ def plan_mission(
     report(SURFACE_STEP, 0.0)
     filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
     check_pois(request.pois, filled)
+    # On the model as it came: a filled hole has its rim's height, and every altitude would be counted from it.
+    home = _home(dsm, request)
     vertices_xy_m, vertex_poi = _vertices(filled, request)
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
     surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
@@ -95,7 +97,7 @@ def plan_mission(
     path = sampled_path(filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path)
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
-    built = _mission(filled, request, profile, path)
+    built = _mission(filled, request, profile, path, home)
     report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **(assumptions or {})}
@@ -136,13 +138,12 @@ def read_back(mission: Mission, dsm: Dsm) -> FlownLine:
 
 
 def _same_flight(line: FlownLine, meant: FlownLine) -> bool:
-    """Whether the line is the one that was meant; heights may be rounded up to the next centimetre, never down."""
+    """Whether the line is the one that was meant, to the millimetre."""
     if line.points_m.shape != meant.points_m.shape or line.ends_with_rtl != meant.ends_with_rtl:
         return False
     off_m = line.points_m - meant.points_m
     off_home_m = np.abs([*np.subtract(line.home_xy_m, meant.home_xy_m), line.home_alt_dsm_m - meant.home_alt_dsm_m])
-    beside, below, above = np.abs(off_m[:, :2]).max(), -off_m[:, 2].min(), off_m[:, 2].max()
-    return bool(max(beside, below, above - _HEIGHT_UNIT_M, off_home_m.max()) <= _READ_BACK_TOLERANCE_M)
+    return bool(max(np.abs(off_m).max(), off_home_m.max()) <= _READ_BACK_TOLERANCE_M)
 
 
 def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfile:
@@ -171,22 +172,24 @@ def _vertices(dsm: Dsm, request: PlanRequest) -> tuple[np.ndarray, tuple[int | N
     poi_index: tuple[int | None, ...] = tuple(range(len(xy_m)))
     if request.home_lat_lon_deg is None:
         return xy_m, poi_index
-    home_from_dsm(dsm, request.home_lat_lon_deg)
     home_xy = dsm.xy_from_lat_lon(np.array([request.home_lat_lon_deg]))
     if np.hypot(*(home_xy[0] - xy_m[0])) < request.path.step_m:
         return xy_m, poi_index
     return np.vstack([home_xy, xy_m]), (None, *poi_index)
 
 
+def _home(dsm: Dsm, request: PlanRequest) -> Home:
+    """Rounded as files carry it, before its height is taken: at a cell's edge the rounding may change the cell."""
+    lat_deg, lon_deg = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
+    return home_from_dsm(dsm, (round(lat_deg, _HOME_DECIMALS), round(lon_deg, _HOME_DECIMALS)))
+
+
 def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.ndarray:
     return np.array([0.0 if i is None else request.pois[i].loiter_s for i in vertex_poi])
 
 
-def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: SampledPath) -> BuiltMission:
+def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: SampledPath, home: Home) -> BuiltMission:
     """Items of the mission; a landing at home first learns how high the way back must be."""
-    lat_deg, lon_deg = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
-    # As files carry it: on the edge of a cell the last digits decide whose height home has.
-    home = home_from_dsm(dsm, (round(lat_deg, _HOME_DECIMALS), round(lon_deg, _HOME_DECIMALS)))
 
     def build(params: MissionParams, needed_m: float | None = None) -> BuiltMission:
         return build_mission(path, home, params, profile, dsm, request.pois, rtl_height_needed_m=needed_m)

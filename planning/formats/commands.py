@@ -29,9 +29,12 @@ def has_position(item: MissionItem) -> bool:
     return item.command in POSITIONED and (item.lat_deg != 0.0 or item.lon_deg != 0.0)
 
 
-def centimetres_up(alt_m: float) -> float:
-    """Altitude rounded UP to the centimetre vehicles keep: rounding must never lower a waypoint."""
-    return math.ceil(alt_m * 100.0 - 1e-6) / 100.0
+def millimetres_up(alt_m: float) -> float:
+    """Altitude rounded UP to the millimetre: rounding must never lower a waypoint.
+
+    Not to the centimetre that vehicles keep: they cut, and what they cut from must be what was certified.
+    """
+    return math.ceil(alt_m * 1000.0 - 1e-6) / 1000.0
 
 
 def home_altitude_note(home: Home) -> str:

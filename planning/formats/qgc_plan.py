@@ -6,7 +6,7 @@ import json
 import math
 
 from planning import __version__
-from planning.formats.commands import FRAME_NONE, POSITIONED, centimetres_up, home_altitude_note, plain_frame
+from planning.formats.commands import FRAME_NONE, POSITIONED, home_altitude_note, millimetres_up, plain_frame
 from planning.formats.qgc_plan_reader import read_plan
 from planning.formats.qgc_words import ALTITUDE_MODE, DEFAULT_SPEED_M_S, FIRMWARE_TYPE, QUADROTOR
 from planning.formats.safe_text import clean_name
@@ -49,7 +49,7 @@ def _mission(mission: Mission) -> dict[str, object]:
 
 
 def _simple_item(item: MissionItem, jump_id: int) -> dict[str, object]:
-    frame, alt_m = plain_frame(item.frame), centimetres_up(item.alt_m)
+    frame, alt_m = plain_frame(item.frame), millimetres_up(item.alt_m)
     params = [finite_or_none(p) for p in item.params] + [_degrees(item.lat_deg), _degrees(item.lon_deg), alt_m]
     plain: dict[str, object] = {
         "type": "SimpleItem",

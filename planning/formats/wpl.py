@@ -11,9 +11,9 @@ from planning.formats.commands import (
     FRAME_AMSL,
     NAV_WAYPOINT,
     POSITIONED,
-    centimetres_up,
     home_altitude_note,
     home_or_first_place,
+    millimetres_up,
     plain_frame,
 )
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
@@ -55,7 +55,7 @@ def _notes(mission: Mission) -> list[str]:
 def _row(index: int, item: MissionItem, firmware: str) -> str:
     missing = "0" if firmware == "ardupilot" else "NaN"
     params = "\t".join(f"{p:.10g}" if math.isfinite(p) else missing for p in item.params)
-    place = f"{item.lat_deg:.9f}\t{item.lon_deg:.9f}\t{centimetres_up(item.alt_m):.2f}"
+    place = f"{item.lat_deg:.9f}\t{item.lon_deg:.9f}\t{millimetres_up(item.alt_m):.3f}"
     return f"{index}\t0\t{item.frame}\t{item.command}\t{params}\t{place}\t{int(item.autocontinue)}"
 
 

@@ -14,6 +14,7 @@ from planning.flown import flown_line
 from planning.formats.commands import has_position
 from planning.formats.detect import read_mission
 from planning.holes import HoleReport, fill_holes
+from planning.home import home_on_ground
 from planning.model import Certificate, ClearanceParams, Mission, VehicleProfile
 from planning.plan import CERTIFICATE_STEP, hole_assumptions
 from planning.poi_files import warn_swapped
@@ -60,7 +61,7 @@ def certify(
         timer(CERTIFICATE_STEP, None)
         filled, holes = fill_holes(source, max_area_m2=max_hole_m2)
         made |= {**hole_assumptions(holes, max_hole_m2), "vehicle_profile": vehicle.name}
-        certificate = certify_line(filled, flown_line(flight, filled), params, assumptions=made)
+        certificate = certify_line(filled, home_on_ground(flown_line(flight, filled), source), params, assumptions=made)
         summary = _summary(certificate, flight, vehicle, source, holes) | {"seconds": timer.seconds()}
         end_progress()
         _answer(summary | {"warnings": warnings}, certificate, as_json=as_json, verbose=verbose)

@@ -8,15 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from affine import Affine
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from pyproj import CRS
 
 from planning.dsm import Dsm
 from planning.errors import CapacityError, DatumError, MissionError, ParameterError, PoiError
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
-from planning.model import Mission, MissionParams, PathParams, SurfaceParams
+from planning.model import Mission, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission, plan_trade, read_back
+from planning.request import PlanRequest
 from tests.planning.plan_examples import QUAD, pois_at, request_over, small_dsm
 from tests.reference import clearance as oracle
 
@@ -247,3 +250,15 @@ def test_trade_falls(plan: Plan) -> None:
     trade = plan_trade(plan)
     assert [choice.waypoints for choice in trade] == sorted((choice.waypoints for choice in trade), reverse=True)
     assert plan.built.waypoints in [choice.waypoints for choice in trade if choice.excess_height_m == 1.0]
+
+
+def test_home_in_a_filled_hole_is_refused() -> None:
+    """The hole takes the roof's height; counted from there, the whole flight would be eight metres too low."""
+    heights = np.zeros((200, 200), np.float32)
+    heights[96:104, 104:112] = 8.0
+    heights[99:102, 101:104] = np.nan
+    dsm = Dsm(heights, Affine(0.5, 0, 5e5, 0, -0.5, 5e6), CRS.from_epsg(32633), None, "0" * 64)
+    xy_m = np.array([(5e5 + 51.2, 5e6 - 50.2), (5e5 + 25, 5e6 - 70), (5e5 + 30, 5e6 - 30)])
+    pois = tuple(Poi(float(lat), float(lon)) for lat, lon in dsm.lat_lon_from_xy(xy_m))
+    with pytest.raises(PoiError, match="home"):
+        plan_mission(dsm, PlanRequest(pois, VehicleProfile("x", position_error_m=0.1)))

@@ -27,7 +27,8 @@ effect(() => {
   if (document_.peek() === null) return;
   for (const entry of arrivalsOf(terrains, seen)) {
     const sent = sentFileOf(entry.name);
-    if (sent?.replaces) useTerrain(entry);
+    // A plan without points takes the model by itself, on the server.
+    if (sent?.replaces && document_.peek()?.pois.length) useTerrain(entry);
     else if (sent) offered.value = entry.id;
   }
   seen = new Set(terrains.map((entry) => entry.id));

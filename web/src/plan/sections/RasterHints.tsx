@@ -1,4 +1,4 @@
-import { useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import type { JobDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { ErrorPanel } from "../../ui/ErrorBox";
@@ -41,12 +41,14 @@ interface FormProps {
 /** Asks for what the file does not say. */
 function HintForm({ name, hints, onSubmit, onLeave }: FormProps) {
   const [draft, setDraft] = useState(hints);
+  const form = useRef<HTMLFormElement>(null);
+  useEffect(() => form.current?.scrollIntoView({ block: "nearest" }), []);
   const submit = (event: Event) => {
     event.preventDefault();
     onSubmit(draft);
   };
   return (
-    <form class="hint-form" data-testid="raster-hints" onSubmit={submit}>
+    <form ref={form} class="hint-form" data-testid="raster-hints" onSubmit={submit}>
       <label class="field text">
         <span title={name}>CRS</span>
         <input
