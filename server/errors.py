@@ -145,6 +145,7 @@ STATUS: dict[type[Exception], int] = {
     StorageError: 500,
     StorageFullError: 507,
     BusyError: 503,
+    WorkerDiedError: 500,
     StartError: 503,
 }
 """Subclasses take the status of their nearest ancestor here; all that is missing is 500."""

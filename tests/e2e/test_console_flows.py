@@ -22,8 +22,7 @@ MOVE_HANDLE_RGB = (51, 145, 238)
 
 @pytest.fixture
 def demo(station: Station, page: Page) -> Page:
-    """A page with the demo's plan, drawn and certified; small, because every pixel is drawn without a graphics card."""
-    page.set_viewport_size({"width": 1120, "height": 600})
+    """A page with the demo's plan, drawn and certified."""
     page.goto(station.link)
     page.get_by_test_id("empty-demo").click()
     _settled(page)

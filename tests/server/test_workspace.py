@@ -194,7 +194,7 @@ def test_an_unknown_message_is_told_and_the_socket_lives(demo: Station) -> None:
     demo.socket.send('{"type": "arm"}')
     assert demo.notice().what == "Messages of type 'arm' are unknown."
     demo.socket.send(SetSelection(selection=SelectionDoc(tool="home")).model_dump_json())
-    assert demo.until(lambda m: isinstance(m, SelectionMessage)).selection.tool == "home"
+    assert demo.until(lambda m: isinstance(m, SelectionMessage) and m.selection.tool == "home")
 
 
 def test_a_burst_of_edits_is_answered_once_for_the_last(demo: Station) -> None:
@@ -229,7 +229,7 @@ def test_a_click_beyond_the_limit_is_told(demo: Station) -> None:
     demo.put(demo.state.document.model_copy(update={"pois": many}), "Many")
     workspace = demo.server.app.state.parts.workspace
     demo.socket.send(SetSelection(selection=SelectionDoc(tool="add_poi")).model_dump_json())
-    demo.until(lambda m: isinstance(m, SelectionMessage))
+    demo.until(lambda m: isinstance(m, SelectionMessage) and m.selection.tool == "add_poi")
     demo.server.on_loop(workspace.pointing.on_terrain(poi.lat_deg, poi.lon_deg, known=True))
     notice = demo.until(lambda m: isinstance(m, NoticeMessage))
     assert "5000" in notice.error.what
