@@ -47,7 +47,8 @@ def _preview() -> None:
     drag()
     times = [_timed(drag)[0] for _ in range(8)]
     print(
-        f"plan after a change of R, {dsm.height_px} x {dsm.width_px}: best {min(times):.3f} s, worst {max(times):.3f} s "
+        f"plan after a change of R, {dsm.height_px} x {dsm.width_px}: "
+        f"best {min(times):.3f} s, worst {max(times):.3f} s "
         f"(at most {PREVIEW_LIMIT_S} s: {'yes' if max(times) <= PREVIEW_LIMIT_S else 'NO'})"
     )
 
