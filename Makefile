@@ -40,7 +40,7 @@ setup: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## install everyt
 demo: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## start Hedgehop with a generated hillside and print its sign-in link
 	@.venv/bin/hedgehop serve --demo
 
-test: $(STAMPS)/test web/dist/index.html ## run the tests of the console and of the Python packages
+test: $(STAMPS)/test web/dist/index.html $(STAMPS)/kernels ## run the tests of the console and of the Python packages
 	@cd web && $(WITH_NODE) npm test
 	@$(WITH_NODE) $(VENV_PYTHON) -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
 

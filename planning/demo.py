@@ -18,6 +18,7 @@ from planning.model import Poi
 
 F64 = NDArray[np.float64]
 
+_HILL_PX = 120
 _SIZE_PX = 1000
 _RESOLUTION_M = 0.5
 _WEST_M, _SOUTH_M = 499_200.0, 4_175_600.0
@@ -56,6 +57,14 @@ def demo_dsm(seed: int = 7) -> Dsm:
     elevation = np.round(surface, 3).astype(np.float32)
     transform = Affine(_RESOLUTION_M, 0.0, _WEST_M, 0.0, -_RESOLUTION_M, _SOUTH_M + _SIZE_PX * _RESOLUTION_M)
     return Dsm(elevation, transform, CRS.from_epsg(_EPSG), _DATUM, hashlib.sha256(elevation.tobytes()).hexdigest())
+
+
+def small_hill() -> Dsm:
+    """A cone of 120 x 120 m: the least that every kernel can be tried on."""
+    cells = np.arange(_HILL_PX) - _HILL_PX / 2
+    cone = 10.0 - np.hypot(cells[:, None], cells[None, :]) / 20.0
+    transform = Affine(1.0, 0.0, _WEST_M, 0.0, -1.0, _SOUTH_M + _HILL_PX)
+    return Dsm(cone.astype(np.float32), transform, CRS.from_epsg(_EPSG), None, "0" * 64)
 
 
 def demo_pois() -> tuple[Poi, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from planning.demo import demo_dsm
+from planning.demo import demo_dsm, small_hill
 from planning.errors import PlanningError
 from planning.geotiff import read_dsm_reported, read_orthophoto
 from planning.spikes import Spike, find_spikes
@@ -36,7 +36,7 @@ def named(upload: Path, filename: str) -> Iterator[None]:
 def warm_up(*, report: Progress) -> None:
     """Loads what the first surface model that is dropped in would wait for."""
     report("Getting ready", None)
-    find_spikes(demo_dsm())
+    find_spikes(small_hill())
 
 
 def import_terrain(

@@ -13,10 +13,10 @@ import numpy as np
 
 from planning import __version__
 from planning.camera import gsd_cm
-from planning.demo import demo_dsm, demo_pois
+from planning.demo import small_hill
 from planning.dsm import Dsm
 from planning.exports import export_file
-from planning.model import F64, VehicleProfile, finite_or_none
+from planning.model import Poi, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
 from planning.poi import shortest_order
 from planning.request import PlanRequest
@@ -38,9 +38,11 @@ PRODUCT_VERSION = __version__
 def warm_up(*, report: Progress) -> None:
     """Loads, or compiles for the first time, what the first edit and the first picture would wait for."""
     report("Getting ready", None)
-    dsm, pois = demo_dsm(), demo_pois()
-    plan = plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up")))
-    plan_scene(plan)
+    dsm = small_hill()
+    west, south, _, _ = dsm.bounds_m
+    places = dsm.lat_lon_from_xy(np.array([(west + 30, south + 30), (west + 90, south + 80)]))
+    pois = tuple(Poi(lat, lon) for lat, lon in places.tolist())
+    plan_scene(plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("warm-up"))))
     build_terrain_scene("warm-up", dsm, shading="height", orthophoto=None)
 
 

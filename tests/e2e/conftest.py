@@ -16,8 +16,9 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from server.settings import default_console_dir
 
-# A first import starts a worker process and compiles what no cache holds yet.
-expect.set_options(timeout=40_000)
+# The browser renders in software while other tests keep the processors busy.
+PATIENCE_MS = 120_000
+expect.set_options(timeout=PATIENCE_MS)
 
 # viser's page tries to evaluate a string, which the content security policy forbids, and goes on without.
 KNOWN_ERROR = "Evaluating a string as JavaScript violates the following Content Security Policy directive"
@@ -108,7 +109,7 @@ def page(browser: Browser) -> Iterator[Page]:
     """A page that fails the test when it asks any other origin, or when the console logs an error."""
     context = browser.new_context(viewport={"width": 1366, "height": 768}, accept_downloads=True)
     page = context.new_page()
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(PATIENCE_MS)
     asked: set[str] = set()
     errors: list[str] = []
     page.on("request", lambda request: asked.add("/".join(request.url.split("/")[:3])))

@@ -12,7 +12,7 @@ import rasterio
 from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
-from tests.e2e.conftest import Station
+from tests.e2e.conftest import PATIENCE_MS, Station
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
@@ -221,7 +221,7 @@ def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
     return rows.count() == wanted
 
 
-def _wait_until(page: Page, condition, timeout_ms: int = 30_000) -> None:
+def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
     for _ in range(timeout_ms // 200):
         if condition():
             return

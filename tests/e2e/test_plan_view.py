@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from planning.formats import read_mission
-from tests.e2e.conftest import Station
+from tests.e2e.conftest import PATIENCE_MS, Station
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
@@ -129,7 +129,7 @@ def _distance_m(page: Page) -> float:
     return float(found.group(0)) if found else -1.0
 
 
-def _wait_until(page: Page, condition, timeout_ms: int = 30_000) -> None:
+def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
     for _ in range(timeout_ms // 200):
         if condition():
             return

@@ -72,7 +72,14 @@ def test_too_little_clearance_says_where_how_much_and_what_helps():
     assert "leg 2 (item 2)" in certificate.reasons[0].text
     assert "0.50 m less than the required 6.50 m" in certificate.reasons[0].text
     assert "Raise H by at least 0.50 m" in certificate.reasons[0].mend
-    assert "RTK" in certificate.reasons[0].mend
+    assert "RTK" not in certificate.reasons[0].mend  # set by hand: it does not fall with the position error
+
+
+def test_rtk_is_named_where_it_would_help():
+    default_m = ClearanceParams.default_required_m(position_error_m=6.0, vehicle_radius_m=0.35)
+    params = replace(PARAMS, position_error_m=6.0, required_clearance_m=default_m)
+    reasons = {r.code: r for r in certify(dsm_of(flat()), line_of(*PLAIN), params).reasons}
+    assert "With RTK (0.1 m)" in reasons["clearance"].mend
 
 
 def test_clearance_equal_to_the_required_is_enough():

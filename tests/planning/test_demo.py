@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from planning.demo import demo_dsm, demo_pois, demo_survey_polygon
+from planning.demo import demo_dsm, demo_pois, demo_survey_polygon, small_hill
 from planning.dsm import Dsm, is_amsl
 from planning.spikes import find_spikes
 
@@ -88,3 +88,10 @@ def test_the_survey_polygon_lies_on_known_ground(dsm: Dsm) -> None:
     assert np.isfinite(dsm.elevation_at(polygon)).all()
     x, y = polygon.T
     assert 5_000 < 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) < 20_000
+
+
+def test_the_small_hill_is_a_whole_model():
+    hill = small_hill()
+    assert hill.elevation_m.shape == (120, 120)
+    assert np.isfinite(hill.elevation_m).all()
+    assert hill.elevation_m[60, 60] == hill.elevation_m.max() == 10.0

@@ -1,5 +1,13 @@
 import { describe, expect, it } from "vitest";
-import { gaps, heightRange, labelsThatFit, levelOf, levelSpans, valueAt } from "../src/chart/transform";
+import {
+  gaps,
+  heightRange,
+  labelsThatFit,
+  levelOf,
+  levelSpans,
+  tickDecimals,
+  valueAt,
+} from "../src/chart/transform";
 
 describe("clearance colours", () => {
   it("are red at zero and below, orange below the requirement, green from it on", () => {
@@ -94,5 +102,11 @@ describe("the value at a place", () => {
 describe("labels", () => {
   it("that would overlap are left out", () => {
     expect(labelsThatFit([0, 10, 100], [40, 40, 40])).toEqual([true, false, true]);
+  });
+});
+
+describe("ticks", () => {
+  it("have the decimals that their step needs, and no more", () => {
+    expect([50, 5, 2.5, 1, 0.5, 0.25, 0.1, 0.05].map(tickDecimals)).toEqual([0, 0, 1, 0, 1, 2, 1, 2]);
   });
 });

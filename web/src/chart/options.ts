@@ -1,7 +1,7 @@
 import uPlot from "uplot";
 import { number } from "../format";
 import { CHART_FONT, type Palette } from "./palette";
-import type { Span } from "./transform";
+import { tickDecimals, type Span } from "./transform";
 
 /** What both charts have in common: axes with units, no zoom, no legend of uPlot's own. */
 interface Frame {
@@ -27,8 +27,7 @@ function axis(palette: Palette): Partial<uPlot.Axis> {
 }
 
 const ticks = (_: uPlot, values: number[]) => {
-  const step = Math.abs((values[1] ?? 1) - (values[0] ?? 0));
-  const decimals = step > 0 && step < 1 ? Math.ceil(-Math.log10(step)) : 0;
+  const decimals = tickDecimals(Math.abs((values[1] ?? 1) - (values[0] ?? 0)));
   return values.map((value) => number(value, decimals));
 };
 

@@ -107,3 +107,14 @@ export const profileRange = (chart: Chart): Span =>
     chart.path_rel_home_m,
     chart.flown_rel_home_m,
   ]);
+
+const MOST_DECIMALS = 4;
+
+/** As few decimals as tell an axis's steps exactly: 1 for a step of 2.5, none for 5. */
+export function tickDecimals(step: number): number {
+  for (let decimals = 0; decimals < MOST_DECIMALS; decimals++) {
+    const scaled = step * 10 ** decimals;
+    if (Math.abs(scaled - Math.round(scaled)) < 1e-6) return decimals;
+  }
+  return MOST_DECIMALS;
+}

@@ -36,7 +36,7 @@ export function clearanceLevel(distance_m: number | null, required_m: number): L
 /** Zero is no height to climb to: the way home is clear at whatever height the vehicle has. */
 function neededWords(needed_m: number | null): string {
   if (needed_m === null) return "none is safe";
-  return needed_m > 0 ? metres(needed_m) : "no particular height";
+  return needed_m > 0 ? metres(needed_m) : "any";
 }
 
 /** On narrow screens the drawer would cover what is shown. */

@@ -56,8 +56,18 @@ function PlanRow({ entry }: { entry: PlanEntry }) {
   );
 }
 
+/** The open plan as it is now: the library knows it as it was when the library last changed. */
+function entries(): PlanEntry[] {
+  const [open, now] = [plan.value, document_.value];
+  if (!open || !now) return library.value.plans;
+  const { name, terrain_id } = now;
+  return library.value.plans.map((entry) =>
+    entry.id === open.plan_id ? { ...entry, name, terrain_id, saved_utc: open.saved_utc } : entry,
+  );
+}
+
 export function PlansDialog() {
-  const { plans } = library.value;
+  const plans = entries();
   return (
     <Dialog title="Plans" testid="plans-dialog" onClose={close}>
       <ErrorBox place="plans" />

@@ -1,4 +1,5 @@
-import type { ServerMessage, ViewDoc } from "../messages";
+import { batch } from "@preact/signals";
+import type { ServerMessage, Snapshot, ViewDoc } from "../messages";
 import { queue, showPlan } from "./plan";
 import * as state from "./state";
 
@@ -6,14 +7,8 @@ import * as state from "./state";
 export function receive(message: ServerMessage): void {
   switch (message.type) {
     case "snapshot":
-      queue.snapshot(message.plan);
-      state.productVersion.value = message.product_version;
-      state.pageId.value = message.page_id;
-      state.library.value = message.library;
-      showView(message.view, message.plan.document.terrain_id);
-      state.selection.value = message.selection;
-      state.jobs.value = new Map(message.jobs.map((job) => [job.id, job]));
-      showPlan();
+      // At once: nobody sees the new library beside the old plan.
+      batch(() => takeSnapshot(message));
       return;
     case "plan":
       queue.pushed(message.plan);
@@ -41,6 +36,17 @@ export function receive(message: ServerMessage): void {
       message satisfies never;
       state.notifyText("warning", "The server sent a message this page does not know.", "Reload the page.");
   }
+}
+
+function takeSnapshot(message: Snapshot): void {
+  queue.snapshot(message.plan);
+  state.productVersion.value = message.product_version;
+  state.pageId.value = message.page_id;
+  state.library.value = message.library;
+  showView(message.view, message.plan.document.terrain_id);
+  state.selection.value = message.selection;
+  state.jobs.value = new Map(message.jobs.map((job) => [job.id, job]));
+  showPlan();
 }
 
 /** The server tells the legend's ends when it has drawn a terrain. */

@@ -13,16 +13,22 @@ interface Props {
 export function Dialog({ title, testid, onClose, children }: Props) {
   const id = useId();
   const ref = useRef<HTMLDialogElement>(null);
+  const gone = useRef(false);
   useEffect(() => {
     const dialog = ref.current;
     if (dialog && !dialog.open) dialog.showModal();
-    return () => dialog?.close();
+    return () => {
+      gone.current = true;
+      dialog?.close();
+    };
   }, []);
+  // The event comes late: a dialog that gave way to another one must not close that one.
+  const onClosed = () => !gone.current && onClose();
   const onBackdrop = (event: MouseEvent) => {
     if (event.target === ref.current) onClose();
   };
   return (
-    <dialog ref={ref} aria-labelledby={id} data-testid={testid} onClose={onClose} onMouseDown={onBackdrop}>
+    <dialog ref={ref} aria-labelledby={id} data-testid={testid} onClose={onClosed} onMouseDown={onBackdrop}>
       <div class="dialog-body">
         <header>
           <h2 id={id}>{title}</h2>

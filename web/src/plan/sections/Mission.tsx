@@ -117,8 +117,8 @@ export function MissionSection({ plan }: { plan: PlanDoc }) {
         />
       </div>
       <NumberField
-        label="Return height set in the autopilot"
-        unit="m above home"
+        label="Return height above home, as set in the autopilot"
+        unit="m"
         min={0}
         max={2000}
         step={1}
