@@ -17,14 +17,12 @@ Every error says what is wrong, where, and what to do.
 """
 
 
-class PlanningError(ValueError):
-    """Base of all planning errors.
-
-    ``what`` is one sentence with the offending value, ``where`` names the file, row, field or
-    place, ``advice`` says what to do next. ``code`` is stable, for programs.
+class DescribedError(Exception):
+    """An error for people: ``what`` is one sentence with the offending value, ``where`` names the file, row,
+    field or place, ``advice`` says what to do next. ``code`` is stable, for programs.
     """
 
-    code = "planning"
+    code = "error"
 
     def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
         super().__init__(what, where, advice)
@@ -40,8 +38,14 @@ class PlanningError(ValueError):
         return _rebuild, (type(self), self.what, self.where, self.advice)
 
 
-def _rebuild(cls: type[PlanningError], what: str, where: str, advice: str) -> PlanningError:
+def _rebuild(cls: type[DescribedError], what: str, where: str, advice: str) -> DescribedError:
     return cls(what, where=where, advice=advice)
+
+
+class PlanningError(DescribedError, ValueError):
+    """Base of all planning errors."""
+
+    code = "planning"
 
 
 class RasterError(PlanningError):

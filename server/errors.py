@@ -31,31 +31,14 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 
-from planning.errors import PlanningError
+from planning.errors import DescribedError, PlanningError
 from server.schemas import ErrorDoc
 
 
-class ServerError(Exception):
-    """Base of all errors of the server; ``code`` is stable, for programs."""
+class ServerError(DescribedError):
+    """Base of all errors of the server."""
 
     code = "server"
-
-    def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
-        super().__init__(what, where, advice)
-        self.what = what
-        self.where = where
-        self.advice = advice
-
-    def __str__(self) -> str:
-        head = f"{self.where}: {self.what}" if self.where else self.what
-        return f"{head} {self.advice}" if self.advice else head
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (type(self), self.what, self.where, self.advice)
-
-
-def _rebuild(cls: type[ServerError], what: str, where: str, advice: str) -> ServerError:
-    return cls(what, where=where, advice=advice)
 
 
 class SignInError(ServerError):
@@ -162,7 +145,7 @@ def status_of(error: Exception) -> int:
 
 def error_doc(error: Exception) -> ErrorDoc:
     """What a page may read about an error; unforeseen ones keep their details for the log."""
-    if isinstance(error, (PlanningError, ServerError)):
+    if isinstance(error, DescribedError):
         return ErrorDoc(code=error.code, what=error.what, where=error.where, advice=error.advice)
     if isinstance(error, (RequestValidationError, ValidationError)):
         return _invalid(error)

@@ -16,7 +16,7 @@ from planning.camera import gsd_cm
 from planning.demo import small_hill
 from planning.dsm import Dsm
 from planning.exports import export_file
-from planning.model import Poi, VehicleProfile, finite_or_none
+from planning.model import F64, Poi, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
 from planning.poi import shortest_order
 from planning.request import PlanRequest
