@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.autopilot_time import predict_duration
 from planning.climb import slope_limits
 from planning.decimate import Decimated, decimate_to_fit
 from planning.dsm import Dsm
 from planning.errors import CapacityError
+from planning.flight_time.predict import predict_duration
 from planning.home import check_start, home_from_dsm, item_heights
 from planning.mission_items import (
     CHANGE_SPEED,

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.autopilot_time import PredictedTime, predict_duration
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
+from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
 from planning.holes import HoleReport, fill_holes

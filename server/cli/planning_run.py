@@ -12,7 +12,7 @@ from planning.dsm import Dsm
 from planning.exports import FILES, export_file
 from planning.model import VehicleProfile
 from planning.plan import Plan, plan_mission
-from planning.report_words import duration, metres
+from planning.report.words import duration, metres
 from planning.request import PlanRequest
 from planning.summary import plan_summary
 from planning.vehicle_profile import load_profile

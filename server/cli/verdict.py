@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from planning.report_words import metres, metres_up
+from planning.report.words import metres, metres_up
 
 
 def verdict_lines(summary: dict[str, Any]) -> list[str]:

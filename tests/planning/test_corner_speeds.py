@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planning.corner_speeds import corner_leg_times
-from planning.scurve import Axes
+from planning.flight_time.corner_speeds import corner_leg_times
+from planning.flight_time.scurve import Axes
 
 AXES = Axes(5.0, 3.0, 1.5, 3.0, 1.0, 6.0, 4.0)
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from planning.flight_time.scurve import Axes
 from planning.model import F64
-from planning.scurve import Axes
 
 STRAIGHT_RAD = math.radians(1.0)
 

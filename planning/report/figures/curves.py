@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.figures.chart import Chart, Mark, Series, render_chart
 from planning.formats.safe_text import clean_name
 from planning.model import Certificate, FlownLine, Poi, SampledPath, Timing
+from planning.report.figures.chart import Chart, Mark, Series, render_chart
 
 F64 = NDArray[np.float64]
 TERRAIN, SURFACE, PATH, FLOWN = "#7a6a55", "#d9822b", "#1769aa", "#243b53"

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from planning.dsm import Dsm
-from planning.figures.curves import BAD, PATH, short_name
-from planning.figures.ticks import label, round_step
 from planning.hillshade import height_colors, hillshade, scale_rgb
 from planning.model import Certificate, FlownLine, Poi
+from planning.report.figures.curves import BAD, PATH, short_name
+from planning.report.figures.ticks import label, round_step
 from planning.surface import fit_within
 
 F64 = NDArray[np.float64]

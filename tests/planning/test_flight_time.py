@@ -9,9 +9,9 @@ from affine import Affine
 from pymavlink import mavutil
 from pyproj import CRS
 
-from planning.autopilot_time import predict_duration, usable_endurance_s
 from planning.dsm import Dsm
 from planning.errors import MissionError
+from planning.flight_time.predict import predict_duration, usable_endurance_s
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 
 # The parameters that the recorded flight set; the rest were the autopilot's defaults, and so are the profile's.

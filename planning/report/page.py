@@ -14,8 +14,6 @@ from markupsafe import Markup
 
 from planning import __version__
 from planning.dsm import Dsm
-from planning.figures.curves import altitude_profile, clearance_trend, speed_chart, time_chart
-from planning.figures.plan_view import plan_view
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
 from planning.model import (
@@ -28,7 +26,9 @@ from planning.model import (
     Timing,
     VehicleProfile,
 )
-from planning.report_words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up
+from planning.report.figures.curves import altitude_profile, clearance_trend, speed_chart, time_chart
+from planning.report.figures.plan_view import plan_view
+from planning.report.words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up
 
 TIGHTEST_LEGS = 8
 

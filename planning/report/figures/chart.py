@@ -9,8 +9,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.figures.thin import keep_extremes
-from planning.figures.ticks import label, padded, round_step, ticks
+from planning.report.figures.thin import keep_extremes
+from planning.report.figures.ticks import label, padded, round_step, ticks
 
 F64 = NDArray[np.float64]
 LEFT, RIGHT, TOP, BOTTOM = 58, 16, 34, 46

@@ -1,0 +1,1 @@
+"""How long a mission will take: legs and corners as the autopilots fly them."""
