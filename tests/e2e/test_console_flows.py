@@ -116,6 +116,53 @@ def test_a_survey_under_an_orthophoto(station: Station, page: Page, shared_data:
     expect(page.get_by_test_id("length")).not_to_have_text(before, use_inner_text=True)
 
 
+def test_plans_are_copied_opened_and_deleted(demo: Page) -> None:
+    page, name, rows = demo, demo.get_by_test_id("plan-name"), demo.get_by_test_id("plan-row")
+    first = name.input_value()
+    page.get_by_test_id("plans-button").click()
+    before = rows.count()
+    page.get_by_test_id("plan-save-as").click()
+    page.get_by_test_id("save-as-name").fill("Second <b>try</b>")
+    page.get_by_test_id("save-as-submit").click()
+    expect(name).to_have_value("Second <b>try</b>")
+    expect(page.get_by_test_id("save-as-dialog")).to_have_count(0)
+    name.fill("Third try")
+    name.press("Enter")
+    page.get_by_test_id("plans-button").click()
+    expect(rows).to_have_count(before + 1)
+    # The open plan stands there under its newest name, and cannot be deleted.
+    opened = rows.filter(has_text=re.compile("open"))
+    expect(opened).to_contain_text("Third try")
+    expect(opened.get_by_role("button")).to_have_count(0)
+    rows.filter(has_text=first).get_by_role("button", name="Open").click()
+    expect(name).to_have_value(first)
+    page.get_by_test_id("plans-button").click()
+    copy = rows.filter(has_text="Third try")
+    copy.get_by_role("button", name="Delete").click()
+    copy.get_by_role("button", name="Delete for good").click()
+    expect(rows).to_have_count(before)
+
+
+def test_a_model_for_another_place_is_offered(demo: Page, shared_data: Path) -> None:
+    page = demo
+    page.reload()
+    _settled(page)
+    _choose(page, page.get_by_test_id("terrain-file"), shared_data / "dsm" / "campus" / "dsm.tif")
+    page.get_by_test_id("offer-new").click()
+    expect(page.get_by_test_id("terrain-row").filter(has_text="dsm.tif")).to_have_class("current")
+    expect(page.get_by_test_id("poi-row")).to_have_count(0)
+
+
+def test_the_page_leaves_when_its_session_ends(demo: Page) -> None:
+    other = demo.context.new_page()
+    other.goto(demo.url)
+    expect(other.get_by_test_id("poi-row")).to_have_count(6)
+    other.get_by_test_id("help").click()
+    other.get_by_test_id("sign-out").click()
+    expect(demo).to_have_url(re.compile(r"/signin\?ended=true$"))
+    other.close()
+
+
 def _settled(page: Page) -> None:
     expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
     _drawn(page)

@@ -84,3 +84,12 @@ export function parseNumber(text: string): number | null {
 
 /** A number for an input: as many decimals as it has, at most 7. */
 export const editable = (value: number) => String(Number(value.toFixed(7)));
+
+/** A message about a surface model without the words of the command line: here a form asks for the same. */
+export function forConsole(message: string): string {
+  return message
+    .replace(/ with --[a-z-]+/g, "")
+    .replace(/use --z-scale( [\d.]*\d| with the metres of one unit)/g, "declare their unit")
+    .replace(/--[a-z-]+ (?=EPSG:)/g, "")
+    .replace(/ \(gdal_calc\.py[^)]*\)/g, "");
+}

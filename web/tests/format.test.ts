@@ -74,3 +74,20 @@ describe("typed numbers", () => {
     expect(checkNumber("x", range, "m")).toContain('"x" is not a number');
   });
 });
+
+describe("messages of the planner", () => {
+  it.each([
+    ["Declare it, for example --crs EPSG:32633.", "Declare it, for example EPSG:32633."],
+    [
+      "Reproject it, or declare the right reference system with --crs, for example EPSG:32633.",
+      "Reproject it, or declare the right reference system, for example EPSG:32633.",
+    ],
+    [
+      "They look like centimetres: use --z-scale 0.01 if so.",
+      "They look like centimetres: declare their unit if so.",
+    ],
+    ["If they are metres, use --z-scale 1.", "If they are metres, declare their unit."],
+    ["Negate them (gdal_calc.py --calc=-A), or leave them.", "Negate them, or leave them."],
+    ["Choose a place on known ground.", "Choose a place on known ground."],
+  ])("%s", (message, shown) => expect(f.forConsole(message)).toBe(shown));
+});

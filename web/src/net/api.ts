@@ -48,8 +48,9 @@ export function asErrorDoc(error: unknown): ErrorDoc {
   return { code: "page", what, where: "this page", advice: "Reload the page if it goes on." };
 }
 
-export function goToSignIn(): void {
-  location.assign("/signin");
+/** Leaves for the sign-in page, which says why unless the operator has just signed out here. */
+export function goToSignIn(why: "ended" | "signed_out" = "ended"): void {
+  location.assign(why === "ended" ? "/signin?ended=true" : "/signin");
 }
 
 /** One request to our server; returns the answer if it is a good one. */

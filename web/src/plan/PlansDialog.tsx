@@ -118,6 +118,7 @@ export function SaveAsDialog() {
           <span>Name</span>
           <input
             type="text"
+            autofocus
             maxLength={80}
             value={name}
             data-testid="save-as-name"

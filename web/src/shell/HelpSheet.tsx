@@ -33,7 +33,7 @@ function Keys({ keys }: { keys: string }) {
 /** Not before the last edit has reached the server. */
 async function signOut(): Promise<void> {
   await allSent();
-  if (await act("DELETE", "/api/session", "session")) goToSignIn();
+  if (await act("DELETE", "/api/session", "session")) goToSignIn("signed_out");
 }
 
 export function HelpSheet() {

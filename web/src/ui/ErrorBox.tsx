@@ -1,3 +1,4 @@
+import { forConsole } from "../format";
 import type { ErrorDoc } from "../messages";
 import { errors, setError } from "../store/state";
 import { Button } from "./Button";
@@ -9,7 +10,7 @@ export function ErrorText({ error }: { error: ErrorDoc }) {
     <div class="error-text">
       <p class="what">{error.what}</p>
       {error.where && <p class="where">{error.where}</p>}
-      {error.advice && <p class="advice">{error.advice}</p>}
+      {error.advice && <p class="advice">{forConsole(error.advice)}</p>}
     </div>
   );
 }

@@ -2,15 +2,22 @@ import { latLon } from "../../format";
 import type { MissionDoc } from "../../messages";
 import { Button, Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
+import { drawer } from "../../shell/ui_state";
 import { editGroup } from "../../store/plan";
 import { selection } from "../../store/state";
 import { setSelection } from "../../store/stream";
+
+/** On narrow screens the drawer would cover what is to be clicked. */
+function pickPlace(): void {
+  setSelection({ tool: "look_at" });
+  drawer.value = null;
+}
 
 const set = (label: string, fields: Partial<MissionDoc>) => editGroup("mission", "mission", label, fields);
 
 function choose(heading: MissionDoc["heading"], mission: MissionDoc): void {
   set("Heading", { heading });
-  if (heading === "point" && !mission.look_at) setSelection({ tool: "look_at" });
+  if (heading === "point" && !mission.look_at) pickPlace();
 }
 
 /** Where the nose points: along the path, one way, or at a place. */
@@ -50,9 +57,9 @@ export function Heading({ mission }: { mission: MissionDoc }) {
             icon="target"
             testid="tool-look_at"
             pressed={selection.value.tool === "look_at"}
-            onClick={() => setSelection({ tool: "look_at" })}
+            onClick={pickPlace}
           >
-            Click it
+            Pick it
           </Button>
         </div>
       )}

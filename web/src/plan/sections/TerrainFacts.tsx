@@ -1,5 +1,5 @@
 import { useState } from "preact/hooks";
-import { metres, number, percent } from "../../format";
+import { forConsole, metres, number, percent } from "../../format";
 import type { TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
@@ -22,9 +22,6 @@ function Spikes({ entry }: { entry: TerrainDoc }) {
     </div>
   );
 }
-
-/** The words of the command line mean nothing here: the form below the warning does it. */
-const forConsole = (warning: string) => warning.replace(/: use --\S+ [\d.]+ if so/, "");
 
 /** What a surface model is, and what is doubtful about it. */
 export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
