@@ -93,7 +93,7 @@ def missing(document: PlanDoc) -> str:
     if document.source == "pois" and len(document.pois) < 2:
         return "Add at least two points: choose Add, then click the surface."
     if document.source == "survey" and len(document.survey.polygon) < 3:
-        return "Draw the survey area: choose Polygon, then click at least three corners."
+        return "Draw the survey area: choose Corners, then click at least three corners."
     if document.mission.heading == "point" and document.mission.look_at is None:
-        return "Choose the place to look at: take its tool, then click the surface."
+        return "Choose the place to look at: press Pick it under Mission, then click the surface."
     return ""

@@ -78,6 +78,7 @@ class Workspace:
             library_changed=self._publish_library,
             show_orthophoto=lambda: self._set_view(self.view.model_copy(update={"shading": "orthophoto"})),
         )
+        self._listed: tuple[str, str | None] | None = None
         self.view, self.selection = ViewDoc(), SelectionDoc()
         self.pointing = Pointing(
             self._desk, selection=lambda: self.selection, select=self._select, tell=streams.publish
@@ -267,7 +268,10 @@ class Workspace:
         self._computing.request(self._desk.revision, self.document, forget=forget)
         if forget:
             self._select(SelectionDoc())
+        listed = (self.document.name, self.document.terrain_id)
+        if forget or listed != self._listed:
             self._publish_library()
+        self._listed = listed
         self._computed()
 
     def _computed(self) -> None:

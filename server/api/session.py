@@ -35,9 +35,12 @@ async def login(request: Request, token: str = "") -> Response:
     return _with_cookie(request, RedirectResponse("/", 303), session_id)
 
 
+_ENDED = "Your session has ended. Sign in again: the plan is saved."
+
+
 @router.get("/signin", include_in_schema=False)
-async def sign_in_form(request: Request) -> Response:
-    return sign_in_page(request, "", 200)
+async def sign_in_form(request: Request, ended: bool = False) -> Response:
+    return sign_in_page(request, _ENDED if ended else "", 200)
 
 
 @router.post("/api/session", status_code=204)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from planning.report.words import metres
 from server.scene import palette
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node
@@ -117,4 +118,4 @@ def _worst(drawing: Drawing, plan: PlanScene) -> list[Node]:
 def _distance_words(nearest_m: float) -> str:
     if not math.isfinite(nearest_m):
         return "Unknown terrain"
-    return f"Nearest {nearest_m:.2f} m" if nearest_m > 0 else "Inside terrain"
+    return f"Nearest {metres(nearest_m)}" if nearest_m > 0 else "Inside terrain"

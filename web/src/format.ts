@@ -24,6 +24,10 @@ export function withUnit(value: number | null | undefined, unit: string, decimal
 
 export const metres = (value: number | null | undefined, decimals = 1) => withUnit(value, "m", decimals);
 
+/** A distance to the ground, rounded down to centimetres: no clearance is flattered. */
+export const clearance = (value_m: number | null | undefined) =>
+  metres(known(value_m) ? Math.floor(value_m * 100 + 1e-6) / 100 : value_m, 2);
+
 /** Long lengths in kilometres. */
 export function length(value_m: number | null | undefined): string {
   if (!known(value_m)) return DASH;

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from planning.formats.safe_text import clean_name
 from planning.model import Certificate, FlownLine, Poi, SampledPath, Timing
 from planning.report.figures.chart import Chart, Mark, Series, render_chart
+from planning.report.words import metres
 
 F64 = NDArray[np.float64]
 TERRAIN, SURFACE, PATH, FLOWN = "#7a6a55", "#d9822b", "#1769aa", "#243b53"
@@ -86,7 +87,7 @@ def short_name(poi: Poi, index: int) -> str:
 def _worst_mark(certificate: Certificate, s_m: float, y: float, *, at_foot: bool = False) -> list[Mark]:
     if not (np.isfinite(s_m) and np.isfinite(y)):
         return []
-    text = f"worst point, {certificate.min_distance_m:.2f} m"
+    text = f"worst point, {metres(certificate.min_distance_m)}"
     return [Mark(s_m, y, text, BAD, at_foot)]
 
 

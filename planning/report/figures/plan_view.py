@@ -16,6 +16,7 @@ from planning.hillshade import height_colors, hillshade, scale_rgb
 from planning.model import Certificate, FlownLine, Poi
 from planning.report.figures.curves import BAD, PATH, short_name
 from planning.report.figures.ticks import label, round_step
+from planning.report.words import metres
 from planning.surface import fit_within
 
 F64 = NDArray[np.float64]
@@ -120,7 +121,7 @@ def _worst(px: F64, certificate: Certificate) -> str:
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="11" fill="none" stroke="#fff" stroke-width="5"/>'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="11" fill="none" stroke="{BAD}" stroke-width="2.6"/>'
         f'<text x="{x + 15:.1f}" y="{y + 20:.1f}" class="halo big" fill="{BAD}">'
-        f"worst {certificate.min_distance_m:.2f} m</text>"
+        f"worst {metres(certificate.min_distance_m)}</text>"
     )
 
 

@@ -1,4 +1,4 @@
-import { latLon, metres } from "../format";
+import { clearance, latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -94,7 +94,7 @@ export function Clearance({ result }: { result: ResultDoc }) {
       <h2>Clearance</h2>
       <div class={`big-figure ${level}`}>
         <span class="value" data-testid="min-distance">
-          {metres(result.min_distance_m, 2)}
+          {clearance(result.min_distance_m)}
         </span>
         <span class="muted">smallest distance</span>
         <span class="required" data-testid="required-clearance">
@@ -104,7 +104,7 @@ export function Clearance({ result }: { result: ResultDoc }) {
       <dl class="figures-list">
         <Figure
           label="Smallest height above"
-          value={metres(result.min_vertical_m, 2)}
+          value={clearance(result.min_vertical_m)}
           testid="min-vertical"
         />
       </dl>
