@@ -91,3 +91,12 @@ describe("messages of the planner", () => {
     ["Choose a place on known ground.", "Choose a place on known ground."],
   ])("%s", (message, shown) => expect(f.forConsole(message)).toBe(shown));
 });
+
+describe("clearances", () => {
+  it("are rounded down, never up", () => {
+    expect(f.clearance(6.2599)).toBe("6.25\u00a0m");
+    expect(f.clearance(6.26)).toBe("6.26\u00a0m");
+    expect(f.clearance(-0.004)).toBe("\u22120.01\u00a0m");
+    expect(f.clearance(null)).toBe(f.DASH);
+  });
+});
