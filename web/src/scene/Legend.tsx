@@ -1,4 +1,4 @@
-import { metres, number } from "../format";
+import { metres } from "../format";
 import { result, terrain, view } from "../store/state";
 
 function HeightScale() {
@@ -7,7 +7,7 @@ function HeightScale() {
   const datum = terrain.value?.vertical_datum ?? "the model's own datum";
   return (
     <span class="height-scale number" title={`Heights in ${datum}`}>
-      {number(legend_min_m)}
+      {metres(legend_min_m, 0)}
       <span class="gradient" aria-hidden="true" />
       {metres(legend_max_m, 0)}
     </span>

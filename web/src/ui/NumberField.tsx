@@ -30,6 +30,9 @@ export function checkNumber(text: string, range: NumberRange, unit: string): num
   return value;
 }
 
+/** A problem below the panel's edge would go unread. */
+const bringIntoSight = (problem: HTMLElement | null) => problem?.scrollIntoView({ block: "nearest" });
+
 /** A number with its unit. Typing takes effect on Enter or when leaving the field; arrows step; Esc gives up. */
 export function NumberField(props: Props) {
   const id = useId();
@@ -86,7 +89,7 @@ export function NumberField(props: Props) {
         {props.unit && <span class="unit">{props.unit}</span>}
       </span>
       {problem && (
-        <p class="problem" id={`${id}-problem`} role="alert">
+        <p class="problem" id={`${id}-problem`} role="alert" ref={bringIntoSight}>
           {problem}
         </p>
       )}
