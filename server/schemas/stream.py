@@ -7,9 +7,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.base import Strict
+from server.schemas.flight import FlyState, FollowDoc, LeaseDoc, NodeDoc, RecordingDoc, Source, TrackDoc
 from server.schemas.library import JobDoc, LibraryState
 from server.schemas.results import ErrorDoc, PlanState
+from server.schemas.review import ReviewDoc
 from server.schemas.view import SelectionDoc, ViewDoc
+from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
+from telemetry.vehicle import VehicleState
 
 
 class Snapshot(Strict):
@@ -67,6 +71,99 @@ class CursorMessage(Strict):
     path_rel_home_m: float | None = None
 
 
+class VehicleMessage(Strict):
+    """The vehicle as it is now, at most 20 times a second; once a second when nothing is heard of it."""
+
+    v: Literal[1] = 1
+    type: Literal["vehicle"] = "vehicle"
+    source: Source
+    now_mono_s: float
+    """The clock of the state's ``..._t_mono_s``: their difference is a value's age."""
+    state: VehicleState | None
+    follow: FollowDoc | None
+
+
+class TrackMessage(Strict):
+    """Replaces the flown path: after a seek, or when another flight begins."""
+
+    v: Literal[1] = 1
+    type: Literal["track"] = "track"
+    track: TrackDoc
+
+
+class TextMessage(Strict):
+    """The vehicle's own words."""
+
+    v: Literal[1] = 1
+    type: Literal["text"] = "text"
+    source: Source
+    text: VehicleText
+
+
+class LinkMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["link"] = "link"
+    link: LinkStatus
+
+
+class TransferMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["transfer"] = "transfer"
+    transfer: TransferStatus
+
+
+class FlightMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["flight"] = "flight"
+    source: Source
+    flight: FlightStatus
+
+
+class FlyMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["fly"] = "fly"
+    fly: FlyState
+
+
+class LeaseMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["lease"] = "lease"
+    lease: LeaseDoc
+
+
+class NodesMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["nodes"] = "nodes"
+    nodes: list[NodeDoc]
+
+
+class RecorderMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["recorder"] = "recorder"
+    recorder: RecorderStatus
+
+
+class RecordingsMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["recordings"] = "recordings"
+    recordings: list[RecordingDoc]
+
+
+class ReviewMessage(Strict):
+    """The recording that is open for review; null: none."""
+
+    v: Literal[1] = 1
+    type: Literal["review"] = "review"
+    review: ReviewDoc | None
+
+
+class ReplayMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["replay"] = "replay"
+    now_mono_s: float
+    replay: ReplayStatus
+
+
 class NoticeMessage(Strict):
     """Something the operator must read: a failed click, a warning."""
 
@@ -84,6 +181,19 @@ ServerMessage = Annotated[
     | SelectionMessage
     | JobMessage
     | CursorMessage
+    | VehicleMessage
+    | TrackMessage
+    | TextMessage
+    | LinkMessage
+    | TransferMessage
+    | FlightMessage
+    | FlyMessage
+    | LeaseMessage
+    | NodesMessage
+    | RecorderMessage
+    | RecordingsMessage
+    | ReviewMessage
+    | ReplayMessage
     | NoticeMessage,
     Field(discriminator="type"),
 ]

@@ -2,6 +2,158 @@
 
 export const PROTOCOL_VERSION = 1;
 
+/** An autopilot that was heard and to which nothing is sent until the operator adopts it. */
+export interface Candidate {
+  id: string;
+  address: string;
+  peer: string;
+  system_id: number;
+  component_id: number;
+  autopilot: string;
+  vehicle_type: number;
+}
+
+/** One way to vehicles, as configured. */
+export interface ConnectionStatus {
+  address: string;
+  state: "open" | "waiting" | "failed";
+  error: ErrorInfo | null;
+  received_messages: number;
+  bad_bytes: number;
+}
+
+/** A ``DescribedError`` on its way through the bus. */
+export interface ErrorInfo {
+  code: string;
+  what: string;
+  where: string;
+  advice: string;
+}
+
+/** What Hedgehop itself is doing with the vehicle. */
+export interface FlightStatus {
+  way: "none" | "auto" | "guided";
+  phase: "idle" | "arming" | "taking_off" | "flying" | "paused" | "returning" | "landed" | "interrupted";
+  target: number | null;
+  targets: number | null;
+  since_utc_s: number | null;
+  broke_off_at: number | null;
+  hint: string;
+}
+
+export interface LinkStatus {
+  t_mono_s: number;
+  connections: ConnectionStatus[];
+  candidates: Candidate[];
+  adopted: Candidate | null;
+  state: "none" | "live" | "stale" | "lost";
+  silent_s: number | null;
+  quality: number | null;
+  round_trip_s: number | null;
+  heartbeat_hz: number;
+  mission_state: "unknown" | "none" | "verified";
+  mission_digest: string | null;
+  warnings: string[];
+}
+
+export interface RecorderStatus {
+  t_mono_s: number;
+  recording: boolean;
+  name: string | null;
+  started_utc_s: number | null;
+  bytes: number;
+  messages: number;
+  free_bytes: number | null;
+  error: ErrorInfo | null;
+}
+
+export interface ReplayStatus {
+  t_mono_s: number;
+  recording: string | null;
+  start_utc_s: number;
+  end_utc_s: number;
+  at_utc_s: number;
+  playing: boolean;
+  speed: number;
+  error: ErrorInfo | null;
+}
+
+/** What the vehicle changed in an item. */
+export interface Rounded {
+  item: number;
+  field: string;
+  sent: number | null;
+  kept: number | null;
+}
+
+/** A mission on its way to or from the vehicle. */
+export interface TransferStatus {
+  direction: "upload" | "download";
+  phase: "sending" | "reading_back" | "done" | "failed";
+  done: number;
+  total: number;
+  error: ErrorInfo | null;
+}
+
+/** The latest of everything, each group with the time at which its last message came. */
+export interface VehicleState {
+  system_id: number;
+  component_id: number;
+  autopilot: "ardupilot" | "px4" | "other";
+  vehicle_type: number;
+  firmware_version: string | null;
+  t_utc_s: number;
+  heartbeat_t_mono_s: number | null;
+  mode: string;
+  armed: boolean;
+  critical: boolean;
+  landed: "on_ground" | "taking_off" | "in_air" | "landing" | null;
+  ready_to_arm: boolean | null;
+  position_t_mono_s: number | null;
+  lat_deg: number | null;
+  lon_deg: number | null;
+  alt_amsl_m: number | null;
+  alt_rel_home_m: number | null;
+  v_north_m_s: number | null;
+  v_east_m_s: number | null;
+  v_down_m_s: number | null;
+  ground_speed_m_s: number | null;
+  climb_m_s: number | null;
+  attitude_t_mono_s: number | null;
+  roll_rad: number | null;
+  pitch_rad: number | null;
+  heading_rad: number | null;
+  battery_t_mono_s: number | null;
+  battery_v: number | null;
+  battery_a: number | null;
+  battery_share: number | null;
+  battery_used_mah: number | null;
+  gnss_t_mono_s: number | null;
+  gnss_fix: "none" | "no_fix" | "2d" | "3d" | "dgps" | "rtk_float" | "rtk_fixed";
+  satellites: number | null;
+  hdop: number | null;
+  horizontal_accuracy_m: number | null;
+  vertical_accuracy_m: number | null;
+  home_lat_deg: number | null;
+  home_lon_deg: number | null;
+  home_alt_amsl_m: number | null;
+  mission_item: number | null;
+  mission_items: number | null;
+  mission_reached: number | null;
+  mission_id: number | null;
+  rc_rssi: number | null;
+  wind_speed_m_s: number | null;
+  wind_from_rad: number | null;
+  estimator_ok: boolean | null;
+}
+
+/** A STATUSTEXT, its parts put together. */
+export interface VehicleText {
+  t_utc_s: number;
+  severity: number;
+  text: string;
+}
+
 export interface PoiDoc {
   id: string;
   lat_deg: number;
@@ -302,6 +454,224 @@ export interface Imported {
   warnings: string[];
 }
 
+/** Where the vehicle is against the plan and the surface model; null where it cannot be told. */
+export interface FollowDoc {
+  /** Distance flown along the planned line, at the place nearest to the vehicle. */
+  s_m: number | null;
+  /** Horizontal distance to the planned line; positive to the right of it. */
+  cross_track_m: number | null;
+  /** Above the planned line. */
+  height_error_m: number | null;
+  /** Above the cell below. */
+  height_above_dsm_m: number | null;
+  /** 3-D, to the nearest cell as a solid column. */
+  distance_to_dsm_m: number | null;
+  /** As placed on the surface model: the same reference as the profile's. */
+  alt_rel_home_m: number | null;
+  /** Share of the planned line that is flown, 0 to 1. */
+  progress: number | null;
+  /** To the landing, by the plan's prediction. */
+  time_left_s: number | null;
+  /** Later (positive) or earlier than the plan's prediction. */
+  behind_plan_s: number | null;
+  home_distance_m: number | null;
+  home_bearing_deg: number | null;
+}
+
+/** The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring. */
+export interface TrackDoc {
+  source: "live" | "replay";
+  s_m: (number | null)[];
+  alt_rel_home_m: (number | null)[];
+  cross_track_m: (number | null)[];
+  /** Since the first of them. */
+  t_s: number[];
+}
+
+/** One line of the check before the start. */
+export interface CheckRow {
+  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready";
+  /** accept: may be flown once the operator accepts it; bad and unknown: not at all. */
+  state: "good" | "accept" | "bad" | "unknown";
+  text: string;
+  mend: string;
+}
+
+/** The check before the start, on what was read back and where the vehicle really stands. */
+export interface PreflightDoc {
+  /** May be started, given what was accepted. */
+  ok: boolean;
+  rows: CheckRow[];
+  /** Surface model at the vehicle's home minus at the planned home. */
+  home_shift_m: number | null;
+  /** Heights were moved by ``home_shift_m``, certified and uploaded again. */
+  rereferenced: boolean;
+  /** Of the mission that was read back. */
+  min_distance_m: number | null;
+  checked_utc: string;
+}
+
+/** The mission on the vehicle, as far as known. */
+export interface OnboardDoc {
+  state: "unknown" | "none" | "verified";
+  digest: string | null;
+  /** Of the plan that was uploaded; empty for a foreign mission. */
+  plan_name: string;
+  /** It is the plan that is open, at its present revision. */
+  is_open_plan: boolean;
+  items: number;
+  rounded: Rounded[];
+  /** One sentence: what the vehicle rounded. */
+  rounded_note: string;
+}
+
+/** What is on board, whether it may be flown, and what is being done about it. */
+export interface FlyState {
+  onboard: OnboardDoc;
+  preflight: PreflightDoc | null;
+  /** After a flight that broke off: where it can go on. */
+  resume_from_item: number | null;
+  /** What is being done right now: "Uploading", "Checking the start" ... */
+  busy: string;
+}
+
+/** Who is in charge. Only they can command the vehicle. */
+export interface LeaseDoc {
+  holder: string | null;
+  mine: boolean;
+}
+
+export interface NodeDoc {
+  name: string;
+  state: "starting" | "running" | "restarting" | "stopped";
+  restarts: number;
+  text: string;
+}
+
+export interface RecordingDoc {
+  id: string;
+  name: string;
+  kind: "hedgehop" | "tlog";
+  started_utc: string;
+  duration_s: number | null;
+  bytes: number;
+  vehicle: string;
+  plan_name: string;
+  /** A surface model in the library that it was flown over. */
+  terrain_id: string | null;
+  /** Why it can only be opened in part, or not at all. */
+  fault: string;
+}
+
+export interface ConnectLink {
+  address: string;
+  adopt?: boolean;
+}
+
+export interface DisconnectLink {
+  address: string;
+}
+
+export interface AdoptVehicle {
+  candidate: string;
+}
+
+/** Uploads the open plan, which must be at this revision. */
+export interface UploadPlan {
+  revision: number;
+}
+
+export interface StartFlight {
+  way?: "auto" | "guided";
+  digest: string;
+  accept?: ("gnss" | "battery" | "rtl_height")[];
+  from_item?: number;
+}
+
+export interface TakeLease {
+  name?: string;
+}
+
+export interface OpenReview {
+  recording_id: string;
+  /** Null: the one it was flown over. */
+  terrain_id?: string | null;
+  /** Judge it against the plan that is open instead of the one in the recording. */
+  use_open_plan?: boolean;
+}
+
+export interface PlayReview {
+  playing: boolean;
+  /** Since the recording's start. */
+  at_s?: number | null;
+  speed?: number | null;
+}
+
+/** From the first waypoint to the last. */
+export interface ReviewFigures {
+  completed: boolean;
+  duration_s: number | null;
+  predicted_s: number | null;
+  /** How much later the flown path is than the plan's timing. */
+  lag_s: number | null;
+  cross_track_max_m: number | null;
+  cross_track_mean_m: number | null;
+  cross_track_p95_m: number | null;
+  height_error_max_m: number | null;
+  height_error_mean_m: number | null;
+  /** Of the absolute value. */
+  height_error_p95_m: number | null;
+  height_error_lowest_m: number | null;
+  height_error_highest_m: number | null;
+  min_distance_m: number | null;
+  min_vertical_m: number | null;
+  certified_distance_m: number | null;
+  min_distance_t_s: number | null;
+  min_distance_s_m: number | null;
+}
+
+/** Curves over time; null where unknown. All lists are equally long. */
+export interface ReviewSeries {
+  t_s: number[];
+  alt_rel_home_m: (number | null)[];
+  reference_alt_rel_home_m: (number | null)[];
+  ground_rel_home_m: (number | null)[];
+  cross_track_m: (number | null)[];
+  s_m: (number | null)[];
+  distance_to_dsm_m: (number | null)[];
+}
+
+/** Of the cross-track error's size. */
+export interface Histogram {
+  edges_m: number[];
+  counts: number[];
+}
+
+export interface ReviewEvent {
+  t_s: number;
+  /** mode, text, arm, item, command */
+  kind: string;
+  text: string;
+  severity: number;
+}
+
+export interface ReviewDoc {
+  recording: RecordingDoc;
+  start_utc: string;
+  duration_s: number;
+  first_waypoint_t_s: number | null;
+  last_waypoint_t_s: number | null;
+  /** Null without a plan. */
+  figures: ReviewFigures | null;
+  series: ReviewSeries;
+  histogram: Histogram | null;
+  events: ReviewEvent[];
+  plan_name: string;
+  terrain_name: string;
+  /** What had to be assumed or could not be told. */
+  notes: string[];
+}
+
 export interface Snapshot {
   v: 1;
   type: "snapshot";
@@ -356,6 +726,95 @@ export interface CursorMessage {
   path_rel_home_m: number | null;
 }
 
+/** The vehicle as it is now, at most 20 times a second; once a second when nothing is heard of it. */
+export interface VehicleMessage {
+  v: 1;
+  type: "vehicle";
+  source: "live" | "replay";
+  /** The clock of the state's ``..._t_mono_s``: their difference is a value's age. */
+  now_mono_s: number;
+  state: VehicleState | null;
+  follow: FollowDoc | null;
+}
+
+/** Replaces the flown path: after a seek, or when another flight begins. */
+export interface TrackMessage {
+  v: 1;
+  type: "track";
+  track: TrackDoc;
+}
+
+/** The vehicle's own words. */
+export interface TextMessage {
+  v: 1;
+  type: "text";
+  source: "live" | "replay";
+  text: VehicleText;
+}
+
+export interface LinkMessage {
+  v: 1;
+  type: "link";
+  link: LinkStatus;
+}
+
+export interface TransferMessage {
+  v: 1;
+  type: "transfer";
+  transfer: TransferStatus;
+}
+
+export interface FlightMessage {
+  v: 1;
+  type: "flight";
+  source: "live" | "replay";
+  flight: FlightStatus;
+}
+
+export interface FlyMessage {
+  v: 1;
+  type: "fly";
+  fly: FlyState;
+}
+
+export interface LeaseMessage {
+  v: 1;
+  type: "lease";
+  lease: LeaseDoc;
+}
+
+export interface NodesMessage {
+  v: 1;
+  type: "nodes";
+  nodes: NodeDoc[];
+}
+
+export interface RecorderMessage {
+  v: 1;
+  type: "recorder";
+  recorder: RecorderStatus;
+}
+
+export interface RecordingsMessage {
+  v: 1;
+  type: "recordings";
+  recordings: RecordingDoc[];
+}
+
+/** The recording that is open for review; null: none. */
+export interface ReviewMessage {
+  v: 1;
+  type: "review";
+  review: ReviewDoc | null;
+}
+
+export interface ReplayMessage {
+  v: 1;
+  type: "replay";
+  now_mono_s: number;
+  replay: ReplayStatus;
+}
+
 /** Something the operator must read: a failed click, a warning. */
 export interface NoticeMessage {
   v: 1;
@@ -401,6 +860,19 @@ export type ServerMessage =
   | SelectionMessage
   | JobMessage
   | CursorMessage
+  | VehicleMessage
+  | TrackMessage
+  | TextMessage
+  | LinkMessage
+  | TransferMessage
+  | FlightMessage
+  | FlyMessage
+  | LeaseMessage
+  | NodesMessage
+  | RecorderMessage
+  | RecordingsMessage
+  | ReviewMessage
+  | ReplayMessage
   | NoticeMessage;
 
 export type ClientMessage =

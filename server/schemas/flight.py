@@ -1,0 +1,181 @@
+"""Flying: the vehicle, the link to it, what may be done with it, and by whom.
+
+What the bus carries (``telemetry.messages``, ``telemetry.vehicle``) goes to the pages as it is; it is not
+written down a second time here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Name, Strict
+from telemetry.messages import Rounded
+
+Source = Literal["live", "replay"]
+Address = Annotated[str, Field(min_length=3, max_length=200)]
+
+
+class FollowDoc(Strict):
+    """Where the vehicle is against the plan and the surface model; null where it cannot be told."""
+
+    s_m: float | None
+    """Distance flown along the planned line, at the place nearest to the vehicle."""
+    cross_track_m: float | None
+    """Horizontal distance to the planned line; positive to the right of it."""
+    height_error_m: float | None
+    """Above the planned line."""
+    height_above_dsm_m: float | None
+    """Above the cell below."""
+    distance_to_dsm_m: float | None
+    """3-D, to the nearest cell as a solid column."""
+    alt_rel_home_m: float | None
+    """As placed on the surface model: the same reference as the profile's."""
+    progress: float | None
+    """Share of the planned line that is flown, 0 to 1."""
+    time_left_s: float | None
+    """To the landing, by the plan's prediction."""
+    behind_plan_s: float | None
+    """Later (positive) or earlier than the plan's prediction."""
+    home_distance_m: float | None
+    home_bearing_deg: float | None
+
+
+class TrackDoc(Strict):
+    """The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring."""
+
+    source: Source
+    s_m: list[float | None]
+    alt_rel_home_m: list[float | None]
+    cross_track_m: list[float | None]
+    t_s: list[float]
+    """Since the first of them."""
+
+
+class CheckRow(Strict):
+    """One line of the check before the start."""
+
+    code: Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready"]
+    state: Literal["good", "accept", "bad", "unknown"]
+    """accept: may be flown once the operator accepts it; bad and unknown: not at all."""
+    text: str
+    mend: str = ""
+
+
+class PreflightDoc(Strict):
+    """The check before the start, on what was read back and where the vehicle really stands."""
+
+    ok: bool
+    """May be started, given what was accepted."""
+    rows: list[CheckRow]
+    home_shift_m: float | None = None
+    """Surface model at the vehicle's home minus at the planned home."""
+    rereferenced: bool = False
+    """Heights were moved by ``home_shift_m``, certified and uploaded again."""
+    min_distance_m: float | None = None
+    """Of the mission that was read back."""
+    checked_utc: str = ""
+
+
+class OnboardDoc(Strict):
+    """The mission on the vehicle, as far as known."""
+
+    state: Literal["unknown", "none", "verified"]
+    digest: str | None = None
+    plan_name: str = ""
+    """Of the plan that was uploaded; empty for a foreign mission."""
+    is_open_plan: bool = False
+    """It is the plan that is open, at its present revision."""
+    items: int = 0
+    rounded: list[Rounded] = Field(default_factory=list)
+    rounded_note: str = ""
+    """One sentence: what the vehicle rounded."""
+
+
+class FlyState(Strict):
+    """What is on board, whether it may be flown, and what is being done about it."""
+
+    onboard: OnboardDoc
+    preflight: PreflightDoc | None = None
+    resume_from_item: int | None = None
+    """After a flight that broke off: where it can go on."""
+    busy: str = ""
+    """What is being done right now: "Uploading", "Checking the start" ..."""
+
+
+class LeaseDoc(Strict):
+    """Who is in charge. Only they can command the vehicle."""
+
+    holder: str | None
+    mine: bool
+
+
+class NodeDoc(Strict):
+    name: str
+    state: Literal["starting", "running", "restarting", "stopped"]
+    restarts: int = 0
+    text: str = ""
+
+
+class RecordingDoc(Strict):
+    id: str
+    name: str
+    kind: Literal["hedgehop", "tlog"]
+    started_utc: str
+    duration_s: float | None
+    bytes: int
+    vehicle: str = ""
+    plan_name: str = ""
+    terrain_id: str | None = None
+    """A surface model in the library that it was flown over."""
+    fault: str = ""
+    """Why it can only be opened in part, or not at all."""
+
+
+# Bodies of requests
+
+
+class ConnectLink(Strict):
+    address: Address
+    adopt: bool = True
+
+
+class DisconnectLink(Strict):
+    address: Address
+
+
+class AdoptVehicle(Strict):
+    candidate: Annotated[str, Field(max_length=300)]
+
+
+class UploadPlan(Strict):
+    """Uploads the open plan, which must be at this revision."""
+
+    revision: int
+
+
+class StartFlight(Strict):
+    way: Literal["auto", "guided"] = "auto"
+    digest: str
+    accept: list[Literal["gnss", "battery", "rtl_height"]] = Field(default_factory=list)
+    from_item: Annotated[int, Field(ge=1)] = 1
+
+
+class TakeLease(Strict):
+    name: Name = ""
+
+
+class OpenReview(Strict):
+    recording_id: str
+    terrain_id: str | None = None
+    """Null: the one it was flown over."""
+    use_open_plan: bool = False
+    """Judge it against the plan that is open instead of the one in the recording."""
+
+
+class PlayReview(Strict):
+    playing: bool
+    at_s: float | None = None
+    """Since the recording's start."""
+    speed: Annotated[float, Field(ge=0.1, le=50)] | None = None

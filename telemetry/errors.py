@@ -1,0 +1,69 @@
+"""What can go wrong between Hedgehop and a vehicle, as one tree.
+
+TelemetryError
+├── AddressError           a link string that names no connection Hedgehop makes
+├── ConnectionFailedError  a port in use, gone or forbidden; a host that does not answer
+├── NoVehicleError         no vehicle adopted, or the link to it is lost
+├── NotAllowedError        not the operator in charge, or a command that does not fit the present state
+│   └── MissionUnknownError    what is on board has not been read back and found to be the plan
+├── RefusedError           the vehicle said no: its result and its own words
+├── SilentError            the vehicle did not answer
+├── TransferError          a mission that did not get across whole
+├── RecordingError         a recording that cannot be read: foreign, empty, broken from the start
+│   └── RecordingFullError     no space left to record on
+└── BusError               a node that is not there, or messages nobody understands
+"""
+
+from __future__ import annotations
+
+from planning.errors import DescribedError
+
+
+class TelemetryError(DescribedError):
+    """Base of all errors of this floor."""
+
+    code = "telemetry"
+
+
+class AddressError(TelemetryError):
+    code = "link_address"
+
+
+class ConnectionFailedError(TelemetryError):
+    code = "connection"
+
+
+class NoVehicleError(TelemetryError):
+    code = "no_vehicle"
+
+
+class NotAllowedError(TelemetryError):
+    code = "not_allowed"
+
+
+class MissionUnknownError(NotAllowedError):
+    code = "mission_unknown"
+
+
+class RefusedError(TelemetryError):
+    code = "vehicle_refused"
+
+
+class SilentError(TelemetryError):
+    code = "vehicle_silent"
+
+
+class TransferError(TelemetryError):
+    code = "transfer"
+
+
+class RecordingError(TelemetryError):
+    code = "recording"
+
+
+class RecordingFullError(RecordingError):
+    code = "recording_full"
+
+
+class BusError(TelemetryError):
+    code = "bus"

@@ -1,0 +1,298 @@
+"""What travels on the bus, defined once. Frozen dataclasses, written as MessagePack by ``telemetry.bus``.
+
+Live names stand in ``Topic``; a replay uses the same names behind ``replay/`` and nothing else does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+from telemetry.vehicle import VehicleState
+
+
+class Topic(StrEnum):
+    """Names on the bus and what they carry."""
+
+    VEHICLE = "vehicle/state"  # VehicleState, latest wins
+    TEXT = "vehicle/text"  # VehicleText, each arrives
+    RAW = "mavlink/raw"  # RawFrame, each arrives
+    LINK = "link/status"  # LinkStatus, latest wins, at 1 Hz and on change
+    TRANSFER = "link/transfer"  # TransferStatus, latest wins
+    FLIGHT = "flight/status"  # FlightStatus, latest wins
+    COMMAND = "flight/command"  # CommandRecord, each arrives, published before the command is sent
+    PLAN = "plan/active"  # PlanRecord, latest wins
+    RECORDER = "recorder/status"  # RecorderStatus, latest wins, at 1 Hz and on change
+    REPLAY = "replayer/status"  # ReplayStatus, latest wins
+    SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
+
+
+REPLAY_PREFIX = "replay/"
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorInfo:
+    """A ``DescribedError`` on its way through the bus."""
+
+    code: str
+    what: str
+    where: str = ""
+    advice: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleText:
+    """A STATUSTEXT, its parts put together."""
+
+    t_utc_s: float
+    severity: int
+    """MAV_SEVERITY: 0 emergency to 7 debug"""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RawFrame:
+    t_utc_s: float
+    sent: bool
+    """True: from Hedgehop to the vehicle."""
+    link: str
+    frame: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionStatus:
+    """One way to vehicles, as configured."""
+
+    address: str
+    state: Literal["open", "waiting", "failed"]
+    """waiting: open, but nothing has been heard; failed: being tried again."""
+    error: ErrorInfo | None = None
+    received_messages: int = 0
+    bad_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An autopilot that was heard and to which nothing is sent until the operator adopts it."""
+
+    id: str
+    """``address/peer/system/component``"""
+    address: str
+    peer: str
+    """Host and port, or the serial device."""
+    system_id: int
+    component_id: int
+    autopilot: str
+    vehicle_type: int
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatus:
+    t_mono_s: float
+    connections: tuple[ConnectionStatus, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    adopted: Candidate | None = None
+    state: Literal["none", "live", "stale", "lost"] = "none"
+    """none: no vehicle adopted; stale after 1.5 s, lost after 3.5 s without a message of it."""
+    silent_s: float | None = None
+    quality: float | None = None
+    """Share of the vehicle's packets of the last seconds that arrived, from sequence numbers."""
+    round_trip_s: float | None = None
+    """From TIMESYNC or a command's answer."""
+    heartbeat_hz: float = 0.0
+    """Of Hedgehop's own heartbeat, as really sent."""
+    mission_state: Literal["unknown", "none", "verified"] = "unknown"
+    mission_digest: str | None = None
+    """Of the mission that a read-back found on board."""
+    warnings: tuple[str, ...] = ()
+    """Such as a second vehicle with the same id."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rounded:
+    """What the vehicle changed in an item."""
+
+    item: int
+    """1 is the first item of the mission; home does not count."""
+    field: str
+    sent: float | None
+    kept: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class TransferStatus:
+    """A mission on its way to or from the vehicle."""
+
+    direction: Literal["upload", "download"]
+    phase: Literal["sending", "reading_back", "done", "failed"]
+    done: int
+    total: int
+    error: ErrorInfo | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A mission item as the wire knows it, home left out."""
+
+    command: int
+    frame: int
+    params: tuple[float | None, float | None, float | None, float | None]
+    """None: NaN, "not given"."""
+    lat_deg: float
+    lon_deg: float
+    alt_m: float
+    autocontinue: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class OnboardMission:
+    """What was read back from the vehicle."""
+
+    items: tuple[Item, ...]
+    """Without the home row of ArduPilot."""
+    home_lat_deg: float | None
+    home_lon_deg: float | None
+    home_alt_amsl_m: float | None
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class UploadReport:
+    verified: bool
+    """The vehicle holds what was sent, but for what it rounded."""
+    onboard: OnboardMission
+    rounded: tuple[Rounded, ...]
+    differences: tuple[str, ...]
+    """Why it is not verified: sentences with item, field, sent and found value."""
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedTarget:
+    """One waypoint of the paper's navigation script (Melita 2020, section 7)."""
+
+    item: int
+    """Number of the mission's item, 1 is the first."""
+    lat_deg: float
+    lon_deg: float
+    alt_rel_home_m: float
+    speed_m_s: float
+    loiter_s: float = 0.0
+    heading_rad: float | None = None
+    """None: the autopilot's own choice."""
+    t_s: float | None = None
+    """When the plan reaches it, since the first target."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightStatus:
+    """What Hedgehop itself is doing with the vehicle."""
+
+    way: Literal["none", "auto", "guided"] = "none"
+    phase: Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"] = "idle"
+    target: int | None = None
+    """Item of the mission that is flown to, 1 is the first."""
+    targets: int | None = None
+    since_utc_s: float | None = None
+    """When the mission was started."""
+    broke_off_at: int | None = None
+    """Item that was flown to when the flight ended before the mission's end: where a resumed one goes on."""
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRecord:
+    """Written down before it is sent, chained by hash (telemetry.mavlink.audit)."""
+
+    t_utc_s: float
+    operator: str
+    words: str
+    """What was asked: "arm", "upload 88 items" ..."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRecord:
+    """What is being flown, complete enough to judge the flight later without the plan's files."""
+
+    t_utc_s: float
+    name: str
+    mission_wpl: str
+    """The mission as QGC WPL 110 text with home (``planning.formats.wpl``)."""
+    digest: str
+    firmware: Literal["ardupilot", "px4"]
+    terrain_id: str
+    terrain_name: str
+    terrain_sha256: str
+    home_alt_dsm_m: float | None
+    vertical_datum: str | None
+    profile_toml: str
+    certificate_json: str
+    """``planning.clearance.certificate_json`` of what was read back; empty when there is none."""
+    plan_json: str = ""
+    """The plan document of the console, if it came from there."""
+    path_csv: str = ""
+    """``trajectory.csv`` with the paper's timing, if there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderStatus:
+    t_mono_s: float
+    recording: bool
+    name: str | None = None
+    """File name without folder."""
+    started_utc_s: float | None = None
+    bytes: int = 0
+    messages: int = 0
+    free_bytes: int | None = None
+    error: ErrorInfo | None = None
+    """A full disk, for one: telemetry goes on."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayStatus:
+    t_mono_s: float
+    recording: str | None = None
+    """File name; None: nothing is open."""
+    start_utc_s: float = 0.0
+    end_utc_s: float = 0.0
+    at_utc_s: float = 0.0
+    playing: bool = False
+    speed: float = 1.0
+    error: ErrorInfo | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ServerAlive:
+    t_mono_s: float
+    pid: int
+
+
+Published = (
+    VehicleState
+    | VehicleText
+    | RawFrame
+    | LinkStatus
+    | TransferStatus
+    | FlightStatus
+    | CommandRecord
+    | PlanRecord
+    | RecorderStatus
+    | ReplayStatus
+    | ServerAlive
+)
+"""Everything that may be published."""
+
+MESSAGE_TYPES: dict[str, type[Published]] = {
+    Topic.VEHICLE: VehicleState,
+    Topic.TEXT: VehicleText,
+    Topic.RAW: RawFrame,
+    Topic.LINK: LinkStatus,
+    Topic.TRANSFER: TransferStatus,
+    Topic.FLIGHT: FlightStatus,
+    Topic.COMMAND: CommandRecord,
+    Topic.PLAN: PlanRecord,
+    Topic.RECORDER: RecorderStatus,
+    Topic.REPLAY: ReplayStatus,
+    Topic.SERVER: ServerAlive,
+}

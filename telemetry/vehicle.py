@@ -1,0 +1,90 @@
+"""What is known of one vehicle, and how each MAVLink message changes it.
+
+Missing values are None, never NaN. Clocks: ``t_mono_s`` is this machine's monotonic clock, the same in all its
+processes; ``t_utc_s`` counts seconds since 1970. Angles are radians but for latitude and longitude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Autopilot = Literal["ardupilot", "px4", "other"]
+Landed = Literal["on_ground", "taking_off", "in_air", "landing"]
+GnssFix = Literal["none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed"]
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """The latest of everything, each group with the time at which its last message came."""
+
+    system_id: int
+    component_id: int
+    autopilot: Autopilot = "other"
+    vehicle_type: int = 0
+    """MAV_TYPE"""
+    firmware_version: str | None = None
+    t_utc_s: float = 0.0
+    """When the newest message came."""
+
+    heartbeat_t_mono_s: float | None = None
+    mode: str = ""
+    """The autopilot's own name of its mode: AUTO, GUIDED, RTL (ArduPilot), MISSION, HOLD (PX4) ..."""
+    armed: bool = False
+    critical: bool = False
+    """MAV_STATE critical or emergency: a failsafe is active."""
+    landed: Landed | None = None
+    ready_to_arm: bool | None = None
+    """The pre-arm bit of SYS_STATUS; the vehicle's own words count more."""
+
+    position_t_mono_s: float | None = None
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    alt_amsl_m: float | None = None
+    alt_rel_home_m: float | None = None
+    v_north_m_s: float | None = None
+    v_east_m_s: float | None = None
+    v_down_m_s: float | None = None
+    ground_speed_m_s: float | None = None
+    climb_m_s: float | None = None
+
+    attitude_t_mono_s: float | None = None
+    roll_rad: float | None = None
+    pitch_rad: float | None = None
+    heading_rad: float | None = None
+    """Clockwise from true north, 0 to 2 pi."""
+
+    battery_t_mono_s: float | None = None
+    battery_v: float | None = None
+    battery_a: float | None = None
+    battery_share: float | None = None
+    """0 to 1"""
+    battery_used_mah: float | None = None
+
+    gnss_t_mono_s: float | None = None
+    gnss_fix: GnssFix = "none"
+    satellites: int | None = None
+    hdop: float | None = None
+    horizontal_accuracy_m: float | None = None
+    """As the receiver claims (one sigma)."""
+    vertical_accuracy_m: float | None = None
+
+    home_lat_deg: float | None = None
+    home_lon_deg: float | None = None
+    home_alt_amsl_m: float | None = None
+
+    mission_item: int | None = None
+    """Sequence number that the vehicle flies to, as the vehicle counts (ArduPilot: 0 is home)."""
+    mission_items: int | None = None
+    mission_reached: int | None = None
+    """Last sequence number that the vehicle said it reached."""
+    mission_id: int | None = None
+    """MISSION_CURRENT.mission_id; None when unsupported or 0."""
+
+    rc_rssi: float | None = None
+    """0 to 1"""
+    wind_speed_m_s: float | None = None
+    wind_from_rad: float | None = None
+    """Direction that the wind comes from, clockwise from north."""
+    estimator_ok: bool | None = None
+    """The autopilot's position estimate is usable."""
