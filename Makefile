@@ -59,6 +59,7 @@ lock: ## resolve the requirements files anew (LOCK_ARGS=--upgrade for newer vers
 	$(COMPILE) pyproject.toml --group build --output-file requirements.txt
 	$(COMPILE) pyproject.toml --group build --extra test --constraint requirements.txt --output-file requirements-test.txt
 	$(COMPILE) --group node --output-file requirements-node.txt
+	$(COMPILE) --no-deps --group peers --output-file requirements-peers.txt
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
   --custom-compile-command 'make lock' $(LOCK_ARGS)
@@ -113,6 +114,6 @@ $(STAMPS)/kernels: $(KERNELS) $(STAMPS)/project
 	$(call step,Step 7 of 7: compiling the kernels (once; about 20 s),$(VENV_PYTHON) -m server.compile_kernels)
 	@touch $@
 
-$(STAMPS)/test: requirements-test.txt $(STAMPS)/project
-	$(call step,Packages for the tests,$(PIP) -r requirements-test.txt)
+$(STAMPS)/test: requirements-test.txt requirements-peers.txt $(STAMPS)/project
+	$(call step,Packages for the tests,$(PIP) -r requirements-test.txt && $(PIP) --no-deps -r requirements-peers.txt)
 	@touch $@

@@ -12,7 +12,7 @@ import pytest
 import planning
 
 ROOT = Path(__file__).resolve().parent.parent
-REQUIREMENTS = ("requirements.txt", "requirements-test.txt", "requirements-node.txt")
+REQUIREMENTS = ("requirements.txt", "requirements-test.txt", "requirements-node.txt", "requirements-peers.txt")
 # Put together here, so that this file does not break the rules it checks.
 HOST_LABELS = (("registry", "npmjs", "org"), ("pypi", "org"), ("files", "pythonhosted", "org"), ("npmmirror", "com"))
 REGISTRY_HOSTS = re.compile(b"|".join(re.escape(".".join(labels).encode()) for labels in HOST_LABELS))
