@@ -15,7 +15,7 @@ from server.library import Library
 from server.logs import configure_logging
 from server.settings import Settings
 from server.web import create_app
-from server.wiring import make_workspace
+from server.wiring import make_workspace, open_flying
 
 WEBSOCKET_LIMIT_BYTES = 1024**2
 """From browsers; what goes to them has no limit."""
@@ -27,7 +27,7 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     """Serves until interrupted. Raises ``StartError`` or ``DataDirError`` with what to do."""
     configure_logging(settings.log_level)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
-        app = create_app(settings, library, make_workspace, demo=demo)
+        app = create_app(settings, library, make_workspace, open_flying, demo=demo)
         server = AnnouncingServer(app, settings)
         server.run(sockets=[listening])
         if not server.started:

@@ -4,10 +4,13 @@ ServerError
 ├── SignInError            no session, a wrong password, a used link
 │   └── TooManyTriesError      wrong passwords in a row
 ├── ForbiddenError         a foreign origin or host
+│   └── NotInChargeError       a command of a session that does not hold the lease
 ├── NotFoundError          no plan, terrain, page or job of that id
 ├── ConflictError          what was asked for does not fit the present state
 │   ├── StaleRevisionError     an edit of a plan that has changed meanwhile
 │   ├── NotReadyError          an export without a finished plan
+│   ├── NotCertifiedError      a plan without a certificate is not uploaded
+│   ├── CheckNeededError       a start without a fresh check of what is on board and where the vehicle stands
 │   ├── InUseError             deleting what something else needs
 │   └── JobCancelledError      somebody cancelled the job
 ├── BadRequestError        a query or body that makes no sense
@@ -20,7 +23,8 @@ ServerError
 ├── WorkerDiedError        the process that did the work ended (killed, out of memory)
 └── StartError             settings or port that Hedgehop cannot start with
 
-Like ``planning.errors``, every error says what is wrong, where, and what to do.
+``telemetry.errors`` come through as they are. Like ``planning.errors``, every error says what is wrong, where, and
+what to do.
 """
 
 from __future__ import annotations
@@ -33,6 +37,19 @@ from starlette.exceptions import HTTPException
 
 from planning.errors import DescribedError, PlanningError
 from server.schemas import ErrorDoc
+from telemetry.errors import (
+    AddressError,
+    BusError,
+    ConnectionFailedError,
+    NotAllowedError,
+    NoVehicleError,
+    RecordingError,
+    RecordingFullError,
+    RefusedError,
+    SilentError,
+    TelemetryError,
+    TransferError,
+)
 
 
 class ServerError(DescribedError):
@@ -53,6 +70,10 @@ class ForbiddenError(ServerError):
     code = "origin"
 
 
+class NotInChargeError(ForbiddenError):
+    code = "not_in_charge"
+
+
 class NotFoundError(ServerError):
     code = "not_found"
 
@@ -67,6 +88,14 @@ class StaleRevisionError(ConflictError):
 
 class NotReadyError(ConflictError):
     code = "not_ready"
+
+
+class NotCertifiedError(ConflictError):
+    code = "not_certified"
+
+
+class CheckNeededError(ConflictError):
+    code = "check_needed"
 
 
 class InUseError(ConflictError):
@@ -130,6 +159,17 @@ STATUS: dict[type[Exception], int] = {
     BusyError: 503,
     WorkerDiedError: 500,
     StartError: 503,
+    TelemetryError: 502,
+    AddressError: 422,
+    ConnectionFailedError: 502,
+    NoVehicleError: 409,
+    NotAllowedError: 409,
+    RefusedError: 409,
+    SilentError: 504,
+    TransferError: 502,
+    RecordingError: 422,
+    RecordingFullError: 507,
+    BusError: 503,
 }
 """Subclasses take the status of their nearest ancestor here; all that is missing is 500."""
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from planning.demo import demo_dsm, small_hill
-from planning.errors import PlanningError
+from planning.errors import DescribedError, PlanningError
 from planning.geotiff import read_dsm_reported, read_orthophoto
 from planning.spikes import Spike, find_spikes
 from planning.spikes import remove_spikes as without
@@ -22,11 +22,11 @@ _MAX_SPIKES = 100
 
 
 @contextmanager
-def named(upload: Path, filename: str) -> Iterator[None]:
+def named(upload: Path, filename: str, *, kind: type[DescribedError] = PlanningError) -> Iterator[None]:
     """Errors name the operator's file, not the place where its upload lies."""
     try:
         yield
-    except PlanningError as error:
+    except kind as error:
         for part in ("what", "where", "advice"):
             text = getattr(error, part).replace(upload.name, filename).replace(upload.stem, filename)
             setattr(error, part, text)

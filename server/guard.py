@@ -157,7 +157,7 @@ class Guard:
         return None
 
     def _body_limit(self, path: str) -> int:
-        if path in ("/api/terrains", "/api/orthophotos"):
+        if path in ("/api/terrains", "/api/orthophotos", "/api/recordings/import"):
             return self._upload_limit
         return IMPORT_LIMIT_BYTES if path == "/api/plan/import" else JSON_LIMIT_BYTES
 

@@ -1,8 +1,9 @@
 """The ``/ws`` streams to the browsers: one bounded queue per page, so that a stalled page holds up no other.
 
-State (plan, library, view, selection, cursor, each job) is latest-wins: a newer message takes the place of the one
-still waiting. Notices must arrive: each waits on its own, and a page that lets the queue fill up is cut off, as is
-one that does not take a message within five seconds. It reconnects and starts from a fresh snapshot.
+State (plan, library, view, selection, cursor, each job, each vehicle) is latest-wins: a newer message takes the place
+of the one still waiting. Notices and the vehicle's own words must arrive: each waits on its own, and a page that lets
+the queue fill up is cut off, as is one that does not take a message within five seconds. It reconnects and starts from
+a fresh snapshot.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import json
 import logging
 import secrets
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from functools import cached_property
 from itertools import count
 
@@ -51,6 +52,20 @@ class _Outgoing:
         return self._message.model_dump_json()
 
 
+def key_of(message: schemas.ServerMessage) -> object | None:
+    """Messages of the same key replace each other; None: each one must arrive."""
+    match message:
+        case schemas.NoticeMessage() | schemas.TextMessage():
+            return None
+        case schemas.JobMessage():
+            return message.type, message.job.id
+        case schemas.VehicleMessage() | schemas.FlightMessage():
+            return message.type, message.source
+        case schemas.TrackMessage():
+            return message.type, message.track.source
+    return message.type
+
+
 class Page:
     """One browser page: its queue, and the reason why it has to go once there is one."""
 
@@ -61,7 +76,7 @@ class Page:
         self.close_code = CLOSE_GOING_AWAY
         self._waiting: dict[object, _Outgoing] = {}
         self._wake = asyncio.Event()
-        self._notices = count()
+        self._numbers = count()
 
     def put(self, message: schemas.ServerMessage, outgoing: _Outgoing) -> None:
         self._waiting[self._key(message)] = outgoing
@@ -70,11 +85,8 @@ class Page:
             self.cut_off(CLOSE_SLOW)
 
     def _key(self, message: schemas.ServerMessage) -> object:
-        if isinstance(message, schemas.JobMessage):
-            return "job", message.job.id
-        if isinstance(message, schemas.NoticeMessage):
-            return "notice", next(self._notices)
-        return message.type
+        key = key_of(message)
+        return (message.type, next(self._numbers)) if key is None else key
 
     async def next_text(self) -> str:
         while not self._waiting:
@@ -112,6 +124,19 @@ class Hub:
         for page in list(self._pages.values()):
             page.put(message, outgoing)
 
+    def publish_each(self, make: Callable[[str], schemas.ServerMessage]) -> None:
+        """To every page, what its session (by ``server.auth.session_key``) may know."""
+        for page in list(self._pages.values()):
+            message = make(page.session_key)
+            page.put(message, _Outgoing(message))
+
+    def publish_to(self, session_key: str, message: schemas.ServerMessage) -> None:
+        """To every page of one session."""
+        outgoing = _Outgoing(message)
+        for page in list(self._pages.values()):
+            if page.session_key == session_key:
+                page.put(message, outgoing)
+
     def send(self, page_id: str, message: schemas.ServerMessage) -> None:
         """To one page; nothing happens when it has gone."""
         if page := self._pages.get(page_id):
@@ -138,9 +163,10 @@ class Hub:
         session_key: str,
         session_remaining_s: float,
         snapshot: Callable[[str], schemas.Snapshot],
+        present: Callable[[], Iterable[schemas.ServerMessage]] = tuple,
         on_message: OnMessage,
     ) -> None:
-        """Runs one accepted socket until either side ends it."""
+        """Runs one accepted socket until either side ends it; ``present`` is what follows the snapshot at once."""
         if len(self._pages) >= PAGES_MAX:
             raise BusyError(f"{PAGES_MAX} pages are open already.", advice="Close some of them.")
         page = Page(session_key)
@@ -148,8 +174,8 @@ class Hub:
         try:
             # Taken in the same step as the registration: no change can fall between snapshot and deltas.
             self.send(page.page_id, snapshot(page.page_id))
-            for notice in self._greetings:
-                self.send(page.page_id, notice)
+            for message in (*self._greetings, *present()):
+                self.send(page.page_id, message)
             await until_first(
                 self._sender(websocket, page),
                 self._receiver(websocket, page, on_message),

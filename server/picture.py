@@ -15,7 +15,7 @@ from server import tasks
 from server.errors import JobCancelledError, NotFoundError, reported
 from server.jobs import Lane
 from server.library import Library
-from server.scene.payload import PlanScene, SceneState, TerrainScene
+from server.scene.payload import PlanScene, ReviewScene, SceneState, TerrainScene
 from server.scene.shots import Target
 from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, ViewDoc
 
@@ -38,6 +38,7 @@ class Picture:
     """Draws the latest wish; wishes that come while it draws are merged into one.
 
     ``changed()`` is called when the terrain on show is another one, ``failed(error)`` when something cannot be shown.
+    A recording that is open is drawn instead of the plan, unless ``held()``: then the terrain stays as it is.
     """
 
     def __init__(
@@ -51,6 +52,8 @@ class Picture:
     ) -> None:
         self._view, self._library, self._lane = view, library, lane
         self._changed, self._failed = changed, failed
+        self.held: Callable[[], bool] = lambda: False
+        self._review: tuple[str, ReviewScene] | None = None
         self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
         self._wake = asyncio.Event()
         self._terrain: TerrainScene | None = None
@@ -73,6 +76,22 @@ class Picture:
         self._wish = (document, selection, view, plan, stale)
         self._wake.set()
 
+    def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
+        """A recorded flight over its surface model; without either, the plan again."""
+        self._review = None if terrain_id is None or scene is None else (terrain_id, scene)
+        self.again()
+
+    def again(self) -> None:
+        self._wake.set()
+
+    @property
+    def review(self) -> tuple[str, ReviewScene] | None:
+        """What is drawn instead of the plan, and over which surface model."""
+        if self._review is None or self._wish is None:
+            return None
+        other_terrain = self._review[0] != self._wish[0].terrain_id
+        return None if other_terrain and self.held() else self._review
+
     async def run(self) -> None:
         """Until cancelled; what cannot be drawn is told, and the next wish is drawn."""
         while True:
@@ -88,6 +107,12 @@ class Picture:
     async def _draw(
         self, document: PlanDoc, selection: SelectionDoc, view: ViewDoc, plan: PlanScene | None, stale: bool
     ) -> None:
+        review = None
+        if self.review is not None:
+            terrain_id, review = self.review
+            photo_id = document.orthophoto_id if document.terrain_id == terrain_id else None
+            document, selection = PlanDoc(terrain_id=terrain_id, orthophoto_id=photo_id), SelectionDoc()
+            plan, stale = None, False
         await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
         state = SceneState(
             terrain=self._terrain,
@@ -96,6 +121,7 @@ class Picture:
             document=document,
             selection=selection,
             view=view,
+            review=review,
         )
         await self._view.show(self._dsm, state)
 

@@ -88,7 +88,10 @@ class Settings(BaseSettings):
     allowed_origins: Names = ()
     """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
     upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
-    """Largest surface model or orthophoto that can be dropped in."""
+    """Largest surface model, orthophoto or recording that can be dropped in."""
+    link: Names = ()
+    """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
+    first vehicle heard on one of them is the one that is flown."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)
@@ -167,13 +170,15 @@ def settings_table() -> str:
     rows = ["| environment variable | in the file | default | meaning |", "|---|---|---|---|"]
     for name, field in Settings.model_fields.items():
         default = _DOCUMENTED.get(name) or str(field.default)
-        rows.append(f"| `HEDGEHOP_{name.upper()}` | `{name}` | {default} | {field.description} |")
+        meaning = " ".join((field.description or "").split())
+        rows.append(f"| `HEDGEHOP_{name.upper()}` | `{name}` | {default} | {meaning} |")
     return "\n".join(rows) + "\n"
 
 
 _DOCUMENTED = {
     "data_dir": "`$XDG_DATA_HOME/hedgehop`, else `~/.local/share/hedgehop`",
     "password": "none",
+    "link": "none",
     "allowed_hosts": "none",
     "allowed_origins": "none",
     "console_dir": "`web/dist` of the project",

@@ -68,7 +68,8 @@ class _LastPlan:
         return self._made
 
 
-_last_plan = _LastPlan()
+last_plan = _LastPlan()
+"""Of this worker: whoever needs the very plan that is on show asks here."""
 
 
 @lru_cache(maxsize=2)
@@ -78,13 +79,13 @@ def _terrain(directory: Path) -> Dsm:
 
 def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
     """The answer to an edit, without the trade table."""
-    plan, source, seconds = _last_plan.of(directory, document, report)
+    plan, source, seconds = last_plan.of(directory, document, report)
     return result_doc(plan, source, seconds), plan_scene(plan)
 
 
 def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:
     """Waypoints, items and duration for a ladder of excess heights."""
-    plan, _, _ = _last_plan.of(directory, document, report)
+    plan, _, _ = last_plan.of(directory, document, report)
     report("Comparing", None)
     return [
         TradeRow(
@@ -101,7 +102,7 @@ def export_plan(
     directory: Path, document: PlanDoc, names: list[str], created_utc: str, *, report: Progress
 ) -> dict[str, bytes]:
     """The files of the plan, computed from the very document that is exported."""
-    plan, source, seconds = _last_plan.of(directory, document, report)
+    plan, source, seconds = last_plan.of(directory, document, report)
     report("Exporting", None)
     return {
         name: export_file(name, plan, source, title=document.name, created_utc=created_utc, seconds=seconds).encode()

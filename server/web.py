@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 import signal
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
 from typing import TYPE_CHECKING
 
@@ -17,11 +17,11 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from planning import __version__
-from planning.errors import PlanningError
-from server.api import console, plan, session, terrain, view
+from planning.errors import DescribedError
+from server.api import console, flight, link, plan, recordings, session, terrain, view
 from server.api.access import Parts, answer
 from server.auth import Auth
-from server.errors import ServerError, error_doc, status_of
+from server.errors import error_doc, status_of
 from server.guard import Guard
 from server.hub import Hub
 from server.library import Library
@@ -32,15 +32,26 @@ from server.settings import Settings
 from server.together import Background
 
 if TYPE_CHECKING:
+    from server.flying.flying import Flying
     from server.workspace import Workspace
 
 log = logging.getLogger("hedgehop.app")
 
 MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
+OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
+"""Joins the bus and all that hangs on it."""
+ROUTERS = (session, plan, terrain, view, console, link, flight, recordings, proxy)
 
 
-def create_app(settings: Settings, library: Library, make_workspace: MakeWorkspace, *, demo: bool = False) -> FastAPI:
+def create_app(
+    settings: Settings,
+    library: Library,
+    make_workspace: MakeWorkspace,
+    open_flying: OpenFlying,
+    *,
+    demo: bool = False,
+) -> FastAPI:
     """The app around an open library, which stays its caller's to close."""
     app = FastAPI(
         title="Hedgehop",
@@ -48,11 +59,11 @@ def create_app(settings: Settings, library: Library, make_workspace: MakeWorkspa
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
-        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, demo),
+        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_flying, demo),
     )
-    for router in (session.router, plan.router, terrain.router, view.router, console.router, proxy.router):
-        app.include_router(router)
-    for error in (ServerError, PlanningError, RequestValidationError, HTTPException):
+    for module in ROUTERS:
+        app.include_router(module.router)
+    for error in (DescribedError, RequestValidationError, HTTPException):
         app.add_exception_handler(error, _tell)
     app.add_exception_handler(ClientDisconnect, _answer_nobody)
     app.add_exception_handler(Exception, _tell_unforeseen)
@@ -62,18 +73,23 @@ def create_app(settings: Settings, library: Library, make_workspace: MakeWorkspa
 
 @contextlib.asynccontextmanager
 async def _lifespan(
-    app: FastAPI, settings: Settings, library: Library, make_workspace: MakeWorkspace, demo: bool
+    app: FastAPI,
+    settings: Settings,
+    library: Library,
+    make_workspace: MakeWorkspace,
+    open_flying: OpenFlying,
+    demo: bool,
 ) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
         stack.callback(background.stop)
         try:
-            parts = await _open(settings, library, make_workspace, background, stack, demo)
-        except (ServerError, PlanningError) as error:
+            parts = await _open(settings, library, make_workspace, open_flying, background, stack, demo)
+        except DescribedError as error:
             app.state.start_error = error
             raise
         app.state.parts = parts
-        for loop in parts.workspace.loops():
+        for loop in (*parts.workspace.loops(), *parts.flying.loops(demo=demo)):
             background.spawn(loop)
         try:
             yield
@@ -91,6 +107,7 @@ async def _open(
     settings: Settings,
     library: Library,
     make_workspace: MakeWorkspace,
+    open_flying: OpenFlying,
     background: Background,
     stack: AsyncExitStack,
     demo: bool,
@@ -102,11 +119,13 @@ async def _open(
     stack.callback(host.close)
     workspace = make_workspace(library, hub, host, background)
     stack.push_async_callback(workspace.close)
+    flying = await open_flying(settings, library, hub, workspace)
+    stack.push_async_callback(flying.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
-    return Parts(settings, auth, hub, library, host, workspace)
+    return Parts(settings, auth, hub, library, host, workspace, flying)
 
 
 async def _tell(request: Request, error: Exception) -> Response:

@@ -1,13 +1,20 @@
-"""Joins the open plan to its 3D view."""
+"""Joins the open plan to its 3D view, and flying to both."""
 
 from __future__ import annotations
 
+from server.flying.flying import Flying
 from server.hub import Hub
 from server.library import Library
 from server.scene.host import SceneHost
 from server.scene.view import SceneView
+from server.settings import Settings
 from server.together import Background
 from server.workspace import Workspace
+
+
+async def open_flying(settings: Settings, library: Library, hub: Hub, workspace: Workspace) -> Flying:
+    """The server's place on the bus. Raises BusError."""
+    return await Flying.open(library, hub, workspace, settings.link)
 
 
 def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Background) -> Workspace:
@@ -16,7 +23,8 @@ def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Back
 
     async def on_terrain_click(page_id: str | None, lat_deg: float, lon_deg: float, known: bool) -> None:
         del page_id
-        await workspace.pointing.on_terrain(lat_deg, lon_deg, known=known)
+        if workspace.picture.review is None:
+            await workspace.pointing.on_terrain(lat_deg, lon_deg, known=known)
 
     async def on_poi_click(poi_id: str) -> None:
         workspace.pointing.on_poi(poi_id)
@@ -31,5 +39,5 @@ def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Back
         on_poi_moved=on_poi_moved,
         page_of_client=host.page_of_client,
     )
-    workspace = Workspace(library, hub, view, spawn=background.spawn)
+    workspace = Workspace(library, hub, view, spawn=background.spawn, stage=view.vehicles)
     return workspace

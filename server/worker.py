@@ -12,8 +12,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from planning.errors import PlanningError
-from server.errors import ServerError, WorkerDiedError
+from planning.errors import DescribedError
+from server.errors import WorkerDiedError
 
 Report = Callable[[str, float | None], None]
 
@@ -45,7 +45,7 @@ def serve(pipe: Connection, parent_pid: int) -> None:
 def _answer(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any], report: Report) -> Any:
     try:
         return "done", function(*args, report=report, **kwargs)
-    except (PlanningError, ServerError) as error:
+    except DescribedError as error:
         return "error", error
     except MemoryError:
         return "error", WorkerDiedError(

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, Protocol
 
+from planning.dsm import Dsm
 from planning.poi_files import looks_swapped, read_pois
 from server import demo, file_tasks, ordering, tasks
 from server.computing import Computing
@@ -23,6 +24,8 @@ from server.library import Library
 from server.picture import Picture, View
 from server.plan_desk import PlanDesk
 from server.pointing import Pointing
+from server.scene.payload import PlanScene, ReviewScene
+from server.scene.vehicles import Vehicles
 from server.schemas import (
     ClientMessage,
     ErrorDoc,
@@ -64,7 +67,10 @@ class Streams(Protocol):
 class Workspace:
     """One open plan at a time: a ground station has one task in hand."""
 
-    def __init__(self, library: Library, streams: Streams, view: View, *, spawn: Spawn) -> None:
+    def __init__(
+        self, library: Library, streams: Streams, view: View, *, spawn: Spawn, stage: Vehicles | None = None
+    ) -> None:
+        """``stage``: where the 3D view shows vehicles; None without a 3D view."""
         self._library, self._streams, self._spawn = library, streams, spawn
         self._plan_lane, self._file_lane = Lane("plan"), Lane("files", niceness=_FILES_NICENESS)
         self._board = JobBoard(self._file_lane, publish=streams.publish, spawn=spawn)
@@ -78,7 +84,11 @@ class Workspace:
             library_changed=self._publish_library,
             show_orthophoto=lambda: self._set_view(self.view.model_copy(update={"shading": "orthophoto"})),
         )
+        self.stage = stage
         self._listed: tuple[str, str | None] | None = None
+        self.changed: Callable[[], None] = lambda: None
+        """Called after every change of the plan or its answer."""
+        self.demo_is_open = asyncio.Event()
         self.view, self.selection = ViewDoc(), SelectionDoc()
         self.pointing = Pointing(
             self._desk, selection=lambda: self.selection, select=self._select, tell=streams.publish
@@ -106,6 +116,42 @@ class Workspace:
         if self._computing.state.state != "running":
             await _logged(self._plan_lane.call(tasks.warm_up), "Getting ready to plan")
         await _logged(self._board.unseen(lambda lane: lane.call(file_tasks.warm_up)), "Getting ready for files")
+
+    # What flying needs
+
+    @property
+    def plan_lane(self) -> Lane:
+        """Its worker holds the plan that was computed last."""
+        return self._plan_lane
+
+    @property
+    def board(self) -> JobBoard:
+        return self._board
+
+    @property
+    def picture(self) -> Picture:
+        return self._picture
+
+    @property
+    def dsm(self) -> Dsm | None:
+        """The surface model on show, at full resolution."""
+        return self._picture.dsm
+
+    @property
+    def planned_home(self) -> tuple[float, float] | None:
+        """(lat_deg, lon_deg) of the plan's home, as set or as computed."""
+        place = self.document.home or (self.document.pois[0] if self.document.pois else None)
+        if place is not None and (self.document.home is not None or self.document.source == "pois"):
+            return place.lat_deg, place.lon_deg
+        scene, dsm = self._computing.scene, self._picture.dsm
+        if scene is None or dsm is None:
+            return None
+        lat_deg, lon_deg = dsm.lat_lon_from_xy(scene.home_m[None, :2])[0].tolist()
+        return lat_deg, lon_deg
+
+    def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
+        """A recording in the 3D view instead of the plan; None: the plan again."""
+        self._picture.show_review(terrain_id, scene)
 
     # What pages see
 
@@ -214,6 +260,7 @@ class Workspace:
         if terrain is None:
             raise NotFoundError("The demo surface model was deleted meanwhile.", advice="Try again.")
         await self.open(await asyncio.to_thread(demo.ensure_plan, self._library, terrain))
+        self.demo_is_open.set()
         return terrain
 
     async def _make_demo(self) -> None:
@@ -241,16 +288,21 @@ class Workspace:
     async def on_client_message(self, page_id: str, message: ClientMessage) -> None:
         match message:
             case HoverProfile():
-                self._streams.publish(await self._picture.mark(self._computing.scene, message.s_m))
+                self._streams.publish(await self._picture.mark(self._scene, message.s_m))
             case HoverView():
                 place = None if message.x is None or message.y is None else (message.x, message.y)
-                self._streams.publish(await self._picture.mark_under(self._computing.scene, page_id, place))
+                self._streams.publish(await self._picture.mark_under(self._scene, page_id, place))
             case SetView():
                 self._set_view(message.view)
             case SetSelection():
                 self._select(message.selection)
             case FrameView():
                 await self._picture.frame(message, page_id)
+
+    @property
+    def _scene(self) -> PlanScene | None:
+        """The plan on show; while a recording is, there is none to point at."""
+        return None if self._picture.review is not None else self._computing.scene
 
     def _set_view(self, view: ViewDoc) -> None:
         self.view = view
@@ -292,6 +344,7 @@ class Workspace:
 
     def _publish_plan(self) -> None:
         self._streams.publish(PlanMessage(plan=self.state))
+        self.changed()
 
     def _publish_library(self) -> None:
         self._streams.publish(LibraryMessage(library=self._library.state()))

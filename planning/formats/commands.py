@@ -8,7 +8,7 @@ from planning.dsm import is_amsl
 from planning.formats.safe_text import clean_name
 from planning.model import Home, MissionItem
 
-POSITIONED = frozenset({16, 17, 18, 19, 21, 22, 31, 33, 36, 80, 82, 84, 85, 94, 179, 189, 192, 195, 201, 206})
+POSITIONED = frozenset({16, 17, 18, 19, 21, 22, 31, 33, 36, 80, 82, 84, 85, 94, 179, 189, 192, 195, 201})
 """MAV_CMDs whose x, y, z are latitude, longitude and altitude."""
 FLOWN_TO = frozenset({16, 17, 18, 19, 31, 36, 82})
 """MAV_CMDs that are places to visit."""

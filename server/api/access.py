@@ -10,15 +10,17 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import HTTPConnection
 
-from server.auth import Auth
+from server.auth import Auth, session_key
 from server.errors import SignInError
 from server.hub import Hub
 from server.library import Library
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc
 from server.settings import Settings
+from telemetry.requests import Operator
 
 if TYPE_CHECKING:
+    from server.flying.flying import Flying
     from server.workspace import Workspace
 
 
@@ -32,6 +34,7 @@ class Parts:
     library: Library
     scene_host: SceneHost
     workspace: Workspace
+    flying: Flying
 
 
 def parts_of(connection: HTTPConnection) -> Parts:
@@ -63,10 +66,27 @@ def workspace_of(request: Request) -> Workspace:
     return parts_of(request).workspace
 
 
+def flying_of(request: Request) -> Flying:
+    return parts_of(request).flying
+
+
+def session_key_of(request: Request) -> str:
+    return session_key(session_of(request))
+
+
+def in_charge(request: Request) -> Operator:
+    """What a command of this session carries; raises ``NotInChargeError``."""
+    return parts_of(request).flying.lease.operator(session_key_of(request))
+
+
 SignedIn = Depends(signed_in)
 Work = Annotated["Workspace", Depends(workspace_of)]
+Fly = Annotated["Flying", Depends(flying_of)]
+Session = Annotated[str, Depends(session_key_of)]
+InCharge = Annotated[Operator, Depends(in_charge)]
+"""Demanded by everything that reaches a vehicle."""
 ERROR_RESPONSES: dict[int | str, dict[str, object]] = {
-    status: {"model": ErrorDoc} for status in (401, 403, 404, 409, 413, 422, 507)
+    status: {"model": ErrorDoc} for status in (401, 403, 404, 409, 413, 422, 502, 503, 504, 507)
 }
 
 

@@ -57,6 +57,7 @@ async def sign_out(request: Request) -> Response:
     parts = parts_of(request)
     await asyncio.to_thread(parts.auth.sign_out, session_id)
     parts.hub.close_session(session_key(session_id))
+    await parts.flying.release_lease(session_key(session_id))
     response = Response(status_code=204)
     response.delete_cookie(cookie_name(request))
     return response

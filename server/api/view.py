@@ -24,12 +24,15 @@ async def stream(websocket: WebSocket) -> None:
         await websocket.close(CLOSE_SIGNED_OUT)
         return
     await websocket.accept()
+    key = session_key(session_id)
+    await parts.flying.page_opens(key)
     try:
         await parts.hub.serve(
             websocket,
-            session_key=session_key(session_id),
+            session_key=key,
             session_remaining_s=parts.auth.remaining_s(session_id),
             snapshot=parts.workspace.snapshot,
+            present=lambda: parts.flying.present_for(key),
             on_message=parts.workspace.on_client_message,
         )
     except BusyError:

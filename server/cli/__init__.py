@@ -13,14 +13,18 @@ from planning import __version__
 from server.cli import examples
 from server.cli.bench import bench
 from server.cli.certify import certify
+from server.cli.fly import fly
 from server.cli.plan import plan
+from server.cli.review import review
 from server.cli.serve import serve
+from server.cli.sim import sim
 from server.cli.survey import survey
+from server.cli.upload import upload
 from server.cli.usage import run_command
 
 app = typer.Typer(
     name="hedgehop",
-    help="Plan drone flights that hug the terrain, and prove their clearance.",
+    help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",
     epilog=examples.EXIT_CODES,
     no_args_is_help=True,
     add_completion=False,
@@ -40,6 +44,10 @@ app.command(epilog=examples.SERVE)(serve)
 app.command(epilog=examples.PLAN)(plan)
 app.command(epilog=examples.CERTIFY)(certify)
 app.command(epilog=examples.SURVEY)(survey)
+app.command(epilog=examples.UPLOAD)(upload)
+app.command(epilog=examples.FLY)(fly)
+app.command(epilog=examples.SIM)(sim)
+app.command(epilog=examples.REVIEW)(review)
 app.command(epilog=examples.BENCH)(bench)
 
 

@@ -30,4 +30,24 @@ SURVEY = _examples(
     ("25 m above the surface, lines from west to east", "hedgehop survey dsm.tif area.kml --out flight "
      "--height-m 25 --angle-deg 90"),
 )  # fmt: skip
+UPLOAD = _examples(
+    ("Over a telemetry radio", "hedgehop upload flight/mission.waypoints --link /dev/ttyUSB0:57600"),
+    ("For a script", "hedgehop upload flight/mission.plan --link udpin:0.0.0.0:14550 --json"),
+)
+FLY = _examples(
+    ("A planned mission, checked against its surface model", "hedgehop fly flight/mission.waypoints "
+     "--link udpin:0.0.0.0:14550 --dsm dsm.tif"),
+    ("Waypoint by waypoint, kept on file", "hedgehop fly flight/mission.waypoints --link tcp:10.0.0.7:5760 "
+     "--mode guided --dsm dsm.tif --record flight.mcap"),
+)  # fmt: skip
+SIM = _examples(
+    ("A vehicle for a ground station on this machine", "hedgehop sim --link udpout:127.0.0.1:14550 "
+     "--home -37.1244507,175.6892879,803.15"),
+    ("Ten times as fast, among the hills", "hedgehop sim --link tcpin:127.0.0.1:5760 "
+     "--home -37.1244507,175.6892879,803.15 --speedup 10 --dsm dsm.tif --parameter RTL_ALT=7000"),
+)  # fmt: skip
+REVIEW = _examples(
+    ("A recording, over its surface model", "hedgehop review flight.mcap --dsm dsm.tif"),
+    ("Another ground station's log", "hedgehop review flight.tlog --dsm dsm.tif --mission mission.waypoints --json"),
+)
 BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))

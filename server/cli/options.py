@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from planning.errors import FormatError
 from planning.vehicle_profile import shipped_profiles
 
 _MODEL, _SURFACE, _PATH = "Surface model", "Surface to fly on", "Path and speeds"
@@ -14,6 +15,22 @@ _VEHICLE, _CLEARANCE, _MISSION = "Vehicle", "Clearance", "Mission"
 
 DsmFile = Annotated[
     Path, typer.Argument(metavar="DSM", help="Surface model: GeoTIFF or ESRI ASCII grid.", show_default=False)
+]
+FlightDsm = Annotated[
+    Path | None,
+    typer.Option("--dsm", metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid."),
+]
+MissionFile = Annotated[
+    Path, typer.Argument(metavar="MISSION", help="Mission: .waypoints or .plan.", show_default=False)
+]
+Link = Annotated[
+    str,
+    typer.Option(
+        "--link",
+        metavar="URL",
+        help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600.",
+        show_default=False,
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Directory for the files.", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, messages on stderr.")]
@@ -205,3 +222,10 @@ CameraTrigger = Annotated[
     float | None,
     typer.Option("--camera-trigger-m", help="Take a photo every so many metres.", rich_help_panel=_MISSION),
 ]
+
+
+def existing(path: Path | None) -> Path | None:
+    """The path; FormatError when there is no such file."""
+    if path is not None and not path.is_file():
+        raise FormatError("There is no such file.", where=str(path), advice="Check the path.")
+    return path

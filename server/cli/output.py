@@ -11,8 +11,8 @@ from typing import Any
 
 import typer
 
-from planning.errors import PlanningError
-from server.errors import ServerError
+from planning.errors import DescribedError
+from telemetry.errors import AddressError, RecordingError, TelemetryError
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
@@ -21,15 +21,16 @@ DONE, FAILED, WRONG_INPUT = 0, 1, 2
 def refusing(*, as_json: bool) -> Iterator[None]:
     """Wrong input ends the command with exit code 2, a message on stderr and, if asked, as JSON on stdout.
 
-    What nobody foresaw ends it with 1 and a message that says where it happened.
+    What a vehicle, a link or nobody foresaw ends it with 1; in the last case the message says where it happened.
     """
     try:
         yield
-    except (typer.Exit, BrokenPipeError):
+    except (typer.Exit, typer.Abort, BrokenPipeError):
         raise
-    except (PlanningError, ServerError) as error:
+    except DescribedError as error:
         _answer_error(error.code, error.what, error.where, error.advice, as_json=as_json)
-        raise typer.Exit(WRONG_INPUT) from None
+        in_flight = isinstance(error, TelemetryError) and not isinstance(error, AddressError | RecordingError)
+        raise typer.Exit(FAILED if in_flight else WRONG_INPUT) from None
     except OSError as error:
         what = f"{error.strerror or error}."
         advice = "Check the path, its permissions and the free space."

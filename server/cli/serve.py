@@ -13,13 +13,21 @@ from server.settings import load_settings
 
 
 def serve(
-    demo: Annotated[bool, typer.Option("--demo", help="Open the generated demo surface model and plan.")] = False,
+    demo: Annotated[bool, typer.Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on; default 127.0.0.1.")] = None,
     port: Annotated[int | None, typer.Option("--port", help="Port; default 8000.")] = None,
+    link: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--link",
+            metavar="ADDRESS",
+            help="Connection to a vehicle, such as udpin:0.0.0.0:14550; may be given several times.",
+        ),
+    ] = None,
     data_dir: Annotated[
         Path | None, typer.Option("--data-dir", help="Where models and plans are kept; default: the user's data home.")
     ] = None,
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
     with refusing(as_json=False):
-        run(load_settings(host=host, port=port, data_dir=data_dir), demo=demo)
+        run(load_settings(host=host, port=port, data_dir=data_dir, link=link or None), demo=demo)

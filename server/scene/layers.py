@@ -11,10 +11,12 @@ from server.scene.flight import flight_nodes
 from server.scene.ground import surface_nodes, terrain_nodes, unknown_nodes
 from server.scene.marks import place_nodes, poi_nodes
 from server.scene.nodes import Node, Ready
-from server.scene.payload import PlanScene, TerrainScene
+from server.scene.payload import PlanScene, ReviewScene, TerrainScene
+from server.scene.review import review_nodes
 
 POIS = "pois"
 Key = tuple[Any, ...]
+_PAYLOADS = (TerrainScene, PlanScene, ReviewScene)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,7 @@ def layers(gizmo_ready: Ready) -> tuple[Layer, ...]:
         Layer("unknown", unknown_nodes, lambda d: (d.terrain, d.frame, d.state.view.show_unknown)),
         Layer("surface", surface_nodes, lambda d: (*_plan_key(d), d.state.view.show_surface)),
         Layer("flight", flight_nodes, lambda d: (*_plan_key(d), d.state.view.show_path)),
+        Layer("review", review_nodes, lambda d: (d.terrain, d.frame, d.state.review)),
         Layer("places", place_nodes, _places_key),
         Layer(POIS, lambda d: poi_nodes(d, gizmo_ready), _pois_key),
     )
@@ -40,9 +43,7 @@ def unchanged(old: Key | None, new: Key) -> bool:
     """Payloads are compared by identity: a worker's answer is a new object, and comparing arrays takes long."""
     if old is None or len(old) != len(new):
         return False
-    return all(
-        a is b or (not isinstance(a, TerrainScene | PlanScene) and a == b) for a, b in zip(old, new, strict=True)
-    )
+    return all(a is b or (not isinstance(a, _PAYLOADS) and a == b) for a, b in zip(old, new, strict=True))
 
 
 def _plan_key(drawing: Drawing) -> Key:

@@ -18,6 +18,12 @@ CURTAIN = (16, 20, 28)
 SURFACE = (96, 165, 250)
 SURVEY = (240, 240, 250)
 LOOK_AT = (200, 205, 220)
+VEHICLE = (0, 216, 255)
+NOSE = (255, 255, 255)
+REPLAY = (236, 214, 255)
+REPLAY_NOSE = (150, 110, 190)
+"""A replayed vehicle is never taken for the live one."""
+RECORDED_PLAN = (250, 250, 250)
 UNKNOWN = ((104, 92, 120), (130, 115, 148))
 """Two stripes"""
 _DIM = (128, 132, 140)

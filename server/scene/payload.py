@@ -64,6 +64,16 @@ class PlanScene:
 
 
 @dataclass(frozen=True, slots=True)
+class ReviewScene:
+    """A recorded flight as the view draws it; all points are x, y, alt_dsm."""
+
+    planned_m: F64
+    """(K, 3) waypoints of the plan that was flown; K is 0 when it is unknown"""
+    flown_m: F64
+    """(N, 3)"""
+
+
+@dataclass(frozen=True, slots=True)
 class SceneState:
     """Everything the view has to show; the view draws the difference to what it shows already."""
 
@@ -74,3 +84,5 @@ class SceneState:
     document: PlanDoc
     selection: SelectionDoc
     view: ViewDoc
+    review: ReviewScene | None = None
+    """The recording that is open; then there is no plan."""

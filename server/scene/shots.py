@@ -50,8 +50,10 @@ def terrain_points(drawing: Drawing) -> F64:
 
 def _plan_points(drawing: Drawing) -> F64 | None:
     """The flight, or the points placed so far; with air around it."""
-    plan = drawing.state.plan
-    if plan is not None and len(plan.path_m):
+    plan, review = drawing.state.plan, drawing.state.review
+    if review is not None:
+        points = drawing.frame.scene_from_model(np.vstack([review.planned_m, review.flown_m]))
+    elif plan is not None and len(plan.path_m):
         points = drawing.frame.scene_from_model(np.vstack([plan.path_m, plan.home_m]))
     else:
         points = drawing.on_ground(drawing.places_xy_m(drawing.state.document.pois))

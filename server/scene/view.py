@@ -21,6 +21,7 @@ from server.scene.nodes import Canvas, Node
 from server.scene.payload import F64, SceneState
 from server.scene.picking import PlaceHit, PoiHit, pick
 from server.scene.shots import Target, shot
+from server.scene.vehicles import Vehicles
 
 _POINTER_REACH_PX = 24.0
 
@@ -45,6 +46,7 @@ class SceneView:
         self._on_terrain_click, self._on_poi_click, self._on_poi_moved = on_terrain_click, on_poi_click, on_poi_moved
         self._page_of_client = page_of_client
         self._canvas = Canvas(server.scene)
+        self.vehicles = Vehicles(self._put)
         self._layers = layers(self._watch_gizmo)
         self._keys: dict[str, Key] = {}
         self._wanted: tuple[Dsm | None, SceneState] | None = None
@@ -96,6 +98,7 @@ class SceneView:
             self._keys.clear()
             self._put({layer.name: [] for layer in self._layers} | {"cursor": []})
             self._drawn = None
+            self.vehicles.redraw(None)
             return
         keys = {layer.name: layer.key(drawing) for layer in self._layers}
         if self._dragged is not None:
@@ -112,8 +115,9 @@ class SceneView:
         self._keys |= keys
         if before is None or before.terrain.terrain_id != drawing.terrain.terrain_id:
             self._aim_all(drawing)
-        if before is None or before.frame != drawing.frame:
+        if before is None or before.frame != drawing.frame or before.dsm is not drawing.dsm:
             self._put({"cursor": self._cursor_nodes()})
+            self.vehicles.redraw(drawing)
 
     def _put(self, built: dict[str, list[Node]]) -> None:
         if not built:

@@ -28,6 +28,12 @@ class ReviewFigures(Strict):
     certified_distance_m: float | None
     min_distance_t_s: float | None
     min_distance_s_m: float | None
+    min_distance_lat_deg: float | None = None
+    min_distance_lon_deg: float | None = None
+    min_distance_way_home_m: float | None = None
+    """From the last waypoint until 3 m from home."""
+    positions: int = 0
+    """That the figures count."""
 
 
 class ReviewSeries(Strict):

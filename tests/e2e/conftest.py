@@ -80,6 +80,42 @@ class Station:
             raise AssertionError("the server did not stop within 20 s of SIGTERM") from None
 
 
+class SimulatedVehicle:
+    """A vehicle at the demo plan's home that flies faster than time; ground stations connect to ``address``."""
+
+    HOME = "37.7290205,14.9926236,1712.0"
+    RTL_CM = 6000
+
+    def __init__(self, *, speedup: float = 10.0) -> None:
+        self.address = f"tcp:127.0.0.1:{_free_port()}"
+        command = [sys.executable, "-m", "server", "sim", "--link", self.address.replace("tcp", "tcpin", 1)]
+        command += ["--home", self.HOME, "--speedup", str(speedup), "--parameter", f"RTL_ALT={self.RTL_CM}"]
+        self._process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        assert self._process.stdout is not None
+        self.said = self._process.stdout.readline()
+
+    def stop(self) -> None:
+        """As when its battery is unplugged; more than once is no harm."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.communicate()
+
+
+@pytest.fixture
+def vehicle(console: None) -> Iterator[SimulatedVehicle]:
+    flying = SimulatedVehicle()
+    try:
+        yield flying
+    finally:
+        flying.stop()
+
+
 @pytest.fixture(scope="session")
 def console() -> None:
     if not (default_console_dir() / "index.html").is_file():

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 from server.errors import NotReadyError, StaleRevisionError
 from server.hub import Hub
+from server.lease import Lease
 from server.library import Library
 from server.schemas import (
     ClientMessage,
     Computation,
     ErrorDoc,
+    FlyState,
     Imported,
     JobDoc,
+    LeaseDoc,
     LibraryState,
     NoticeMessage,
+    OnboardDoc,
     PlanDoc,
     PlanEdit,
     PlanMessage,
     PlanState,
     PoiDoc,
     SelectionDoc,
+    ServerMessage,
     SetSelection,
     Snapshot,
     ViewDoc,
@@ -134,3 +141,47 @@ class FakeWorkspace:
     def _remove_spikes(self, terrain_id: str) -> JobDoc:
         self.library.terrain_dir(terrain_id)
         return JobDoc(id="j2", label="Removing spikes", state="running")
+
+
+class FakeFlying:
+    """A lease and nothing to command; keeps what it was asked."""
+
+    def __init__(self, library: Library, hub: Hub) -> None:
+        self.lease = Lease(library.root / "lease.json")
+        self.hub = hub
+        self.asked: list[tuple[Any, ...]] = []
+        self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
+
+    def loops(self, *, demo: bool = False) -> list:
+        return []
+
+    async def close(self) -> None:
+        self.asked.append(("close",))
+
+    async def page_opens(self, session_key: str) -> None:
+        self.lease.take_if_free(session_key)
+
+    def present_for(self, session_key: str) -> list[ServerMessage]:
+        return []
+
+    async def take_lease(self, session_key: str, name: str) -> LeaseDoc:
+        self.lease.take(session_key, name)
+        return self.lease.doc_for(session_key)
+
+    async def release_lease(self, session_key: str) -> LeaseDoc:
+        self.lease.release(session_key)
+        return self.lease.doc_for(session_key)
+
+
+class _Asked:
+    """Takes every call and keeps its name and arguments."""
+
+    def __init__(self, asked: list[tuple[Any, ...]]) -> None:
+        self._asked = asked
+
+    def __getattr__(self, name: str) -> Callable[..., Awaitable[Any]]:
+        async def call(*args: object, **more: object) -> Any:
+            self._asked.append((name, *args, *more.values()))
+            return FlyState(onboard=OnboardDoc(state="none")) if name in ("upload", "check") else None
+
+        return call

@@ -20,8 +20,8 @@ from server.app import bound_socket, server_config
 from server.hub import Hub
 from server.library import Library
 from server.settings import Settings
-from server.web import MakeWorkspace, create_app
-from tests.server.fakes import FakeWorkspace
+from server.web import MakeWorkspace, OpenFlying, create_app
+from tests.server.fakes import FakeFlying, FakeWorkspace
 
 T = TypeVar("T")
 PASSWORD = "correct horse battery"
@@ -43,6 +43,10 @@ class Running:
     @property
     def workspace(self) -> FakeWorkspace:
         return cast(FakeWorkspace, self.parts.workspace)
+
+    @property
+    def flying(self) -> FakeFlying:
+        return cast(FakeFlying, self.parts.flying)
 
     def on_loop(self, work: Coroutine[Any, Any, T]) -> T:
         """Runs it where the server's own coroutines run."""
@@ -78,15 +82,24 @@ def _fake_workspace(library: Library, hub: Hub, *_: object) -> Any:
     return FakeWorkspace(library, hub)
 
 
+async def fake_flying(settings: Settings, library: Library, hub: Hub, *_: object) -> Any:
+    return FakeFlying(library, hub)
+
+
 @contextlib.contextmanager
 def running(
-    data_dir: Path, *, make: MakeWorkspace = _fake_workspace, demo: bool = False, **overrides: Any
+    data_dir: Path,
+    *,
+    make: MakeWorkspace = _fake_workspace,
+    flying: OpenFlying = fake_flying,
+    demo: bool = False,
+    **overrides: Any,
 ) -> Iterator[Running]:
-    """With a workspace that computes nothing, unless ``make`` makes another one."""
+    """With a workspace that computes nothing and nothing to fly, unless others are given."""
     with bound_socket("127.0.0.1", 0) as listening, contextlib.closing(Library(data_dir)) as library:
         port = listening.getsockname()[1]
         settings = Settings(data_dir=data_dir, port=port, **{"console_dir": data_dir / "no-console", **overrides})
-        app = create_app(settings, library, make, demo=demo)
+        app = create_app(settings, library, make, flying, demo=demo)
         ready = threading.Event()
         server = _Signalling(server_config(app, settings), ready)
         thread = threading.Thread(target=server.run, args=([listening],))

@@ -25,8 +25,8 @@ from server.schemas import (
     ServerMessage,
     Snapshot,
 )
-from server.wiring import make_workspace
-from tests.server.running import Running, running
+from server.wiring import make_workspace, open_flying
+from tests.server.running import Running, fake_flying, running
 
 PATIENCE_S = 90.0
 """A worker may have to start and to compile kernels, on a busy machine."""
@@ -110,8 +110,10 @@ def ok(response: httpx.Response) -> httpx.Response:
 
 
 @contextlib.contextmanager
-def station(data_dir: Path, *, demo: bool = False, **overrides: Any) -> Iterator[Station]:
-    with running(data_dir, make=make_workspace, demo=demo, **overrides) as server:
+def station(data_dir: Path, *, demo: bool = False, flies: bool = False, **overrides: Any) -> Iterator[Station]:
+    """``flies``: with a bus and nodes, which planning alone does not need."""
+    flying = open_flying if flies else fake_flying
+    with running(data_dir, make=make_workspace, flying=flying, demo=demo, **overrides) as server:
         server.http.timeout = httpx.Timeout(PATIENCE_S)
         with server.socket() as socket:
             yield Station(server, socket)

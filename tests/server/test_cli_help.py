@@ -11,7 +11,7 @@ from planning import __version__
 from tests.server.cli_runs import hedgehop
 
 
-@pytest.mark.parametrize("command", ["serve", "plan", "certify", "survey", "bench"])
+@pytest.mark.parametrize("command", ["serve", "plan", "certify", "survey", "upload", "fly", "sim", "review", "bench"])
 def test_help_has_examples(command: str) -> None:
     run = hedgehop(command, "--help")
     assert run.code == 0
@@ -45,7 +45,7 @@ def test_no_command_shows_the_help() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("fly",), "No such command 'fly'."),
+        (("soar",), "No such command 'soar'."),
         (("plan",), "Missing argument"),
         (("plan", "a", "b", "--out", "c", "--wings", "2"), "No such option: --wings"),
         (("plan", "a", "b", "--out", "c", "--radius-m", "wide"), "--radius-m"),

@@ -97,3 +97,41 @@ export function forConsole(message: string): string {
     .replace(/--[a-z-]+ (?=EPSG:)/g, "")
     .replace(/ \(gdal_calc\.py[^)]*\)/g, "");
 }
+
+/** A deviation with its direction in words: "0.42 m right". */
+export function deviation(value_m: number | null | undefined, words: { more: string; less: string }): string {
+  if (!known(value_m)) return DASH;
+  const size = metres(Math.abs(value_m), 2);
+  if (Math.abs(value_m) < 0.005) return size;
+  return `${size} ${value_m > 0 ? words.more : words.less}`;
+}
+
+/** A compass bearing with three digits: 074°. */
+export function bearing(value_deg: number | null | undefined): string {
+  if (!known(value_deg)) return DASH;
+  const whole = ((Math.round(value_deg) % 360) + 360) % 360;
+  return `${String(whole).padStart(3, "0")}°`;
+}
+
+const POINTS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"] as const;
+
+export function compassPoint(value_deg: number): string {
+  return POINTS[((Math.round(value_deg / 45) % 8) + 8) % 8] ?? "";
+}
+
+export function bytes(value: number | null | undefined): string {
+  if (!known(value)) return DASH;
+  if (value < 1000) return withUnit(value, "B");
+  const units = ["kB", "MB", "GB", "TB"] as const;
+  const step = Math.min(units.length - 1, Math.floor(Math.log10(value) / 3) - 1);
+  const scaled = value / 1000 ** (step + 1);
+  return withUnit(scaled, units[step] ?? "TB", scaled < 10 ? 1 : 0);
+}
+
+/** Minutes and seconds with tenths, for a time line: 3:07.4. */
+export function timecode(value_s: number | null | undefined): string {
+  if (!known(value_s)) return DASH;
+  const tenths = Math.floor(Math.max(0, value_s) * 10 + 1e-6);
+  const seconds = String(Math.floor(tenths / 10) % 60).padStart(2, "0");
+  return `${Math.floor(tenths / 600)}:${seconds}.${tenths % 10}`;
+}

@@ -17,9 +17,16 @@ import "./styles/chart.css";
 import "./styles/messages.css";
 import "./styles/menus.css";
 import "./styles/dialogs.css";
+import "./styles/strip.css";
+import "./styles/hold.css";
+import "./styles/fly.css";
+import "./styles/instruments.css";
+import "./styles/review.css";
 import { App } from "./shell/App";
+import { startClock } from "./store/clock";
 import { connect } from "./store/stream";
 
 const root = document.getElementById("app");
 if (root) render(<App />, root);
+startClock();
 connect();

@@ -628,6 +628,12 @@ export interface ReviewFigures {
   certified_distance_m: number | null;
   min_distance_t_s: number | null;
   min_distance_s_m: number | null;
+  min_distance_lat_deg: number | null;
+  min_distance_lon_deg: number | null;
+  /** From the last waypoint until 3 m from home. */
+  min_distance_way_home_m: number | null;
+  /** That the figures count. */
+  positions: number;
 }
 
 /** Curves over time; null where unknown. All lists are equally long. */

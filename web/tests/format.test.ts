@@ -100,3 +100,34 @@ describe("clearances", () => {
     expect(f.clearance(null)).toBe(f.DASH);
   });
 });
+
+describe("flight", () => {
+  it("deviations have a direction in words", () => {
+    const words = { more: "right", less: "left" };
+    expect(f.deviation(0.42, words)).toBe("0.42\u00a0m right");
+    expect(f.deviation(-1.2, words)).toBe("1.20\u00a0m left");
+    expect(f.deviation(0.001, words)).toBe("0.00\u00a0m");
+    expect(f.deviation(null, words)).toBe(f.DASH);
+  });
+
+  it("bearings have three digits and a compass point", () => {
+    expect([0, 7.4, 359.7, -90, 74].map(f.bearing)).toEqual(["000°", "007°", "000°", "270°", "074°"]);
+    expect([0, 44, 359, 225].map(f.compassPoint)).toEqual(["N", "NE", "N", "SW"]);
+  });
+
+  it("sizes have fitting units", () => {
+    expect([0, 999, 1234, 12_345_678, 5e9].map(f.bytes)).toEqual([
+      "0\u00a0B",
+      "999\u00a0B",
+      "1.2\u00a0kB",
+      "12\u00a0MB",
+      "5.0\u00a0GB",
+    ]);
+    expect(f.bytes(null)).toBe(f.DASH);
+  });
+
+  it("time codes have tenths", () => {
+    expect([0, 7.44, 59.99, 187.4].map(f.timecode)).toEqual(["0:00.0", "0:07.4", "0:59.9", "3:07.4"]);
+    expect(f.timecode(-3)).toBe("0:00.0");
+  });
+});

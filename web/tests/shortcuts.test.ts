@@ -41,3 +41,30 @@ describe("keys", () => {
     expect(shortcutOf(press("x"), false)).toBeNull();
   });
 });
+
+describe("keys of the views", () => {
+  const at = (view: "plan" | "fly" | "review", afterG = false) => ({ view, afterG });
+
+  it("G and a letter go to a view, from anywhere but an input", () => {
+    expect(shortcutOf(press("f"), false, at("plan", true))).toEqual({ id: "view", view: "fly" });
+    expect(shortcutOf(press("R"), false, at("fly", true))).toEqual({ id: "view", view: "review" });
+    expect(shortcutOf(press("f"), false, at("plan"))?.id).toBe("fit");
+    expect(shortcutOf(press("p"), true, at("plan", true))).toBeNull();
+  });
+
+  it("that change the plan have no meaning elsewhere", () => {
+    for (const view of ["fly", "review"] as const) {
+      expect(
+        [press("a"), press("Delete"), press("z", true)].map((key) => shortcutOf(key, false, at(view))),
+      ).toEqual([null, null, null]);
+    }
+  });
+
+  it("steer the replay in Review only", () => {
+    expect(shortcutOf(press(" "), false, at("review"))?.id).toBe("play");
+    expect(shortcutOf(press("ArrowLeft"), false, at("review"))).toEqual({ id: "seek", by_s: -10 });
+    expect(shortcutOf(press("ArrowRight"), false, at("review"))).toEqual({ id: "seek", by_s: 10 });
+    expect(shortcutOf(press(" "), false, at("fly"))).toBeNull();
+    expect(shortcutOf(press(" "), true, at("review"))).toBeNull();
+  });
+});

@@ -5,6 +5,7 @@ import { throttled } from "../scene/frame_events";
 import { chartHeight_px } from "../store/prefs";
 import { computation, cursor, isFresh, result } from "../store/state";
 import { send } from "../store/stream";
+import { activeView } from "../shell/views";
 import { CursorValues } from "./CursorValues";
 import { Plot, type ChartKind } from "./Plot";
 import { ResizeHandle } from "./ResizeHandle";
@@ -29,7 +30,7 @@ function hover(s_m: number | null): void {
   tellServer(s_m);
 }
 
-function Keys() {
+function Keys({ flown }: { flown: boolean }) {
   if (kind.value === "distance") return <span class="muted">Distance to the surface model, in space</span>;
   return (
     <span class="chart-keys" aria-hidden="true">
@@ -37,6 +38,7 @@ function Keys() {
       <span class="key surface">Safe surface</span>
       <span class="key path">Path</span>
       <span class="key flown">Mission</span>
+      {flown && <span class="key track">Flown</span>}
     </span>
   );
 }
@@ -51,6 +53,7 @@ function Empty() {
 export function ProfilePane() {
   const shown = result.value;
   const place = cursor.value?.s_m == null ? null : cursor.value;
+  const flown = activeView.value.id === "fly";
   return (
     <section
       class="profile-pane"
@@ -69,13 +72,13 @@ export function ProfilePane() {
           ]}
           onChange={(next) => (kind.value = next)}
         />
-        {shown && place ? <CursorValues result={shown} cursor={place} /> : shown && <Keys />}
+        {shown && place ? <CursorValues result={shown} cursor={place} /> : shown && <Keys flown={flown} />}
         <span class="spring" />
         {shown && !place && <span class="muted">along path, m · {count(shown.waypoints, "waypoint")}</span>}
       </header>
       {shown ? (
         <div class={`plot-holder ${isFresh.value ? "" : "stale"}`}>
-          <Plot kind={kind.value} result={shown} onHover={hover} />
+          <Plot kind={kind.value} result={shown} flown={flown} onHover={hover} />
         </div>
       ) : (
         <Empty />

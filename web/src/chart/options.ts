@@ -13,7 +13,13 @@ interface Frame {
   series: uPlot.Series[];
   draw: (u: uPlot) => void;
   drawUnder: (u: uPlot) => void;
-  onHover: (s_m: number | null) => void;
+  onHover: (at: number | null) => void;
+  /** The place under the pressed pointer, where a press means something. */
+  onPick?: (at: number, isOver: boolean) => void;
+  /** How the horizontal axis is written; in metres if left out. */
+  xText?: (value: number) => string;
+  /** Room above the chart, for names of places. */
+  top?: number;
 }
 
 function axis(palette: Palette): Partial<uPlot.Axis> {
@@ -26,10 +32,34 @@ function axis(palette: Palette): Partial<uPlot.Axis> {
   };
 }
 
+/** Steps of a time axis that people count in. */
+const CLOCK_STEPS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600];
+
 const ticks = (_: uPlot, values: number[]) => {
   const decimals = tickDecimals(Math.abs((values[1] ?? 1) - (values[0] ?? 0)));
   return values.map((value) => number(value, decimals));
 };
+
+/** Pressing and dragging picks places along the horizontal axis. */
+function pickPlugin(onPick: NonNullable<Frame["onPick"]>): uPlot.Plugin {
+  const ready = (u: uPlot) => {
+    const at = (event: PointerEvent) => {
+      const { left, width } = u.over.getBoundingClientRect();
+      return u.posToVal(Math.min(width, Math.max(0, event.clientX - left)), "x");
+    };
+    u.over.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      u.over.setPointerCapture(event.pointerId);
+      onPick(at(event), false);
+    });
+    u.over.addEventListener("pointermove", (event) => {
+      if (u.over.hasPointerCapture(event.pointerId)) onPick(at(event), false);
+    });
+    // Also when the gesture is taken away from the page.
+    u.over.addEventListener("lostpointercapture", (event) => onPick(at(event), true));
+  };
+  return { hooks: { ready } };
+}
 
 function hoverPlugin(onHover: Frame["onHover"]): uPlot.Plugin {
   return {
@@ -46,11 +76,12 @@ function hoverPlugin(onHover: Frame["onHover"]): uPlot.Plugin {
 }
 
 export function chartOptions(frame: Frame): uPlot.Options {
-  const { palette } = frame;
+  const { palette, onPick, xText } = frame;
+  const xTicks = xText ? (_: uPlot, values: number[]) => values.map(xText) : ticks;
   return {
     width: frame.width,
     height: frame.height,
-    padding: [22, 16, 0, 0],
+    padding: [frame.top ?? 22, 16, 0, 0],
     legend: { show: false },
     cursor: { drag: { x: false, y: false }, points: { show: false }, y: false, x: false },
     scales: {
@@ -58,7 +89,7 @@ export function chartOptions(frame: Frame): uPlot.Options {
       y: { range: () => [frame.range[0], frame.range[1]] },
     },
     axes: [
-      { ...axis(palette), size: 28, values: ticks, space: 80 },
+      { ...axis(palette), size: 28, values: xTicks, space: 80, ...(xText ? { incrs: CLOCK_STEPS_S } : {}) },
       {
         ...axis(palette),
         size: 58,
@@ -71,6 +102,6 @@ export function chartOptions(frame: Frame): uPlot.Options {
     ],
     series: [{}, ...frame.series],
     hooks: { drawAxes: [frame.drawUnder], draw: [frame.draw] },
-    plugins: [hoverPlugin(frame.onHover)],
+    plugins: [hoverPlugin(frame.onHover), ...(onPick ? [pickPlugin(onPick)] : [])],
   };
 }

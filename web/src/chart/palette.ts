@@ -9,6 +9,8 @@ export interface Palette {
   surface: string;
   path: string;
   accent: string;
+  flown: string;
+  replayed: string;
   good: string;
   near: string;
   bad: string;
@@ -25,6 +27,8 @@ const NAMES: Record<keyof Palette, string> = {
   surface: "--chart-surface",
   path: "--chart-path",
   accent: "--accent",
+  flown: "--flown",
+  replayed: "--replayed",
   good: "--good-fill",
   near: "--near-fill",
   bad: "--bad-fill",

@@ -1,4 +1,3 @@
-import { ErrorBox } from "../ui/ErrorBox";
 import { Icon, type IconName } from "../ui/Icon";
 import { Menu } from "../ui/Menu";
 import { computation, isFresh, plan } from "../store/state";
@@ -42,73 +41,70 @@ function Warning() {
 }
 
 /** Why there is nothing to export yet. */
-function obstacle(): string | null {
+export function obstacle(): string | null {
   const now = computation.value;
   if (!now || now.state === "empty") return "Nothing to export yet";
   if (now.state === "error") return "The plan has an error: see the right panel";
   return now.state === "running" && !now.result ? "Computing…" : null;
 }
 
-export function ExportMenu() {
+/** Beside another primary action it is a plain button. */
+export function ExportMenu({ isPrimary }: { isPrimary: boolean }) {
   const why = obstacle();
   return (
-    <footer class="primary-action">
-      <ErrorBox place="export" />
-      {why && <p class="muted action-hint">{why}</p>}
-      <Menu
-        label="Export"
-        class="export"
-        testid="export-list"
-        trigger={({ open, toggle }) => (
-          <button
-            type="button"
-            class="button primary wide"
-            aria-expanded={open}
-            disabled={why !== null || busy.value}
-            data-testid="export-menu"
-            onClick={toggle}
-          >
-            <Icon name="export" />
-            {busy.value ? "Exporting…" : "Export"}
-            <Icon name={open ? "down" : "up"} size={16} />
-          </button>
-        )}
-      >
-        {(close) => {
-          const then = (go: () => void) => () => {
-            close();
-            go();
-          };
-          return (
-            <>
-              <Warning />
-              {FILES.map(({ file, ...item }) => (
-                <Item
-                  key={file}
-                  {...item}
-                  testid={`export-${file}`}
-                  onClick={then(() => void download(file))}
-                />
-              ))}
-              <hr />
+    <Menu
+      label="Export"
+      class="export"
+      testid="export-list"
+      trigger={({ open, toggle }) => (
+        <button
+          type="button"
+          class={`button wide ${isPrimary ? "primary" : "tall"}`}
+          aria-expanded={open}
+          disabled={why !== null || busy.value}
+          data-testid="export-menu"
+          onClick={toggle}
+        >
+          <Icon name="export" />
+          {busy.value ? "Exporting…" : "Export"}
+          <Icon name={open ? "down" : "up"} size={16} />
+        </button>
+      )}
+    >
+      {(close) => {
+        const then = (go: () => void) => () => {
+          close();
+          go();
+        };
+        return (
+          <>
+            <Warning />
+            {FILES.map(({ file, ...item }) => (
               <Item
-                label="Report"
-                note="new tab"
-                icon="chart"
-                testid="export-report"
-                onClick={then(() => openReport(false))}
+                key={file}
+                {...item}
+                testid={`export-${file}`}
+                onClick={then(() => void download(file))}
               />
-              <Item
-                label="Print the report"
-                note=""
-                icon="print"
-                testid="export-print"
-                onClick={then(() => openReport(true))}
-              />
-            </>
-          );
-        }}
-      </Menu>
-    </footer>
+            ))}
+            <hr />
+            <Item
+              label="Report"
+              note="new tab"
+              icon="chart"
+              testid="export-report"
+              onClick={then(() => openReport(false))}
+            />
+            <Item
+              label="Print the report"
+              note=""
+              icon="print"
+              testid="export-print"
+              onClick={then(() => openReport(true))}
+            />
+          </>
+        );
+      }}
+    </Menu>
   );
 }

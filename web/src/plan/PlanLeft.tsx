@@ -1,6 +1,6 @@
 import { ErrorBox } from "../ui/ErrorBox";
 import { document_ } from "../store/state";
-import { ExportMenu } from "./ExportMenu";
+import { PlanActions } from "./PlanActions";
 import { MissionSection } from "./sections/Mission";
 import { PointsSection } from "./sections/Points";
 import { SpeedsSection } from "./sections/Speeds";
@@ -8,7 +8,7 @@ import { SurfaceSection } from "./sections/Surface";
 import { TerrainSection } from "./sections/Terrain";
 import { VehicleSection } from "./sections/Vehicle";
 
-/** What the operator does: from the terrain down to the mission, and the export as the one primary action. */
+/** What the operator does: from the terrain down to the mission, and upload or export as the one primary action. */
 export function PlanLeft() {
   const plan = document_.value;
   return (
@@ -28,7 +28,7 @@ export function PlanLeft() {
           <p class="muted panel-empty">Loading the plan…</p>
         )}
       </div>
-      <ExportMenu />
+      <PlanActions />
     </>
   );
 }

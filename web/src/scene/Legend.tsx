@@ -1,4 +1,6 @@
 import { metres } from "../format";
+import { trackVersion, tracks } from "../store/flying";
+import { isReplaying } from "../store/review";
 import { result, terrain, view } from "../store/state";
 
 function HeightScale() {
@@ -26,10 +28,16 @@ function Key({ kind, label, title }: { kind: string; label: string; title?: stri
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
 export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
-  const planned = result.value !== null;
+  const isReview = isReplaying.value;
+  const planned = result.value !== null && !isReview;
+  const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;
   const isEmpty =
-    shading !== "height" && !(planned && (show_surface || show_path)) && !(show_unknown && hasUnknown);
+    shading !== "height" &&
+    !(planned && (show_surface || show_path)) &&
+    !(show_unknown && hasUnknown) &&
+    !flown &&
+    !isReview;
   if (isEmpty) return null;
   return (
     <div class="legend overlay" data-testid="legend">
@@ -40,6 +48,13 @@ export function Legend() {
           <Key kind="good" label="Clear" title="Path with the required clearance" />
           <Key kind="near" label="Too near" title="Path with less than the required clearance" />
           <Key kind="bad" label="Inside" title="Path inside or above unknown terrain" />
+        </>
+      )}
+      {flown && <Key kind="flown" label="Flown" title="Where the vehicle has flown" />}
+      {isReview && (
+        <>
+          <Key kind="recorded-plan" label="Plan" title="The plan in the recording" />
+          <Key kind="replayed" label="Flown, replay" title="Where the vehicle flew then" />
         </>
       )}
       {show_unknown && hasUnknown && <Key kind="unknown" label="Unknown" title="No height is known there" />}

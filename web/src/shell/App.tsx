@@ -1,26 +1,27 @@
 import { Scene } from "../scene/Scene";
-import { ProfilePane } from "../chart/ProfilePane";
 import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
 import { FileDrop } from "./FileDrop";
 import { HelpSheet } from "./HelpSheet";
 import { StatusBar } from "./StatusBar";
+import { VehicleStrip } from "./VehicleStrip";
 import { useKeyboard } from "./keyboard";
 import { drawer, openDialog } from "./ui_state";
 import { activeView } from "./views";
 
 export function App() {
   useKeyboard();
-  const { Left, Right } = activeView.value;
+  const { id, Left, Right, Below } = activeView.value;
   const open = drawer.value;
   return (
-    <div class="app" data-drawer={open ?? "none"}>
+    <div class="app" data-drawer={open ?? "none"} data-view={id}>
       <StatusBar />
+      <VehicleStrip />
       <aside class="panel left" aria-label="What I do" data-testid="panel-left">
         <Left />
       </aside>
       <main class="centre">
         <Scene />
-        <ProfilePane />
+        <Below />
       </main>
       <aside class="panel right" aria-label="What is true" data-testid="panel-right">
         <Right />

@@ -1,6 +1,7 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
-import { takeFiles } from "../store/files";
+import { takeRecordings } from "../review/ReviewLeft";
+import { isRecording, takeFiles } from "../store/files";
 import { dragging } from "./ui_state";
 
 export const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -26,7 +27,9 @@ export function FileDrop() {
   const drop = (event: DragEvent) => {
     event.preventDefault();
     end();
-    takeFiles(event.dataTransfer?.files ?? []);
+    const files = [...(event.dataTransfer?.files ?? [])];
+    takeRecordings(files.filter(isRecording));
+    takeFiles(files.filter((file) => !isRecording(file)));
   };
   return (
     <div
@@ -42,6 +45,7 @@ export function FileDrop() {
         <p class="drop-title">Drop to open</p>
         <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
         <p>Points or polygon: CSV, GeoJSON, KML, .waypoints, .plan</p>
+        <p>Recorded flight: .tlog, .mcap</p>
       </div>
     </div>
   );

@@ -25,7 +25,9 @@ function Keys({ keys }: { keys: string }) {
   const parts = keys.split(" ");
   return (
     <>
-      {parts.map((part) => (part === "or" || part === "to" ? <i> {part} </i> : <kbd key={part}>{part}</kbd>))}
+      {parts.map((part) =>
+        ["or", "to", "then"].includes(part) ? <i> {part} </i> : <kbd key={part}>{part}</kbd>,
+      )}
     </>
   );
 }

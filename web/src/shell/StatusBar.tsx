@@ -7,7 +7,7 @@ import { JobList } from "./JobList";
 import { NoticeMenu } from "./Notices";
 import { PlanName, UndoRedo } from "./PlanName";
 import { drawer, openDialog } from "./ui_state";
-import { activeView, views } from "./views";
+import { activeView, goTo, views } from "./views";
 
 /** Below it the panels are drawers, as in layout.css. */
 const NARROW_PX = 1100;
@@ -58,12 +58,31 @@ function Tabs() {
           key={view.id}
           aria-current={view === activeView.value ? "page" : undefined}
           data-testid={`tab-${view.id}`}
-          onClick={() => (activeView.value = view)}
+          onClick={() => goTo(view.id)}
         >
           {view.label}
         </button>
       ))}
     </nav>
+  );
+}
+
+/** What the right panel holds, where it is a drawer and the certificate is not what it shows. */
+function RightDrawerButton() {
+  const { id } = activeView.value;
+  if (id === "plan") return null;
+  const open = drawer.value === "right";
+  return (
+    <button
+      type="button"
+      class="drawer-button right"
+      aria-expanded={open}
+      data-testid="drawer-facts"
+      onClick={() => (drawer.value = open ? null : "right")}
+    >
+      <Icon name="chart" />
+      <span>{id === "fly" ? "Instruments" : "Figures"}</span>
+    </button>
   );
 }
 
@@ -85,7 +104,8 @@ function PlanDrawerButton() {
 
 /** On narrow screens the right panel is a drawer; on wide ones it is there, and takes the focus. */
 function showCertificate(): void {
-  if (window.innerWidth < NARROW_PX) drawer.value = drawer.value === "right" ? null : "right";
+  if (activeView.value.id !== "plan") goTo("plan");
+  else if (window.innerWidth < NARROW_PX) drawer.value = drawer.value === "right" ? null : "right";
   else document.querySelector<HTMLElement>(".panel.right .panel-scroll")?.focus();
 }
 
@@ -103,12 +123,13 @@ export function StatusBar() {
       <button
         type="button"
         class="verdict-button"
-        title="Show the certificate"
+        title={activeView.value.id === "plan" ? "Show the certificate" : "The open plan: show it"}
         data-testid="drawer-right"
         onClick={showCertificate}
       >
         <VerdictBadge />
       </button>
+      <RightDrawerButton />
       <div class="group">
         <NoticeMenu />
         <ThemeToggle />

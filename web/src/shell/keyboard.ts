@@ -1,14 +1,17 @@
 import { useEffect } from "preact/hooks";
-import { sectionIsOpen, setSection } from "../ui/Section";
+import { setSection } from "../ui/Section";
 import { redo, removeSelectedPoi, undo } from "../plan/commands";
+import { seekBy, togglePlaying } from "../review/commands";
 import { takeFiles } from "../store/files";
 import { document_, selection } from "../store/state";
 import { frame, setSelection } from "../store/stream";
 import { drawer, openDialog } from "./ui_state";
-import { shortcutOf, type Hit } from "./shortcuts";
+import { shortcutOf, type Hit, type ViewId } from "./shortcuts";
+import { activeView, goTo } from "./views";
 
-/** The sections of the plan's left panel by their number key. */
-const SECTION_IDS = ["terrain", "points", "vehicle", "surface", "speeds", "mission"];
+/** How long after G its second key may come. */
+const SEQUENCE_MS = 1500;
+let pressedG_ms = -Infinity;
 
 /** Asks for files of this computer. */
 export function chooseFiles(accept = "", take: (files: File[]) => void = takeFiles): void {
@@ -20,10 +23,10 @@ export function chooseFiles(accept = "", take: (files: File[]) => void = takeFil
 }
 
 function toggleSection(number: number): void {
-  const id = SECTION_IDS[number - 1];
+  const id = activeView.value.sections[number - 1];
   if (!id) return;
-  const open = !sectionIsOpen(id, id === "terrain" || id === "points");
-  setSection(id, open);
+  const body = document.getElementById(`section-${id}`);
+  setSection(id, body === null);
   const header = document.querySelector<HTMLElement>(`[data-section=${id}] > h2 > button`);
   header?.focus();
   // Its content is there after the next frame; tall sections show their beginning.
@@ -62,6 +65,12 @@ function act(hit: Hit): void {
       return void frame("top");
     case "section":
       return toggleSection(hit.section ?? 0);
+    case "view":
+      return goTo(hit.view ?? "plan");
+    case "play":
+      return togglePlaying();
+    case "seek":
+      return seekBy(hit.by_s ?? 0);
     case "help":
       openDialog.value = "help";
   }
@@ -72,12 +81,21 @@ function isInput(target: EventTarget | null): boolean {
   return /^(INPUT|TEXTAREA|SELECT)$/.test(element?.tagName ?? "") || Boolean(element?.isContentEditable);
 }
 
+/** Space and the arrows belong to what has the focus if that uses them itself. */
+function isControl(event: KeyboardEvent): boolean {
+  const element = event.target as HTMLElement | null;
+  return event.key === " " && /^(BUTTON|A|SUMMARY)$/.test(element?.tagName ?? "");
+}
+
 /** Listens on our page, and through the 3D view on its page as well. */
 export function onKey(event: KeyboardEvent): void {
   if (openDialog.value !== null || event.altKey || event.defaultPrevented) return;
   const key = { key: event.key, mod: event.ctrlKey || event.metaKey, shift: event.shiftKey };
-  const hit = shortcutOf(key, isInput(event.target));
-  if (!hit) return;
+  const inInput = isInput(event.target);
+  const afterG = event.timeStamp - pressedG_ms < SEQUENCE_MS;
+  pressedG_ms = event.key.toLowerCase() === "g" && !key.mod && !inInput ? event.timeStamp : -Infinity;
+  const hit = shortcutOf(key, inInput, { view: activeView.value.id as ViewId, afterG });
+  if (!hit || isControl(event)) return;
   event.preventDefault();
   act(hit);
 }

@@ -10,10 +10,15 @@ export const SHORTCUTS = [
   { id: "fit", keys: "F", text: "Fit the plan into the view" },
   { id: "top", keys: "T", text: "Look from above, north up" },
   { id: "section", keys: "1 to 6", text: "Open or close a section on the left" },
+  { id: "view", keys: "G then P or F or R", text: "Go to Plan, Fly or Review" },
+  { id: "play", keys: "Space", text: "Review: play and pause" },
+  { id: "seek", keys: "← or →", text: "Review: 10 s back, 10 s forward" },
   { id: "help", keys: "?", text: "This sheet" },
 ] as const;
 
 export type ShortcutId = (typeof SHORTCUTS)[number]["id"];
+
+export type ViewId = "plan" | "fly" | "review";
 
 export interface Key {
   key: string;
@@ -25,10 +30,43 @@ export interface Hit {
   id: ShortcutId;
   /** For `section`: which, from 1. */
   section?: number;
+  /** For `view`: which. */
+  view?: ViewId;
+  /** For `seek`: by how much. */
+  by_s?: number;
 }
 
+/** Where the key was pressed: the view, and whether G was pressed just before. */
+export interface Where {
+  view: ViewId;
+  afterG: boolean;
+}
+
+const VIEW_KEYS: Readonly<Record<string, ViewId>> = { p: "plan", f: "fly", r: "review" };
+/** What would change the plan has no meaning where it is flown or reviewed. */
+const PLANNING: ReadonlySet<ShortcutId> = new Set(["undo", "redo", "add", "delete"]);
+const SEEK_S = 10;
+
 /** The shortcut that a key press means. Inside inputs only saving and opening are ours. */
-export function shortcutOf({ key, mod, shift }: Key, inInput: boolean): Hit | null {
+export function shortcutOf(
+  pressed: Key,
+  inInput: boolean,
+  where: Where = { view: "plan", afterG: false },
+): Hit | null {
+  const view = VIEW_KEYS[pressed.key.toLowerCase()];
+  if (where.afterG && view && !pressed.mod && !inInput) return { id: "view", view };
+  const hit = where.view === "review" && !pressed.mod && !inInput ? replayKey(pressed.key) : null;
+  const found = hit ?? anywhere(pressed, inInput);
+  return found && where.view !== "plan" && PLANNING.has(found.id) ? null : found;
+}
+
+function replayKey(key: string): Hit | null {
+  if (key === " ") return { id: "play" };
+  if (key === "ArrowLeft") return { id: "seek", by_s: -SEEK_S };
+  return key === "ArrowRight" ? { id: "seek", by_s: SEEK_S } : null;
+}
+
+function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
   const lower = key.toLowerCase();
   if (mod) {
     if (lower === "s") return { id: "save" };

@@ -1,19 +1,80 @@
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import type { ComponentType } from "preact";
+import { ProfilePane } from "../chart/ProfilePane";
+import { FlyLeft } from "../fly/FlyLeft";
+import { FlyRight } from "../fly/FlyRight";
 import { PlanLeft } from "../plan/PlanLeft";
 import { PlanRight } from "../plan/PlanRight";
+import { ReviewLeft } from "../review/ReviewLeft";
+import { ReviewRight } from "../review/ReviewRight";
+import { TimePane } from "../review/TimePane";
+import { lastView } from "../store/prefs";
+import { selection } from "../store/state";
+import { setSelection } from "../store/stream";
+import { drawer } from "./ui_state";
 
-/** A view of the console: what stands left ("what I do") and right ("what is true") of the 3D view. */
+/** A view of the console: what stands left ("what I do"), right ("what is true") and below the 3D view. */
 export interface View {
-  id: string;
+  id: "plan" | "fly" | "review";
   label: string;
   Left: ComponentType;
   Right: ComponentType;
+  Below: ComponentType;
+  /** Of the left panel, by their number keys. */
+  sections: readonly string[];
 }
 
 /** In the order of their tabs. */
 export const views: readonly [View, ...View[]] = [
-  { id: "plan", label: "Plan", Left: PlanLeft, Right: PlanRight },
+  {
+    id: "plan",
+    label: "Plan",
+    Left: PlanLeft,
+    Right: PlanRight,
+    Below: ProfilePane,
+    sections: ["terrain", "points", "vehicle", "surface", "speeds", "mission"],
+  },
+  {
+    id: "fly",
+    label: "Fly",
+    Left: FlyLeft,
+    Right: FlyRight,
+    Below: ProfilePane,
+    sections: ["connection", "onboard", "preflight", "flight"],
+  },
+  {
+    id: "review",
+    label: "Review",
+    Left: ReviewLeft,
+    Right: ReviewRight,
+    Below: TimePane,
+    sections: ["recordings", "judge"],
+  },
 ];
 
-export const activeView = signal<View>(views[0]);
+const byId = (id: string) => views.find((view) => view.id === id);
+const inAddress = () => byId(location.hash.slice(1));
+
+/** The address tells the view, so that it can be linked and reloaded; without it, the last one of this browser. */
+export const activeView = signal<View>(inAddress() ?? byId(lastView.value) ?? views[0]);
+
+export function goTo(id: View["id"]): void {
+  const view = byId(id);
+  if (!view || view === activeView.value) return;
+  activeView.value = view;
+  drawer.value = null;
+  // What is selected in the plan can be dragged in 3D: not where nobody means to edit.
+  const { tool, poi_id } = selection.value;
+  if (id !== "plan" && (tool !== "select" || poi_id !== null)) setSelection({ tool: "select", poi_id: null });
+}
+
+effect(() => {
+  const { id } = activeView.value;
+  lastView.value = id;
+  if (inAddress()?.id !== id) history.replaceState(null, "", `#${id}`);
+});
+
+window.addEventListener("hashchange", () => {
+  const view = inAddress();
+  if (view) goTo(view.id);
+});

@@ -1,5 +1,5 @@
 import { signal } from "@preact/signals";
-import type { Imported, JobDoc } from "../messages";
+import type { Imported, JobDoc, RecordingDoc } from "../messages";
 import { ApiError, asErrorDoc, request, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
 import { document_, jobs, notifyText, setError, terrain } from "./state";
@@ -110,10 +110,23 @@ export async function sendPoints(file: File): Promise<void> {
   }
 }
 
-/** Any dropped file: points by their ending, everything else is tried as a surface model. */
+/** A recording of a flight; `then` gets it once the library has it. */
+export async function sendRecording(file: File, then: (recording: RecordingDoc) => void): Promise<void> {
+  setError("recordings", null);
+  try {
+    const path = `/api/recordings/import?${new URLSearchParams({ filename: file.name })}`;
+    then(JSON.parse(await sendFile(path, file)) as RecordingDoc);
+  } catch (error) {
+    report("recordings", error);
+  }
+}
+
+/** Any dropped file but a recording: points by their ending, everything else is tried as a surface model. */
 export function takeFiles(files: Iterable<File>): void {
   for (const file of files) void (POINT_FILES.test(file.name) ? sendPoints(file) : sendTerrain(file));
 }
+
+export const isRecording = (file: File) => /\.(tlog|mcap)$/i.test(file.name);
 
 /** The file that a terrain was read from, if this page sent it. */
 export function sentFileOf(name: string): SentFile | null {

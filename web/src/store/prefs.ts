@@ -32,9 +32,13 @@ const isHeight = (value: unknown): value is number =>
 const isOpenMap = (value: unknown): value is Record<string, boolean> =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 
+const isText = (value: unknown): value is string => typeof value === "string" && value.length < 40;
+
 export const theme = remembered<Theme>("theme", "dark", isTheme);
 export const chartHeight_px = remembered<number>("chartHeight", 244, isHeight);
 export const openSections = remembered<Record<string, boolean>>("sections", {}, isOpenMap);
+/** The view that was open last. */
+export const lastView = remembered<string>("view", "plan", isText);
 
 effect(() => {
   document.documentElement.dataset["theme"] = theme.value;

@@ -1,14 +1,19 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage, Snapshot, ViewDoc } from "../messages";
+import { takeFlying } from "./flying";
 import { queue, showPlan } from "./plan";
+import { confirm, forgetUnconfirmed } from "./reconnect";
+import { takeReviewing } from "./review";
 import * as state from "./state";
 
 /** Takes one message of the stream into the page's state. */
 export function receive(message: ServerMessage): void {
+  confirm(message);
   switch (message.type) {
     case "snapshot":
       // At once: nobody sees the new library beside the old plan.
       batch(() => takeSnapshot(message));
+      forgetUnconfirmed();
       return;
     case "plan":
       queue.pushed(message.plan);
@@ -31,6 +36,23 @@ export function receive(message: ServerMessage): void {
       return;
     case "notice":
       state.notify(message.level, message.error);
+      return;
+    case "vehicle":
+    case "track":
+    case "text":
+    case "link":
+    case "transfer":
+    case "flight":
+    case "fly":
+    case "lease":
+    case "nodes":
+    case "recorder":
+      takeFlying(message, performance.now());
+      return;
+    case "recordings":
+    case "review":
+    case "replay":
+      takeReviewing(message, performance.now());
       return;
     default:
       message satisfies never;

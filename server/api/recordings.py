@@ -1,0 +1,83 @@
+"""Recordings: started and stopped, kept, brought in and taken out, and opened for review."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import FileResponse, Response
+from pydantic import RootModel
+
+from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer, parts_of
+from server.api.terrain import RAW_BODY
+from server.api.uploads import display_name, stream_to_disk
+from server.library.recordings import suffix_of_recording
+from server.schemas import OpenReview, PlayReview, RecordingDoc
+
+router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["recordings"], responses=ERROR_RESPONSES)
+
+
+class Recordings(RootModel[list[RecordingDoc]]):
+    """Newest first."""
+
+
+@router.post("/recorder/start", status_code=204)
+async def start(operator: InCharge, flying: Fly) -> Response:
+    """Records from now on, armed or not."""
+    del operator
+    await flying.recording.start()
+    return Response(status_code=204)
+
+
+@router.post("/recorder/stop", status_code=204)
+async def stop(operator: InCharge, flying: Fly) -> Response:
+    del operator
+    await flying.recording.stop()
+    return Response(status_code=204)
+
+
+@router.get("/recordings", response_model=Recordings)
+async def recordings(flying: Fly) -> Response:
+    return answer(Recordings(await flying.recording.docs()))
+
+
+@router.post("/recordings/import", response_model=RecordingDoc, openapi_extra=RAW_BODY)
+async def add(request: Request, flying: Fly, filename: Annotated[str, Query(max_length=1000)]) -> Response:
+    """A ``.tlog`` of any ground station, or an ``.mcap`` of Hedgehop's."""
+    name = display_name(filename)
+    suffix = suffix_of_recording(name)
+    upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix))
+    return answer(await flying.recording.add(upload, name))
+
+
+@router.get("/recordings/{recording_id}/file", response_class=FileResponse)
+async def download(recording_id: str, flying: Fly) -> Response:
+    path = flying.shelf.path(recording_id)
+    return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+
+@router.delete("/recordings/{recording_id}", status_code=204)
+async def delete(recording_id: str, flying: Fly) -> Response:
+    """409 for the one that is being written."""
+    await flying.recording.delete(recording_id)
+    return Response(status_code=204)
+
+
+@router.post("/review/open", status_code=204)
+async def open_review(body: OpenReview, flying: Fly) -> Response:
+    """Reads a recording, judges it against its plan, and makes it ready to be played."""
+    await flying.reviewing.open(body)
+    return Response(status_code=204)
+
+
+@router.post("/review/close", status_code=204)
+async def close_review(flying: Fly) -> Response:
+    await flying.reviewing.close()
+    return Response(status_code=204)
+
+
+@router.post("/review/play", status_code=204)
+async def play(body: PlayReview, flying: Fly) -> Response:
+    """Plays, pauses, seeks, changes speed. Nothing that is replayed can reach a vehicle."""
+    await flying.reviewing.play(body)
+    return Response(status_code=204)

@@ -1,0 +1,185 @@
+"""``hedgehop fly``: a mission from the upload to the landing, and what the flight came to.
+
+Ctrl+C before the start ends the command. In the air it never does so at once, because the vehicle would fly on
+unwatched: the first says so, the second commands the return home, the third leaves the vehicle to itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import signal
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from planning.dsm import Dsm
+from planning.formats.detect import read_mission
+from planning.model import Mission
+from planning.request import PlanRequest, check_demands
+from server.cli import options as o
+from server.cli.files import check_directory, read_small
+from server.cli.flight_progress import FlightProgress
+from server.cli.nodes import OPERATOR, Station, own_nodes
+from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
+from server.cli.planning_run import profile_with
+from server.cli.review import answer
+from server.cli.terrain import ModelOptions, read_model
+from server.errors import StorageError
+from server.review import recording_of, review
+from server.schemas.review import ReviewDoc
+from server.stopwatch import StepTimer
+from telemetry.flight.fly import FlyOptions, FlyResult
+from telemetry.flight.fly import fly as conduct
+from telemetry.mavlink.address import parse_address
+from telemetry.recording.flight_log import read_flight_log
+from telemetry.requests import StartRecording, StopRecording
+
+NODE_TIMEOUT_S = 30.0
+
+
+class Acceptable(StrEnum):
+    """Rows of the check that a pilot may take upon themselves."""
+
+    GNSS = "gnss"
+    BATTERY = "battery"
+    RTL_HEIGHT = "rtl_height"
+
+
+def fly(
+    mission: o.MissionFile,
+    link: o.Link,
+    mode: Annotated[
+        Literal["auto", "guided"],
+        typer.Option("--mode", help="The mission on board, or waypoints handed over one at a time."),
+    ] = "auto",
+    dsm: o.FlightDsm = None,
+    from_item: Annotated[
+        int,
+        typer.Option("--from-item", min=1, help="Go on at this item with a mission that broke off; needs --dsm."),
+    ] = 1,
+    accept: Annotated[
+        list[Acceptable] | None,
+        typer.Option("--accept", help="Fly although this row of the check is only acceptable; several times."),
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE", help="Keep the recording (.mcap) here.")
+    ] = None,
+    as_json: o.AsJson = False,
+    profile: o.Profile = "generic-quad",
+    position_error_m: o.PositionError = None,
+    rtl_height_m: o.RtlHeight = None,
+    required_clearance_m: o.RequiredClearance = None,
+    crs: o.Crs = None,
+    z_scale: o.ZScale = None,
+    vertical_datum: o.VerticalDatum = None,
+) -> None:
+    """Upload a mission, check the start, fly it, and judge the flight.
+
+    Without --dsm neither the ground at home nor the clearance is checked.
+    """
+    with refusing(as_json=as_json):
+        flight = read_mission(mission.name, read_small(mission))
+        parse_address(link)
+        _check_record(record)
+        vehicle = profile_with(profile, position_error_m=position_error_m, rtl_height_m=rtl_height_m)
+        request = PlanRequest(pois=(), profile=vehicle, required_clearance_m=required_clearance_m)
+        check_demands(request)
+        model_options = ModelOptions(crs, z_scale, vertical_datum)
+        model = read_model(dsm, StepTimer(progress), model_options)[0] if dsm else None
+        for warning in flight.warnings:
+            say(f"Note: {warning}")
+        if model is None:
+            say("Note: without --dsm neither the ground at home nor the clearance is checked.")
+        options = FlyOptions(
+            address=link,
+            operator=OPERATOR,
+            profile=vehicle,
+            clearance=request.clearance(),
+            way=mode,
+            dsm=model,
+            from_item=from_item,
+            accept=frozenset(accept or ()),
+            name=mission.stem,
+        )
+        result, doc = asyncio.run(_Conductor(flight, options, record).run())
+        say(result.text)
+        completed = result.completed and (doc.figures is None or doc.figures.completed)
+        if doc.figures is not None:
+            doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
+        answer(doc, as_json=as_json)
+        raise typer.Exit(DONE if completed else FAILED)
+
+
+def _check_record(record: Path | None) -> None:
+    if record is None:
+        return
+    check_directory(record.parent)
+    if record.exists():
+        raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")
+
+
+class _Conductor:
+    """One flight with nodes of its own, and what Ctrl+C means at each moment of it."""
+
+    def __init__(self, mission: Mission, options: FlyOptions, record: Path | None) -> None:
+        self._mission, self._options, self._record = mission, options, record
+        self._go_home = asyncio.Event()
+        self._progress = FlightProgress(options)
+        self._pressed = 0
+        self._task: asyncio.Task[object] | None = None
+
+    async def run(self) -> tuple[FlyResult, ReviewDoc]:
+        self._task = asyncio.current_task()
+        loop = asyncio.get_running_loop()
+        loop.add_signal_handler(signal.SIGINT, self._on_interrupt)
+        try:
+            async with own_nodes(recorder=True) as station:
+                return await self._fly(station)
+        except asyncio.CancelledError:
+            raise typer.Abort from None
+        finally:
+            loop.remove_signal_handler(signal.SIGINT)
+
+    async def _fly(self, station: Station) -> tuple[FlyResult, ReviewDoc]:
+        options = self._options
+        name = await station.bus.call("recorder", StartRecording(options.name), result=str, timeout_s=NODE_TIMEOUT_S)
+        recording = station.recordings / name
+        try:
+            result = await conduct(
+                station.link,
+                station.bus,
+                self._mission,
+                options,
+                self._progress,
+                go_home=self._go_home,
+            )
+        finally:
+            end_progress()
+            await station.bus.call("recorder", StopRecording(), result=type(None), timeout_s=NODE_TIMEOUT_S)
+            if self._record is not None:
+                await asyncio.to_thread(shutil.copyfile, recording, self._record)
+        return result, await asyncio.to_thread(_judge, recording, options.dsm)
+
+    def _on_interrupt(self) -> None:
+        assert self._task is not None
+        if not self._progress.in_flight:
+            self._task.cancel()
+            return
+        self._pressed += 1
+        end_progress()
+        if self._pressed == 1:
+            say("The vehicle flies on. Ctrl+C again commands it to return home, a third time leaves it to itself.")
+        elif self._pressed == 2:
+            self._go_home.set()
+        else:
+            say("The vehicle is left to itself: nobody watches it any more.")
+            self._task.cancel()
+
+
+def _judge(recording: Path, dsm: Dsm | None) -> ReviewDoc:
+    log = read_flight_log(recording)
+    return review(replace(log, faults=()), recording_of(log, recording), dsm=dsm)

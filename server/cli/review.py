@@ -1,0 +1,118 @@
+"""``hedgehop review``: the figures of a recorded flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from planning.formats.detect import read_mission
+from server.cli import options as o
+from server.cli.files import read_small
+from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
+from server.cli.terrain import ModelOptions, read_model
+from server.review import recording_of
+from server.review import review as judge
+from server.schemas.review import ReviewDoc
+from server.stopwatch import StepTimer
+from telemetry.recording.flight_log import read_flight_log
+
+FIRST_KEYS = (
+    "completed",
+    "cross_track_max_m",
+    "cross_track_mean_m",
+    "cross_track_p95_m",
+    "height_error_max_m",
+    "min_distance_m",
+    "lag_s",
+    "duration_s",
+)
+"""What ``fly`` and ``review`` print first, in this order."""
+
+
+def review(
+    recording: Annotated[
+        Path, typer.Argument(metavar="RECORDING|TLOG", help="A recording, or any ground station's .tlog.")
+    ],
+    dsm: o.FlightDsm = None,
+    mission: Annotated[
+        Path | None,
+        typer.Option("--mission", metavar="FILE", help="Mission to judge it against; default: the recorded one."),
+    ] = None,
+    truth: Annotated[
+        bool, typer.Option("--truth", help="Take a simulator's true positions instead of the vehicle's estimate.")
+    ] = False,
+    as_json: o.AsJson = False,
+    crs: o.Crs = None,
+    z_scale: o.ZScale = None,
+    vertical_datum: o.VerticalDatum = None,
+) -> None:
+    """Judge a recorded flight: errors against its mission, distances to the surface model, lag."""
+    with refusing(as_json=as_json):
+        flown = read_mission(mission.name, read_small(mission)) if mission else None
+        timer = StepTimer(progress)
+        model = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum))[0] if dsm else None
+        timer("Reading the recording", None)
+        log = read_flight_log(recording)
+        timer("Judging the flight", None)
+        doc = judge(log, recording_of(log, recording), dsm=model, mission=flown, truth=truth)
+        end_progress()
+        for note in doc.notes:
+            say(f"Note: {note}")
+        answer(doc, as_json=as_json)
+        raise typer.Exit(DONE if doc.figures is not None else FAILED)
+
+
+def answer(doc: ReviewDoc, *, as_json: bool) -> None:
+    """One JSON object, or a few lines."""
+    if as_json:
+        print_json(summary(doc))
+    else:
+        typer.echo("\n".join(figure_lines(doc)))
+
+
+def summary(doc: ReviewDoc) -> dict[str, Any]:
+    """The figures, those that ``fly`` promises first; null where they cannot be told."""
+    figures = doc.figures.model_dump() if doc.figures else {}
+    first = {key: figures.get(key) for key in FIRST_KEYS} | {"completed": figures.get("completed", False)}
+    return {
+        **first,
+        **{key: value for key, value in figures.items() if key not in first},
+        "first_waypoint_t_s": doc.first_waypoint_t_s,
+        "last_waypoint_t_s": doc.last_waypoint_t_s,
+        "start_utc": doc.start_utc,
+        "recording_s": doc.duration_s,
+        "notes": doc.notes,
+    }
+
+
+def figure_lines(doc: ReviewDoc) -> list[str]:
+    """What the figures say to people."""
+    figures = doc.figures
+    if figures is None:
+        return [
+            f"{harmless(doc.recording.name)}: no figures",
+            f"  recorded {doc.duration_s:.0f} s from {doc.start_utc}",
+        ]
+    lines = [
+        "COMPLETED" if figures.completed else "NOT COMPLETED",
+        f"  from the first waypoint to the last: {_number(figures.duration_s, 1)} s,"
+        f" predicted {_number(figures.predicted_s, 1)} s, lag {_number(figures.lag_s, 1)} s",
+        f"  beside the line: at most {_number(figures.cross_track_max_m)} m, mean"
+        f" {_number(figures.cross_track_mean_m)} m, 95 % within {_number(figures.cross_track_p95_m)} m",
+        f"  above and below it: {_number(figures.height_error_lowest_m)} m to"
+        f" {_number(figures.height_error_highest_m)} m, 95 % within {_number(figures.height_error_p95_m)} m",
+    ]
+    if figures.min_distance_m is not None:
+        certified = figures.certified_distance_m
+        proved = f", certified {_number(certified)} m" if certified is not None else ""
+        lines.append(
+            f"  distance to the surface model: at least {_number(figures.min_distance_m)} m{proved};"
+            f" on the way home {_number(figures.min_distance_way_home_m)} m"
+        )
+    return lines
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "unknown" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,64 @@
+"""``hedgehop upload``: a mission onto the vehicle, verified by reading it back."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import asdict
+from typing import Any
+
+import typer
+
+from planning.formats.detect import read_mission
+from planning.model import Mission
+from server.cli import options as o
+from server.cli.files import read_small
+from server.cli.nodes import OPERATOR, own_nodes
+from server.cli.output import DONE, FAILED, print_json, refusing, say
+from telemetry.flight.prepare import connect, transfer
+from telemetry.flight.watch import watching
+from telemetry.mavlink.address import parse_address
+from telemetry.messages import UploadReport
+
+
+def upload(mission: o.MissionFile, link: o.Link, as_json: o.AsJson = False) -> None:
+    """Replace the mission on board, read it back, and say what the vehicle rounded."""
+    with refusing(as_json=as_json):
+        flight = read_mission(mission.name, read_small(mission))
+        parse_address(link)
+        for warning in flight.warnings:
+            say(f"Note: {warning}")
+        report = asyncio.run(_upload(flight, link))
+        if as_json:
+            print_json(_summary(report))
+        else:
+            typer.echo("\n".join(_lines(report)))
+        raise typer.Exit(DONE if report.verified else FAILED)
+
+
+async def _upload(flight: Mission, link: str) -> UploadReport:
+    async with own_nodes(recorder=False) as station, watching(station.bus) as watch:
+        await connect(station.link, watch, link, OPERATOR, say)
+        return await transfer(station.link, flight, OPERATOR, say)
+
+
+def _summary(report: UploadReport) -> dict[str, Any]:
+    return {
+        "verified": report.verified,
+        "items": len(report.onboard.items),
+        "rounded": [asdict(rounded) for rounded in report.rounded],
+        "differences": list(report.differences),
+        "digest": report.onboard.digest,
+        "seconds": report.seconds,
+    }
+
+
+def _lines(report: UploadReport) -> list[str]:
+    items = f"{len(report.onboard.items)} items in {report.seconds:.1f} s"
+    if not report.verified:
+        return [f"NOT VERIFIED: {items}, and the vehicle holds something else", *(f"  {d}" for d in report.differences)]
+    rounded = [f"  item {r.item}: {r.field} {_value(r.sent)} is kept as {_value(r.kept)}" for r in report.rounded]
+    return [f"VERIFIED: {items}, read back", *rounded]
+
+
+def _value(value: float | None) -> str:
+    return "not given" if value is None else f"{value:.9g}"

@@ -1,0 +1,112 @@
+"""One vehicle as the pages see it: the live one, or the one of a recording."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from server.flying.following import Follower
+from server.flying.pace import Pace
+from server.flying.track import Track
+from server.schemas import (
+    FlightMessage,
+    FollowDoc,
+    ServerMessage,
+    Source,
+    TextMessage,
+    TrackMessage,
+    VehicleMessage,
+)
+from telemetry.messages import FlightStatus, VehicleText
+from telemetry.vehicle import VehicleState
+
+RATE_HZ, BURST = 20.0, 8.0
+HOMES_APART_M = 1.0
+
+
+class Channel:
+    """Publishes each state as soon as it comes, but no faster than pages draw; lives on the event loop."""
+
+    def __init__(
+        self,
+        source: Source,
+        tell: Callable[[ServerMessage], None],
+        *,
+        now_mono_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._source: Source = source
+        self._tell, self._now_mono_s = tell, now_mono_s
+        self._pace = Pace(RATE_HZ, burst=BURST)
+        self._waiting: asyncio.TimerHandle | None = None
+        self._told_mono_s = float("-inf")
+        self.follower = Follower()
+        self.track = Track()
+        self.state: VehicleState | None = None
+        self.flight = FlightStatus()
+        self.follow: FollowDoc | None = None
+
+    def on_state(self, state: VehicleState) -> None:
+        """A new flight begins where the vehicle arms: its path starts afresh."""
+        begins = state.armed and (self.state is None or not self.state.armed)
+        self.state = state
+        if begins and self._source == "live":
+            self.restart_track()
+        if self._waiting is None:
+            wait_s = self._pace.wait_s(self._now_mono_s())
+            if wait_s == 0.0:
+                self._publish()
+            else:
+                self._waiting = asyncio.get_running_loop().call_later(wait_s, self._due)
+
+    def on_flight(self, flight: FlightStatus) -> None:
+        self.flight = flight
+        self._tell(FlightMessage(source=self._source, flight=flight))
+
+    def on_text(self, text: VehicleText) -> None:
+        self._tell(TextMessage(source=self._source, text=text))
+
+    def forget(self) -> None:
+        """The vehicle is another one, or gone."""
+        self.state, self.follow = None, None
+        self.restart_track()
+        self._publish()
+
+    def restart_track(self) -> None:
+        self.track.clear()
+        self.follower.begin_again()
+        self.publish_track()
+
+    def prepend(self, states: list[VehicleState]) -> None:
+        """What was flown before this server began to listen."""
+        later = [state for state in self.track.states if not states or state.t_utc_s > states[-1].t_utc_s]
+        self.track.clear()
+        self.follower.begin_again()
+        for state in (*states, *later):
+            self.track.add(state, self.follower.follow(state))
+        self.publish_track()
+
+    def publish_track(self) -> None:
+        self._tell(TrackMessage(track=self.track.doc(self._source)))
+
+    def tick(self) -> None:
+        """Once a second: when nothing is heard, ages go on running."""
+        if self.state is not None and self._now_mono_s() - self._told_mono_s >= 1.0:
+            self._publish()
+
+    def close(self) -> None:
+        if self._waiting is not None:
+            self._waiting.cancel()
+
+    def _due(self) -> None:
+        self._waiting = None
+        self._pace.wait_s(self._now_mono_s())
+        self._publish()
+
+    def _publish(self) -> None:
+        state = self.state
+        self.follow = None if state is None else self.follower.follow(state, self.flight)
+        if state is not None and (state.armed or self._source == "replay"):
+            self.track.add(state, self.follow)
+        self._told_mono_s = self._now_mono_s()
+        self._tell(VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow))

@@ -1,0 +1,154 @@
+"""What the flight lane's worker does before a start: judges what was read back, where the vehicle really stands.
+
+The checks bring in the wire protocols; they are imported by the worker only, so that the page answers sooner.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planning.certificate.as_json import certificate_json
+from planning.dsm import Dsm
+from planning.formats.trajectory_csv import read_trajectory
+from planning.formats.wpl import read_wpl, write_wpl
+from planning.holes import fill_holes
+from planning.model import ClearanceParams
+from planning.request import PlanRequest
+from planning.vehicle_profile import parse_profile
+from server.clock import utc_now
+from server.documents import profile_from_doc
+from server.jobs import Progress
+from server.library.terrains import load_terrain
+from server.schemas import CheckRow, PlanDoc, PreflightDoc
+from telemetry.messages import Item, OnboardMission, PlanRecord
+from telemetry.vehicle import VehicleState
+
+if TYPE_CHECKING:
+    from telemetry.flight.preflight import Preflight
+    from telemetry.flight.targets import GuidedPlan
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """The mission with its heights counted from where the vehicle stands."""
+
+    items: tuple[Item, ...]
+    record: PlanRecord
+    home: tuple[float, float, float]
+    """lat_deg, lon_deg, height in the surface model's datum"""
+    shift_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    doc: PreflightDoc
+    certificate_json: str
+    """Of what was read back; empty when there is none."""
+    moved: Moved | None
+    """What has to be uploaded before the check can be made anew."""
+
+
+def check_start(
+    directory: Path,
+    record: PlanRecord,
+    onboard: OnboardMission,
+    state: VehicleState,
+    parameters: dict[str, float | None],
+    rereferenced_m: float | None = None,
+    *,
+    report: Progress,
+) -> Checked:
+    """``rereferenced_m``: by how much the heights of what is on board were moved already."""
+    from telemetry.flight.preflight import check
+
+    report("Checking the start", None)
+    dsm, planned = load_terrain(directory), read_wpl(record.mission_wpl)
+    found = check(
+        onboard,
+        state,
+        parameters,
+        dsm=dsm,
+        profile=parse_profile(record.profile_toml.encode(), where="the plan's profile"),
+        clearance=clearance_of(record),
+        planned_home=planned.home,
+        firmware=record.firmware,
+        rereferenced_m=rereferenced_m,
+    )
+    certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
+    moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
+    return Checked(_doc(found, rereferenced_m), certificate, moved)
+
+
+def clearance_of(record: PlanRecord) -> ClearanceParams:
+    """What the plan demands."""
+    document = PlanDoc.model_validate_json(record.plan_json)
+    return PlanRequest(
+        pois=(),
+        profile=profile_from_doc(document.profile),
+        required_clearance_m=document.clearance.required_clearance_m,
+        max_height_above_ground_m=document.clearance.max_height_above_ground_m,
+    ).clearance()
+
+
+def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
+    """The mission as the navigation script hands it over, with the paper's timing. Raises MissionError."""
+    from telemetry.flight.targets import guided_plan, with_timing
+
+    report("Preparing the navigation script", None)
+    plan = guided_plan(read_wpl(record.mission_wpl))
+    if not record.path_csv:
+        return plan
+    return replace(plan, targets=with_timing(plan.targets, read_trajectory(record.path_csv)))
+
+
+def climb_for_resuming(
+    directory: Path, record: PlanRecord, state: VehicleState, from_item: int, *, report: Progress
+) -> tuple[int, float]:
+    """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
+    from telemetry.flight.preflight import SMALL_HOLE_M2, actual_home
+    from telemetry.flight.resume import plan_resumption
+
+    report("Finding the way back into the mission", None)
+    dsm = load_terrain(directory)
+    mission, home = read_wpl(record.mission_wpl), actual_home(state, dsm)
+    surface, _ = fill_holes(dsm, max_area_m2=SMALL_HOLE_M2)
+    at = mission if home is None else replace(mission, home=home)
+    way = plan_resumption(at, from_item, surface, clearance_of(record))
+    return way.from_item, way.climb_to_m
+
+
+def _moved(found: Preflight, record: PlanRecord, state: VehicleState, dsm: Dsm) -> Moved | None:
+    from telemetry.flight.preflight import actual_home
+    from telemetry.flight.rereference import rereference
+    from telemetry.mavlink.items import items_from_mission
+
+    home, shift_m = actual_home(state, dsm), found.home_shift_m
+    if home is None or shift_m is None or not math.isfinite(home.alt_dsm_m):
+        return None
+    mission = rereference(read_wpl(record.mission_wpl), shift_m, home=home)
+    text = write_wpl(mission)
+    written = read_wpl(text)
+    return Moved(
+        items=items_from_mission(written),
+        record=replace(record, mission_wpl=text, digest="", certificate_json="", home_alt_dsm_m=home.alt_dsm_m),
+        home=(home.lat_deg, home.lon_deg, home.alt_dsm_m),
+        shift_m=shift_m,
+    )
+
+
+def _doc(found: Preflight, rereferenced_m: float | None) -> PreflightDoc:
+    nearest_m = found.min_distance_m
+    return PreflightDoc(
+        ok=found.ok({row.code for row in found.rows}),
+        rows=[CheckRow(code=row.code, state=row.state, text=row.text, mend=row.mend) for row in found.rows],
+        home_shift_m=found.home_shift_m if rereferenced_m is None else rereferenced_m,
+        rereferenced=rereferenced_m is not None,
+        min_distance_m=None if nearest_m is None or not np.isfinite(nearest_m) else nearest_m,
+        checked_utc=utc_now(),
+    )

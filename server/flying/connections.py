@@ -1,0 +1,87 @@
+"""The connections to vehicles that are wanted: asked of the link node, and again whenever it has forgotten them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Callable
+
+from server.errors import reported
+from server.flying.asking import Asks
+from telemetry.messages import LinkStatus
+from telemetry.requests import Adopt, Connect, Disconnect, Operator, Release
+
+log = logging.getLogger("hedgehop.flying")
+
+
+class Connections:
+    """``need_link()`` starts the link node; ``server_operator()`` is for what the server asks on its own."""
+
+    def __init__(
+        self,
+        link: Asks,
+        *,
+        need_link: Callable[[], Awaitable[None]],
+        server_operator: Callable[[], Operator],
+        configured: tuple[str, ...] = (),
+    ) -> None:
+        self._link, self._need_link, self._server_operator = link, need_link, server_operator
+        self._wanted: dict[str, bool] = dict.fromkeys(configured, True)
+        """Address -> whether the first vehicle heard on it is adopted."""
+        self._candidate: str | None = None
+        self._met = False
+        """Whether a link node has told what it holds: from then on this list is the truth, and not the node's."""
+        self._last_fault = ""
+        self.status: LinkStatus | None = None
+
+    @property
+    def wanted(self) -> list[str]:
+        return list(self._wanted)
+
+    async def ask_for_configured(self) -> None:
+        """At the start: a link node that is just starting has told nothing yet."""
+        for address, adopt in list(self._wanted.items()):
+            await self._ask(Connect(self._server_operator(), address, adopt), f"Connecting {address}")
+
+    async def connect(self, operator: Operator, address: str, *, adopt: bool) -> None:
+        """Raises AddressError, ConnectionFailedError."""
+        await self._need_link()
+        await self._link.call(Connect(operator, address, adopt))
+        self._wanted[address] = adopt
+
+    async def disconnect(self, operator: Operator, address: str) -> None:
+        self._wanted.pop(address, None)
+        await self._link.call(Disconnect(operator, address))
+
+    async def adopt(self, operator: Operator, candidate: str) -> None:
+        await self._link.call(Adopt(operator, candidate))
+        self._candidate = candidate
+
+    async def release(self, operator: Operator) -> None:
+        self._candidate = None
+        # Otherwise a link node that is started again would adopt what was just let go of.
+        self._wanted = dict.fromkeys(self._wanted, False)
+        await self._link.call(Release(operator))
+
+    async def on_status(self, status: LinkStatus) -> None:
+        """What the node holds is taken over from a server before; what it lacks is asked for again."""
+        self.status = status
+        held = {connection.address for connection in status.connections}
+        if not self._met:
+            self._wanted |= dict.fromkeys(held - self._wanted.keys(), False)
+            self._met = True
+        if status.adopted is not None:
+            self._candidate = status.adopted.id
+        for address in [address for address in self._wanted if address not in held]:
+            await self._ask(Connect(self._server_operator(), address, self._wanted[address]), f"Connecting {address}")
+        if status.adopted is None and self._candidate in {candidate.id for candidate in status.candidates}:
+            await self._ask(Adopt(self._server_operator(), self._candidate or ""), "Adopting the vehicle again")
+
+    async def _ask(self, request: Connect | Adopt, doing: str) -> None:
+        try:
+            await self._link.call(request)
+        except Exception as error:
+            fault = reported(error, log, doing).what
+            # Once a second it would fail the same way again.
+            if fault != self._last_fault:
+                log.warning("%s: %s", doing, fault)
+            self._last_fault = fault

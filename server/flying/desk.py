@@ -1,0 +1,237 @@
+"""The desk from which a vehicle is flown: mission up, check, start, and every other command.
+
+Commands are made here from live data only; nothing of a replay comes near it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from server.errors import ConflictError
+from server.flying.asking import Asks
+from server.flying.check_task import Checked
+from server.flying.onboard import Onboard, is_plan, onboard, read_onboard, write_onboard
+from server.flying.starting import Ready, check_start
+from server.flying.upload_task import MadeUpload
+from server.schemas import FlyMessage, FlyState, OnboardDoc, PlanDoc, ServerMessage, StartFlight
+from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
+from telemetry.messages import FlightStatus, Item, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
+from telemetry.vehicle import VehicleState
+
+if TYPE_CHECKING:
+    from telemetry.flight.targets import GuidedPlan
+
+
+class Works(Protocol):
+    """What is done in worker processes: ``server.flying.work``."""
+
+    async def made_upload(self, revision: int) -> MadeUpload: ...
+
+    async def checked(
+        self, record: PlanRecord, mission: OnboardMission, state: VehicleState, rereferenced_m: float | None
+    ) -> Checked: ...
+
+    async def guided(self, record: PlanRecord) -> GuidedPlan: ...
+
+    async def way_back(self, record: PlanRecord, state: VehicleState, from_item: int) -> tuple[int, float]: ...
+
+
+class FlightDesk:
+    """``present_document()`` is the open plan; ``publish_plan`` tells the recorder what is being flown."""
+
+    def __init__(
+        self,
+        link: Asks,
+        works: Works,
+        *,
+        file: Path,
+        present_document: Callable[[], PlanDoc],
+        vehicle: Callable[[], VehicleState | None],
+        tell: Callable[[ServerMessage], None],
+        publish_plan: Callable[[PlanRecord], None],
+    ) -> None:
+        self._link, self._works, self._file = link, works, file
+        self._present_document, self._vehicle, self._tell = present_document, vehicle, tell
+        self._publish_plan = publish_plan
+        self._onboard: Onboard | None = read_onboard(file)
+        self._status: LinkStatus | None = None
+        self._flight = FlightStatus()
+        self._ready: Ready | None = None
+        self._busy = ""
+        self._told: FlyState | None = None
+
+    @property
+    def record(self) -> PlanRecord | None:
+        """Of the mission that is on board, or was when the vehicle was last heard; None for a foreign one."""
+        kept, status = self._onboard, self._status
+        if kept is None or (status is not None and status.mission_digest not in (None, kept.record.digest)):
+            return None
+        return kept.record
+
+    @property
+    def state(self) -> FlyState:
+        return FlyState(
+            onboard=self._onboard_doc(),
+            preflight=None if self._ready is None else self._ready.doc,
+            resume_from_item=self._flight.broke_off_at,
+            busy=self._busy,
+        )
+
+    # What is heard
+
+    def on_link(self, status: LinkStatus) -> None:
+        self._status = status
+        if self._ready is not None and status.mission_digest not in (None, self._ready.digest):
+            self._ready = None
+        self.refresh()
+
+    def on_flight(self, flight: FlightStatus) -> None:
+        self._flight = flight
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Tells the pages, if there is anything new; also when the open plan has changed."""
+        if (state := self.state) != self._told:
+            self._told = state
+            self._tell(FlyMessage(fly=state))
+
+    # What is asked
+
+    async def upload(self, operator: Operator, revision: int) -> FlyState:
+        """Raises NotReadyError, NotCertifiedError, StaleRevisionError, TransferError and what the vehicle said."""
+        async with self._doing("Uploading"):
+            self._ready = None
+            made = await self._works.made_upload(revision)
+            await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
+        return self.state
+
+    async def check(self, operator: Operator) -> FlyState:
+        """Raises MissionUnknownError when what is on board did not come from here."""
+        async with self._doing("Checking the start"):
+            self._ready = None
+            checked = await self._checked(operator)
+            if (moved := checked.moved) is not None:
+                self._set_busy("Moving the heights to the vehicle's home")
+                await self._send(operator, moved.items, moved.record, moved.home)
+                checked = await self._checked(operator, rereferenced_m=moved.shift_m)
+            self._ready = Ready(checked.doc, self._digest(), self._state(), time.monotonic())
+            await self._certified(checked.certificate_json)
+        return self.state
+
+    async def start(self, operator: Operator, body: StartFlight) -> None:
+        """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted."""
+        async with self._doing("Starting"):
+            state = self._state()
+            check_start(self._ready, body, state, time.monotonic())
+            record = self._known_record(body.digest)
+            self._publish_plan(replace(record, t_utc_s=time.time()))
+            await self._link.call(await self._start_request(operator, body, record, state))
+
+    async def command(self, request: LinkRequest) -> None:
+        """At any time: whatever else is being done, the vehicle can be told to hold, return or land."""
+        await self._link.call(request)
+
+    # How
+
+    async def _send(
+        self, operator: Operator, items: tuple[Item, ...], record: PlanRecord, home: tuple[float, float, float]
+    ) -> None:
+        report = await self._link.call(Upload(operator, items, *home))
+        if not report.verified:
+            raise _not_verified(report)
+        record = replace(record, digest=report.onboard.digest, t_utc_s=time.time())
+        await self._keep(onboard(record, len(report.onboard.items), report.rounded))
+
+    async def _keep(self, kept: Onboard) -> None:
+        self._onboard = kept
+        if self._status is not None:
+            self._status = replace(self._status, mission_state="verified", mission_digest=kept.record.digest)
+        self._publish_plan(kept.record)
+        await asyncio.to_thread(write_onboard, self._file, kept)
+
+    async def _checked(self, operator: Operator, *, rereferenced_m: float | None = None) -> Checked:
+        mission = await self._link.call(Download(operator))
+        return await self._works.checked(self._known_record(mission.digest), mission, self._state(), rereferenced_m)
+
+    async def _start_request(
+        self, operator: Operator, body: StartFlight, record: PlanRecord, state: VehicleState
+    ) -> StartAuto | StartGuided:
+        if body.way == "guided":
+            if body.from_item != 1:
+                raise NotAllowedError(
+                    "The navigation script begins at the first waypoint.", advice="Go on with the mission in AUTO."
+                )
+            plan = await self._works.guided(record)
+            return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
+        if body.from_item == 1:
+            return StartAuto(operator, body.digest)
+        from_item, climb_to_m = await self._works.way_back(record, state, body.from_item)
+        return StartAuto(operator, body.digest, from_item, climb_to_m)
+
+    async def _certified(self, certificate_json: str) -> None:
+        if self._onboard is not None and certificate_json:
+            await self._keep(
+                replace(self._onboard, record=replace(self._onboard.record, certificate_json=certificate_json))
+            )
+
+    def _known_record(self, digest: str) -> PlanRecord:
+        if self._onboard is None or self._onboard.record.digest != digest:
+            raise MissionUnknownError(
+                "The mission on board was not uploaded from this plan.", advice="Upload the plan, then check again."
+            )
+        return self._onboard.record
+
+    def _state(self) -> VehicleState:
+        state = self._vehicle()
+        if state is None:
+            raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
+        return state
+
+    def _digest(self) -> str:
+        return "" if self._onboard is None else self._onboard.record.digest
+
+    def _onboard_doc(self) -> OnboardDoc:
+        status, kept = self._status, self._onboard
+        if status is None or status.mission_state != "verified" or kept is None:
+            return OnboardDoc(state="unknown" if status is None else status.mission_state)
+        if status.mission_digest != kept.record.digest:
+            return OnboardDoc(state="verified", digest=status.mission_digest)
+        return OnboardDoc(
+            state="verified",
+            digest=kept.record.digest,
+            plan_name=kept.record.name,
+            is_open_plan=is_plan(kept.record, self._present_document()),
+            items=kept.items,
+            rounded=list(kept.rounded),
+            rounded_note=kept.note,
+        )
+
+    @contextlib.asynccontextmanager
+    async def _doing(self, what: str) -> AsyncIterator[None]:
+        if self._busy:
+            raise ConflictError(f"Hedgehop is busy with the vehicle: {self._busy}.", advice="Wait until it is done.")
+        self._set_busy(what)
+        try:
+            yield
+        finally:
+            self._set_busy("")
+
+    def _set_busy(self, what: str) -> None:
+        self._busy = what
+        self.refresh()
+
+
+def _not_verified(report: UploadReport) -> TransferError:
+    first = report.differences[0] if report.differences else "It answered, but holds another mission."
+    more = f" ({len(report.differences) - 1} more such differences.)" if len(report.differences) > 1 else ""
+    return TransferError(
+        f"The vehicle does not hold the mission that was sent: {first}{more}",
+        advice="Upload again. Do not start what is on board.",
+    )

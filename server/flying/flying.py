@@ -1,0 +1,271 @@
+"""Flying as a whole: the server's place on the bus, and everything that hangs on it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import sys
+import time
+from collections.abc import Coroutine
+from typing import Any
+
+from server.errors import reported
+from server.flying.channel import Channel
+from server.flying.connections import Connections
+from server.flying.desk import FlightDesk
+from server.flying.nodes import Nodes
+from server.flying.plan_followed import PlanFollowed
+from server.flying.present import Present
+from server.flying.recording import RecordingDesk
+from server.flying.relay import Relay
+from server.flying.reviewing import Reviewing
+from server.flying.scenery import Scenery
+from server.flying.simulation import Simulation
+from server.flying.track_so_far import TrackSoFar
+from server.flying.work import FlightWork
+from server.hub import Hub
+from server.jobs import Lane
+from server.lease import Lease
+from server.library import Library
+from server.library.recordings import RecordingShelf
+from server.schemas import (
+    ErrorDoc,
+    LeaseDoc,
+    LeaseMessage,
+    LinkMessage,
+    NoticeMessage,
+    ServerMessage,
+    TransferMessage,
+)
+from server.workspace import Workspace
+from telemetry.bus import Bus
+from telemetry.link_client import LinkClient
+from telemetry.messages import FlightStatus, LinkStatus, PlanRecord, RecorderStatus, ServerAlive, Topic
+from telemetry.requests import RecorderRequest, ReplayRequest, StartRecording
+from telemetry.vehicle import VehicleState
+
+log = logging.getLogger("hedgehop.flying")
+
+RUNTIME_FOLDER = "run"
+ALIVE_EVERY_S = 1.0
+CALL_TIMEOUT_S = 15.0
+"""A node may have to start first, on a busy machine."""
+
+
+class Flying:
+    """Everything about vehicles that the server does; all methods belong to the event loop."""
+
+    def __init__(
+        self, bus: Bus, lease: Lease, library: Library, hub: Hub, workspace: Workspace, links: tuple[str, ...]
+    ) -> None:
+        self._bus, self._hub, self._workspace = bus, hub, workspace
+        self.lease = lease
+        self._present = Present(hub.publish)
+        tell = self._present.tell
+        runtime_dir = library.root / RUNTIME_FOLDER
+        self.shelf = RecordingShelf(library.root, terrains=library.terrains)
+        self.nodes = Nodes(runtime_dir, self.shelf.folder, tell)
+        self._lane = Lane("flight")
+        self.live, self.replay = Channel("live", tell), Channel("replay", tell)
+        link = LinkClient(bus)
+        self.connections = Connections(
+            link, need_link=self.nodes.link, server_operator=lease.server_operator, configured=links
+        )
+        work = FlightWork(
+            library,
+            link,
+            present_plan=lambda: workspace.state,
+            plan_lane=workspace.plan_lane,
+            flight_lane=self._lane,
+        )
+        self.desk = FlightDesk(
+            link,
+            work,
+            file=library.root / "onboard.json",
+            present_document=lambda: workspace.document,
+            vehicle=lambda: self.live.state,
+            tell=tell,
+            publish_plan=self._publish_plan,
+        )
+        self.recording = RecordingDesk(
+            self.shelf,
+            ask=self._ask_recorder,
+            run=workspace.board.run,
+            tell=tell,
+            in_review=lambda: self.reviewing.file_name,
+        )
+        self.reviewing = Reviewing(
+            library,
+            self.shelf,
+            workspace,
+            self.replay,
+            ask=self._ask_replay,
+            run=workspace.board.run,
+            tell=tell,
+            forget=self._present.forget_replay,
+        )
+        self.simulation = Simulation(library, workspace, self.nodes, self.connections, self._lane, runtime_dir)
+        self._scenery = Scenery(workspace.stage, {"live": self.live, "replay": self.replay})
+        self._followed = PlanFollowed(library, self.live, open_dsm=lambda: workspace.dsm)
+        self._track_so_far = TrackSoFar(self.shelf.folder, self.live, self._lane)
+
+    @classmethod
+    async def open(cls, library: Library, hub: Hub, workspace: Workspace, links: tuple[str, ...]) -> Flying:
+        """Joins the bus; nodes that a server before this one has left running are taken over. Raises BusError."""
+        lease = await asyncio.to_thread(Lease, library.root / "lease.json")
+        bus = await Bus.open(library.root / RUNTIME_FOLDER, "server")
+        return cls(bus, lease, library, hub, workspace, links)
+
+    # Life
+
+    def loops(self, *, demo: bool = False) -> list[Coroutine[Any, Any, None]]:
+        """To be run by the application's task group until it ends."""
+        self._workspace.changed = self._on_plan_changed
+        self._workspace.picture.held = lambda: self.armed
+        starts = [self._start(demo=demo), *([self._start_demo()] if demo else [])]
+        return [
+            *self._relay().loops(),
+            self.nodes.supervisor.run(),
+            self._beat(),
+            self._scenery.run(),
+            self._followed.run(),
+            *starts,
+        ]
+
+    async def close(self) -> None:
+        """Nodes go on while a vehicle is armed: the next server finds them again."""
+        if self.armed:
+            sys.stdout.write(_LEFT_FLYING)
+            sys.stdout.flush()
+        else:
+            await self.nodes.stop_all()
+        self.live.close()
+        self.replay.close()
+        await self._lane.close()
+        await self._bus.close()
+
+    @property
+    def armed(self) -> bool:
+        return self.live.state is not None and self.live.state.armed
+
+    async def _start(self, *, demo: bool) -> None:
+        await self.recording.refresh()
+        if self.connections.wanted or demo:
+            await self.nodes.link()
+            await self.connections.ask_for_configured()
+        if self.desk.record is not None:
+            self._publish_plan(self.desk.record)
+
+    async def _start_demo(self) -> None:
+        """Once the demo's plan is open; whoever is in charge by then stays so."""
+        try:
+            await self._workspace.demo_is_open.wait()
+            await self.simulation.start(self.lease.server_operator())
+        except Exception as error:
+            doc = reported(error, log, "Starting the simulated vehicle")
+            self._hub.publish(NoticeMessage(level="warning", error=doc))
+
+    async def _beat(self) -> None:
+        while True:
+            self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
+            self.live.tick()
+            await asyncio.sleep(ALIVE_EVERY_S)
+
+    # What is heard
+
+    def _relay(self) -> Relay:
+        relay, tell = Relay(self._bus), self._present.tell
+        relay.on(Topic.VEHICLE, self._on_state)
+        relay.on(Topic.TEXT, self.live.on_text, each=True)
+        relay.on(Topic.LINK, self._on_link)
+        relay.on(Topic.TRANSFER, lambda transfer: tell(TransferMessage(transfer=transfer)))
+        relay.on(Topic.FLIGHT, self._on_flight)
+        relay.on(Topic.RECORDER, self._on_recorder)
+        relay.on(Topic.REPLAY, self.reviewing.on_status)
+        relay.on(Topic.VEHICLE, self.replay.on_state, replayed=True)
+        relay.on(Topic.TEXT, self.replay.on_text, replayed=True, each=True)
+        relay.on(Topic.FLIGHT, self.replay.on_flight, replayed=True)
+        return relay
+
+    def _on_state(self, state: VehicleState) -> None:
+        was_armed = self.armed
+        self.live.on_state(state)
+        if self.armed != was_armed:
+            self._workspace.picture.again()
+
+    async def _on_link(self, status: LinkStatus) -> None:
+        self._present.tell(LinkMessage(link=status))
+        if status.adopted is None and self.live.state is not None:
+            self.live.forget()
+        self.desk.on_link(status)
+        self._followed.want(self.desk.record)
+        await self.connections.on_status(status)
+
+    def _on_flight(self, flight: FlightStatus) -> None:
+        self.live.on_flight(flight)
+        self.desk.on_flight(flight)
+
+    async def _on_recorder(self, status: RecorderStatus) -> None:
+        await self.recording.on_status(status)
+        await self._track_so_far.on_status(status)
+
+    def _on_plan_changed(self) -> None:
+        self.desk.refresh()
+        self._followed.want(self.desk.record)
+
+    def _publish_plan(self, record: PlanRecord) -> None:
+        self._followed.want(record)
+        self._bus.publish(Topic.PLAN, record)
+
+    # What is asked of other nodes
+
+    async def _ask_recorder(self, request: RecorderRequest) -> object:
+        await self.nodes.recorder()
+        result = str if isinstance(request, StartRecording) else type(None)
+        return await self._bus.call("recorder", request, result=result, timeout_s=CALL_TIMEOUT_S)
+
+    async def _ask_replay(self, request: ReplayRequest) -> object:
+        await self.nodes.replay()
+        return await self._bus.call("replay", request, result=type(None), timeout_s=CALL_TIMEOUT_S)
+
+    # Pages and who is in charge
+
+    def present_for(self, session_key: str) -> list[ServerMessage]:
+        """What a page is told right after its snapshot."""
+        return [*self._present.messages(), self._lease_message(session_key)]
+
+    async def page_opens(self, session_key: str) -> None:
+        if self.lease.take_if_free(session_key):
+            await self._lease_changed()
+
+    async def take_lease(self, session_key: str, name: str) -> LeaseDoc:
+        before = self.lease.take(session_key, name)
+        await self._lease_changed()
+        if before is not None and self.lease.holder is not None:
+            what = f"{self.lease.holder.name} has taken control of the vehicle."
+            doc = ErrorDoc(code="lease_taken", what=what, advice="Press Take control to have it back.")
+            self._hub.publish_to(before.session_key, NoticeMessage(level="warning", error=doc))
+        return self.lease.doc_for(session_key)
+
+    async def release_lease(self, session_key: str) -> LeaseDoc:
+        if self.lease.release(session_key):
+            await self._lease_changed()
+        return self.lease.doc_for(session_key)
+
+    async def _lease_changed(self) -> None:
+        self._hub.publish_each(self._lease_message)
+        try:
+            await asyncio.to_thread(self.lease.save)
+        except Exception as error:
+            log.warning("Noting who is in charge: %s", reported(error, log, "Noting who is in charge").what)
+
+    def _lease_message(self, session_key: str) -> LeaseMessage:
+        return LeaseMessage(lease=self.lease.doc_for(session_key))
+
+
+_LEFT_FLYING = (
+    "The vehicle is armed: its link and the recording go on without the server, for 10 seconds.\n"
+    "Start Hedgehop again within that time to stay in touch. After it, Hedgehop falls silent and the vehicle's own\n"
+    "failsafe decides; in GUIDED it is told to hold its position first.\n"
+)

@@ -1,0 +1,145 @@
+"""The vehicle against the plan that it flies and the surface model below it, position by position."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.dsm import Dsm
+from planning.following.live import Following, follow_on
+from planning.following.reference import Reference, reference_line
+from planning.following.surface import SurfaceDistance
+from planning.formats.wpl import read_wpl
+from planning.model import F64, finite_or_none
+from planning.vehicle_profile import parse_profile
+from server.placing import Placer, home_distance_bearing
+from server.schemas import FollowDoc
+from telemetry.messages import FlightStatus, PlanRecord
+from telemetry.vehicle import VehicleState
+
+NO_FLIGHT = FlightStatus()
+_OFF_PLAN = ("returning", "landed", "interrupted")
+MARGIN_M = 400.0
+"""Around a plan: what lies farther away is not asked for, and a large model would take seconds and gigabytes."""
+
+_KERNELS = threading.Lock()
+"""Not every threading layer of the kernels bears two callers at once: some end the whole process."""
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A plan over its surface model, made ready to be followed."""
+
+    placer: Placer
+    surface: SurfaceDistance
+    reference: Reference
+
+    @staticmethod
+    def of(record: PlanRecord, dsm: Dsm) -> Followed:
+        """Takes a second or so: for a thread. Raises PlanningError."""
+        mission = read_wpl(record.mission_wpl)
+        profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
+        return Followed.over(reference_line(mission, dsm, profile), dsm)
+
+    @staticmethod
+    def over(reference: Reference, dsm: Dsm) -> Followed:
+        with _KERNELS:
+            surface = SurfaceDistance(_window(dsm, reference.points_m))
+        return Followed(Placer(dsm), surface, reference)
+
+
+class Follower:
+    """Remembers where along the plan the vehicle was; quick enough for the event loop."""
+
+    def __init__(self, followed: Followed | None = None, *, over: Dsm | None = None) -> None:
+        """``over``: the surface model below, when there is no plan to follow."""
+        self._followed = followed
+        self._over = None if over is None else Placer(over)
+        self._following = Following()
+        self._share: float | None = None
+
+    def begin_again(self) -> None:
+        """The next position is the first of a flight, or lies elsewhere."""
+        self._following, self._share = Following(), None
+
+    def follow(self, state: VehicleState, flight: FlightStatus = NO_FLIGHT) -> FollowDoc | None:
+        """None as long as there is no position. On the way home nothing is held against the plan any more."""
+        if state.lat_deg is None:
+            return None
+        placer = self._over if self._followed is None else self._followed.placer
+        place = None if placer is None else placer.place(state)
+        distance_m, bearing_deg = home_distance_bearing(state)
+        if placer is None or place is None:
+            near = {}
+        elif self._followed is None:
+            near = {"height_above_dsm_m": finite_or_none(float(place[2] - placer.dsm.elevation_at(place[None, :2])[0]))}
+        else:
+            xyz_m = (float(place[0]), float(place[1]), float(place[2]))
+            near = self._over_ground(self._followed, xyz_m)
+            if flight.phase not in _OFF_PLAN:
+                near |= self._against_plan(self._followed, xyz_m, state)
+            elif flight.phase != "landed":
+                near["progress"] = self._share
+        return FollowDoc(
+            **{**_UNKNOWN, "alt_rel_home_m": state.alt_rel_home_m, **near},
+            home_distance_m=distance_m,
+            home_bearing_deg=bearing_deg,
+        )
+
+    def _over_ground(self, followed: Followed, xyz_m: tuple[float, float, float]) -> dict[str, float | None]:
+        return {
+            "height_above_dsm_m": followed.surface.height_m(xyz_m),
+            "distance_to_dsm_m": _distance_m(followed.surface, xyz_m),
+            "alt_rel_home_m": xyz_m[2] - followed.reference.home_alt_dsm_m,
+        }
+
+    def _against_plan(
+        self, followed: Followed, xyz_m: tuple[float, float, float], state: VehicleState
+    ) -> dict[str, float | None]:
+        self._following, progress = follow_on(self._following, followed.reference, xyz_m, state.t_utc_s)
+        at, self._share = self._following.at, progress.share
+        assert at is not None
+        return {
+            "s_m": at.s_m,
+            "cross_track_m": at.cross_track_m,
+            "height_error_m": at.height_error_m,
+            "progress": progress.share,
+            "time_left_s": progress.time_left_s,
+            # On the ground nobody is late.
+            "behind_plan_s": progress.behind_plan_s if state.armed else None,
+        }
+
+
+def _distance_m(surface: SurfaceDistance, xyz_m: tuple[float, float, float]) -> float | None:
+    """None while another plan is being made ready: the next position will tell."""
+    if not _KERNELS.acquire(blocking=False):
+        return None
+    try:
+        return surface.distance_m(xyz_m)
+    finally:
+        _KERNELS.release()
+
+
+_UNKNOWN: dict[str, float | None] = dict.fromkeys(
+    (
+        "s_m",
+        "cross_track_m",
+        "height_error_m",
+        "height_above_dsm_m",
+        "distance_to_dsm_m",
+        "progress",
+        "time_left_s",
+        "behind_plan_s",
+    )
+)
+
+
+def _window(dsm: Dsm, points_m: F64) -> Dsm:
+    low, high = points_m[:, :2].min(axis=0) - MARGIN_M, points_m[:, :2].max(axis=0) + MARGIN_M
+    rows, columns = dsm.fractional_cell(np.array([low, high]))
+    row0, row1 = math.floor(rows.min()), math.ceil(rows.max())
+    col0, col1 = math.floor(columns.min()), math.ceil(columns.max())
+    return dsm.window(row0, col0, row1 - max(0, row0), col1 - max(0, col0))

@@ -1,0 +1,56 @@
+"""Which node processes run, and what the pages are told of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from server.flying.ground_task import Ground
+from server.schemas import NodeDoc, NodesMessage, ServerMessage
+from server.supervisor import NodeState, Supervisor
+from telemetry.node_lock import running_node
+
+LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
+
+
+class Nodes:
+    """Starts nodes when they are needed. Those that outlived a server before this one are taken over."""
+
+    def __init__(self, runtime_dir: Path, recordings_dir: Path, tell: Callable[[ServerMessage], None]) -> None:
+        self._runtime_dir, self._recordings_dir, self._tell = runtime_dir, recordings_dir, tell
+        self.supervisor = Supervisor(runtime_dir, changed=self._changed)
+
+    async def simulator_link(self) -> str | None:
+        """Where the simulated vehicle sends to, if one runs."""
+        facts = await asyncio.to_thread(running_node, self._runtime_dir, SIMULATOR)
+        if facts is None or "--link" not in facts.arguments:
+            return None
+        return facts.arguments[facts.arguments.index("--link") + 1]
+
+    async def link(self) -> None:
+        """With the recorder: a flight that nobody recorded cannot be looked at again."""
+        await self.supervisor.start(LINK, [])
+        await self.recorder()
+
+    async def recorder(self) -> None:
+        await self.supervisor.start(RECORDER, ["--recordings", str(self._recordings_dir)])
+
+    async def replay(self) -> None:
+        await self.supervisor.start(REPLAY, [])
+
+    async def simulator(self, ground: Ground, link: str, *, rtl_height_m: float) -> None:
+        """Set up as the plan's profile says of its vehicle."""
+        home = f"{ground.home_lat_deg:.9f},{ground.home_lon_deg:.9f},{ground.home_alt_m:.3f}"
+        rtl = f"RTL_ALT={100 * rtl_height_m:.0f}"
+        arguments = ["--home", home, "--dsm", str(ground.path), "--link", link, "--parameter", rtl]
+        await self.supervisor.start(SIMULATOR, arguments)
+
+    async def stop_all(self) -> None:
+        """The simulated vehicle last: until then its link may say farewell."""
+        for names in ((REPLAY, LINK, RECORDER), (SIMULATOR,)):
+            await asyncio.gather(*(self.supervisor.stop(name) for name in names))
+
+    def _changed(self, nodes: Sequence[NodeState]) -> None:
+        docs = [NodeDoc(name=n.name, state=n.state, restarts=n.restarts, text=n.text) for n in nodes]
+        self._tell(NodesMessage(nodes=docs))

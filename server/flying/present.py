@@ -1,0 +1,49 @@
+"""The present values of flying: what every page is told, and what a page that opens later must see at once."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+
+from server.hub import key_of
+from server.schemas import ReplayMessage, ServerMessage, TextMessage, VehicleMessage
+
+TEXTS_KEPT = 50
+
+
+class Present:
+    """Publishes and keeps: the latest of each kind, and the vehicles' last words in their order."""
+
+    def __init__(self, publish: Callable[[ServerMessage], None]) -> None:
+        self._publish = publish
+        self._latest: dict[object, ServerMessage] = {}
+        self._texts: deque[TextMessage] = deque(maxlen=TEXTS_KEPT)
+
+    def tell(self, message: ServerMessage) -> None:
+        if isinstance(message, TextMessage):
+            self._texts.append(message)
+        else:
+            self._latest[key_of(message)] = message
+        self._publish(message)
+
+    def forget_replay(self) -> None:
+        """Another recording, or none: what the last one said is over."""
+        kept = [text for text in self._texts if text.source == "live"]
+        self._texts.clear()
+        self._texts.extend(kept)
+        self._latest = {key: message for key, message in self._latest.items() if not _is_replayed(message)}
+
+    def messages(self) -> list[ServerMessage]:
+        """For a page that has just opened; ages count from now."""
+        return [*(_at_present(message) for message in self._latest.values()), *self._texts]
+
+
+def _at_present(message: ServerMessage) -> ServerMessage:
+    if isinstance(message, ReplayMessage) or (isinstance(message, VehicleMessage) and message.source == "live"):
+        return message.model_copy(update={"now_mono_s": time.monotonic()})
+    return message
+
+
+def _is_replayed(message: ServerMessage) -> bool:
+    return getattr(message, "source", "live") == "replay"

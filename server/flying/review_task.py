@@ -1,0 +1,107 @@
+"""What the file lane's worker does for a review: reads the recording, finds what it was flown over, judges it.
+
+The readers bring in the wire protocols; they are imported by the worker only, so that the page answers sooner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planning.following.reference import Reference
+from planning.plan import plan_mission
+from server.documents import request_from_doc
+from server.jobs import Progress
+from server.library.terrain_of import FlownOver
+from server.library.terrains import load_terrain
+from server.scene.payload import ReviewScene
+from server.schemas import PlanDoc, RecordingDoc, ReviewDoc
+
+if TYPE_CHECKING:
+    from telemetry.recording.flight_log import FlightLog
+
+_PLACES = 12
+_DRAWN_POINTS = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class FlownTerrain:
+    """A surface model of the library."""
+
+    terrain_id: str
+    name: str
+    directory: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Reviewed:
+    """All that is shown of a recording."""
+
+    doc: ReviewDoc
+    start_utc_s: float
+    terrain_id: str | None
+    scene: ReviewScene | None
+    reference: Reference | None
+    """In the coordinates of that surface model; None without one, or without a plan."""
+
+
+def flown_over(path: Path, *, report: Progress) -> FlownOver:
+    """What the recording tells about its surface model. Raises RecordingError."""
+    report("Reading the recording", None)
+    log = _log(path, path.stat().st_mtime_ns)
+    rows = np.unique(np.linspace(0, max(0, len(log.track) - 1), _PLACES).astype(int)) if len(log.track) else []
+    places = tuple((float(log.track.lat_deg[row]), float(log.track.lon_deg[row])) for row in rows)
+    if log.plan is None:
+        return FlownOver(places=places)
+    return FlownOver(log.plan.terrain_id, log.plan.terrain_sha256, places)
+
+
+def review(
+    path: Path, recording: RecordingDoc, terrain: FlownTerrain | None, plan: PlanDoc | None, *, report: Progress
+) -> Reviewed:
+    """Judges a recording against its own plan, or ``plan``, over a surface model.
+
+    Raises RecordingError, PlanningError.
+    """
+    from server.review import review as judged
+    from server.review_flight import placed_flight
+
+    report("Reading the recording", None)
+    log = _log(path, path.stat().st_mtime_ns)
+    dsm = None if terrain is None else load_terrain(terrain.directory)
+    mission = None
+    if plan is not None and dsm is not None:
+        report("Computing the plan", None)
+        mission = plan_mission(dsm, request_from_doc(plan, dsm)).mission
+    report("Judging the flight", None)
+    doc = judged(log, recording, dsm=dsm, mission=mission, terrain_name="" if terrain is None else terrain.name)
+    if plan is not None:
+        doc = doc.model_copy(update={"plan_name": plan.name})
+    flight = None if dsm is None else placed_flight(log, dsm=dsm, mission=mission)
+    reference = None if flight is None else flight.reference
+    return Reviewed(
+        doc=doc,
+        start_utc_s=log.start_utc_s,
+        terrain_id=None if terrain is None else terrain.terrain_id,
+        scene=None if flight is None else _scene(flight.track.xyz_m, reference),
+        reference=reference,
+    )
+
+
+def _scene(flown_m: np.ndarray, reference: Reference | None) -> ReviewScene:
+    every = max(1, len(flown_m) // _DRAWN_POINTS)
+    planned_m = np.zeros((0, 3)) if reference is None else reference.points_m
+    return ReviewScene(planned_m=planned_m, flown_m=flown_m[::every])
+
+
+@lru_cache(maxsize=1)
+def _log(path: Path, changed_ns: int) -> FlightLog:
+    """Read once for both questions."""
+    from telemetry.recording.flight_log import read_flight_log
+
+    del changed_ns
+    return read_flight_log(path)

@@ -1,0 +1,181 @@
+"""Review: one recording is open at a time, judged by a worker and played by the replay node.
+
+What is replayed is only looked at: nothing here knows the way to the link node.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from server.errors import NotReadyError
+from server.flying import review_task
+from server.flying.channel import Channel
+from server.flying.following import Followed, Follower
+from server.flying.recording import Run
+from server.flying.review_task import FlownTerrain, Reviewed
+from server.jobs import Lane, Progress
+from server.library import Library
+from server.library.recordings import RecordingShelf
+from server.library.terrain_of import FlownOver, terrain_of
+from server.scene.payload import ReviewScene
+from server.schemas import (
+    OpenReview,
+    PlanDoc,
+    PlayReview,
+    RecordingDoc,
+    ReplayMessage,
+    ReviewMessage,
+    ServerMessage,
+)
+from telemetry.messages import ReplayStatus
+from telemetry.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+
+_SEEK_S = 2.0
+"""A jump of the clock beyond what playing explains."""
+
+
+class Screen(Protocol):
+    """The part of the workspace that shows a recording in the 3D view instead of the plan."""
+
+    @property
+    def document(self) -> PlanDoc: ...
+
+    def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Open:
+    path: Path
+    reviewed: Reviewed
+
+
+class Reviewing:
+    """``ask`` reaches the replay node, which is started for it; ``channel`` is the replayed vehicle's."""
+
+    def __init__(
+        self,
+        library: Library,
+        shelf: RecordingShelf,
+        screen: Screen,
+        channel: Channel,
+        *,
+        ask: Callable[[ReplayRequest], Awaitable[object]],
+        run: Run,
+        tell: Callable[[ServerMessage], None],
+        forget: Callable[[], None],
+    ) -> None:
+        self._library, self._shelf, self._screen, self._channel = library, shelf, screen, channel
+        self._ask, self._run, self._tell, self._forget = ask, run, tell, forget
+        self._open: _Open | None = None
+        self._opening = asyncio.Lock()
+        self._last: ReplayStatus | None = None
+        self._last_mono_s = 0.0
+
+    @property
+    def file_name(self) -> str | None:
+        return None if self._open is None else self._open.path.name
+
+    async def open(self, body: OpenReview) -> None:
+        """Raises NotFoundError, RecordingError, NotReadyError."""
+        async with self._opening:
+            path = await asyncio.to_thread(self._shelf.path, body.recording_id)
+            doc = await asyncio.to_thread(self._shelf.doc, body.recording_id)
+            plan = self._screen.document if body.use_open_plan else None
+            terrain_id = plan.terrain_id if plan is not None else body.terrain_id
+
+            async def work(lane: Lane, progress: Progress) -> Reviewed:
+                return await self._reviewed(lane, progress, path, doc, plan, terrain_id)
+
+            reviewed = await self._run(f"Opening {doc.name}", work)
+            assert isinstance(reviewed, Reviewed)
+            followed = await asyncio.to_thread(self._followed, reviewed)
+            await self._ask(OpenRecording(str(path)))
+            self._show(_Open(path, reviewed), Follower(followed))
+
+    async def close(self) -> None:
+        async with self._opening:
+            if self._open is None:
+                return
+            self._open = None
+            self._screen.show_review(None, None)
+            self._forget()
+            self._channel.forget()
+            self._tell(ReviewMessage(review=None))
+            await self._ask(CloseRecording())
+
+    async def play(self, body: PlayReview) -> None:
+        if self._open is None:
+            raise NotReadyError("No recording is open.", advice="Open one first.")
+        start_s = self._open.reviewed.start_utc_s
+        at_utc_s = None if body.at_s is None else start_s + body.at_s
+        await self._ask(Play(body.playing, at_utc_s, body.speed))
+
+    async def on_status(self, status: ReplayStatus) -> None:
+        """Where the replay is. A replay node that was started again gets its recording again."""
+        before, before_mono_s, now_mono_s = self._last, self._last_mono_s, time.monotonic()
+        self._last, self._last_mono_s = status, now_mono_s
+        self._tell(ReplayMessage(now_mono_s=now_mono_s, replay=status))
+        if self._opening.locked():
+            return
+        if self._open is None:
+            if status.recording is not None:
+                # Of a server before this one.
+                await self._ask(CloseRecording())
+            return
+        if status.recording is None and status.error is None:
+            await self._ask(OpenRecording(str(self._open.path)))
+        elif before is None or _jumped(before, status, now_mono_s - before_mono_s):
+            self._cut_track(self._open.reviewed, status.at_utc_s)
+
+    async def _reviewed(
+        self,
+        lane: Lane,
+        progress: Progress,
+        path: Path,
+        doc: RecordingDoc,
+        plan: PlanDoc | None,
+        terrain_id: str | None,
+    ) -> Reviewed:
+        if terrain_id is None:
+            flown: FlownOver = await lane.call(review_task.flown_over, path, progress=progress)
+            found = terrain_of(flown, self._library.terrains())
+            terrain_id = None if found is None else found.id
+        terrain = None if terrain_id is None else self._terrain(terrain_id)
+        return await lane.call(review_task.review, path, doc, terrain, plan, progress=progress)
+
+    def _terrain(self, terrain_id: str) -> FlownTerrain:
+        directory = self._library.terrain_dir(terrain_id)
+        doc = next(doc for doc in self._library.terrains() if doc.id == terrain_id)
+        return FlownTerrain(terrain_id, doc.name, directory)
+
+    def _followed(self, reviewed: Reviewed) -> Followed | None:
+        if reviewed.terrain_id is None or reviewed.reference is None:
+            return None
+        return Followed.over(reviewed.reference, self._library.load_terrain(reviewed.terrain_id))
+
+    def _show(self, opened: _Open, follower: Follower) -> None:
+        self._open, self._last = opened, None
+        reviewed = opened.reviewed
+        self._forget()
+        self._channel.forget()
+        self._channel.follower = follower
+        self._screen.show_review(reviewed.terrain_id, reviewed.scene)
+        self._tell(ReviewMessage(review=reviewed.doc))
+        self._cut_track(reviewed, reviewed.start_utc_s)
+
+    def _cut_track(self, reviewed: Reviewed, at_utc_s: float) -> None:
+        """After a seek the path behind the vehicle is the one that was flown until then."""
+        self._channel.follower.begin_again()
+        self._channel.track.load(reviewed.doc.series, reviewed.start_utc_s, until_utc_s=at_utc_s)
+        self._channel.publish_track()
+
+
+def _jumped(before: ReplayStatus, now: ReplayStatus, after_s: float) -> bool:
+    explained_s = before.speed * after_s if before.playing else 0.0
+    away_s = abs(now.at_utc_s - before.at_utc_s - explained_s)
+    return now.recording != before.recording or away_s > _SEEK_S * max(1.0, before.speed, now.speed)

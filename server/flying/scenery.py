@@ -1,0 +1,105 @@
+"""Puts the vehicles and their paths into the 3D view, ten times a second, on whatever surface model is on show."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Protocol
+
+import numpy as np
+
+from planning.dsm import Dsm
+from planning.model import F64
+from server.flying.channel import Channel
+from server.placing import Placer
+from server.scene.vehicle import VehiclePose
+from server.schemas import Source
+from telemetry.vehicle import VehicleState
+
+PERIOD_S = 0.1
+_TRACK_EVERY = 5
+"""Of the periods: a path grows by half a metre in one."""
+
+
+class Stage(Protocol):
+    """The part of ``server.scene.vehicles.Vehicles`` that is used here."""
+
+    @property
+    def dsm(self) -> Dsm | None: ...
+
+    def move(self, source: Source, pose: VehiclePose | None) -> None: ...
+
+    def follow(self, source: Source, points_m: F64) -> None: ...
+
+
+class Scenery:
+    """Draws only what has changed since the last time."""
+
+    def __init__(self, stage: Stage | None, channels: dict[Source, Channel]) -> None:
+        self._stage = stage
+        self._actors = {source: _Actor(source, channel) for source, channel in channels.items()}
+        self._placer: Placer | None = None
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        beat = 0
+        while True:
+            await asyncio.sleep(PERIOD_S)
+            beat += 1
+            self.draw(with_tracks=beat % _TRACK_EVERY == 0)
+
+    def draw(self, *, with_tracks: bool = True) -> None:
+        dsm = None if self._stage is None else self._stage.dsm
+        if self._stage is None or dsm is None:
+            self._placer = None
+            return
+        if self._placer is None or self._placer.dsm is not dsm:
+            self._placer = Placer(dsm)
+            for actor in self._actors.values():
+                actor.forget()
+        for actor in self._actors.values():
+            actor.move(self._stage, self._placer)
+            if with_tracks:
+                actor.draw_track(self._stage, self._placer)
+
+
+class _Actor:
+    """One vehicle on the stage, and what of it is drawn already."""
+
+    def __init__(self, source: Source, channel: Channel) -> None:
+        self._source: Source = source
+        self._channel = channel
+        self.forget()
+
+    def forget(self) -> None:
+        self._drawn: VehicleState | None = None
+        self._placed = 0
+        self._points = np.zeros((0, 3))
+
+    def move(self, stage: Stage, placer: Placer) -> None:
+        state = self._channel.state
+        if state is not self._drawn:
+            self._drawn = state
+            stage.move(self._source, None if state is None else _pose(state, placer))
+
+    def draw_track(self, stage: Stage, placer: Placer) -> None:
+        states = self._channel.track.states
+        if len(states) == self._placed:
+            return
+        if len(states) < self._placed:
+            self._placed, self._points = 0, np.zeros((0, 3))
+        self._points = np.concatenate([self._points, placer.places(states[self._placed :])])
+        self._placed = len(states)
+        stage.follow(self._source, self._points)
+
+
+def _pose(state: VehicleState, placer: Placer) -> VehiclePose | None:
+    place = placer.place(state)
+    if place is None:
+        return None
+    return VehiclePose(
+        place,
+        roll_rad=state.roll_rad or 0.0,
+        pitch_rad=state.pitch_rad or 0.0,
+        heading_rad=state.heading_rad or 0.0,
+        home_m=placer.home(state),
+    )

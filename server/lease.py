@@ -1,0 +1,104 @@
+"""Who is in charge: one session at a time may command the vehicle, and every command carries a fencing token.
+
+The token only ever grows, across restarts too: it counts milliseconds since 1970, or one more than the last one if
+the clock went back. Whoever held the lease before has a lower token, and the link node refuses it.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.errors import NotInChargeError
+from server.library.files import write_atomically
+from server.schemas import LeaseDoc
+from telemetry.requests import Operator
+
+SERVER_NAME = "Hedgehop"
+"""What the server calls itself when it opens the connections it was started with."""
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    session_key: str
+    name: str
+
+
+class Lease:
+    """Every method belongs to the event loop's thread, but for ``save``, which may block."""
+
+    def __init__(self, file: Path, *, clock_utc_s: Callable[[], float] = time.time) -> None:
+        self._file, self._clock_utc_s = file, clock_utc_s
+        self._token, self._holder = self._read()
+
+    @property
+    def holder(self) -> Holder | None:
+        return self._holder
+
+    def doc_for(self, session_key: str) -> LeaseDoc:
+        holder = self._holder
+        return LeaseDoc(
+            holder=None if holder is None else holder.name,
+            mine=holder is not None and holder.session_key == session_key,
+        )
+
+    def take_if_free(self, session_key: str) -> bool:
+        """The first one to open a page takes charge; False when somebody is in charge already."""
+        if self._holder is not None:
+            return False
+        self.take(session_key)
+        return True
+
+    def take(self, session_key: str, name: str = "") -> Holder | None:
+        """Takes charge; the one who was in charge before, unless it was this session."""
+        before = self._holder
+        self._holder = Holder(session_key, name or default_name(session_key))
+        self._next_token()
+        return before if before is not None and before.session_key != session_key else None
+
+    def release(self, session_key: str) -> bool:
+        """Lets go, if this session was in charge."""
+        if self._holder is None or self._holder.session_key != session_key:
+            return False
+        self._holder = None
+        self._next_token()
+        return True
+
+    def operator(self, session_key: str) -> Operator:
+        """What a command of this session carries. Raises NotInChargeError when another one, or nobody, is in charge."""
+        holder = self._holder
+        if holder is None or holder.session_key != session_key:
+            who = "Nobody is" if holder is None else f"{holder.name} is"
+            raise NotInChargeError(f"{who} in charge of the vehicle.", advice="Press Take control first.")
+        return Operator(holder.name, self._token)
+
+    def server_operator(self) -> Operator:
+        """For what the server itself asks of the link node: never against the one in charge."""
+        return Operator(SERVER_NAME, self._token)
+
+    def save(self) -> None:
+        """Raises StorageError; nothing is lost but that a restart forgets who was in charge."""
+        holder = self._holder
+        kept = {"token": self._token, "holder": None if holder is None else [holder.session_key, holder.name]}
+        write_atomically(self._file, json.dumps(kept).encode())
+
+    def _next_token(self) -> None:
+        self._token = max(self._token + 1, int(1000 * self._clock_utc_s()))
+
+    def _read(self) -> tuple[int, Holder | None]:
+        now = int(1000 * self._clock_utc_s())
+        try:
+            kept = json.loads(self._file.read_text(encoding="utf-8"))
+            holder = None if kept["holder"] is None else Holder(*(str(part) for part in kept["holder"]))
+            return max(int(kept["token"]) + 1, now), holder
+        except (FileNotFoundError, ValueError, TypeError, KeyError):
+            # A damaged file costs pressing a button, never a refused start.
+            return now, None
+
+
+def default_name(session_key: str) -> str:
+    """Sessions have no names; four characters tell them apart, and stay the same after a restart."""
+    return f"Operator {session_key[:4]}"

@@ -1,0 +1,77 @@
+"""Where a vehicle is on a surface model: its height above home counts from the model's height at its actual home."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from planning.dsm import Dsm, is_amsl
+from planning.model import F64
+from telemetry.vehicle import VehicleState
+
+_EARTH_RADIUS_M = 6_371_008.8
+
+
+class Placer:
+    """One surface model; remembers the height at home, which seldom moves."""
+
+    def __init__(self, dsm: Dsm) -> None:
+        self.dsm = dsm
+        self._home_alt_dsm_m = lru_cache(maxsize=8)(self._ground_alt_dsm_m)
+
+    def place(self, state: VehicleState) -> F64 | None:
+        """(3,) x, y, alt_dsm in the model's coordinates; None where it cannot be told."""
+        if state.lat_deg is None or state.lon_deg is None:
+            return None
+        alt_dsm_m = self._alt_dsm_m(state)
+        if alt_dsm_m is None:
+            return None
+        xy_m = self.dsm.xy_from_lat_lon(np.array([[state.lat_deg, state.lon_deg]]))[0]
+        place = np.array([xy_m[0], xy_m[1], alt_dsm_m])
+        return place if np.isfinite(place).all() else None
+
+    def places(self, states: Sequence[VehicleState]) -> F64:
+        """(N, 3) of those of the states that can be placed, in their order."""
+        known = [(s, alt_m) for s in states if s.lat_deg is not None and (alt_m := self._alt_dsm_m(s)) is not None]
+        lat_lon_deg = np.array([(s.lat_deg, s.lon_deg) for s, _ in known], dtype=np.float64).reshape(-1, 2)
+        points = np.column_stack([self.dsm.xy_from_lat_lon(lat_lon_deg), [alt_m for _, alt_m in known]])
+        return points[np.isfinite(points).all(axis=1)]
+
+    def home(self, state: VehicleState) -> F64 | None:
+        """(3,) the vehicle's actual home on the model's ground."""
+        if state.home_lat_deg is None or state.home_lon_deg is None:
+            return None
+        xy_m = self.dsm.xy_from_lat_lon(np.array([[state.home_lat_deg, state.home_lon_deg]]))[0]
+        place = np.array([xy_m[0], xy_m[1], self._home_alt_dsm_m(state.home_lat_deg, state.home_lon_deg)])
+        return place if np.isfinite(place).all() else None
+
+    def _alt_dsm_m(self, state: VehicleState) -> float | None:
+        if state.alt_rel_home_m is not None and state.home_lat_deg is not None and state.home_lon_deg is not None:
+            home_m = self._home_alt_dsm_m(state.home_lat_deg, state.home_lon_deg)
+            if math.isfinite(home_m):
+                return home_m + state.alt_rel_home_m
+        if state.alt_amsl_m is not None and is_amsl(self.dsm.vertical_datum):
+            return state.alt_amsl_m
+        return None
+
+    def _ground_alt_dsm_m(self, lat_deg: float, lon_deg: float) -> float:
+        return float(self.dsm.elevation_at(self.dsm.xy_from_lat_lon(np.array([[lat_deg, lon_deg]])))[0])
+
+
+def home_distance_bearing(state: VehicleState) -> tuple[float | None, float | None]:
+    """Metres from the vehicle to its home, and degrees clockwise from north; on the sphere."""
+    if state.lat_deg is None or state.lon_deg is None or state.home_lat_deg is None or state.home_lon_deg is None:
+        return None, None
+    north = math.radians(state.home_lat_deg - state.lat_deg)
+    east = math.radians(state.home_lon_deg - state.lon_deg) * math.cos(math.radians(state.lat_deg))
+    return _EARTH_RADIUS_M * math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360.0
+
+
+def metres_apart(a_lat_lon_deg: tuple[float, float], b_lat_lon_deg: tuple[float, float]) -> float:
+    """Between two places near each other, on the sphere."""
+    north = math.radians(b_lat_lon_deg[0] - a_lat_lon_deg[0])
+    east = math.radians(b_lat_lon_deg[1] - a_lat_lon_deg[1]) * math.cos(math.radians(a_lat_lon_deg[0]))
+    return _EARTH_RADIUS_M * math.hypot(north, east)

@@ -1,0 +1,108 @@
+"""Review: what a recorded flight came to, against its plan and over the surface model."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from planning.dsm import Dsm
+from planning.following.figures import Judged, judge
+from planning.model import Mission
+from server.review_curves import curves, events, figures_doc, histogram_doc, predicted_note
+from server.review_flight import Flight, placed_flight
+from server.schemas.flight import RecordingDoc
+from server.schemas.review import ReviewDoc, ReviewSeries
+from telemetry.recording.flight_log import FlightLog
+
+EMPTY = ReviewSeries(
+    t_s=[],
+    alt_rel_home_m=[],
+    reference_alt_rel_home_m=[],
+    ground_rel_home_m=[],
+    cross_track_m=[],
+    s_m=[],
+    distance_to_dsm_m=[],
+)
+
+
+def review(
+    log: FlightLog,
+    recording: RecordingDoc,
+    *,
+    dsm: Dsm | None = None,
+    mission: Mission | None = None,
+    terrain_name: str = "",
+    truth: bool = False,
+) -> ReviewDoc:
+    """Judge a flight. Takes a second or two for a long one: not for the event loop.
+
+    ``mission`` stands in for the recording's own; ``truth`` takes a simulator's true positions instead of
+    the vehicle's estimate. What is missing is null, and ``notes`` say why.
+    """
+    flight = placed_flight(log, dsm=dsm, mission=mission, truth=truth)
+    judged = _judged(flight)
+    figures = judged.figures if judged else None
+    return ReviewDoc(
+        recording=recording,
+        start_utc=iso_utc(log.start_utc_s),
+        duration_s=log.end_utc_s - log.start_utc_s,
+        first_waypoint_t_s=figures.start_s if figures else None,
+        last_waypoint_t_s=figures.end_s if figures and figures.completed else None,
+        figures=figures_doc(flight, figures) if flight and figures else None,
+        series=curves(flight, judged) if flight else EMPTY,
+        histogram=histogram_doc(figures) if figures else None,
+        events=events(log),
+        plan_name=log.plan.name if log.plan and mission is None else "",
+        terrain_name=terrain_name,
+        notes=_notes(flight, judged, dsm, log),
+    )
+
+
+def _judged(flight: Flight | None) -> Judged | None:
+    if flight is None or flight.reference is None:
+        return None
+    return judge(flight.reference, flight.track, flight.surface)
+
+
+def _notes(flight: Flight | None, judged: Judged | None, dsm: Dsm | None, log: FlightLog) -> list[str]:
+    if flight is None:
+        return list(dict.fromkeys([*log.faults, "The recording holds no position of the vehicle."]))
+    notes = list(flight.notes)
+    if dsm is None:
+        notes.append("There is no surface model: distances to the ground are not known.")
+    elif log.plan and log.plan.terrain_sha256 and log.plan.terrain_sha256 != dsm.sha256:
+        notes.append(f"The flight was planned over another surface model ({log.plan.terrain_name}).")
+    if judged is None:
+        return notes
+    if judged.figures is None:
+        return [*notes, "The flight never came to the mission's line: there are no figures."]
+    figures = judged.figures
+    if figures.told_by == "geometry":
+        notes.append("The vehicle did not say what it reached: waypoints count where the track is nearest to them.")
+    if not figures.completed:
+        notes.append("The last waypoint was not reached: the figures end where the mission was left.")
+    if figures.unknown_positions:
+        notes.append(f"{figures.unknown_positions} positions lie over terrain that the surface model does not know.")
+    note = predicted_note(flight.reference, log)
+    return [*notes, note] if note else notes
+
+
+def recording_of(log: FlightLog, path: Path) -> RecordingDoc:
+    """A file outside the library as the library would list it."""
+    vehicle = log.vehicle
+    return RecordingDoc(
+        id=path.name,
+        name=path.stem,
+        kind=log.kind,
+        started_utc=iso_utc(log.start_utc_s),
+        duration_s=log.end_utc_s - log.start_utc_s,
+        bytes=path.stat().st_size,
+        vehicle=f"{vehicle.autopilot} {vehicle.firmware_version or ''}".strip(),
+        plan_name=log.plan.name if log.plan else "",
+        fault=" ".join(log.faults),
+    )
+
+
+def iso_utc(t_utc_s: float) -> str:
+    """ISO 8601 with milliseconds and Z."""
+    return datetime.fromtimestamp(t_utc_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

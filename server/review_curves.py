@@ -1,0 +1,139 @@
+"""A judged flight as the console's figures, curves and events: thinned, with every peak kept."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.following.figures import Judged, TrackFigures
+from planning.following.reference import Reference
+from planning.model import F64
+from server.review_flight import Flight
+from server.schemas.review import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
+from telemetry.recording.flight_log import FlightLog
+
+STRETCHES = 400
+"""Parts of a long recording of which each keeps its first position and its peaks."""
+
+
+def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
+    nearest, home = figures.nearest, figures.nearest_on_way_home
+    lat_deg = lon_deg = None
+    if nearest:
+        lat_deg, lon_deg = (float(v) for v in flight.dsm.lat_lon_from_xy(np.array([nearest.xyz_m[:2]]))[0])
+    return ReviewFigures(
+        completed=figures.completed,
+        duration_s=figures.flight_s,
+        predicted_s=figures.predicted_s,
+        lag_s=figures.lag_s,
+        cross_track_max_m=figures.cross_track.max_m,
+        cross_track_mean_m=figures.cross_track.mean_m,
+        cross_track_p95_m=figures.cross_track.p95_m,
+        height_error_max_m=figures.height.max_m,
+        height_error_mean_m=figures.height.mean_m,
+        height_error_p95_m=figures.height.p95_m,
+        height_error_lowest_m=figures.height_lowest_m,
+        height_error_highest_m=figures.height_highest_m,
+        min_distance_m=nearest.distance_m if nearest else None,
+        min_vertical_m=figures.min_vertical_m,
+        certified_distance_m=certified_distance_m(flight.log),
+        min_distance_t_s=nearest.t_s if nearest else None,
+        min_distance_s_m=nearest.s_m if nearest else None,
+        min_distance_lat_deg=lat_deg,
+        min_distance_lon_deg=lon_deg,
+        min_distance_way_home_m=home.distance_m if home else None,
+        positions=figures.positions,
+    )
+
+
+def certified_distance_m(log: FlightLog) -> float | None:
+    """What was certified of the mission that flew; None when the recording holds no certificate."""
+    if log.plan is None or not log.plan.certificate_json:
+        return None
+    try:
+        value = json.loads(log.plan.certificate_json)["min_distance_m"]
+    except (ValueError, KeyError, TypeError):
+        return None
+    return float(value) if isinstance(value, int | float) else None
+
+
+def histogram_doc(figures: TrackFigures) -> Histogram:
+    return Histogram(edges_m=figures.histogram_edges_m.tolist(), counts=figures.histogram_counts.tolist())
+
+
+def curves(flight: Flight, judged: Judged | None) -> ReviewSeries:
+    """Curves over the whole recording; errors against the plan only where the flight is judged."""
+    track = flight.track
+    n = len(track.t_s)
+    nowhere = np.full(n, math.nan)
+    cross_m, s_m, reference_m, distance_m = nowhere, nowhere, nowhere, nowhere
+    if flight.surface is not None:
+        distance_m = judged.distance_m if judged and judged.distance_m is not None else _distances(flight)
+    if judged is not None and judged.window is not None and flight.reference is not None:
+        counts = judged.window.judged
+        cross_m = np.where(counts, judged.found.cross_track_m, math.nan)
+        s_m = np.where(counts, judged.found.s_m, math.nan)
+        line_m = track.xyz_m[:, 2] - judged.found.height_error_m - flight.home_alt_dsm_m
+        reference_m = np.where(counts, line_m, math.nan)
+    height_m = track.xyz_m[:, 2] - flight.home_alt_dsm_m
+    ground_m = nowhere
+    if flight.surface is not None:
+        ground_m = flight.dsm.elevation_at(track.xyz_m[:, :2]) - flight.home_alt_dsm_m
+    kept = thinned(n, (cross_m, height_m - reference_m, distance_m, height_m))
+    return ReviewSeries(
+        t_s=track.t_s[kept].tolist(),
+        alt_rel_home_m=_or_null(height_m[kept]),
+        reference_alt_rel_home_m=_or_null(reference_m[kept]),
+        ground_rel_home_m=_or_null(ground_m[kept]),
+        cross_track_m=_or_null(cross_m[kept]),
+        s_m=_or_null(s_m[kept]),
+        distance_to_dsm_m=_or_null(distance_m[kept]),
+    )
+
+
+def _distances(flight: Flight) -> F64:
+    assert flight.surface is not None
+    return flight.surface.distances_m(flight.track.xyz_m)
+
+
+def thinned(count: int, peaks: tuple[F64, ...]) -> NDArray[np.int64]:
+    """Rows to keep of a long track: of every stretch the first, and where each curve is lowest and highest."""
+    if count <= STRETCHES * (2 * len(peaks) + 1):
+        return np.arange(count)
+    edges = np.linspace(0, count, STRETCHES + 1).astype(np.int64)
+    kept = {0, count - 1, *edges[:-1].tolist()}
+    for begin, end in itertools.pairwise(edges):
+        for curve in peaks:
+            part = curve[begin:end]
+            if np.isfinite(part).any():
+                kept |= {int(begin + np.nanargmin(part)), int(begin + np.nanargmax(part))}
+    return np.array(sorted(kept), dtype=np.int64)
+
+
+def _or_null(values: F64) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def events(log: FlightLog) -> list[ReviewEvent]:
+    """Everything that happened, in the order of time."""
+    found = [_event(log, t, "mode", mode) for t, mode in log.modes]
+    found += [_event(log, t, "arm", "Armed" if armed else "Disarmed") for t, armed in log.armed]
+    found += [_event(log, t, "item", f"Item {seq} reached") for t, seq in log.reached]
+    found += [_event(log, text.t_utc_s, "text", text.text, text.severity) for text in log.texts]
+    found += [_event(log, c.t_utc_s, "command", f"{c.operator}: {c.words}") for c in log.commands]
+    return sorted(found, key=lambda event: event.t_s)
+
+
+def _event(log: FlightLog, t_utc_s: float, kind: str, text: str, severity: int = 6) -> ReviewEvent:
+    return ReviewEvent(t_s=t_utc_s - log.start_utc_s, kind=kind, text=text, severity=severity)
+
+
+def predicted_note(reference: Reference | None, log: FlightLog) -> str | None:
+    """On whose limits the predicted time rests, when the recording does not say what was planned with."""
+    if reference is None or not math.isfinite(reference.flight_s) or (log.plan and log.plan.profile_toml):
+        return None
+    return "The predicted time and the lag rest on the default vehicle profile's speeds: the recording names none."

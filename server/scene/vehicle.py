@@ -1,0 +1,146 @@
+"""Layers of the vehicles: a quadrotor with a nose, a plumb line to the ground, its home, and the path it has flown.
+
+They change ten times a second: the same nodes keep their names and the shapes of their arrays, so that only the new
+numbers travel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from viser import transforms
+
+from server.scene import palette
+from server.scene.drawing import Drawing
+from server.scene.nodes import Node
+from server.scene.payload import F64
+from server.scene.shapes import CONE, Rgb, label_node, line_node, shape_node
+from server.schemas import Source
+
+_SIZE = 2.6
+"""Half the quadrotor's width, in radii of a mark: seen from where the whole model is seen."""
+_CHUNK_SEGMENTS = 256
+_ROTOR_AT = 0.72
+
+
+@dataclass(frozen=True, slots=True)
+class VehiclePose:
+    """A vehicle on the surface model that is on show; angles as in ``telemetry.vehicle``."""
+
+    place_m: F64
+    """(3,) x, y, alt_dsm"""
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    heading_rad: float = 0.0
+    home_m: F64 | None = None
+    """(3,) where it took off"""
+
+
+@dataclass(frozen=True, slots=True)
+class _Style:
+    body: Rgb
+    nose: Rgb
+    label: str
+
+
+_STYLES: dict[Source, _Style] = {
+    "live": _Style(palette.VEHICLE, palette.NOSE, ""),
+    "replay": _Style(palette.REPLAY, palette.REPLAY_NOSE, "REPLAY"),
+}
+
+
+def vehicle_nodes(drawing: Drawing, source: Source, pose: VehiclePose | None) -> list[Node]:
+    """The marks of one vehicle; none when it is nowhere on this model."""
+    if pose is None:
+        return []
+    style, name = _STYLES[source], f"/vehicle_{source}"
+    at = drawing.frame.scene_from_model(pose.place_m)
+    size, middle = _SIZE * drawing.mark_m, np.zeros(3)
+    return [
+        Node(name, "frame", {"show_axes": False, "position": _triple(at), "wxyz": scene_wxyz(pose)}),
+        shape_node(f"{name}/body", _BODY, middle, size, style.body),
+        shape_node(f"{name}/nose", _NOSE, middle, size, style.nose),
+        *([label_node(f"{name}/label", style.label, np.array([0.0, 0.0, 0.9 * size]))] if style.label else []),
+        _plumb(drawing, name, pose, at, style),
+        *_home(drawing, name, pose, style),
+    ]
+
+
+def scene_wxyz(pose: VehiclePose) -> tuple[float, float, float, float]:
+    """R_scene_body as a quaternion; body x forward, y left, z up. Height exaggeration does not bend attitudes."""
+    yaw = transforms.SO3.from_z_radians(math.pi / 2 - pose.heading_rad)
+    R = yaw @ transforms.SO3.from_y_radians(-pose.pitch_rad) @ transforms.SO3.from_x_radians(pose.roll_rad)
+    w, x, y, z = R.wxyz.tolist()
+    return w, x, y, z
+
+
+def track_nodes(drawing: Drawing, source: Source, points_m: F64) -> list[Node]:
+    """The flown path (N, 3) in pieces of equal size: a longer path changes the last piece only."""
+    if len(points_m) < 2:
+        return []
+    points = drawing.frame.scene_from_model(points_m)
+    starts = range(0, len(points) - 1, _CHUNK_SEGMENTS)
+    return [_piece(source, number, points[start:]) for number, start in enumerate(starts)]
+
+
+def _piece(source: Source, number: int, points: F64) -> Node:
+    points = points[: _CHUNK_SEGMENTS + 1]
+    # The rest of an unfinished piece stands on its last point, unseen.
+    rest = np.repeat(points[-1:], _CHUNK_SEGMENTS + 1 - len(points), axis=0)
+    color, width_px = (palette.VEHICLE, 4.0) if source == "live" else (palette.REPLAY, 3.0)
+    return line_node(f"/track_{source}/{number}", np.concatenate([points, rest]), color, width_px=width_px)
+
+
+def _plumb(drawing: Drawing, name: str, pose: VehiclePose, at: F64, style: _Style) -> Node:
+    foot = drawing.on_ground(pose.place_m[None, :2])
+    line = np.stack([foot[0] if len(foot) else at, at])
+    return line_node(f"{name}_plumb", line, style.body, width_px=1.5)
+
+
+def _home(drawing: Drawing, name: str, pose: VehiclePose, style: _Style) -> list[Node]:
+    if pose.home_m is None:
+        return []
+    at = drawing.on_ground(pose.home_m[None, :2])
+    return [shape_node(f"{name}_home", CONE, at[0], 0.8 * drawing.mark_m, style.body)] if len(at) else []
+
+
+def _quadrotor() -> trimesh.Trimesh:
+    """Body, two arms and four rotors, x forward, one unit from its middle to the rotors' far edges."""
+    parts = [trimesh.creation.box((0.5, 0.34, 0.2))]
+    for angle in (math.pi / 4, -math.pi / 4):
+        arm = trimesh.creation.box((2 * _ROTOR_AT, 0.09, 0.07))
+        parts.append(_turned(arm, angle))
+    for angle in (math.pi / 4 + quarter * math.pi / 2 for quarter in range(4)):
+        rotor = trimesh.creation.annulus(r_min=0.2, r_max=0.28, height=0.07, sections=20)
+        rotor.apply_translation((_ROTOR_AT * math.cos(angle), _ROTOR_AT * math.sin(angle), 0.08))
+        parts.append(rotor)
+    whole = trimesh.util.concatenate(parts)
+    assert isinstance(whole, trimesh.Trimesh)
+    return whole
+
+
+def _nose() -> trimesh.Trimesh:
+    """A cone that points forward: which way the vehicle looks is seen from afar."""
+    cone = trimesh.creation.cone(radius=0.17, height=0.62, sections=16)
+    cone.apply_transform(trimesh.transformations.rotation_matrix(math.pi / 2, (0.0, 1.0, 0.0)))
+    cone.apply_translation((0.25, 0.0, 0.0))
+    return cone
+
+
+def _turned(mesh: trimesh.Trimesh, angle_rad: float) -> trimesh.Trimesh:
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(angle_rad, (0.0, 0.0, 1.0)))
+    return mesh
+
+
+def _arrays(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    return np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.uint32)
+
+
+_BODY, _NOSE = _arrays(_quadrotor()), _arrays(_nose())
+
+
+def _triple(at: F64) -> tuple[float, float, float]:
+    return float(at[0]), float(at[1]), float(at[2])

@@ -1,0 +1,196 @@
+"""Starts node processes, takes over those that outlived an earlier server, and starts the dead again."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from planning import __version__
+from server.node_process import NodeProcess, bound_log
+from telemetry.bus.sockets import private_directory
+from telemetry.node_lock import NodeFacts, running_node, running_nodes
+
+log = logging.getLogger(__name__)
+
+_PAUSES_S = (0.2, 0.5, 1.0, 2.0, 5.0)
+_STEADY_S = 30.0
+"""A node that has run so long begins anew with the shortest pause."""
+_LOOK_EVERY_S = 0.1
+
+
+State = Literal["starting", "running", "restarting", "stopped"]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeState:
+    """One node, for people."""
+
+    name: str
+    state: State
+    restarts: int = 0
+    text: str = ""
+
+
+class _Node:
+    """What is wanted of one node, and what there is."""
+
+    def __init__(self, name: str, arguments: Sequence[str]) -> None:
+        self.name = name
+        self.arguments = tuple(arguments)
+        self.state = NodeState(name, "starting")
+        self.process: NodeProcess | None = None
+        self.keeping: asyncio.Task[None] | None = None
+        self.failures = 0
+        self.last_end = ""
+        self.changing = asyncio.Lock()
+
+
+class Supervisor:
+    """All methods belong to one event loop. ``run`` keeps the nodes alive; when it ends, they go on without us.
+
+    ``changed`` gets all states, sorted by name, whenever one of them changes.
+    """
+
+    def __init__(
+        self, runtime_dir: Path, *, changed: Callable[[list[NodeState]], None], package: str = "telemetry.nodes"
+    ) -> None:
+        self._runtime_dir = runtime_dir.absolute()
+        self._changed = changed
+        self._package = package
+        self._nodes: dict[str, _Node] = {}
+        self._group: asyncio.TaskGroup | None = None
+
+    @property
+    def states(self) -> list[NodeState]:
+        return [self._nodes[name].state for name in sorted(self._nodes)]
+
+    async def run(self) -> None:
+        """Takes over what runs already, then keeps everything running until cancelled."""
+        private_directory(self._runtime_dir)
+        for facts in await asyncio.to_thread(running_nodes, self._runtime_dir):
+            if facts.name not in self._nodes and facts.arguments[:2] == self._all_arguments(()):
+                self._nodes[facts.name] = _Node(facts.name, facts.arguments[2:])
+        try:
+            async with asyncio.TaskGroup() as self._group:
+                for node in self._nodes.values():
+                    self._keep(self._group, node)
+                await asyncio.Event().wait()
+        finally:
+            self._group = None
+
+    async def start(self, name: str, arguments: Sequence[str]) -> None:
+        """Wants the node running with these arguments. Does not wait for it: a call over the bus does.
+
+        A node that runs with other arguments is ended and started anew, unless it says that it must not be.
+        """
+        node = self._nodes.setdefault(name, _Node(name, arguments))
+        async with node.changing:
+            node.arguments = tuple(arguments)
+            if node.keeping is not None:
+                return
+            self._tell(node, "starting", "")
+            if self._group is not None:
+                self._keep(self._group, node)
+
+    async def stop(self, name: str) -> None:
+        """Ends the node and waits until it has ended. Nothing happens if it does not run."""
+        node = self._nodes.get(name)
+        if node is None:
+            return
+        async with node.changing:
+            if node.keeping is not None:
+                node.keeping.cancel()
+                await asyncio.wait([node.keeping])
+                node.keeping = None
+            if node.process is not None:
+                await node.process.end()
+            self._tell(node, "stopped", "", restarts=0)
+
+    def _keep(self, group: asyncio.TaskGroup, node: _Node) -> None:
+        node.failures, node.last_end = 0, ""
+        node.keeping = group.create_task(self._keep_running(node), name=f"keeps {node.name}")
+
+    async def _keep_running(self, node: _Node) -> None:
+        while True:
+            node.process = await self._found(node) or self._started(node)
+            if node.process is None or not await self._watch(node, node.process):
+                await self._pause(node)
+
+    async def _found(self, node: _Node) -> NodeProcess | None:
+        """A running process of this name, taken over."""
+        facts = await asyncio.to_thread(running_node, self._runtime_dir, node.name)
+        if facts is None:
+            return None
+        node.last_end = ""
+        text = f"The {node.name} node was running already and was taken over."
+        log.info(text)
+        self._tell(node, "running", text)
+        return NodeProcess.adopt(self._runtime_dir, facts)
+
+    def _started(self, node: _Node) -> NodeProcess | None:
+        try:
+            return NodeProcess.start(self._runtime_dir, node.name, self._package, self._all_arguments(node.arguments))
+        except OSError as error:
+            log.error("The %s node cannot be started: %s", node.name, error)
+            node.last_end = f"The {node.name} node cannot be started ({error.strerror})"
+            return None
+
+    async def _watch(self, node: _Node, process: NodeProcess) -> bool:
+        """Until the process has ended. Returns True if it had to, because it was started for something else."""
+        since_s = asyncio.get_running_loop().time()
+        while not process.has_ended():
+            if facts := process.facts():
+                self._note_running(node)
+                if self._is_outdated(node, facts) and await self._replace(node, process, facts):
+                    return True
+            if asyncio.get_running_loop().time() - since_s > _STEADY_S:
+                node.failures = 0
+            bound_log(self._runtime_dir / f"{node.name}.log")
+            await asyncio.sleep(_LOOK_EVERY_S)
+        code = "" if process.code is None else f" (code {process.code})"
+        node.last_end = f"The {node.name} node ended{code}"
+        log.warning("%s. Its log is %s.", node.last_end, self._runtime_dir / f"{node.name}.log")
+        return False
+
+    def _note_running(self, node: _Node) -> None:
+        if node.state.state != "running":
+            self._tell(node, "running", f"{node.last_end} and was started again." if node.last_end else "")
+
+    def _is_outdated(self, node: _Node, facts: NodeFacts) -> bool:
+        return facts.arguments != self._all_arguments(node.arguments) or facts.version != __version__
+
+    async def _replace(self, node: _Node, process: NodeProcess, facts: NodeFacts) -> bool:
+        if not facts.replaceable:
+            self._tell(node, "running", _kept(facts))
+            return False
+        log.info("The %s node was started for something else and is replaced.", node.name)
+        self._tell(node, "starting", "")
+        await process.end()
+        node.last_end = ""
+        return True
+
+    async def _pause(self, node: _Node) -> None:
+        pause_s = _PAUSES_S[min(node.failures, len(_PAUSES_S) - 1)]
+        node.failures += 1
+        self._tell(node, "restarting", f"{node.last_end}.", restarts=node.state.restarts + 1)
+        await asyncio.sleep(pause_s)
+
+    def _all_arguments(self, arguments: Sequence[str]) -> tuple[str, ...]:
+        return "--runtime", str(self._runtime_dir), *arguments
+
+    def _tell(self, node: _Node, state: State, text: str, **changes: Any) -> None:
+        after = replace(node.state, state=state, text=text, **changes)
+        if after != node.state or state == "starting":
+            node.state = after
+            self._changed(self.states)
+
+
+def _kept(facts: NodeFacts) -> str:
+    how = "with other settings" if facts.version == __version__ else f"by version {facts.version}"
+    return (
+        f"The {facts.name} node was started {how}. It is kept while its vehicle may be armed, and replaced after that."
+    )

@@ -1,0 +1,1 @@
+"""Flying a plan: the navigation script, checks before the start, resuming."""

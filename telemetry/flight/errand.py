@@ -1,0 +1,62 @@
+"""One command under way for the script: what it sends, and what follows when it is done or has failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from telemetry.errors import TelemetryError
+from telemetry.mavlink.actions import Action, Done, Failed, Message, Send
+from telemetry.mavlink.commands import CommandRun
+from telemetry.mavlink.ends import Ends
+from telemetry.vehicle import VehicleState
+
+Then = Callable[[float], list[Action]]
+OnFailed = Callable[[TelemetryError, float], list[Action]]
+
+
+class Errand:
+    def __init__(self, ends: Ends, on_failed: OnFailed) -> None:
+        self._ends = ends
+        self._run: CommandRun | None = None
+        self._then: Then | None = None
+        self._on_failed = on_failed
+
+    @property
+    def is_under_way(self) -> bool:
+        return self._run is not None
+
+    def begin(
+        self,
+        message: Message,
+        now_s: float,
+        *,
+        once: bool = False,
+        confirm: Callable[[VehicleState], bool] | None = None,
+        then: Then | None = None,
+    ) -> list[Action]:
+        """In place of the one before; ``once`` and ``confirm`` as in CommandRun."""
+        self._run = CommandRun(message, target=self._ends.vehicle, own=self._ends.own, once=once, confirm=confirm)
+        self._then = then
+        return self._pass_on(self._run.start(now_s), now_s)
+
+    def on_message(self, message: Message, now_s: float) -> list[Action]:
+        return [] if self._run is None else self._pass_on(self._run.on_message(message, now_s), now_s)
+
+    def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
+        return [] if self._run is None else self._pass_on(self._run.on_state(state, now_s), now_s)
+
+    def on_tick(self, now_s: float) -> list[Action]:
+        return [] if self._run is None else self._pass_on(self._run.on_tick(now_s), now_s)
+
+    def _pass_on(self, actions: list[Action], now_s: float) -> list[Action]:
+        out: list[Action] = []
+        for action in actions:
+            if isinstance(action, Send):
+                out.append(action)
+            elif isinstance(action, Done | Failed):
+                then, self._run, self._then = self._then, None, None
+                if isinstance(action, Failed):
+                    out += self._on_failed(action.error, now_s)
+                elif then is not None:
+                    out += then(now_s)
+        return out

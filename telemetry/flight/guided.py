@@ -1,0 +1,304 @@
+"""The navigation script of Melita 2020, section 7, sans-IO: targets are handed over one at a time.
+
+Take-off, then each target when the one before was reached and its loiter time has passed, then the way home. It never
+skips a target, waits while the link is down, and ends as soon as somebody else chooses another flight mode.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from planning.model import Firmware
+from telemetry.errors import NotAllowedError, SilentError, TelemetryError
+from telemetry.flight.errand import Errand, Then
+from telemetry.flight.handover import Handover, is_fresh
+from telemetry.flight.mode_watch import ModeWatch
+from telemetry.flight.orders import Orders, Place
+from telemetry.flight.punctuality import Punctuality
+from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
+from telemetry.mavlink.ends import GROUND_STATION, Ends
+from telemetry.messages import FlightStatus, GuidedTarget
+from telemetry.requests import StartGuided
+from telemetry.vehicle import VehicleState
+
+Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
+TAKEOFF_TOLERANCE_M = 0.3
+OFF_THE_GROUND_M = 0.5
+RETURN_AGAIN_S = 2.0
+SLOW_TARGET_SENDINGS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedEnd:
+    completed: bool
+    words: str
+
+
+class GuidedScript:
+    """Ends in Done(GuidedEnd), or in Failed before take-off. Feed it states, messages and ticks of one clock."""
+
+    def __init__(
+        self,
+        request: StartGuided,
+        state: VehicleState,
+        *,
+        firmware: Firmware,
+        target: tuple[int, int],
+        own: tuple[int, int] = GROUND_STATION,
+    ) -> None:
+        self._request, self._ends, self._orders = request, Ends(target, own), Orders(firmware, target)
+        self._watch, self._punctuality = ModeWatch(), Punctuality()
+        self.phase: Phase = "idle"
+        self.hint = ""
+        self.broke_off_at: int | None = None
+        self._index = 0
+        self._state = state
+        self._home_alt_amsl_m = math.nan
+        self._errand = Errand(self._ends, self._on_failed_command)
+        self._handover: Handover | None = None
+        self._speed_m_s: float | None = None
+        self._reached_s: float | None = None
+        self._return_at_s = 0.0
+
+    @property
+    def is_over(self) -> bool:
+        return self.phase in ("landed", "interrupted")
+
+    @property
+    def target(self) -> GuidedTarget:
+        """That is flown to, or was last."""
+        return self._request.targets[min(self._index, len(self._request.targets) - 1)]
+
+    @property
+    def behind_s(self) -> float | None:
+        """How much later than planned the script is; negative when it is ahead."""
+        return self._punctuality.behind_s
+
+    def status(self, *, since_utc_s: float | None = None) -> FlightStatus:
+        late = "" if self.behind_s is None or self.behind_s < 1 else f"{self.behind_s:.0f} s behind the plan."
+        return FlightStatus(
+            way="guided",
+            phase=self.phase,
+            target=self.target.item,
+            targets=self._request.targets[-1].item,
+            since_utc_s=since_utc_s,
+            broke_off_at=self.broke_off_at,
+            hint=self.hint or late,
+        )
+
+    def start(self, now_s: float) -> list[Action]:
+        """From the ground only: Failed(NotAllowedError) in flight."""
+        self.phase, state = "arming", self._state
+        if not self._request.targets:
+            return self._fail(NotAllowedError("The script has no targets.", advice="Plan a mission first."))
+        if state.armed and state.landed == "in_air":
+            return self._fail(NotAllowedError("The vehicle is already flying.", advice="Land it, then start again."))
+        self._note_home(state)
+        if math.isnan(self._home_alt_amsl_m):
+            return self._fail(
+                NotAllowedError("The vehicle does not know its height yet.", advice="Wait for its position.")
+            )
+        self._watch.expect(self._orders.script_modes, before=frozenset({state.mode}))
+        return self._change_mode(self._orders.guided_mode, now_s, then=self._arm)
+
+    def on_message(self, message: Message, now_s: float) -> list[Action]:
+        if self.is_over or not self._ends.is_from_vehicle(message):
+            return []
+        if message.get_type() == "POSITION_TARGET_GLOBAL_INT" and self._handover is not None:
+            self._handover.on_position_target(message, now_s)
+        return self._errand.on_message(message, now_s)
+
+    def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
+        if self.is_over:
+            return []
+        self._state = state
+        self._note_home(state)
+        actions = self._errand.on_state(state, now_s)
+        if not self.is_over:
+            actions += self._look(state, now_s)
+        return actions
+
+    def on_tick(self, now_s: float) -> list[Action]:
+        if self.is_over:
+            return []
+        actions = self._errand.on_tick(now_s)
+        if not self.is_over:
+            actions += self._look(self._state, now_s)
+        return actions
+
+    def pause(self, now_s: float) -> list[Action]:
+        """Holds the position, during the take-off as soon as it is up; before the take-off it ends the script."""
+        if self.phase == "arming":
+            return self._interrupt("Paused before the take-off.")
+        if self.phase == "flying":
+            self.phase, self.hint = "paused", ""
+            return self._go_to(self._here(), now_s)
+        if self.phase == "taking_off":
+            self.phase, self.hint = "paused", "It climbs to the height of the take-off first."
+        return []
+
+    def resume(self, now_s: float) -> list[Action]:
+        if self.phase != "paused":
+            return []
+        self.hint = ""
+        if self._handover is None:
+            self.phase = "taking_off"
+            return []
+        self.phase = "flying"
+        return self._hand_over(now_s)
+
+    def stop(self, words: str) -> list[Action]:
+        """Ends the script without a command: another one for the vehicle follows."""
+        return [] if self.is_over else self._interrupt(words)
+
+    # What each look at the vehicle's state leads to.
+
+    def _look(self, state: VehicleState, now_s: float) -> list[Action]:
+        if self.phase != "arming" and (words := self._watch.interruption(state)):
+            landed = self.phase == "returning" and not state.armed
+            return self._land() if landed else self._interrupt(words)
+        step = {"taking_off": self._climb, "flying": self._fly, "paused": self._hold, "returning": self._return}
+        return step[self.phase](state, now_s) if self.phase in step else []
+
+    def _climb(self, state: VehicleState, now_s: float) -> list[Action]:
+        if not self._is_up(state, now_s):
+            return []
+        self.phase = "flying"
+        return self._hand_over(now_s)
+
+    def _is_up(self, state: VehicleState, now_s: float) -> bool:
+        height_m = state.alt_rel_home_m
+        up = height_m is not None and height_m >= self._request.takeoff_alt_rel_home_m - TAKEOFF_TOLERANCE_M
+        return up and not self._errand.is_under_way and is_fresh(state, now_s)
+
+    def _fly(self, state: VehicleState, now_s: float) -> list[Action]:
+        assert self._handover is not None
+        if self._reached_s is None and self._handover.has_arrived(state, now_s):
+            self._reached_s, self.hint = now_s, ""
+            self._punctuality.reached(self.target, now_s)
+        if self._reached_s is None:
+            self._punctuality.on_the_way(self.target, now_s)
+            return self._again_if_needed(state, now_s)
+        if now_s - self._reached_s < self.target.loiter_s or not is_fresh(state, now_s):
+            return []
+        self._index += 1
+        progress = Progress("flying", self._index, len(self._request.targets))
+        if self._index == len(self._request.targets):
+            self.phase, self._handover = "returning", None
+            return [progress, *self._go_home(now_s)]
+        return [progress, *self._hand_over(now_s)]
+
+    def _hold(self, state: VehicleState, now_s: float) -> list[Action]:
+        if self._handover is not None:
+            return self._again_if_needed(state, now_s)
+        return self._go_to(self._here(), now_s) if self._is_up(state, now_s) else []
+
+    def _return(self, state: VehicleState, now_s: float) -> list[Action]:
+        if not state.armed or (state.landed == "on_ground" and self._watch.seen):
+            return self._land()
+        return (
+            self._go_home(now_s)
+            if not self._errand.is_under_way and not self._watch.seen and now_s >= self._return_at_s
+            else []
+        )
+
+    def _land(self) -> list[Action]:
+        self.phase, self.hint = "landed", ""
+        return [Done(GuidedEnd(True, "All targets were flown, and the vehicle has landed."))]
+
+    # What is sent.
+
+    def _change_mode(self, mode: str, now_s: float, *, then: Then | None = None) -> list[Action]:
+        message = self._orders.set_mode(mode)
+        return self._errand.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
+
+    def _arm(self, now_s: float) -> list[Action]:
+        message = self._orders.arm()
+        return self._errand.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._take_off)
+
+    def _take_off(self, now_s: float) -> list[Action]:
+        self.phase = "taking_off"
+        message = self._orders.take_off(self._request.takeoff_alt_rel_home_m, self._home_alt_amsl_m)
+        return self._errand.begin(message, now_s, once=True, confirm=_is_off_the_ground)
+
+    def _hand_over(self, now_s: float) -> list[Action]:
+        target, self._reached_s = self.target, None
+        place = Place(
+            lat_deg=target.lat_deg,
+            lon_deg=target.lon_deg,
+            alt_rel_home_m=target.alt_rel_home_m,
+            home_alt_amsl_m=self._home_alt_amsl_m,
+            heading_rad=target.heading_rad,
+        )
+        speed = [] if target.speed_m_s == self._speed_m_s else self._set_speed(target.speed_m_s, now_s)
+        return [*speed, *self._go_to(place, now_s)]
+
+    def _set_speed(self, speed_m_s: float, now_s: float) -> list[Action]:
+        self._speed_m_s = speed_m_s
+        return self._errand.begin(self._orders.change_speed(speed_m_s), now_s)
+
+    def _go_to(self, place: Place, now_s: float) -> list[Action]:
+        self._handover = Handover(place, radius_m=self._request.waypoint_radius_m)
+        return self._send_place(now_s)
+
+    def _send_place(self, now_s: float) -> list[Action]:
+        assert self._handover is not None
+        self._handover.sent(self._state, now_s)
+        return [Send(self._orders.go_to(self._handover.place))]
+
+    def _again_if_needed(self, state: VehicleState, now_s: float) -> list[Action]:
+        assert self._handover is not None
+        if not self._handover.must_be_sent_again(state, now_s):
+            return []
+        if self._handover.sendings >= SLOW_TARGET_SENDINGS:
+            self.hint = f"The vehicle does not fly to item {self.target.item}, which it was sent again and again."
+        return self._send_place(now_s)
+
+    def _go_home(self, now_s: float) -> list[Action]:
+        mode = self._orders.end_mode(self._request.end)
+        self._return_at_s = now_s + RETURN_AGAIN_S
+        self._watch.expect(frozenset({mode, "LAND"}), before=self._orders.script_modes)
+        return self._change_mode(mode, now_s)
+
+    # Ends.
+
+    def _on_failed_command(self, error: TelemetryError, now_s: float) -> list[Action]:
+        """On the ground it ends the script; in flight the vehicle is already under way and the script goes on."""
+        if self.phase in ("arming", "taking_off") or (self.phase == "paused" and self._handover is None):
+            return self._fail(error)
+        self.hint = str(error)
+        if isinstance(error, SilentError):
+            self._speed_m_s = None  # sent again with the next target
+        return []
+
+    def _interrupt(self, words: str) -> list[Action]:
+        self.broke_off_at = None if self.phase in ("arming", "returning") else self.target.item
+        self.phase, self.hint = "interrupted", words
+        return [Done(GuidedEnd(False, words))]
+
+    def _fail(self, error: TelemetryError) -> list[Action]:
+        self.phase, self.hint = "interrupted", str(error)
+        return [Failed(error)]
+
+    # Places.
+
+    def _note_home(self, state: VehicleState) -> None:
+        """Where heights above home begin; what was known once stays known."""
+        if state.alt_amsl_m is not None and state.alt_rel_home_m is not None:
+            self._home_alt_amsl_m = state.alt_amsl_m - state.alt_rel_home_m
+
+    def _here(self) -> Place:
+        """Where the vehicle is; it has come that way, so it is clear."""
+        state = self._state
+        if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
+            target = self.target
+            return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, self._home_alt_amsl_m)
+        return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, self._home_alt_amsl_m)
+
+
+def _is_off_the_ground(state: VehicleState) -> bool:
+    if state.landed is None:
+        return (state.alt_rel_home_m or 0.0) > OFF_THE_GROUND_M
+    return state.landed in ("taking_off", "in_air")

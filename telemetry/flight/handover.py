@@ -1,0 +1,78 @@
+"""One place given to the vehicle: has it taken it, must it be sent again, is it there?"""
+
+from __future__ import annotations
+
+import math
+
+from telemetry.flight.orders import Place
+from telemetry.mavlink.actions import Message
+from telemetry.vehicle import VehicleState
+
+METRES_PER_DEG = 111_195.0
+SAME_PLACE_M = 1.0
+"""Between a target and the one that the vehicle says it flies to."""
+ANSWER_S = 0.7
+"""A POSITION_TARGET_GLOBAL_INT that was on its way when the target was sent shows the old one."""
+STUCK_S = 2.0
+NEARER_M, MOVING_M_S = 0.3, 0.3
+OLD_POSITION_S = 2.0
+
+
+def away_m(state: VehicleState, place: Place) -> float:
+    """3-D distance; infinite where the vehicle's position is not known."""
+    if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
+        return math.inf
+    north_m, east_m = _offset_m(place, state.lat_deg, state.lon_deg)
+    return math.hypot(north_m, east_m, state.alt_rel_home_m - place.alt_rel_home_m)
+
+
+def is_fresh(state: VehicleState, now_s: float) -> bool:
+    """Whether the position is of now."""
+    return state.position_t_mono_s is not None and now_s - state.position_t_mono_s <= OLD_POSITION_S
+
+
+def _offset_m(place: Place, lat_deg: float, lon_deg: float) -> tuple[float, float]:
+    shrink = math.cos(math.radians(place.lat_deg))
+    return (lat_deg - place.lat_deg) * METRES_PER_DEG, (lon_deg - place.lon_deg) * METRES_PER_DEG * shrink
+
+
+class Handover:
+    def __init__(self, place: Place, *, radius_m: float) -> None:
+        self.place = place
+        self.sendings = 0
+        self._radius_m = radius_m
+        self._taken: bool | None = None
+        self._sent_s = -math.inf
+        self._away_when_sent_m = math.inf
+
+    def sent(self, state: VehicleState, now_s: float) -> None:
+        self.sendings += 1
+        self._sent_s, self._away_when_sent_m = now_s, away_m(state, self.place)
+
+    def on_position_target(self, message: Message, now_s: float) -> None:
+        """POSITION_TARGET_GLOBAL_INT of the vehicle, above mean sea level."""
+        if now_s - self._sent_s < ANSWER_S and self._taken is None and not self._is_same(message):
+            return
+        self._taken = bool(self._taken) or self._is_same(message)
+
+    def _is_same(self, message: Message) -> bool:
+        north_m, east_m = _offset_m(self.place, message.lat_int * 1e-7, message.lon_int * 1e-7)
+        up_m = message.alt - self.place.home_alt_amsl_m - self.place.alt_rel_home_m
+        return math.hypot(north_m, east_m) <= SAME_PLACE_M and not abs(up_m) > SAME_PLACE_M
+
+    def must_be_sent_again(self, state: VehicleState, now_s: float) -> bool:
+        """Not while the position is old: then the link is down, and what is sent now would come late."""
+        if self._taken or not is_fresh(state, now_s):
+            return False
+        waited_s = now_s - self._sent_s
+        if self._taken is False:
+            return waited_s >= ANSWER_S
+        return waited_s >= STUCK_S and not self._seems_to_go(state)
+
+    def _seems_to_go(self, state: VehicleState) -> bool:
+        left_m = away_m(state, self.place)
+        moving = (state.ground_speed_m_s or 0.0) > MOVING_M_S or abs(state.climb_m_s or 0.0) > MOVING_M_S
+        return moving or left_m <= self._radius_m or left_m < self._away_when_sent_m - NEARER_M
+
+    def has_arrived(self, state: VehicleState, now_s: float) -> bool:
+        return is_fresh(state, now_s) and away_m(state, self.place) <= self._radius_m

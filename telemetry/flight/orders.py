@@ -1,0 +1,105 @@
+"""What each autopilot is sent to fly the navigation script: ArduPilot in GUIDED, PX4 in HOLD with DO_REPOSITION."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from planning.model import Firmware
+from telemetry.mavlink.actions import Message
+from telemetry.mavlink.modes import mode_numbers
+
+CUSTOM_MODE = 1.0
+IGNORE_ALL_BUT_PLACE = 0b1101_1111_1000
+"""POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored."""
+YAW_IS_GIVEN = IGNORE_ALL_BUT_PLACE & ~mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+GROUND_SPEED, ANY_THROTTLE = 1.0, -1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    lat_deg: float
+    lon_deg: float
+    alt_rel_home_m: float
+    home_alt_amsl_m: float
+    """PX4 takes altitudes above mean sea level only."""
+    heading_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """Messages to one vehicle."""
+
+    firmware: Firmware
+    target: tuple[int, int]
+
+    @property
+    def guided_mode(self) -> str:
+        return "GUIDED" if self.firmware == "ardupilot" else "HOLD"
+
+    @property
+    def script_modes(self) -> frozenset[str]:
+        """In which the script is in charge; any other was chosen by somebody else."""
+        return frozenset({"GUIDED"} if self.firmware == "ardupilot" else {"HOLD", "TAKEOFF"})
+
+    def set_mode(self, name: str) -> Message:
+        numbers = mode_numbers(self.firmware, name)
+        assert numbers is not None, name
+        return self._long(mavlink.MAV_CMD_DO_SET_MODE, CUSTOM_MODE, float(numbers.main), float(numbers.sub))
+
+    def arm(self) -> Message:
+        return self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def take_off(self, alt_rel_home_m: float, home_alt_amsl_m: float) -> Message:
+        if self.firmware == "ardupilot":
+            return self._long(mavlink.MAV_CMD_NAV_TAKEOFF, last=alt_rel_home_m)
+        nan = math.nan
+        return self._long(mavlink.MAV_CMD_NAV_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, home_alt_amsl_m + alt_rel_home_m)
+
+    def change_speed(self, speed_m_s: float) -> Message:
+        return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, GROUND_SPEED, speed_m_s, ANY_THROTTLE)
+
+    def go_to(self, place: Place) -> Message:
+        lat_e7, lon_e7 = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
+        yaw_rad = place.heading_rad
+        if self.firmware == "px4":
+            return self._reposition(lat_e7, lon_e7, place.home_alt_amsl_m + place.alt_rel_home_m, yaw_rad)
+        mask = IGNORE_ALL_BUT_PLACE if yaw_rad is None else YAW_IS_GIVEN
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        return mavlink.MAVLink_set_position_target_global_int_message(
+            time_boot_ms=0,
+            target_system=self.target[0],
+            target_component=self.target[1],
+            coordinate_frame=frame,
+            type_mask=mask,
+            lat_int=lat_e7,
+            lon_int=lon_e7,
+            alt=place.alt_rel_home_m,
+            vx=0.0,
+            vy=0.0,
+            vz=0.0,
+            afx=0.0,
+            afy=0.0,
+            afz=0.0,
+            yaw=yaw_rad or 0.0,
+            yaw_rate=0.0,
+        )
+
+    def end_mode(self, end: Literal["rtl", "land"]) -> str:
+        return end.upper()
+
+    def _reposition(self, lat_e7: int, lon_e7: int, alt_amsl_m: float, yaw_rad: float | None) -> Message:
+        default_speed, change_mode = -1.0, 1.0
+        yaw = math.nan if yaw_rad is None else yaw_rad
+        command, frame = mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_FRAME_GLOBAL
+        return mavlink.MAVLink_command_int_message(
+            *self.target, frame, command, 0, 0, default_speed, change_mode, 0.0, yaw, lat_e7, lon_e7, alt_amsl_m
+        )
+
+    def _long(self, command: int, *params: float, last: float = 0.0) -> Message:
+        """COMMAND_LONG; parameters that are not named are 0, ``last`` is the seventh."""
+        p1, p2, p3, p4, p5, p6, p7 = params if len(params) == 7 else (*params, *(0.0,) * (6 - len(params)), last)
+        return mavlink.MAVLink_command_long_message(*self.target, command, 0, p1, p2, p3, p4, p5, p6, p7)

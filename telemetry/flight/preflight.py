@@ -1,0 +1,189 @@
+"""The check before the start: on what was READ BACK from the vehicle, and where the vehicle really stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planning.clearance import certify
+from planning.dsm import Dsm
+from planning.errors import MissionError
+from planning.flight_time.predict import predict_duration
+from planning.flown import AMSL_FRAMES, flown_line
+from planning.formats.commands import has_position
+from planning.holes import fill_holes
+from planning.home import home_on_ground
+from planning.model import Certificate, ClearanceParams, Firmware, Home, Mission, VehicleProfile
+from telemetry.flight import checks
+from telemetry.flight.checks import Row
+from telemetry.flight.parameters import return_settings
+from telemetry.mavlink.items import mission_from_onboard
+from telemetry.messages import OnboardMission
+from telemetry.vehicle import VehicleState
+
+__all__ = ["LARGEST_SHIFT_M", "Preflight", "Row", "actual_home", "check"]
+
+LARGEST_SHIFT_M = 0.3
+"""Heights are re-referenced when the ground at the actual home differs from the planned by more."""
+SMALL_HOLE_M2 = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Preflight:
+    """What the check found."""
+
+    rows: tuple[Row, ...]
+    home_shift_m: float | None
+    """Surface model at the vehicle's home minus at the planned home."""
+    needs_rereference: bool
+    """Heights must be moved by ``home_shift_m``, certified and uploaded again; then the check is made anew."""
+    certificate: Certificate | None
+    """Of the mission that was read back, from the actual home; None without a surface model."""
+    mission: Mission | None
+    """What was read back, with the actual home on the surface model."""
+    clearance: ClearanceParams | None = None
+    """What the certificate demanded: with the vehicle's own return height."""
+
+    @property
+    def min_distance_m(self) -> float | None:
+        return None if self.certificate is None else self.certificate.min_distance_m
+
+    def ok(self, accepted: Collection[str] = ()) -> bool:
+        """Whether the flight may start once the rows named by these codes are accepted."""
+        return all(row.state == "good" or (row.state == "accept" and row.code in accepted) for row in self.rows)
+
+    def in_the_way(self, accepted: Collection[str] = ()) -> tuple[Row, ...]:
+        """The rows because of which it may not."""
+        return tuple(
+            row for row in self.rows if not (row.state == "good" or (row.state == "accept" and row.code in accepted))
+        )
+
+
+def check(
+    onboard: OnboardMission | None,
+    state: VehicleState,
+    parameters: Mapping[str, float | None],
+    *,
+    dsm: Dsm | None,
+    profile: VehicleProfile,
+    clearance: ClearanceParams,
+    planned_home: Home | None,
+    firmware: Firmware = "ardupilot",
+    rereferenced_m: float | None = None,
+) -> Preflight:
+    """Judge a start. Pure; takes up to seconds on a large model: not for the event loop.
+
+    ``clearance`` is what the plan demands; the return height in it gives way to the vehicle's own. Without a
+    surface model the rows that need one can be accepted at most. ``rereferenced_m``: heights were moved by so much.
+    """
+    settings = return_settings(parameters, firmware)
+    home = actual_home(state, dsm)
+    shift_m = _shift(home, planned_home, dsm)
+    mission = _mission(onboard, firmware, home, dsm)
+    surface = fill_holes(dsm, max_area_m2=SMALL_HOLE_M2)[0] if dsm is not None else None
+    height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
+    demanded = replace(clearance, rtl_height_m=height_m)
+    certificate, problem = _certificate(mission, dsm, surface, demanded)
+    needs = _needs_rereference(shift_m, mission)
+    rows = (
+        checks.mission_row(onboard),
+        checks.clearance_row(certificate, problem, has_surface=dsm is not None),
+        _home_row(home, planned_home, state, dsm, shift_m, mission, needs, rereferenced_m),
+        checks.gnss_row(state, profile),
+        checks.return_row(certificate, settings, clearance),
+        checks.battery_row(state, profile, _predicted_s(mission, profile, surface)),
+        checks.ready_row(state),
+    )
+    return Preflight(rows, shift_m, needs, certificate, mission if surface is not None else None, demanded)
+
+
+def actual_home(state: VehicleState, dsm: Dsm | None) -> Home | None:
+    """Where home will be: the place of a disarmed vehicle, for it moves its home there when it arms.
+
+    Its height is the surface model's, NaN without one or off it; None when the vehicle has no position.
+    """
+    places = [(state.home_lat_deg, state.home_lon_deg), (state.lat_deg, state.lon_deg)]
+    for lat_deg, lon_deg in places if state.armed else reversed(places):
+        if lat_deg is not None and lon_deg is not None:
+            alt_m = math.nan
+            if dsm is not None:
+                alt_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[lat_deg, lon_deg]])))[0])
+            return Home(lat_deg, lon_deg, alt_m, dsm.vertical_datum if dsm is not None else None)
+    return None
+
+
+def _shift(home: Home | None, planned: Home | None, dsm: Dsm | None) -> float | None:
+    if home is None or planned is None or dsm is None:
+        return None
+    planned_m = dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[planned.lat_deg, planned.lon_deg]])))[0]
+    shift_m = home.alt_dsm_m - float(planned_m)
+    return shift_m if math.isfinite(shift_m) else None
+
+
+def _needs_rereference(shift_m: float | None, mission: Mission | None) -> bool:
+    return shift_m is not None and abs(shift_m) > LARGEST_SHIFT_M and mission is not None and not _all_amsl(mission)
+
+
+def _all_amsl(mission: Mission) -> bool:
+    return all(item.frame in AMSL_FRAMES for item in mission.items if has_position(item))
+
+
+def _mission(onboard: OnboardMission | None, firmware: Firmware, home: Home | None, dsm: Dsm | None) -> Mission | None:
+    if onboard is None or not onboard.items:
+        return None
+    return mission_from_onboard(onboard, firmware, home=home if dsm is not None else None)
+
+
+def _certificate(
+    mission: Mission | None, dsm: Dsm | None, surface: Dsm | None, demanded: ClearanceParams
+) -> tuple[Certificate | None, str]:
+    if mission is None or dsm is None or surface is None:
+        return None, ""
+    try:
+        line = home_on_ground(flown_line(mission, surface), dsm)
+        return certify(surface, line, demanded), ""
+    except MissionError as error:
+        return None, f"{error.what} {error.advice}".strip()
+
+
+def _predicted_s(mission: Mission | None, profile: VehicleProfile, surface: Dsm | None) -> float | None:
+    if mission is None or surface is None:
+        return None
+    try:
+        return predict_duration(mission, profile, surface).total_s
+    except MissionError:
+        return None
+
+
+def _home_row(
+    home: Home | None,
+    planned: Home | None,
+    state: VehicleState,
+    dsm: Dsm | None,
+    shift_m: float | None,
+    mission: Mission | None,
+    needs: bool,
+    rereferenced_m: float | None,
+) -> Row:
+    if dsm is None:
+        return Row("home", "accept", "Without a surface model the ground at the vehicle's home cannot be checked.")
+    if home is None:
+        return Row("home", "unknown", "The vehicle has no position yet.", "Wait for GNSS.")
+    if not math.isfinite(home.alt_dsm_m):
+        return Row(
+            "home",
+            "bad",
+            f"The vehicle stands at {home.lat_deg:.7f}, {home.lon_deg:.7f}, where the surface model knows no height.",
+            "Start from a place on the surface model.",
+        )
+    offset = checks.amsl_row(mission, state, home)
+    if offset is not None:
+        return offset
+    away_m = 0.0
+    if planned is not None:
+        places = np.array([[home.lat_deg, home.lon_deg], [planned.lat_deg, planned.lon_deg]])
+        away_m = float(np.linalg.norm(np.diff(dsm.xy_from_lat_lon(places), axis=0)))
+    return checks.home_row(away_m, shift_m, needs=needs, rereferenced_m=rereferenced_m)

@@ -1,0 +1,1 @@
+"""MAVLink: addresses, connections, one vehicle at a time, and the machines that speak its protocols."""

@@ -1,0 +1,197 @@
+"""The adopted vehicle: its state, its link's quality, and the conversations with it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, cast
+
+from planning.model import Firmware
+from telemetry.errors import RefusedError, SilentError
+from telemetry.mavlink.actions import Message
+from telemetry.mavlink.boot_clock import BootClock
+from telemetry.mavlink.commands import CommandRun
+from telemetry.mavlink.exchanges import Exchanges
+from telemetry.mavlink.heartbeat import heartbeat
+from telemetry.mavlink.line import Line
+from telemetry.mavlink.onboard import OnBoard
+from telemetry.mavlink.orders import Order, Orders
+from telemetry.mavlink.parameters import BYTEWISE
+from telemetry.mavlink.quality import RoundTripClock, SequenceQuality
+from telemetry.mavlink.streams import StreamRequests
+from telemetry.mavlink.texts import Texts
+from telemetry.messages import Candidate
+from telemetry.reduce import reduce
+from telemetry.vehicle import Autopilot, VehicleState
+
+STALE_S, LOST_S = 1.5, 3.5
+FAST_LINK_BAUD = 400_000
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """Whom the vehicle tells. ``unsure``: the mission on board may be another one than the one last read back."""
+
+    state: Callable[[VehicleState], None]
+    text: Callable[[int, str], None]
+    unsure: Callable[[], None]
+    sent: Callable[[bytes], None]
+
+
+class AdoptedVehicle:
+    def __init__(self, candidate: Candidate, line: Line, telling: Telling, clock: Callable[[], float]) -> None:
+        now_s = clock()
+        self.candidate, self.line = candidate, line
+        self.target = (candidate.system_id, candidate.component_id)
+        self.state = VehicleState(
+            system_id=candidate.system_id,
+            component_id=candidate.component_id,
+            autopilot=cast(Autopilot, candidate.autopilot),
+            vehicle_type=candidate.vehicle_type,
+        )
+        self.onboard = OnBoard()
+        self.exchanges = Exchanges(self.send, clock)
+        self.heard_s = now_s
+        self.capabilities: int | None = None
+        self._telling, self._clock = telling, clock
+        slow = line.address.kind == "serial" and line.address.baud < FAST_LINK_BAUD
+        self._streams = StreamRequests(self.target, candidate.autopilot, slow=slow, now_s=now_s)
+        self._quality, self._round_trip = SequenceQuality(), RoundTripClock()
+        self._boot, self._texts = BootClock(), Texts()
+        self._next_state: asyncio.Future[None] | None = None
+
+    @property
+    def orders(self) -> Orders:
+        return Orders(self.target, self.state.autopilot)
+
+    @property
+    def firmware(self) -> Firmware:
+        """Which of the two mission protocols it speaks; only ArduPilot has a home row."""
+        return "ardupilot" if self.candidate.autopilot == "ardupilot" else "px4"
+
+    @property
+    def sends_integers_bytewise(self) -> bool:
+        if self.capabilities is None:
+            return self.firmware == "px4"
+        return bool(self.capabilities & BYTEWISE)
+
+    @property
+    def silent_s(self) -> float:
+        return self._clock() - self.heard_s
+
+    @property
+    def link_state(self) -> Literal["live", "stale", "lost"]:
+        silent_s = self.silent_s
+        if silent_s < STALE_S:
+            return "live"
+        return "stale" if silent_s < LOST_S else "lost"
+
+    @property
+    def quality(self) -> float | None:
+        return self._quality.share(self._clock())
+
+    @property
+    def round_trip_s(self) -> float | None:
+        return self._round_trip.round_trip_s
+
+    def moved(self, candidate: Candidate) -> None:
+        """It sends from another port now."""
+        self.candidate = candidate
+
+    def send_first(self) -> None:
+        """A heartbeat at once: some vehicles answer nobody whose heartbeat they have not heard."""
+        self.send(heartbeat())
+        self.on_tick()
+
+    def send(self, message: Message) -> None:
+        frame = self.line.send(message, self.candidate.peer)
+        if frame is not None:
+            self._telling.sent(frame)
+
+    def on_message(self, message: Message, t_utc_s: float) -> None:
+        """Any message of its system; those of its other components are only shown to the machines."""
+        now_s = self._clock()
+        if message.get_srcComponent() == self.target[1]:
+            self._on_own(message, now_s)
+        new = reduce(self.state, message, t_mono_s=now_s, t_utc_s=t_utc_s)
+        self.exchanges.on_message(message)
+        if new is not None and new is not self.state:
+            self._on_state(new, now_s)
+
+    def on_tick(self) -> None:
+        now_s = self._clock()
+        self.exchanges.on_tick()
+        for message in (*self._streams.on_tick(now_s), *self._round_trip.on_tick(now_s)):
+            self.send(message)
+        for severity, text in self._texts.on_tick(now_s):
+            self._telling.text(severity, text)
+
+    async def obey(self, order: Order) -> None:
+        """Sends a command until it is answered. Raises RefusedError with the vehicle's own words, SilentError."""
+        run = CommandRun(order.message, target=self.target, once=order.once, confirm=order.seen)
+        await self.exchanges.run(run)
+
+    async def wait_until(self, seen: Callable[[VehicleState], bool], *, timeout_s: float, what: str) -> None:
+        """Raises SilentError when the state does not show it in time."""
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not seen(self.state):
+                    await self._another_state()
+        except TimeoutError:
+            advice = "Look at the vehicle: it holds its position or does what its own failsafe says."
+            raise SilentError(f"The vehicle did not {what} within {timeout_s:.0f} s.", advice=advice) from None
+
+    async def obey_first(self, *orders: Order) -> None:
+        """The first of several ways to the same end that the vehicle does not refuse."""
+        for order in orders[:-1]:
+            try:
+                await self.obey(order)
+            except RefusedError:
+                continue
+            return
+        await self.obey(orders[-1])
+
+    def _on_own(self, message: Message, now_s: float) -> None:
+        if now_s - self.heard_s > LOST_S:
+            self._came_back(now_s)
+        self.heard_s = now_s
+        self._quality.hear(message.get_seq(), now_s)
+        self._round_trip.on_message(message, now_s)
+        self._streams.on_message(message, now_s)
+        if message.get_type() == "AUTOPILOT_VERSION":
+            self.capabilities = message.capabilities
+        if self._boot.has_restarted(message):
+            self._restarted(now_s)
+        if self.onboard.on_message(message, now_s):
+            self._telling.unsure()
+        for severity, text in self._texts.on_message(message, now_s):
+            self._telling.text(severity, text)
+
+    def _on_state(self, state: VehicleState, now_s: float) -> None:
+        self.state = state
+        self.exchanges.on_state(state)
+        if self.onboard.on_state(state, now_s):
+            self._telling.unsure()
+        if self._next_state is not None:
+            self._next_state.set_result(None)
+            self._next_state = None
+        self._telling.state(state)
+
+    def _came_back(self, now_s: float) -> None:
+        """After so long a silence it may have been restarted; in flight its boot clock will tell."""
+        self._streams.restart(now_s)
+        if not self.state.armed:
+            self.onboard.forget()
+            self._telling.unsure()
+
+    def _restarted(self, now_s: float) -> None:
+        self._boot = BootClock()
+        self._streams.restart(now_s)
+        self.onboard.forget()
+        self._telling.unsure()
+
+    async def _another_state(self) -> None:
+        if self._next_state is None:
+            self._next_state = asyncio.get_running_loop().create_future()
+        await asyncio.shield(self._next_state)

@@ -1,0 +1,129 @@
+"""Each request to the link: who may ask it, what must hold for it, what is written down, and who carries it out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, Any
+
+from telemetry import requests
+from telemetry.errors import NotAllowedError, NoVehicleError
+
+if TYPE_CHECKING:
+    from telemetry.mavlink.link import Link
+
+
+class Answering:
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._answers: dict[type, Callable[[Any], Awaitable[object]]] = {
+            requests.Connect: self._connect,
+            requests.Disconnect: self._disconnect,
+            requests.Adopt: self._adopt,
+            requests.Release: self._release,
+            requests.Upload: self._upload,
+            requests.Download: self._download,
+            requests.ReadParameters: self._read_parameters,
+            requests.Arm: self._arm,
+            requests.Disarm: self._disarm,
+            requests.StartAuto: self._start_auto,
+            requests.StartGuided: self._start_guided,
+            requests.Pause: self._pause,
+            requests.Resume: self._resume,
+            requests.ReturnHome: self._return_home,
+            requests.Land: self._land,
+        }
+
+    async def answer(self, request: requests.LinkRequest) -> object:
+        if not isinstance(request, requests.ReadParameters):
+            self._link.right.check(request.operator)
+        return await self._answers[type(request)](request)
+
+    async def _connect(self, request: requests.Connect) -> None:
+        await self._link.connect(request.address, adopt=request.adopt)
+
+    async def _disconnect(self, request: requests.Disconnect) -> None:
+        self._link.disconnect(request.address)
+
+    async def _adopt(self, request: requests.Adopt) -> None:
+        candidate = self._link.peers.find(request.candidate, time.monotonic())
+        adopted = self._link.peers.adopted
+        if adopted is not None and adopted.id == request.candidate:
+            return
+        if candidate is None:
+            what = f"{request.candidate!r} is not heard at the moment."
+            raise NoVehicleError(what, advice="Wait until the vehicle's heartbeat is heard.")
+        await self._record(request, f"adopt {candidate.id}")
+        self._link.adopt(candidate)
+
+    async def _release(self, request: requests.Release) -> None:
+        await self._record(request, "release the vehicle")
+        self._link.release()
+
+    async def _upload(self, request: requests.Upload) -> object:
+        _, pilot, transfers = self._link.need_vehicle()
+        if pilot.flies_mission:
+            what = "A mission is being flown: replacing it would send the vehicle somewhere else."
+            raise NotAllowedError(what, advice="Land first.")
+        await self._record(request, f"upload {len(request.items)} items")
+        return await transfers.upload(request)
+
+    async def _download(self, request: requests.Download) -> object:
+        _, _, transfers = self._link.need_vehicle()
+        return await transfers.download()
+
+    async def _read_parameters(self, request: requests.ReadParameters) -> object:
+        _, _, transfers = self._link.need_vehicle()
+        return await transfers.read_parameters(request.names)
+
+    async def _arm(self, request: requests.Arm) -> None:
+        _, pilot, _ = self._link.need_vehicle()
+        await self._record(request, "arm")
+        await pilot.arm()
+
+    async def _disarm(self, request: requests.Disarm) -> None:
+        _, pilot, _ = self._link.need_vehicle()
+        await self._record(request, "disarm", must=False)
+        await pilot.disarm()
+
+    async def _start_auto(self, request: requests.StartAuto) -> None:
+        _, pilot, transfers = self._link.need_vehicle()
+        _refuse_while(transfers.is_busy)
+        await self._record(request, f"start mission {request.digest[:12]} at item {request.from_item}")
+        await pilot.start_auto(request)
+
+    async def _start_guided(self, request: requests.StartGuided) -> None:
+        _, pilot, transfers = self._link.need_vehicle()
+        _refuse_while(transfers.is_busy)
+        await self._record(request, f"fly {len(request.targets)} targets in GUIDED")
+        await pilot.start_guided(request)
+
+    # Whatever makes a flight end well is tried over a link that seems lost, too.
+
+    async def _pause(self, request: requests.Pause) -> None:
+        _, pilot, _ = self._link.need_vehicle(live=False)
+        await self._record(request, "pause", must=False)
+        await pilot.pause()
+
+    async def _resume(self, request: requests.Resume) -> None:
+        _, pilot, _ = self._link.need_vehicle()
+        await self._record(request, "resume")
+        await pilot.resume()
+
+    async def _return_home(self, request: requests.ReturnHome) -> None:
+        _, pilot, _ = self._link.need_vehicle(live=False)
+        await self._record(request, "return home", must=False)
+        await pilot.return_home()
+
+    async def _land(self, request: requests.Land) -> None:
+        _, pilot, _ = self._link.need_vehicle(live=False)
+        await self._record(request, "land", must=False)
+        await pilot.land()
+
+    async def _record(self, request: Any, words: str, *, must: bool = True) -> None:
+        await self._link.trail.record(request.operator, words, must=must)
+
+
+def _refuse_while(busy: bool) -> None:
+    if busy:
+        raise NotAllowedError("A mission is being transferred.", advice="Wait until it is over.")

@@ -1,0 +1,202 @@
+"""Reading the mission on board, sans-IO: several items are asked for at once, until messages get lost."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from planning.model import Firmware
+from telemetry.errors import RefusedError, SilentError, TransferError
+from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
+from telemetry.mavlink.boot_clock import BootClock
+from telemetry.mavlink.ends import GROUND_STATION, Ends
+from telemetry.mavlink.items import item_from_message
+from telemetry.mavlink.round_trip import RoundTrip
+from telemetry.mavlink.verify import digest
+from telemetry.messages import Item, OnboardMission
+
+LIST_EVERY_S = 0.4
+BEGIN_AGAIN_S = 4.0
+"""PX4 ends a reading that displeases it, and then answers no request any more."""
+SILENT_S = 15.0
+REFUSED_S = 10.0
+"""A vehicle that is still receiving a mission says no, and gives an abandoned one up after 8 s."""
+WINDOW = 8
+LONGEST_S, LONGEST_PER_ITEM_S = 60.0, 2.0
+ACCEPTED, DENIED, CANCELLED = 0, 14, 15
+
+
+class MissionDownload:
+    """Ends in Done(OnboardMission). ArduPilot answers any request, others only the next one: see ``_lost``."""
+
+    def __init__(
+        self,
+        *,
+        firmware: Firmware,
+        target: tuple[int, int],
+        own: tuple[int, int] = GROUND_STATION,
+        now_s: float = 0.0,
+        lossy: bool = False,
+    ) -> None:
+        """``lossy``: the link is known to lose messages."""
+        self._firmware, self._ends = firmware, Ends(target, own)
+        self._window = 1 if lossy and firmware != "ardupilot" else WINDOW
+        self._boot, self._round_trip = BootClock(), RoundTrip()
+        self._over, self._most_items = False, 0
+        self._refused_since_s: float | None = None
+        self._heard_s = self._any_heard_s = self._started_s = self._moved_s = now_s
+        self._forget()
+
+    def _forget(self) -> None:
+        self._count: int | None = None
+        self._rows: dict[int, Message] = {}
+        self._asked_s: dict[int, float] = {}
+        self._asked_again: set[int] = set()
+        self._next = 0
+        """The first item that was not asked for."""
+        self._list_s = -LIST_EVERY_S
+
+    def start(self, now_s: float) -> list[Action]:
+        self._heard_s = self._any_heard_s = self._started_s = now_s
+        return self._ask_for_list(now_s)
+
+    def on_message(self, message: Message, now_s: float) -> list[Action]:
+        if self._over or not self._ends.is_from_vehicle(message):
+            return []
+        self._any_heard_s = now_s
+        if self._boot.has_restarted(message):
+            return self._fail(
+                TransferError("The vehicle restarted while its mission was read.", advice="Read it again.")
+            )
+        handler = {
+            "MISSION_COUNT": self._on_count,
+            "MISSION_ITEM_INT": self._on_item,
+            "MISSION_ACK": self._on_ack,
+        }.get(message.get_type())
+        if handler is None or not self._ends.is_for_us(message) or message.mission_type != 0:
+            return []
+        self._heard_s = now_s
+        return handler(message, now_s)
+
+    def on_tick(self, now_s: float) -> list[Action]:
+        if self._over:
+            return []
+        if now_s - self._heard_s > SILENT_S:
+            return self._fail(self._silent(now_s))
+        if now_s - self._started_s > LONGEST_S + LONGEST_PER_ITEM_S * self._most_items:
+            return self._fail(self._endless())
+        if self._count is None:
+            return self._ask_for_list(now_s) if now_s - self._list_s >= LIST_EVERY_S else []
+        if now_s - self._moved_s >= BEGIN_AGAIN_S:
+            self._forget()
+            self._window = WINDOW if self._firmware == "ardupilot" else 1
+            return self._ask_for_list(now_s)
+        lost = [seq for seq, at_s in self._asked_s.items() if now_s - at_s >= self._round_trip.patience_s]
+        return self._lost(lost, now_s) if lost else []
+
+    def cancel(self, now_s: float) -> list[Action]:
+        error = TransferError("Reading the mission was cancelled.", advice="Read it again before the start.")
+        return [] if self._over else [self._ack(CANCELLED), *self._fail(error)]
+
+    def _ask_for_list(self, now_s: float) -> list[Action]:
+        self._list_s = now_s
+        return [Send(mavlink.MAVLink_mission_request_list_message(*self._ends.vehicle, 0))]
+
+    def _on_count(self, message: Message, now_s: float) -> list[Action]:
+        if self._count == message.count:
+            return []
+        self._forget()
+        self._count, self._refused_since_s, self._moved_s = message.count, None, now_s
+        self._most_items = max(self._most_items, message.count)
+        return self._ask(now_s)
+
+    def _on_item(self, message: Message, now_s: float) -> list[Action]:
+        asked_s = self._asked_s.pop(message.seq, None)
+        if asked_s is None or self._count is None:
+            return []  # of an earlier reading, or a repetition
+        self._rows[message.seq], self._moved_s = message, now_s
+        if message.seq not in self._asked_again:
+            self._round_trip.measure(now_s - asked_s)
+        progress = Progress("reading_back", len(self._rows), self._count)
+        return [progress, *self._ask(now_s)]
+
+    def _ask(self, now_s: float) -> list[Action]:
+        """Fills the window with requests for the next missing items; ends when none is missing."""
+        assert self._count is not None
+        if len(self._rows) == self._count:
+            return self._finish()
+        first, room = self._next, self._window - len(self._asked_s)
+        self._next = max(first, min(first + room, self._count))
+        return [self._request(seq, now_s) for seq in range(first, self._next)]
+
+    def _request(self, seq: int, now_s: float) -> Action:
+        self._asked_s[seq] = now_s
+        return Send(mavlink.MAVLink_mission_request_int_message(*self._ends.vehicle, seq, 0))
+
+    def _lost(self, lost: list[int], now_s: float) -> list[Action]:
+        """ArduPilot: ask for what is missing, in any order. Others: from the gap on, one at a time from now on."""
+        self._asked_again.update(lost)
+        if self._firmware == "ardupilot":
+            return [self._request(seq, now_s) for seq in lost]
+        gap, self._window = min(lost), 1
+        self._next = gap + 1
+        self._asked_s.clear()
+        self._rows = {seq: row for seq, row in self._rows.items() if seq < gap}
+        return [self._request(gap, now_s)]
+
+    def _on_ack(self, message: Message, now_s: float) -> list[Action]:
+        """A refusal: wait while an upload may still be open, begin again when the order of requests was disliked."""
+        if message.type == ACCEPTED or (self._firmware == "ardupilot" and message.type != DENIED):
+            return []  # the late end of an upload
+        if self._refused_since_s is None:
+            self._refused_since_s = now_s
+        if now_s - self._refused_since_s > REFUSED_S:
+            return self._fail(
+                RefusedError(
+                    "The vehicle does not let its mission be read now.",
+                    advice="Wait until no other ground station is transferring one, then read it again.",
+                )
+            )
+        if self._count is not None:
+            self._forget()
+            self._window, self._list_s = 1, now_s
+        return []
+
+    def _finish(self) -> list[Action]:
+        self._over = True
+        return [self._ack(ACCEPTED), Done(self._onboard())]
+
+    def _onboard(self) -> OnboardMission:
+        rows = [self._rows[seq] for seq in range(len(self._rows))]
+        items = tuple(map(item_from_message, rows))
+        home: Item | None = None
+        if self._firmware == "ardupilot":
+            home, items = (items[0], items[1:]) if items else (None, ())
+        return OnboardMission(
+            items=items,
+            home_lat_deg=home and home.lat_deg,
+            home_lon_deg=home and home.lon_deg,
+            home_alt_amsl_m=home and home.alt_m,
+            digest=digest(items),
+        )
+
+    def _ack(self, result: int) -> Action:
+        return Send(mavlink.MAVLink_mission_ack_message(*self._ends.vehicle, result, 0))
+
+    def _fail(self, error: TransferError | RefusedError | SilentError) -> list[Action]:
+        self._over = True
+        return [Failed(error)]
+
+    def _silent(self, now_s: float) -> SilentError:
+        heard = now_s - self._any_heard_s < SILENT_S / 2
+        known = f"{len(self._rows)} of {self._count} items came" if self._count is not None else "none of it came"
+        return SilentError(
+            f"The vehicle {'answers nothing about its mission' if heard else 'has fallen silent'}: {known}.",
+            advice="The mission on board is unknown. Check the link and read it again.",
+        )
+
+    def _endless(self) -> TransferError:
+        known = f"{len(self._rows)} of {self._count} items came" if self._count is not None else "none of it came"
+        return TransferError(
+            f"Reading the mission took too long: {known}.",
+            advice="The mission on board is unknown. Improve the link and read it again.",
+        )

@@ -1,0 +1,136 @@
+"""What Hedgehop is doing with the vehicle, and where a flight broke off, followed from the vehicle's state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from telemetry.mavlink.orders import LAND_MODES, MISSION_MODES, RETURN_MODES
+from telemetry.messages import FlightStatus, OnboardMission
+from telemetry.vehicle import VehicleState
+
+Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
+GOING_HOME_COMMANDS = frozenset({20, 21, 189})
+"""MAV_CMD of RTL, LAND and DO_LAND_START."""
+TAKEOFF = 22
+UNDER_WAY = frozenset({"arming", "taking_off", "flying", "paused", "returning"})
+GOING_HOME_FROM = frozenset({"taking_off", "flying", "paused", "returning", "interrupted"})
+
+
+class FlightKeeper:
+    """``status`` changes only by the calls below. Items are counted from 1 here, home left out."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Another vehicle."""
+        self.status = FlightStatus()
+        self._completed = self._was_armed = False
+
+    @property
+    def is_under_way(self) -> bool:
+        return self.status.phase in UNDER_WAY
+
+    def take_up(self, status: FlightStatus) -> None:
+        """Of a link node that died. A script died with it; a mission on board goes on without us."""
+        if status.phase not in UNDER_WAY:
+            return
+        if status.way == "guided":
+            hint = "The navigation script ended with the link node. The vehicle holds its position: return home."
+            status = replace(status, phase="interrupted", broke_off_at=status.target, hint=hint)
+        self.status, self._was_armed = status, True
+
+    def begin(self, targets: int, t_utc_s: float, *, first: int = 1) -> None:
+        """The mission on board has been started; the vehicle is not armed yet."""
+        self._completed = self._was_armed = False
+        self.status = FlightStatus(way="auto", phase="arming", target=first, targets=targets, since_utc_s=t_utc_s)
+
+    def cancel(self, hint: str) -> None:
+        """The start was refused; the vehicle is where it was."""
+        self.status = FlightStatus(hint=hint)
+
+    def say(self, hint: str) -> None:
+        if hint != self.status.hint:
+            self.status = replace(self.status, hint=hint)
+
+    def script(self, status: FlightStatus, *, armed: bool) -> None:
+        """The guided script tells itself what it does."""
+        self.status, self._was_armed = status, armed
+        self._completed = status.phase in ("returning", "landed") and status.broke_off_at is None
+
+    def on_state(self, state: VehicleState, onboard: OnboardMission | None, *, joining: bool) -> None:
+        """``joining``: on the way to the item at which a broken-off mission goes on."""
+        if not state.armed:
+            self._on_disarmed()
+            return
+        self._was_armed = True
+        in_mission = state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
+        if in_mission and (not self.is_under_way or self.status.way != "auto"):
+            self.begin(_count(state, onboard), state.t_utc_s)  # started by the pilot's remote control
+        if in_mission:
+            self._on_mission(state, onboard)
+        elif self.status.phase in GOING_HOME_FROM and (state.mode in RETURN_MODES or state.mode in LAND_MODES):
+            self._go_home()
+        elif joining:
+            self._phase("flying" if state.landed == "in_air" else "taking_off")
+        elif self.status.phase in ("taking_off", "flying", "returning"):
+            self._phase("paused")
+
+    def _on_mission(self, state: VehicleState, onboard: OnboardMission | None) -> None:
+        target = item_of(state)
+        command = _command(onboard, target)
+        targets = _count(state, onboard) or self.status.targets
+        status = replace(self.status, target=target or self.status.target, targets=targets, broke_off_at=None)
+        if status != self.status:
+            self.status = status
+        # The last item's number alone may be left over from the flight before.
+        at_end = targets is not None and target == targets and state.mission_reached == state.mission_item
+        self._completed = command in GOING_HOME_COMMANDS or at_end
+        if self._completed:
+            self._phase("returning")
+        else:
+            starting = self.status.phase in ("arming", "taking_off")
+            climbing = starting and (command == TAKEOFF or not target or state.landed == "on_ground")
+            self._phase("taking_off" if climbing else "flying")
+
+    def _go_home(self) -> None:
+        if self.status.phase == "returning":
+            return
+        broke_off_at = None if self._completed else self.status.broke_off_at or self.status.target
+        self.status = replace(self.status, phase="returning", broke_off_at=broke_off_at)
+
+    def _on_disarmed(self) -> None:
+        if not self._was_armed or self.status.phase not in GOING_HOME_FROM:
+            return
+        self._was_armed = False
+        broke_off_at = None if self._completed else self.status.broke_off_at or self.status.target
+        self.status = replace(
+            self.status, phase="landed" if self._completed else "interrupted", broke_off_at=broke_off_at
+        )
+
+    def _phase(self, phase: Phase) -> None:
+        if self.status.phase != phase:
+            self.status = replace(self.status, phase=phase)
+
+
+def item_of(state: VehicleState) -> int | None:
+    """Number of the mission's item that is flown to: ArduPilot counts home as 0, PX4 begins with 0."""
+    if state.mission_item is None:
+        return None
+    return state.mission_item if state.autopilot == "ardupilot" else state.mission_item + 1
+
+
+def sequence_of(item: int, autopilot: str) -> int:
+    """The other way round."""
+    return item if autopilot == "ardupilot" else item - 1
+
+
+def _count(state: VehicleState, onboard: OnboardMission | None) -> int:
+    return len(onboard.items) if onboard else state.mission_items or 0
+
+
+def _command(onboard: OnboardMission | None, item: int | None) -> int | None:
+    if onboard is None or item is None or not 1 <= item <= len(onboard.items):
+        return None
+    return onboard.items[item - 1].command

@@ -1,0 +1,245 @@
+"""What each of the pilot's commands means for the vehicle, one at a time: a newer one ends what an older one began."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
+from telemetry.flight.guided import GuidedScript
+from telemetry.mavlink.adopted import AdoptedVehicle
+from telemetry.mavlink.flight_keeper import FlightKeeper, sequence_of
+from telemetry.mavlink.joining import JoinMission
+from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
+from telemetry.mavlink.procedures import Accepted, Procedures, Spawn
+from telemetry.requests import StartAuto, StartGuided
+
+RESTART_PARAMETER = "MIS_RESTART"
+IN_THE_AIR = ("taking_off", "in_air", "landing")
+LOW_M = 1.0
+SUPERSEDED = "Another command was given."
+
+
+class Pilot:
+    """Of one adopted vehicle. Every method raises RefusedError, SilentError or NotAllowedError."""
+
+    def __init__(
+        self,
+        vehicle: AdoptedVehicle,
+        flight: FlightKeeper,
+        *,
+        spawn: Spawn,
+        read_parameter: Callable[[str], Awaitable[float | None]],
+    ) -> None:
+        self.vehicle, self.flight = vehicle, flight
+        self.script: GuidedScript | None = None
+        self.join: JoinMission | None = None
+        self._procedures, self._read_parameter = Procedures(spawn, flight.say), read_parameter
+        self._script_since_s: float | None = None
+        self._script_accepted: Accepted = lambda: None
+
+    @property
+    def script_flies(self) -> bool:
+        return self.script is not None and not self.script.is_over
+
+    @property
+    def is_guided(self) -> bool:
+        """The vehicle waits for, or flies to, places that this link hands over."""
+        return self.script_flies or (self.join is not None and self.join.is_active)
+
+    @property
+    def flies_mission(self) -> bool:
+        """Whether replacing the mission on board would change what is being flown."""
+        state = self.vehicle.state
+        in_mission = state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
+        return self.flight.status.phase == "arming" or (state.armed and (in_mission or self.flight.is_under_way))
+
+    def close(self) -> None:
+        """The vehicle is given up: nothing more is sent."""
+        self._end_current()
+
+    # What the flight's status follows.
+
+    def on_tick(self) -> None:
+        state = self.vehicle.state
+        if state.heartbeat_t_mono_s is None:
+            return  # it has just been adopted: nobody knows yet whether it is armed
+        if self.script is not None:
+            self._follow_script(self.script)
+        joining = self.join is not None and self.join.is_active
+        if self.script is None:
+            self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
+
+    def _follow_script(self, script: GuidedScript) -> None:
+        status = script.status(since_utc_s=self._script_since_s)
+        self.flight.script(status, armed=self.vehicle.state.armed)
+        if script.phase != "arming":
+            self._script_accepted()
+        if script.is_over:
+            self.script = None
+
+    # Commands.
+
+    async def arm(self) -> None:
+        await self.vehicle.obey(self.vehicle.orders.arm())
+
+    async def disarm(self) -> None:
+        state = self.vehicle.state
+        low = state.alt_rel_home_m is None or state.alt_rel_home_m < LOW_M
+        if state.landed in IN_THE_AIR or (state.landed is None and not low):
+            raise NotAllowedError("The vehicle is in the air: its motors are not stopped.", advice="Land it first.")
+        await self.vehicle.obey(self.vehicle.orders.disarm())
+
+    async def start_auto(self, request: StartAuto) -> None:
+        self._check_start(request)
+        self.join = None
+        if request.from_item > 1:
+            self.join = JoinMission(self.vehicle, request)
+        await self._procedures.take_over(lambda accepted: self._start_auto(request, accepted))
+
+    async def start_guided(self, request: StartGuided) -> None:
+        vehicle = self.vehicle
+        self._check_on_ground()
+        if not request.targets:
+            raise NotAllowedError("The script has no targets.", advice="Plan a mission first.")
+        self.join = None
+        script = GuidedScript(request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target)
+        self.script, self._script_since_s = script, time.time()
+
+        async def fly(accepted: Accepted) -> None:
+            self._script_accepted = accepted
+            try:
+                await vehicle.exchanges.run(script)
+            finally:
+                script.stop(SUPERSEDED)
+
+        await self._procedures.take_over(fly)
+
+    async def pause(self) -> None:
+        if self.script_flies:
+            assert self.script is not None
+            self._tell_script(self.script.pause(time.monotonic()))
+            if self.script_flies and self.script.phase != "paused":
+                advice = "Wait until it is up, or land it."
+                raise NotAllowedError(f"The script cannot pause while it is {self._doing()}.", advice=advice)
+            return
+        state = self.vehicle.state
+        if not state.armed or state.landed == "on_ground":
+            raise NotAllowedError("Nothing is being flown that could be paused.")
+        self._end_current()
+        modes = HOLD_MODES.get(state.autopilot, ())
+        await self.vehicle.obey_first(*(self.vehicle.orders.mode(name) for name in modes))
+
+    async def resume(self) -> None:
+        if self.script_flies:
+            assert self.script is not None
+            self._tell_script(self.script.resume(time.monotonic()))
+            return
+        state = self.vehicle.state
+        if not state.armed or self.flight.status.way != "auto" or not self.flight.is_under_way:
+            raise NotAllowedError("There is no paused mission to go on with.", advice="Start the mission.")
+        join = self.join
+        if join is not None and not join.is_done:
+            await self._procedures.take_over(join.go_on)
+            return
+        await self._check_goes_on()
+        await self._procedures.take_over(self._mission_mode)
+
+    async def return_home(self) -> None:
+        await self._change_mode("RTL")
+
+    async def land(self) -> None:
+        await self._change_mode("LAND")
+
+    async def hold(self) -> None:
+        """Nobody watches any more: what this link hands over is stopped."""
+        if self.script_flies and self.script is not None:
+            self._tell_script(self.script.pause(time.monotonic()))
+        elif self.join is not None and self.join.is_active:
+            await self.pause()
+
+    # How they are carried out.
+
+    def _check_start(self, request: StartAuto) -> None:
+        onboard = self.vehicle.onboard
+        if onboard.state != "verified":
+            what = "What is on board is not known." if onboard.state == "unknown" else "There is no mission on board."
+            raise MissionUnknownError(what, advice="Upload the plan, or read the mission back.")
+        if onboard.digest != request.digest:
+            what = "The mission on board is another one than the one that was checked."
+            raise MissionUnknownError(what, advice="Upload the plan again.")
+        self._check_on_ground()
+        items = onboard.mission.items if onboard.mission else ()
+        if not 1 <= request.from_item <= len(items):
+            what = f"The mission on board has {len(items)} items: there is no item {request.from_item}."
+            raise NotAllowedError(what, advice="Start it at an item that it has.")
+
+    def _check_on_ground(self) -> None:
+        if self.vehicle.state.armed and self.vehicle.state.landed in IN_THE_AIR:
+            raise NotAllowedError("The vehicle is already flying.", advice="Land it first, or resume what is paused.")
+
+    async def _start_auto(self, request: StartAuto, accepted: Accepted) -> None:
+        vehicle, items = self.vehicle, self.vehicle.onboard.mission
+        self.flight.begin(len(items.items) if items else 0, time.time(), first=request.from_item)
+        try:
+            if self.join is not None:
+                await self.join.take_off()
+            else:
+                await self._begin_mission()
+        except (TelemetryError, asyncio.CancelledError) as error:
+            self.flight.cancel(str(error) or SUPERSEDED)
+            raise
+        if self.join is not None:
+            await self.join.go_on(accepted)
+        else:
+            await vehicle.wait_until(lambda state: state.armed, timeout_s=10, what="arm")
+
+    async def _begin_mission(self) -> None:
+        """ArduPilot does not arm in AUTO; PX4 takes off as soon as it is armed in its mission mode."""
+        vehicle, orders = self.vehicle, self.vehicle.orders
+        first = sequence_of(1, vehicle.state.autopilot)
+        if (vehicle.state.mission_item or 0) > first:
+            await vehicle.obey(orders.mission_item(first))
+        if vehicle.firmware == "ardupilot":
+            await vehicle.obey(orders.mode("GUIDED"))
+            await self._arm_if_needed()
+            await vehicle.obey(orders.mission_mode())
+            await vehicle.obey(orders.start_mission())
+        else:
+            await vehicle.obey(orders.mission_mode())
+            await self._arm_if_needed()
+            await vehicle.obey(orders.start_mission())
+
+    async def _arm_if_needed(self) -> None:
+        if not self.vehicle.state.armed:
+            await self.vehicle.obey(self.vehicle.orders.arm())
+
+    async def _mission_mode(self, accepted: Accepted) -> None:
+        await self.vehicle.obey(self.vehicle.orders.mission_mode())
+
+    async def _check_goes_on(self) -> None:
+        if self.vehicle.firmware != "ardupilot":
+            return
+        if await self._read_parameter(RESTART_PARAMETER):
+            what = f"The vehicle would begin its mission again: its parameter {RESTART_PARAMETER} is not 0."
+            advice = f"Return home, set {RESTART_PARAMETER} to 0, and start where the flight broke off."
+            raise NotAllowedError(what, advice=advice)
+
+    async def _change_mode(self, name: str) -> None:
+        """Obeyed before anything else; what was under way ends first, so that it sends nothing in between."""
+        self._end_current()
+        await self.vehicle.obey(self.vehicle.orders.mode(name))
+
+    def _tell_script(self, actions: list[Any]) -> None:
+        if self.script is not None:
+            self.vehicle.exchanges.perform(self.script, actions)
+
+    def _doing(self) -> str:
+        return self.script.phase.replace("_", " ") if self.script else "idle"
+
+    def _end_current(self) -> None:
+        self._procedures.end()
+        if self.script_flies and self.script is not None:
+            self.script.stop(SUPERSEDED)

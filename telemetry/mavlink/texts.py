@@ -1,0 +1,38 @@
+"""STATUSTEXT messages, the parts of long ones put together in the order in which they were sent."""
+
+from __future__ import annotations
+
+from telemetry.mavlink.actions import Message
+
+PART_BYTES = 50
+PATIENCE_S = 1.0
+"""After this a text is given out with what came of it."""
+
+
+class Texts:
+    def __init__(self) -> None:
+        self._parts: dict[int, dict[int, str]] = {}
+        self._severity: dict[int, int] = {}
+        self._since_s: dict[int, float] = {}
+
+    def on_message(self, message: Message, now_s: float) -> list[tuple[int, str]]:
+        """(severity, text) of what is complete now."""
+        if message.get_type() != "STATUSTEXT":
+            return []
+        if message.id == 0:
+            return [(message.severity, message.text.strip("\0 "))]
+        parts = self._parts.setdefault(message.id, {})
+        parts[message.chunk_seq] = message.text
+        self._severity[message.id] = message.severity
+        self._since_s.setdefault(message.id, now_s)
+        last = max((seq for seq, text in parts.items() if len(text) < PART_BYTES), default=None)
+        return [self._whole(message.id)] if last is not None and len(parts) == last + 1 else []
+
+    def on_tick(self, now_s: float) -> list[tuple[int, str]]:
+        late = [number for number, since_s in self._since_s.items() if now_s - since_s > PATIENCE_S]
+        return [self._whole(number) for number in late]
+
+    def _whole(self, number: int) -> tuple[int, str]:
+        del self._since_s[number]
+        parts = self._parts.pop(number)
+        return self._severity.pop(number), "".join(text for _, text in sorted(parts.items())).strip("\0 ")

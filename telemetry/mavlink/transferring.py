@@ -1,0 +1,119 @@
+"""Mission transfers and parameters of the adopted vehicle: one transfer at a time, its progress told."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Literal
+
+from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.mavlink.actions import Progress
+from telemetry.mavlink.adopted import AdoptedVehicle
+from telemetry.mavlink.download import MissionDownload
+from telemetry.mavlink.parameters import ParameterRead
+from telemetry.mavlink.upload import MissionUpload
+from telemetry.messages import ErrorInfo, OnboardMission, TransferStatus, UploadReport
+from telemetry.requests import Upload
+
+TELL_EVERY_S = 0.05
+Phase = Literal["sending", "reading_back", "done", "failed"]
+
+
+class Transfers:
+    def __init__(self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None]) -> None:
+        self._vehicle, self._tell = vehicle, tell
+        self._machine: MissionUpload | MissionDownload | None = None
+        self._is_own_idea = False
+        self._told_s = 0.0
+
+    @property
+    def is_busy(self) -> bool:
+        return self._machine is not None
+
+    @property
+    def knows_mission(self) -> bool:
+        return self._vehicle.onboard.mission is not None
+
+    async def upload(self, request: Upload) -> UploadReport:
+        """Raises TelemetryError; then nobody knows what is on board."""
+        self._make_way()
+        home = (request.home_lat_deg, request.home_lon_deg, request.home_alt_amsl_m)
+        vehicle = self._vehicle
+        machine = MissionUpload(
+            request.items, home, firmware=vehicle.firmware, target=vehicle.target, now_s=time.monotonic()
+        )
+        vehicle.onboard.transfer_begins(replaces=True)
+        known: OnboardMission | None = None
+        try:
+            report = await self._run(machine, "upload", len(request.items))
+            assert isinstance(report, UploadReport)
+            known = report.onboard
+            return report
+        finally:
+            vehicle.onboard.transfer_ends(known, time.monotonic())
+
+    async def download(self, *, own_idea: bool = False) -> OnboardMission:
+        """``own_idea``: nobody asked, so nobody is told of its progress and an upload may push it aside."""
+        self._make_way()
+        self._is_own_idea = own_idea
+        vehicle = self._vehicle
+        machine = MissionDownload(firmware=vehicle.firmware, target=vehicle.target, now_s=time.monotonic())
+        vehicle.onboard.transfer_begins(replaces=False)
+        known: OnboardMission | None = None
+        try:
+            onboard = await self._run(machine, "download", 0)
+            assert isinstance(onboard, OnboardMission)
+            known = onboard
+            return onboard
+        finally:
+            vehicle.onboard.transfer_ends(known, time.monotonic())
+
+    async def read_parameters(self, names: tuple[str, ...]) -> dict[str, float | None]:
+        vehicle = self._vehicle
+        machine = ParameterRead(names, target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
+        values = await vehicle.exchanges.run(machine)
+        assert isinstance(values, dict)
+        return values
+
+    def _make_way(self) -> None:
+        if self._machine is None:
+            return
+        if not self._is_own_idea:
+            advice = "Wait until it is over."
+            raise NotAllowedError("A mission is being transferred already.", advice=advice)
+        self._vehicle.exchanges.perform(self._machine, self._machine.cancel(time.monotonic()))
+        self._machine = None
+
+    async def _run(
+        self, machine: MissionUpload | MissionDownload, direction: Literal["upload", "download"], total: int
+    ) -> object:
+        self._machine, last = machine, Progress("sending" if direction == "upload" else "reading_back", 0, total)
+
+        def progress(news: Progress) -> None:
+            nonlocal last
+            last = news
+            self._progress(direction, news)
+
+        try:
+            result = await self._vehicle.exchanges.run(machine, progress=progress)
+        except TelemetryError as error:
+            info = ErrorInfo(error.code, error.what, error.where, error.advice)
+            self._publish(TransferStatus(direction, "failed", last.done, last.total, info))
+            raise
+        else:
+            self._publish(TransferStatus(direction, "done", last.total, last.total))
+        finally:
+            if self._machine is machine:
+                self._machine, self._is_own_idea = None, False
+        return result
+
+    def _progress(self, direction: Literal["upload", "download"], news: Progress) -> None:
+        now_s = time.monotonic()
+        if now_s - self._told_s >= TELL_EVERY_S or news.done in (0, news.total):
+            self._told_s = now_s
+            phase: Phase = "sending" if news.phase == "sending" else "reading_back"
+            self._publish(TransferStatus(direction, phase, news.done, news.total))
+
+    def _publish(self, status: TransferStatus) -> None:
+        if not self._is_own_idea:
+            self._tell(status)

@@ -1,0 +1,118 @@
+"""The lock file of a node: held while the node lives, and saying who it is."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Self
+
+from planning import __version__
+from telemetry.errors import BusError
+
+_SUFFIX = ".lock"
+_PATIENCE_S = 1.0
+"""Somebody may just be looking whether the lock is held, or a node that ends may still hold it."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFacts:
+    """What a running node says of itself."""
+
+    name: str
+    pid: int
+    arguments: tuple[str, ...]
+    version: str
+    replaceable: bool
+    """May be ended without asking anybody. A link node is not, while its vehicle is armed."""
+
+
+def running_node(runtime_dir: Path, name: str) -> NodeFacts | None:
+    """The facts of the node, or None when no process holds its lock."""
+    try:
+        fd = os.open(runtime_dir / f"{name}{_SUFFIX}", os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        if _take(fd, fcntl.LOCK_SH):
+            return None
+        return _read(fd)
+    finally:
+        os.close(fd)
+
+
+def running_nodes(runtime_dir: Path) -> list[NodeFacts]:
+    names = (path.name.removesuffix(_SUFFIX) for path in sorted(runtime_dir.glob(f"*{_SUFFIX}")))
+    found = (running_node(runtime_dir, name) for name in names if not name.endswith(".sock"))
+    return [facts for facts in found if facts is not None]
+
+
+class NodeLock:
+    """Context manager that makes this process the one node of its name; BusError when there is another."""
+
+    def __init__(self, runtime_dir: Path, name: str, arguments: Sequence[str]) -> None:
+        self._path = runtime_dir / f"{name}{_SUFFIX}"
+        # A link node that has not heard of its vehicle yet may have an armed one.
+        self._facts = NodeFacts(name, os.getpid(), tuple(arguments), __version__, replaceable=name != "link")
+        self._fd = -1
+
+    def __enter__(self) -> Self:
+        self._fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        deadline_s = time.monotonic() + _PATIENCE_S
+        while not _take(self._fd, fcntl.LOCK_EX):
+            if time.monotonic() > deadline_s:
+                raise self._taken()
+            time.sleep(0.02)
+        self._write()
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        # The file stays: whoever opened it before it was removed would hold a lock that nobody sees.
+        os.close(self._fd)
+
+    def set_replaceable(self, replaceable: bool) -> None:
+        if replaceable != self._facts.replaceable:
+            self._facts = replace(self._facts, replaceable=replaceable)
+            self._write()
+
+    def _taken(self) -> BusError:
+        other = _read(self._fd)
+        os.close(self._fd)
+        whom = f" (process {other.pid})" if other else ""
+        return BusError(
+            f"The {self._facts.name} node is running already{whom}.",
+            where=str(self._path.parent),
+            advice="End it first, or choose another runtime directory.",
+        )
+
+    def _write(self) -> None:
+        text = json.dumps(asdict(self._facts)).encode() + b"\n"
+        os.pwrite(self._fd, text, 0)
+        os.ftruncate(self._fd, len(text))
+
+
+def _take(fd: int, kind: int) -> bool:
+    try:
+        fcntl.flock(fd, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _read(fd: int) -> NodeFacts | None:
+    """None while the holder is writing, or has not yet written."""
+    try:
+        found = json.loads(os.pread(fd, 65536, 0))
+        return NodeFacts(
+            name=str(found["name"]),
+            pid=int(found["pid"]),
+            arguments=tuple(str(argument) for argument in found["arguments"]),
+            version=str(found["version"]),
+            replaceable=bool(found["replaceable"]),
+        )
+    except (ValueError, KeyError, TypeError):
+        return None

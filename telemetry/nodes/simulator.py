@@ -1,0 +1,124 @@
+"""The simulator node: ``python -m telemetry.nodes.simulator --home LAT,LON,ALT [--link URL] [--runtime DIR] ...``.
+
+With ``--runtime`` it is one of the supervised nodes and ends by itself when it is disarmed and no server has been
+there for long; without, it runs until it is stopped, and needs no bus.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from planning.errors import DescribedError, ParameterError
+from telemetry.bus import Bus
+from telemetry.node import EXIT_ENDED, EXIT_REFUSED, NodeContext, run_node
+from telemetry.simulator.gnss import RECEIVERS
+from telemetry.simulator.run import SimOptions, flying, run
+
+_log = logging.getLogger(__name__)
+
+_LOOK_EVERY_S = 0.5
+_UNATTENDED_S = 60.0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The process's exit code."""
+    try:
+        options, runtime = read_options(arguments)
+        if runtime:
+            return run_node("simulator", runtime, lambda bus, context: _fly_supervised(bus, context, options))
+        run(options, announce=lambda line: print(line, flush=True))
+    except DescribedError as error:
+        print(error, file=sys.stderr)
+        return EXIT_REFUSED
+    return EXIT_ENDED
+
+
+async def _fly_supervised(bus: Bus, context: NodeContext, options: SimOptions) -> None:
+    async with flying(options) as simulator:
+        _log.info("%s", simulator.start_line)
+        pilot = simulator.vehicle.autopilot
+        while pilot.armed or context.unattended_s() < _UNATTENDED_S:
+            context.set_replaceable(not pilot.armed)
+            await asyncio.sleep(_LOOK_EVERY_S)
+
+
+def read_options(arguments: Sequence[str] | None = None) -> tuple[SimOptions, Path | None]:
+    """The vehicle's options and the directory of the bus."""
+    given = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    lat_deg, lon_deg, alt_m = read_home(given.home)
+    options = SimOptions(
+        home_lat_deg=lat_deg,
+        home_lon_deg=lon_deg,
+        home_alt_amsl_m=alt_m,
+        link=given.link,
+        speedup=given.speedup,
+        seed=given.seed,
+        gnss=given.gnss,
+        wind_m_s=given.wind_m_s,
+        wind_from_deg=given.wind_from_deg,
+        dsm=given.dsm,
+        boot_s=given.boot_s,
+        endurance_s=given.endurance_s,
+        parameters=tuple(read_parameter(text) for text in given.parameter),
+    )
+    return options, given.runtime
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """``--home -37.1,...`` as ``--home=-37.1,...``: a southern latitude looks like an option."""
+    out: list[str] = []
+    for argument in arguments:
+        if out and out[-1] == "--home":
+            out[-1] = f"--home={argument}"
+        else:
+            out.append(argument)
+    return out
+
+
+def read_home(text: str) -> tuple[float, float, float]:
+    """``LAT,LON,ALT``: degrees, degrees, metres above sea level."""
+    try:
+        lat_deg, lon_deg, alt_m = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ParameterError(
+            f'"{text}" is no home.', where="--home", advice="Write LAT,LON,ALT, such as -37.1244507,175.6892879,803.15."
+        ) from error
+    return lat_deg, lon_deg, alt_m
+
+
+def read_parameter(text: str) -> tuple[str, float]:
+    """``NAME=VALUE``"""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip().upper(), float(value)
+    except ValueError as error:
+        raise ParameterError(
+            f'"{text}" sets no parameter.', where="--parameter", advice="Write NAME=VALUE, such as RTL_ALT=3000."
+        ) from error
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="telemetry.nodes.simulator", description="A simulated vehicle on MAVLink.")
+    default = SimOptions(0.0, 0.0, 0.0)
+    parser.add_argument("--link", default=default.link, help="udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT")
+    parser.add_argument("--runtime", type=Path, help="directory of the bus; without it no bus is used")
+    parser.add_argument("--home", required=True, help="LAT,LON,ALT: degrees, degrees, metres above sea level")
+    parser.add_argument("--speedup", type=float, default=default.speedup, help="simulated seconds per second")
+    parser.add_argument("--seed", type=int, default=default.seed)
+    parser.add_argument("--gnss", choices=sorted(RECEIVERS), default=default.gnss)
+    parser.add_argument("--wind-m-s", type=float, default=default.wind_m_s)
+    parser.add_argument("--wind-from-deg", type=float, default=default.wind_from_deg)
+    parser.add_argument("--dsm", type=Path, help="surface model that stands around the vehicle")
+    parser.add_argument("--boot-s", type=float, default=default.boot_s, help="until the position is known")
+    parser.add_argument("--endurance-s", type=float, default=default.endurance_s, help="of hovering")
+    parser.add_argument("--parameter", action="append", default=[], metavar="NAME=VALUE", help="of the autopilot")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

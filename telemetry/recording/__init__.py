@@ -1,0 +1,1 @@
+"""Flights on disk: writing them while they happen, reading them afterwards, playing them again."""

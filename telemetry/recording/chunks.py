@@ -1,0 +1,75 @@
+"""Chunks of an MCAP file: compressed stretches of messages, each with a checksum."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import zstandard
+from mcap.opcode import Opcode
+
+from telemetry.recording.closing import ChunkPlace
+from telemetry.recording.records import Record, record_at, records
+from telemetry.recording.tlog import Data
+
+_CHUNK = struct.Struct("<QQQI")
+_MESSAGE = struct.Struct("<HIQQ")
+_LARGEST_CHUNK_BYTES = 256 * 1024 * 1024
+
+
+class Message(NamedTuple):
+    channel: int
+    t_ns: int
+    own_ns: int
+    data: bytes
+    offset: int
+    """Of its record in the chunk."""
+
+
+def chunk_place(data: Data, record: Record) -> ChunkPlace:
+    start_ns, end_ns, size, _ = _CHUNK.unpack_from(data, record.start)
+    compression, _, packed = _chunk_data(data, record)
+    length = record.end - record.offset
+    return ChunkPlace(record.offset, length, start_ns, end_ns, {}, 0, compression, packed, size)
+
+
+def _chunk_data(data: Data, record: Record) -> tuple[str, int, int]:
+    """Compression, where the packed bytes begin, and how many they are."""
+    at = record.start + _CHUNK.size
+    (name_length,) = struct.unpack_from("<I", data, at)
+    compression = data[at + 4 : at + 4 + min(name_length, 16)].decode()
+    at += 4 + name_length
+    (packed,) = struct.unpack_from("<Q", data, at)
+    if at + 8 + packed > record.end:
+        raise ValueError("a chunk that is longer than its record")
+    return compression, at + 8, packed
+
+
+def chunk_content(data: Data, chunk: ChunkPlace) -> bytes:
+    """The unpacked records of a chunk. Raises what ``BROKEN`` lists when it is damaged."""
+    record = record_at(data, chunk.offset, len(data))
+    _, _, size, crc = _CHUNK.unpack_from(data, record.start)
+    compression, at, packed = _chunk_data(data, record)
+    content = data[at : at + packed]
+    if size > _LARGEST_CHUNK_BYTES:
+        raise ValueError("a chunk larger than any that is written")
+    if compression == "zstd":
+        if zstandard.frame_content_size(content) != size:
+            raise ValueError("a chunk that unpacks to another size than it says")
+        content = zstandard.ZstdDecompressor().decompress(content)
+    elif compression:
+        raise ValueError(f"a compression that is not read: {compression}")
+    if len(content) != size or (crc and zlib.crc32(content) != crc):
+        raise ValueError("a damaged chunk")
+    return content
+
+
+def messages(content: bytes) -> Iterator[Message]:
+    """The messages of an unpacked chunk in the order of writing."""
+    for record in records(content, 0, len(content)):
+        if record.opcode == Opcode.MESSAGE:
+            channel, _, t_ns, own_ns = _MESSAGE.unpack_from(content, record.start)
+            data = content[record.start + _MESSAGE.size : record.end]
+            yield Message(channel, t_ns, own_ns, data, record.offset)

@@ -1,0 +1,112 @@
+"""What a list of recordings says of each file, found without reading all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.errors import RecordingError
+from telemetry.recording.files import foreign, is_mcap, opened
+from telemetry.recording.frame_facts import decode_frame
+from telemetry.recording.reader import UNFINISHED, own_contents
+from telemetry.recording.scan import glance
+from telemetry.recording.tlog import Damage, Data, LogFrame, tlog_frames
+from telemetry.recording.tlog_flight import looks_like_tlog
+from telemetry.recording.writer import ABOUT, PLAN, VEHICLE
+from telemetry.reduce import autopilot_name
+
+_AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
+_HEAD_BYTES = 256 * 1024
+_TAIL_BYTES = 64 * 1024
+_HEARTBEAT = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingInfo:
+    """One line of a list. ``fault``: why the file cannot be opened, or what is wrong with it; None if nothing is."""
+
+    name: str
+    """File name without folder."""
+    size_bytes: int
+    kind: Literal["hedgehop", "tlog", "unreadable"] = "unreadable"
+    start_utc_s: float | None = None
+    duration_s: float | None = None
+    vehicle: str = ""
+    """Such as ``ArduPilot 4.7.0-dev, system 1``."""
+    plan_name: str = ""
+    terrain_id: str = ""
+    terrain_sha256: str = ""
+    fault: str | None = None
+
+
+def describe_recording(path: Path) -> RecordingInfo:
+    """Never raises: what is wrong with a file stands in ``fault``."""
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        return RecordingInfo(path.name, 0, fault=f"The file cannot be read: {error.strerror}.")
+    try:
+        with opened(path) as data:
+            if is_mcap(data):
+                return _of_mcap(path.name, data)
+            if looks_like_tlog(data):
+                return _of_tlog(path.name, data)
+            raise foreign(path, data)
+    except RecordingError as error:
+        return RecordingInfo(path.name, size, fault=error.what)
+
+
+def _of_mcap(name: str, data: Data) -> RecordingInfo:
+    contents = own_contents(name, data, glance)
+    about, plan = contents.metadata.get(ABOUT, {}), contents.metadata.get(PLAN, {})
+    return RecordingInfo(
+        name=name,
+        size_bytes=len(data),
+        kind="hedgehop",
+        start_utc_s=contents.start_ns / 1e9,
+        duration_s=(contents.end_ns - contents.start_ns) / 1e9,
+        vehicle=_vehicle_words(contents.metadata.get(VEHICLE, {})),
+        plan_name=plan.get("name") or about.get("name", ""),
+        terrain_id=plan.get("terrain_id", ""),
+        terrain_sha256=plan.get("terrain_sha256", ""),
+        fault=None if contents.finished else UNFINISHED,
+    )
+
+
+def _vehicle_words(vehicle: dict[str, str]) -> str:
+    if not vehicle:
+        return ""
+    autopilot = _AUTOPILOTS.get(vehicle.get("autopilot", ""), "Autopilot")
+    return (
+        f"{' '.join([autopilot, vehicle.get('firmware_version', '')]).strip()}, system {vehicle.get('system_id', '?')}"
+    )
+
+
+def _of_tlog(name: str, data: Data) -> RecordingInfo:
+    """Its first and last bytes: damage between them shows when it is opened."""
+    head = list(tlog_frames(data[:_HEAD_BYTES]))
+    damage = Damage()
+    tail = list(tlog_frames(data, damage, start=max(0, len(data) - _TAIL_BYTES)))
+    times = [frame.t_utc_s for frame in head + tail]
+    return RecordingInfo(
+        name=name,
+        size_bytes=len(data),
+        kind="tlog",
+        start_utc_s=min(times),
+        duration_s=max(times) - min(times),
+        vehicle=_heard(head),
+        fault="The file ends in the middle of a message." if damage.cut_short else None,
+    )
+
+
+def _heard(frames: list[LogFrame]) -> str:
+    """The first autopilot with a heartbeat."""
+    decoder = mavlink.MAVLink(None)
+    for frame in frames:
+        message = decode_frame(decoder, frame.frame) if frame.message_id == _HEARTBEAT else None
+        if message is not None and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
+            return _vehicle_words({"autopilot": autopilot_name(message.autopilot), "system_id": str(frame.system_id)})
+    return ""

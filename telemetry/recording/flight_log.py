@@ -1,0 +1,25 @@
+"""Reads any recording, Hedgehop's own or another ground station's, as one flight log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from telemetry.recording.files import foreign, is_mcap, opened
+from telemetry.recording.flight import FlightLog, HomePosition, Track
+from telemetry.recording.mcap_flight import read_mcap_flight
+from telemetry.recording.tlog_flight import looks_like_tlog, read_tlog_flight
+
+__all__ = ["FlightLog", "HomePosition", "Track", "read_flight_log"]
+
+
+def read_flight_log(path: Path) -> FlightLog:
+    """A recording (also of a killed recorder) or a telemetry log -> all that review needs.
+
+    Raises RecordingError for files that are empty, foreign or hold no flight: it says what the file is instead.
+    """
+    with opened(path) as data:
+        if is_mcap(data):
+            return read_mcap_flight(path, data)
+        if looks_like_tlog(data):
+            return read_tlog_flight(path, data)
+        raise foreign(path, data)

@@ -1,0 +1,129 @@
+"""What a replay is fed from: Hedgehop's own recordings message by message, other logs through the state reducer."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from contextlib import ExitStack
+from operator import itemgetter
+from pathlib import Path
+from typing import Protocol
+
+from telemetry.messages import Topic
+from telemetry.recording.files import foreign, is_mcap, opened
+from telemetry.recording.frame_facts import FrameFacts
+from telemetry.recording.reader import Entry, Recording
+from telemetry.recording.tlog import Data
+from telemetry.recording.tlog_flight import looks_like_tlog, states_of, survey
+from telemetry.recording.topics import LATEST, RECORDED
+from telemetry.vehicle import VehicleState
+
+_REPLAYED = RECORDED - {Topic.RAW, Topic.SERVER}
+"""Frames are for other programs, and a replay is no sign of life of a server."""
+_SPACING_S = 0.05
+
+
+class ReplaySource(Protocol):
+    """All that can be replayed of one file."""
+
+    name: str
+
+    @property
+    def start_utc_s(self) -> float: ...
+
+    @property
+    def end_utc_s(self) -> float: ...
+
+    @property
+    def mono_minus_utc_s(self) -> float: ...
+
+    def latest(self, until_utc_s: float) -> list[Entry]:
+        """The last message of each topic that shows a state, up to a time."""
+        ...
+
+    def entries(self, from_utc_s: float) -> Iterator[Entry]: ...
+
+    def close(self) -> None: ...
+
+
+def open_source(path: Path, *, raw: bool = False) -> ReplaySource:
+    """``raw``: MAVLink frames too. Blocks while a log of another program is read; raises RecordingError."""
+    stack = ExitStack()
+    with stack:
+        data = stack.enter_context(opened(path))
+        if is_mcap(data):
+            recording = Recording(path.name, data)
+            return RecordingSource(recording, stack.pop_all(), raw=raw)
+        if looks_like_tlog(data):
+            return _tlog_source(path.name, data)
+        raise foreign(path, data)
+
+
+def _tlog_source(name: str, data: Data) -> TlogSource:
+    """Every position, and of all else not more than can be seen."""
+    seen = survey(data)
+    vehicle = seen.chosen(name)
+    facts, entries = FrameFacts(*vehicle), list[Entry]()
+    last: VehicleState | None = None
+    for state, t_utc_s in states_of(data, vehicle, facts):
+        moved = last is None or state.position_t_mono_s != last.position_t_mono_s or state.armed != last.armed
+        if last is None or moved or t_utc_s - last.t_utc_s >= _SPACING_S:
+            entries.append(Entry(t_utc_s, Topic.VEHICLE, state))
+            last = state
+    entries += [Entry(text.t_utc_s, Topic.TEXT, text) for text in facts.texts()]
+    entries.sort(key=itemgetter(0))
+    return TlogSource(name, entries, seen.start_utc_s, seen.end_utc_s)
+
+
+class RecordingSource:
+    """Reads chunk after chunk from the open file: its size does not matter."""
+
+    def __init__(self, recording: Recording, stack: ExitStack, *, raw: bool) -> None:
+        self.name = recording.name
+        self._recording, self._stack = recording, stack
+        self._topics = _REPLAYED | ({Topic.RAW} if raw else frozenset())
+
+    @property
+    def start_utc_s(self) -> float:
+        return self._recording.start_utc_s
+
+    @property
+    def end_utc_s(self) -> float:
+        return self._recording.end_utc_s
+
+    @property
+    def mono_minus_utc_s(self) -> float:
+        return self._recording.mono_minus_utc_s
+
+    def latest(self, until_utc_s: float) -> list[Entry]:
+        found = (self._recording.latest(topic, until_utc_s) for topic in sorted(LATEST & self._topics))
+        return [entry for entry in found if entry is not None]
+
+    def entries(self, from_utc_s: float) -> Iterator[Entry]:
+        return self._recording.entries(self._topics, from_utc_s)
+
+    def close(self) -> None:
+        self._stack.close()
+
+
+class TlogSource:
+    """All states in memory: logs of other programs have no index."""
+
+    mono_minus_utc_s = 0.0
+
+    def __init__(self, name: str, entries: list[Entry], start_utc_s: float, end_utc_s: float) -> None:
+        self.name, self._entries = name, entries
+        self.start_utc_s, self.end_utc_s = start_utc_s, end_utc_s
+
+    def latest(self, until_utc_s: float) -> list[Entry]:
+        for number in range(bisect_right(self._entries, until_utc_s, key=itemgetter(0)) - 1, -1, -1):
+            if self._entries[number].topic == Topic.VEHICLE:
+                return [self._entries[number]]
+        return []
+
+    def entries(self, from_utc_s: float) -> Iterator[Entry]:
+        start = bisect_left(self._entries, from_utc_s, key=itemgetter(0))
+        return (self._entries[number] for number in range(start, len(self._entries)))
+
+    def close(self) -> None:
+        self._entries = []

@@ -1,0 +1,218 @@
+"""Writes one flight as an MCAP file in small chunks that are on their way to the disk a quarter of a second later.
+
+The library's own writer keeps far more in memory than may be lost when its process is killed, and does not see a
+disk take only a part of what it is given; the records themselves are the library's.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Chunk, Header, Metadata, Schema
+
+from planning import __version__
+from telemetry.messages import MESSAGE_TYPES, PlanRecord, Published, RawFrame
+from telemetry.recording.closing import ChunkPlace, Closing
+from telemetry.recording.files import MCAP_MAGIC
+from telemetry.recording.foxglove import Standards, standard_schema
+from telemetry.recording.message_index import message_index
+from telemetry.recording.schemas import codec_of
+from telemetry.recording.sink import Sink, Write
+from telemetry.recording.topics import RAW_ENCODING, raw_channel_topic
+from telemetry.vehicle import VehicleState
+
+LIBRARY = f"hedgehop {__version__}"
+ABOUT, PLAN, VEHICLE = "hedgehop", "plan", "vehicle"
+"""Names of the metadata that tell what a recording is without reading it."""
+_CHUNK_BYTES = 64 * 1024
+_CHUNK_S = 0.2
+_MESSAGE = struct.Struct("<BQHIQQ")
+_MESSAGE_OPCODE = 5
+
+
+class RecordingWriter:
+    """One file. ``write`` collects, ``commit`` puts on disk; what was committed survives SIGKILL and a full disk."""
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        t_utc_s: float,
+        t_mono_s: float,
+        name: str = "",
+        now: Callable[[], float] = time.monotonic,
+        write: Write = os.write,
+    ) -> None:
+        """Creates the file. ``t_utc_s`` and ``t_mono_s``: the same moment on both clocks.
+
+        Raises RecordingFullError and RecordingError, as do ``write``, ``commit`` and ``close``.
+        """
+        self.path = path
+        self.messages = 0
+        """Committed ones, of what was published."""
+        self._now, self._committed_mono_s = now, now()
+        self._closing, self._standards = Closing(), Standards()
+        self._channels: dict[tuple[str, str], int] = {}
+        self._schemas: dict[str, int] = {}
+        self._notes: dict[str, dict[str, str]] = {}
+        self._compressor = zstandard.ZstdCompressor(level=3)
+        self._last_ns = 0
+        self._clear()
+        self._sink = Sink(path, write=write)
+        try:
+            self._sink.append(_head())
+        except BaseException:
+            self._sink.close()
+            raise
+        self._note(ABOUT, {"t_utc_s": repr(t_utc_s), "t_mono_s": repr(t_mono_s), "name": name})
+
+    @property
+    def bytes(self) -> int:
+        return self._sink.size
+
+    def write(self, topic: str, message: Published, t_utc_s: float) -> None:
+        """``t_utc_s``: when it came here; never goes back within a recording."""
+        self._last_ns = t_ns = max(self._last_ns, round(t_utc_s * 1e9))
+        if isinstance(message, RawFrame):
+            channel = self._channel(raw_channel_topic(message.sent), message.link, "", b"", RAW_ENCODING)
+            self._add(channel, t_ns, _own_time_ns(message, t_ns), message.frame)
+        else:
+            codec = codec_of(MESSAGE_TYPES[topic])
+            channel = self._channel(topic, "", codec.schema_name, codec.schema, "json")
+            self._add(channel, t_ns, _own_time_ns(message, t_ns), codec.encode(message))
+            self._describe(message)
+            for standard in self._standards.of(message):
+                schema = standard_schema(standard.schema_name) if standard.schema_name not in self._schemas else b""
+                channel = self._channel(standard.topic, "", standard.schema_name, schema, "json")
+                self._add(channel, t_ns, _own_time_ns(message, t_ns), standard.data)
+        self._new_messages += 1
+        if len(self._chunk) >= _CHUNK_BYTES or self._now() - self._committed_mono_s >= _CHUNK_S:
+            self.commit()
+
+    def commit(self) -> None:
+        """On disk with all that was written; does nothing when nothing was."""
+        self._committed_mono_s = self._now()
+        if not self._index and not self._new_notes:
+            return
+        place, block, notes = self._block()
+        self._sink.append(block)
+        for name, offset, length in notes:
+            self._closing.add_metadata(name, offset, length)
+        if place is not None:
+            self._closing.add_chunk(place, {channel: len(entries) for channel, entries in self._index.items()})
+        self.messages += self._new_messages
+        self._clear()
+
+    def close(self) -> None:
+        """Finishes the file with its index, safely on disk. Without space for that it stays readable all the same."""
+        try:
+            self.commit()
+            self._sink.append(self._closing.block(self._sink.size))
+            self._sink.sync()
+        finally:
+            self._sink.close()
+
+    def abandon(self) -> None:
+        """Leaves the file as it is on disk."""
+        self._sink.close()
+
+    def _clear(self) -> None:
+        self._chunk = bytearray()
+        self._index: dict[int, list[tuple[int, int]]] = {}
+        self._start_ns = self._last_ns
+        self._new_messages = 0
+        self._new_notes: list[tuple[str, bytes]] = []
+
+    def _add(self, channel: int, t_ns: int, own_ns: int, data: bytes) -> None:
+        if not self._index:
+            self._start_ns = t_ns
+        self._index.setdefault(channel, []).append((t_ns, len(self._chunk)))
+        self._chunk += _MESSAGE.pack(_MESSAGE_OPCODE, 22 + len(data), channel, 0, t_ns, own_ns)
+        self._chunk += data
+
+    def _channel(self, topic: str, link: str, schema_name: str, schema: bytes, encoding: str) -> int:
+        """Its number; where a channel is met first, its definition goes into the chunk."""
+        known = self._channels.get((topic, link))
+        if known is not None:
+            return known
+        number = self._channels[topic, link] = len(self._channels) + 1
+        channel = Channel(
+            id=number,
+            topic=topic,
+            message_encoding=encoding,
+            metadata={"link": link} if link else {},
+            schema_id=self._schema(schema_name, schema),
+        )
+        self._closing.channels[number] = channel
+        self._chunk += _written(channel)
+        return number
+
+    def _schema(self, name: str, data: bytes) -> int:
+        if not name:
+            return 0
+        if name not in self._schemas:
+            number = self._schemas[name] = len(self._schemas) + 1
+            schema = self._closing.schemas[number] = Schema(id=number, data=data, encoding="jsonschema", name=name)
+            self._chunk += _written(schema)
+        return self._schemas[name]
+
+    def _describe(self, message: Published) -> None:
+        if isinstance(message, PlanRecord):
+            names = ("name", "digest", "terrain_id", "terrain_name", "terrain_sha256")
+            self._note(PLAN, {name: str(getattr(message, name)) for name in names})
+        elif isinstance(message, VehicleState) and message.heartbeat_t_mono_s is not None:
+            names = ("autopilot", "vehicle_type", "firmware_version", "system_id", "component_id")
+            self._note(VEHICLE, {name: str(getattr(message, name) or "") for name in names})
+
+    def _note(self, name: str, values: dict[str, str]) -> None:
+        if self._notes.get(name) != values:
+            self._notes[name] = values
+            self._new_notes.append((name, _written(Metadata(name=name, metadata=values))))
+
+    def _block(self) -> tuple[ChunkPlace | None, bytes, list[tuple[str, int, int]]]:
+        block, notes = bytearray(), []
+        for name, record in self._new_notes:
+            notes.append((name, self._sink.size + len(block), len(record)))
+            block += record
+        if not self._index:
+            return None, bytes(block), notes
+        offset, data = self._sink.size + len(block), bytes(self._chunk)
+        packed = self._compressor.compress(data)
+        chunk = _written(
+            Chunk(
+                compression="zstd",
+                data=packed,
+                message_end_time=self._last_ns,
+                message_start_time=self._start_ns,
+                uncompressed_crc=zlib.crc32(data),
+                uncompressed_size=len(data),
+            )
+        )
+        indexes, channels = message_index(self._index, offset + len(chunk))
+        place = ChunkPlace(
+            offset, len(chunk), self._start_ns, self._last_ns, channels, len(indexes), "zstd", len(packed), len(data)
+        )
+        return place, bytes(block + chunk + indexes), notes
+
+
+def _head() -> bytes:
+    return MCAP_MAGIC + _written(Header(profile="", library=LIBRARY))
+
+
+def _written(record: Header | Channel | Schema | Metadata | Chunk) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()
+
+
+def _own_time_ns(message: Published, t_ns: int) -> int:
+    """When the message itself says that it is from; when it came for those that do not say."""
+    own_utc_s = getattr(message, "t_utc_s", 0.0)
+    return round(own_utc_s * 1e9) if own_utc_s > 0 else t_ns

@@ -1,0 +1,252 @@
+"""The pure reducer: how each MAVLink message changes what is known of one vehicle.
+
+The same function serves the live link, replays and logs of other ground stations. What a vehicle does not know
+(NaN, the largest integer, -1, a latitude of 95 degrees) becomes None; messages of other systems change nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.mavlink.modes import mode_name
+from telemetry.mavlink.values import (
+    INT16_MAX,
+    INT32_MAX,
+    UINT16_MAX,
+    accuracy,
+    finite,
+    heading,
+    lat_lon,
+    scaled,
+    share,
+)
+from telemetry.vehicle import Autopilot, GnssFix, Landed, VehicleState
+
+Changes = dict[str, Any]
+Handler = Callable[[VehicleState, Any, float], Changes]
+
+_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+_PRE_ARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_AUTOPILOTS: dict[int, Autopilot] = {
+    mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
+    mavlink.MAV_AUTOPILOT_PX4: "px4",
+}
+_CRITICAL_STATES = frozenset({5, 6, 8})
+_NO_VEHICLE_TYPES = frozenset({5, 6, 18, 26, 27, 30, 36})
+"""MAV_TYPE of antenna tracker, ground station, onboard computer, gimbal, ADSB, camera and battery."""
+_LANDED: dict[int, Landed] = {1: "on_ground", 2: "in_air", 3: "taking_off", 4: "landing"}
+_FIXES: tuple[GnssFix, ...] = ("none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed", "rtk_fixed", "dgps")
+_RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+
+
+def is_vehicle_heartbeat(message: Any) -> bool:
+    """A heartbeat of an autopilot, not of a ground station, gimbal, camera or radio."""
+    return (
+        message.get_type() == "HEARTBEAT"
+        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+        and message.type not in _NO_VEHICLE_TYPES
+    )
+
+
+def autopilot_name(number: int) -> Autopilot:
+    """Of a MAV_AUTOPILOT."""
+    return _AUTOPILOTS.get(number, "other")
+
+
+def reduce(state: VehicleState | None, message: Any, *, t_mono_s: float, t_utc_s: float) -> VehicleState | None:
+    """What is known after ``message`` (a pymavlink message object); the same object when it changes nothing.
+
+    ``state`` None: the first heartbeat of any autopilot begins one. Clocks as in ``telemetry.vehicle``.
+    """
+    system, component = message.get_srcSystem(), message.get_srcComponent()
+    if state is None:
+        if not is_vehicle_heartbeat(message):
+            return None
+        state = VehicleState(system_id=system, component_id=component)
+    elif system != state.system_id or (component != state.component_id and message.get_type() != "RADIO_STATUS"):
+        return state
+    handler = _HANDLERS.get(message.get_type())
+    if handler is None:
+        return state
+    changes = handler(state, message, t_mono_s)
+    return replace(state, t_utc_s=t_utc_s, **changes) if changes else state
+
+
+def _heartbeat(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    if not is_vehicle_heartbeat(message):
+        return {}
+    autopilot = autopilot_name(message.autopilot)
+    return {
+        "autopilot": autopilot,
+        "vehicle_type": message.type,
+        "heartbeat_t_mono_s": t_mono_s,
+        "mode": mode_name(autopilot, message.type, message.custom_mode),
+        "armed": bool(message.base_mode & _ARMED),
+        "critical": message.system_status in _CRITICAL_STATES,
+    }
+
+
+def _global_position(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    lat_deg, lon_deg = lat_lon(message.lat, message.lon)
+    north, east, down = (scaled(v, 100, INT16_MAX) for v in (message.vx, message.vy, message.vz))
+    return {
+        "position_t_mono_s": t_mono_s,
+        "lat_deg": lat_deg,
+        "lon_deg": lon_deg,
+        "alt_amsl_m": scaled(message.alt, 1000, INT32_MAX),
+        "alt_rel_home_m": scaled(message.relative_alt, 1000, INT32_MAX),
+        "v_north_m_s": north,
+        "v_east_m_s": east,
+        "v_down_m_s": down,
+        "ground_speed_m_s": None if north is None or east is None else math.hypot(north, east),
+        "climb_m_s": None if down is None else 0.0 - down,
+    }
+
+
+def _attitude(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    return {
+        "attitude_t_mono_s": t_mono_s,
+        "roll_rad": finite(message.roll),
+        "pitch_rad": finite(message.pitch),
+        "heading_rad": heading(message.yaw),
+    }
+
+
+def _vfr_hud(state: VehicleState, message: Any, _: float) -> Changes:
+    if state.v_north_m_s is not None:
+        return {}  # GLOBAL_POSITION_INT says the same more often; two sources would make the figures flicker
+    return {"ground_speed_m_s": finite(message.groundspeed), "climb_m_s": finite(message.climb)}
+
+
+def _gps_raw(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    return {
+        "gnss_t_mono_s": t_mono_s,
+        "gnss_fix": _FIXES[message.fix_type] if message.fix_type < len(_FIXES) else "3d",
+        "satellites": None if message.satellites_visible == 255 else message.satellites_visible,
+        "hdop": scaled(message.eph, 100, UINT16_MAX),
+        "horizontal_accuracy_m": accuracy(message.h_acc),
+        "vertical_accuracy_m": accuracy(message.v_acc),
+    }
+
+
+def _sys_status(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    checked = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled & _PRE_ARM
+    return {
+        "ready_to_arm": bool(message.onboard_control_sensors_health & _PRE_ARM) if checked else None,
+        "battery_t_mono_s": t_mono_s,
+        "battery_v": scaled(message.voltage_battery, 1000, UINT16_MAX),
+        "battery_a": scaled(message.current_battery, 100, -1),
+        "battery_share": share(message.battery_remaining),
+    }
+
+
+def _battery_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    if message.id != 0:
+        return {}
+    cells = [v for v in message.voltages if v != UINT16_MAX] + [v for v in message.voltages_ext if v != 0]
+    # SYS_STATUS is about the same battery: what only one of the two knows must not come and go.
+    volts = sum(cells) / 1000 if cells else state.battery_v
+    amperes, left = scaled(message.current_battery, 100, -1), share(message.battery_remaining)
+    return {
+        "battery_t_mono_s": t_mono_s,
+        "battery_v": volts,
+        "battery_a": state.battery_a if amperes is None else amperes,
+        "battery_share": state.battery_share if left is None else left,
+        "battery_used_mah": scaled(message.current_consumed, 1, -1),
+    }
+
+
+def _home_position(_: VehicleState, message: Any, __: float) -> Changes:
+    lat_deg, lon_deg = lat_lon(message.latitude, message.longitude)
+    known = lat_deg is not None
+    altitude_m = scaled(message.altitude, 1000, INT32_MAX) if known else None
+    return {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": altitude_m}
+
+
+def _mission_current(_: VehicleState, message: Any, __: float) -> Changes:
+    items = {0: None, UINT16_MAX: 0}.get(message.total, message.total)
+    return {"mission_item": message.seq, "mission_items": items, "mission_id": mission_id(message)}
+
+
+def mission_id(message: Any) -> int | None:
+    """Of a MISSION_CURRENT: the dialect in use does not know this extension field, so it is read from the frame."""
+    frame = message.get_msgbuf()
+    if not frame or frame[0] != mavlink.PROTOCOL_MARKER_V2 or frame[1] <= 6:
+        return None
+    payload = bytes(frame[10 : 10 + frame[1]])
+    return int.from_bytes(payload[6:10], "little") or None
+
+
+def _mission_item_reached(_: VehicleState, message: Any, __: float) -> Changes:
+    return {"mission_reached": message.seq}
+
+
+def _extended_sys_state(_: VehicleState, message: Any, __: float) -> Changes:
+    return {"landed": _LANDED.get(message.landed_state)}
+
+
+def _ekf_status(_: VehicleState, message: Any, __: float) -> Changes:
+    bad = mavlink.EKF_CONST_POS_MODE | mavlink.EKF_UNINITIALIZED | mavlink.EKF_GPS_GLITCHING
+    return {"estimator_ok": _estimator_ok(message.flags, bad)}
+
+
+def _estimator_status(_: VehicleState, message: Any, __: float) -> Changes:
+    bad = mavlink.ESTIMATOR_CONST_POS_MODE | mavlink.ESTIMATOR_GPS_GLITCH | mavlink.ESTIMATOR_ACCEL_ERROR
+    return {"estimator_ok": _estimator_ok(message.flags, bad)}
+
+
+def _estimator_ok(flags: int, bad: int) -> bool:
+    needed = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_ABS
+    return flags & needed == needed and not flags & bad
+
+
+def _wind(_: VehicleState, message: Any, __: float) -> Changes:
+    from_deg = finite(message.direction)
+    return {
+        "wind_speed_m_s": finite(message.speed),
+        "wind_from_rad": None if from_deg is None else heading(math.radians(from_deg)),
+    }
+
+
+def _wind_cov(_: VehicleState, message: Any, __: float) -> Changes:
+    north, east = finite(message.wind_x), finite(message.wind_y)
+    if north is None or east is None:
+        return {"wind_speed_m_s": None, "wind_from_rad": None}
+    return {"wind_speed_m_s": math.hypot(north, east), "wind_from_rad": heading(math.atan2(-east, -north))}
+
+
+def _rssi(_: VehicleState, message: Any, __: float) -> Changes:
+    return {"rc_rssi": None if message.rssi == 255 else message.rssi / 254}
+
+
+def _autopilot_version(_: VehicleState, message: Any, __: float) -> Changes:
+    version = message.flight_sw_version
+    major, minor, patch, release = version >> 24 & 255, version >> 16 & 255, version >> 8 & 255, version & 255
+    return {"firmware_version": f"{major}.{minor}.{patch}{_RELEASES.get(release, '')}" if version else None}
+
+
+_HANDLERS: dict[str, Handler] = {
+    "HEARTBEAT": _heartbeat,
+    "GLOBAL_POSITION_INT": _global_position,
+    "ATTITUDE": _attitude,
+    "VFR_HUD": _vfr_hud,
+    "GPS_RAW_INT": _gps_raw,
+    "SYS_STATUS": _sys_status,
+    "BATTERY_STATUS": _battery_status,
+    "HOME_POSITION": _home_position,
+    "MISSION_CURRENT": _mission_current,
+    "MISSION_ITEM_REACHED": _mission_item_reached,
+    "EXTENDED_SYS_STATE": _extended_sys_state,
+    "EKF_STATUS_REPORT": _ekf_status,
+    "ESTIMATOR_STATUS": _estimator_status,
+    "WIND": _wind,
+    "WIND_COV": _wind_cov,
+    "RC_CHANNELS": _rssi,
+    "RADIO_STATUS": _rssi,
+    "AUTOPILOT_VERSION": _autopilot_version,
+}

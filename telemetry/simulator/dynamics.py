@@ -1,0 +1,110 @@
+"""How the simulated multirotor moves: a point mass that tilts to accelerate, with drag against the wind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from telemetry.simulator.frame import Vec3
+
+GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Airframe:
+    """Limits of a quadcopter of about 3 kg."""
+
+    max_tilt_rad: float = math.radians(30.0)
+    max_thrust_m_s2: float = 2.0 * GRAVITY_M_S2
+    drag_per_s: float = 0.27
+    """Deceleration over airspeed; ArduCopter's own simulation leans 0.028 rad at 1 m/s."""
+    tilt_rate_rad_s: float = 12.0
+    """Natural frequency of the attitude loop, critically damped."""
+    thrust_lag_s: float = 0.05
+    max_yaw_rate_rad_s: float = math.radians(60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What the autopilot wants of the airframe."""
+
+    accel_neu: Vec3
+    """Acceleration over the ground, m/s^2"""
+    heading_rad: float
+
+
+class Multirotor:
+    """True motion, stepped with a fixed time step. Heights are metres above the frame's origin."""
+
+    def __init__(self, airframe: Airframe, heading_rad: float = 0.0) -> None:
+        self.airframe = airframe
+        self.p_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.v_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.accel_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.heading_rad = heading_rad
+        self.yaw_rate_rad_s = 0.0
+        self.lean: tuple[float, float] = (0.0, 0.0)
+        """Horizontal specific force, m/s^2 north and east: where the rotors pull."""
+        self._lean_rate: tuple[float, float] = (0.0, 0.0)
+        self._thrust_m_s2 = 0.0
+
+    def step(self, demand: Demand | None, wind_neu: Vec3, dt_s: float) -> None:
+        """One free-flight step; without a demand the motors stand still."""
+        if demand is None:
+            self._thrust_m_s2, self.lean, self._lean_rate = 0.0, (0.0, 0.0), (0.0, 0.0)
+            self.yaw_rate_rad_s = 0.0
+        else:
+            self._turn(demand.heading_rad, dt_s)
+            self._lean_towards(demand.accel_neu, dt_s)
+            self._push(demand.accel_neu[2], dt_s)
+        self._move(wind_neu, dt_s)
+
+    def rest_on(self, up_m: float, *, sliding: bool = False) -> None:
+        """Stand on the ground at this height."""
+        self.p_neu = (self.p_neu[0], self.p_neu[1], up_m)
+        self.v_neu = (self.v_neu[0], self.v_neu[1], 0.0) if sliding else (0.0, 0.0, 0.0)
+        self.accel_neu = (0.0, 0.0, 0.0)
+        self.lean, self._lean_rate = (0.0, 0.0), (0.0, 0.0)
+        self.yaw_rate_rad_s = 0.0
+
+    @property
+    def attitude_rad(self) -> Vec3:
+        """Roll, pitch, heading."""
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        forward, right = self.lean[0] * c + self.lean[1] * s, -self.lean[0] * s + self.lean[1] * c
+        pitch = -math.atan2(forward, GRAVITY_M_S2)
+        return math.atan2(right * math.cos(pitch), GRAVITY_M_S2), pitch, self.heading_rad
+
+    def _turn(self, heading_rad: float, dt_s: float) -> None:
+        off = math.remainder(heading_rad - self.heading_rad, 2 * math.pi)
+        limit = self.airframe.max_yaw_rate_rad_s
+        rate = max(-limit, min(limit, 4.0 * off))
+        self.yaw_rate_rad_s += (rate - self.yaw_rate_rad_s) * min(1.0, dt_s / 0.1)
+        self.heading_rad = (self.heading_rad + self.yaw_rate_rad_s * dt_s) % (2 * math.pi)
+
+    def _lean_towards(self, accel_neu: Vec3, dt_s: float) -> None:
+        north, east = accel_neu[0], accel_neu[1]
+        most = GRAVITY_M_S2 * math.tan(self.airframe.max_tilt_rad)
+        size = math.hypot(north, east)
+        if size > most:
+            north, east = north * most / size, east * most / size
+        w = self.airframe.tilt_rate_rad_s
+        (x, y), (vx, vy) = self.lean, self._lean_rate
+        vx += (w * w * (north - x) - 2 * w * vx) * dt_s
+        vy += (w * w * (east - y) - 2 * w * vy) * dt_s
+        self.lean, self._lean_rate = (x + vx * dt_s, y + vy * dt_s), (vx, vy)
+
+    def _push(self, up_m_s2: float, dt_s: float) -> None:
+        wanted = max(0.0, min(self.airframe.max_thrust_m_s2, up_m_s2 + GRAVITY_M_S2))
+        self._thrust_m_s2 += (wanted - self._thrust_m_s2) * min(1.0, dt_s / self.airframe.thrust_lag_s)
+
+    def _move(self, wind_neu: Vec3, dt_s: float) -> None:
+        k = self.airframe.drag_per_s
+        (vn, ve, vu), (wn, we, wu) = self.v_neu, wind_neu
+        an = self.lean[0] - k * (vn - wn)
+        ae = self.lean[1] - k * (ve - we)
+        au = self._thrust_m_s2 - GRAVITY_M_S2 - k * (vu - wu)
+        vn, ve, vu = vn + an * dt_s, ve + ae * dt_s, vu + au * dt_s
+        n, e, u = self.p_neu
+        self.accel_neu, self.v_neu = (an, ae, au), (vn, ve, vu)
+        self.p_neu = (n + vn * dt_s, e + ve * dt_s, u + vu * dt_s)

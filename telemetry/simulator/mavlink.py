@@ -1,0 +1,214 @@
+"""The simulated vehicle's MAVLink side as a machine without sockets or clock: what comes in, what goes out.
+
+Unasked it sends HEARTBEAT, TIMESYNC and STATUSTEXT and no position, as ArduCopter does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as wire
+from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
+
+from telemetry.simulator.commands import RESULTS, Commands, read_order, whole
+from telemetry.simulator.mission_protocol import MissionProtocol, Reply
+from telemetry.simulator.parameter_protocol import ParameterProtocol
+from telemetry.simulator.pilot import HomeSet, Reached, StateChanged, Text
+from telemetry.simulator.streams import Streams
+from telemetry.simulator.vehicle import SimulatedVehicle
+
+HEARTBEAT_S = 1.0
+TIMESYNC_S = 10.0
+FASTEST_WALL_S = 0.02
+"""However fast simulated time runs, no stream sends more often than 50 times a second."""
+GROUPS: dict[int, tuple[int, ...]] = {
+    wire.MAV_DATA_STREAM_EXTENDED_STATUS: (1, 24, 42, 62, 87),
+    wire.MAV_DATA_STREAM_POSITION: (33, 32),
+    wire.MAV_DATA_STREAM_EXTRA1: (30, 108),
+    wire.MAV_DATA_STREAM_EXTRA2: (74,),
+    wire.MAV_DATA_STREAM_EXTRA3: (2, 147, 193),
+}
+"""REQUEST_DATA_STREAM's groups."""
+MISSION_MESSAGES = {
+    "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_REQUEST_LIST", "MISSION_REQUEST",
+    "MISSION_REQUEST_INT", "MISSION_CLEAR_ALL", "MISSION_WRITE_PARTIAL_LIST",
+}  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Stream:
+    interval_s: float
+    """Simulated"""
+    due_s: float
+    sent_wall_s: float = -1e9
+
+
+@dataclass(slots=True)
+class _Peer:
+    streams: dict[int, _Stream] = field(default_factory=dict)
+
+
+class Endpoint:
+    """One autopilot for any number of ground stations. ``peer`` names the way to one of them.
+
+    ``wall_s`` is any monotonic clock. Answers of the mission protocol keep its time, everything else
+    keeps simulated time.
+    """
+
+    def __init__(self, vehicle: SimulatedVehicle) -> None:
+        self.vehicle = vehicle
+        self._pilot = vehicle.autopilot
+        self._missions = MissionProtocol(self._pilot)
+        self._parameters = ParameterProtocol(vehicle.parameters)
+        self._streams = Streams(vehicle, self._missions)
+        self._commands = Commands(self._pilot)
+        self._peers: dict[Hashable, _Peer] = {}
+        self._heartbeat = _Stream(HEARTBEAT_S, 0.0)
+        self._timesync = _Stream(TIMESYNC_S, TIMESYNC_S)
+
+    @property
+    def system_id(self) -> int:
+        return int(self.vehicle.parameters["MAV_SYSID"])
+
+    @property
+    def component_id(self) -> int:
+        return wire.MAV_COMP_ID_AUTOPILOT1
+
+    def connect(self, peer: Hashable) -> None:
+        self._peers.setdefault(peer, _Peer())
+
+    def disconnect(self, peer: Hashable) -> None:
+        self._peers.pop(peer, None)
+
+    def on_message(self, message: Any, peer: Hashable, wall_s: float) -> list[Reply]:
+        """Answers, in the order in which they go out."""
+        self.connect(peer)
+        kind = message.get_type()
+        if getattr(message, "target_system", 0) not in (0, self.system_id):
+            return []
+        if kind == "HEARTBEAT":
+            self._on_heartbeat(message)
+            return []
+        if kind in MISSION_MESSAGES:
+            return self._missions.on_message(message, peer, wall_s) + self._tell()
+        replies = self._answer(kind, message, peer)
+        return [(peer, reply) for reply in replies] + self._tell()
+
+    def on_slice(self, wall_s: float) -> list[Reply]:
+        """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
+        out = self._missions.on_tick(wall_s)
+        out += self._tell()
+        now_s = self.vehicle.now_s
+        if _due(self._heartbeat, now_s, wall_s) or wall_s - self._heartbeat.sent_wall_s > HEARTBEAT_S:
+            out += self._beat(wall_s)
+        if _due(self._timesync, now_s, wall_s):
+            self._timesync.sent_wall_s = wall_s
+            out += self._to_all(wire.MAVLink_timesync_message(0, int(now_s * 1e9)))
+        for peer, state in self._peers.items():
+            for message_id, stream in state.streams.items():
+                if _due(stream, now_s, wall_s) and (message := self._streams.build(message_id)):
+                    stream.sent_wall_s = wall_s
+                    out.append((peer, message))
+        return out
+
+    def _answer(self, kind: str, message: Any, peer: Hashable) -> list[MAVLink_message]:
+        if kind in ("COMMAND_LONG", "COMMAND_INT"):
+            return self._on_command(message, peer)
+        if kind.startswith("PARAM_"):
+            return self._parameters.on_message(message)
+        if kind == "SET_MODE":
+            self._commands.set_mode(message.base_mode, message.custom_mode)
+        elif kind in ("SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"):
+            self._commands.position_target(message)
+        elif kind == "REQUEST_DATA_STREAM":
+            self._on_data_stream(message, peer)
+        elif kind == "MISSION_SET_CURRENT":
+            self._pilot.set_current(message.seq)
+            return [self._streams.mission_current()]
+        elif kind == "TIMESYNC" and message.tc1 == 0:
+            return [wire.MAVLink_timesync_message(int(self.vehicle.now_s * 1e9), message.ts1)]
+        return []
+
+    def _on_heartbeat(self, message: Any) -> None:
+        if message.get_srcSystem() == self.vehicle.parameters["MAV_GCS_SYSID"]:
+            self._pilot.gcs_heard()
+
+    def _on_command(self, message: Any, peer: Hashable) -> list[MAVLink_message]:
+        order, extra = read_order(message), []
+        first, second = order.params[:2]
+        if order.command == wire.MAV_CMD_SET_MESSAGE_INTERVAL:
+            result = self._set_interval(peer, whole(first), second)
+        elif order.command == wire.MAV_CMD_GET_MESSAGE_INTERVAL:
+            result, extra = self._interval(peer, whole(first))
+        elif order.command in REQUESTS:
+            requested = self._streams.build(REQUESTS[order.command] or whole(first))
+            result, extra = (RESULTS["accepted"], [requested]) if requested else (RESULTS["failed"], [])
+        else:
+            result = self._commands.run(order)
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        return [wire.MAVLink_command_ack_message(message.command, result, 0, 0, *sender), *extra]
+
+    def _set_interval(self, peer: Hashable, message_id: int, interval_us: float) -> int:
+        if message_id not in self._streams:
+            return RESULTS["denied"]
+        streams = self._peers[peer].streams
+        if interval_us > 0:
+            streams[message_id] = _Stream(interval_us / 1e6, self.vehicle.now_s)
+        else:
+            streams.pop(message_id, None)
+        return RESULTS["accepted"]
+
+    def _interval(self, peer: Hashable, message_id: int) -> tuple[int, list[MAVLink_message]]:
+        if message_id not in self._streams:
+            return RESULTS["denied"], []
+        stream = self._peers[peer].streams.get(message_id)
+        interval_us = round(stream.interval_s * 1e6) if stream else 0
+        return RESULTS["accepted"], [wire.MAVLink_message_interval_message(message_id, min(interval_us, 2**31 - 1))]
+
+    def _on_data_stream(self, message: Any, peer: Hashable) -> None:
+        wanted = GROUPS if message.req_stream_id == wire.MAV_DATA_STREAM_ALL else (message.req_stream_id,)
+        interval_us = 1e6 / message.req_message_rate if message.start_stop and message.req_message_rate else -1
+        for group in wanted:
+            for message_id in GROUPS.get(group, ()):
+                self._set_interval(peer, message_id, interval_us)
+
+    def _beat(self, wall_s: float) -> list[Reply]:
+        self._heartbeat.sent_wall_s = wall_s
+        return self._to_all(self._streams.heartbeat())
+
+    def _tell(self) -> list[Reply]:
+        """The autopilot's news, to everybody."""
+        out: list[Reply] = []
+        for event in self._pilot.take_events():
+            match event:
+                case Text(severity, text):
+                    out += self._to_all(wire.MAVLink_statustext_message(severity, text.encode()[:50]))
+                case Reached(seq):
+                    out += self._to_all(wire.MAVLink_mission_item_reached_message(seq))
+                case HomeSet():
+                    for message in (self._streams.gps_global_origin(), self._streams.home_position()):
+                        out += self._to_all(message) if message else []
+                case StateChanged():
+                    out += self._to_all(self._streams.heartbeat())
+        return out
+
+    def _to_all(self, message: Any) -> list[Reply]:
+        return [(peer, message) for peer in self._peers]
+
+
+REQUESTS = {
+    wire.MAV_CMD_REQUEST_MESSAGE: 0,
+    wire.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: wire.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    wire.MAV_CMD_GET_HOME_POSITION: wire.MAVLINK_MSG_ID_HOME_POSITION,
+}
+"""Commands that ask for a message; 0: the one that the command names."""
+
+
+def _due(stream: _Stream, now_s: float, wall_s: float) -> bool:
+    """Whether the stream's time has come; then its next one is set."""
+    if now_s < stream.due_s or wall_s - stream.sent_wall_s < FASTEST_WALL_S:
+        return False
+    stream.due_s = max(stream.due_s + stream.interval_s, now_s)
+    return True

@@ -1,0 +1,149 @@
+"""What the simulated autopilot knows, and what its modes use of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from planning.flight_time.scurve import Axes
+from telemetry.simulator.control import PositionControl
+from telemetry.simulator.frame import Frame, Vec3
+from telemetry.simulator.legs import Motion
+from telemetry.simulator.mission import MissionSteps, Step
+from telemetry.simulator.parameters import Parameters
+
+AS_REAL_BOOT_S = 41.5
+"""From switching on to a usable position estimate, in the recordings."""
+READY_SHARE, FIX_SHARE = 2.35 / AS_REAL_BOOT_S, 19.9 / AS_REAL_BOOT_S
+"""When "ArduPilot Ready" is said and when the receiver has its fix, as shares of the boot time."""
+FASTEST_M_S = 20.0
+"""WPNAV_SPEED's upper end."""
+Answer = Literal["accepted", "denied", "failed", "unsupported"]
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    severity: int
+    """0 emergency to 7 debug"""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class HomeSet:
+    """Home or the estimator's origin is new."""
+
+
+@dataclass(frozen=True, slots=True)
+class StateChanged:
+    """Another mode, armed or disarmed."""
+
+
+Event = Text | Reached | HomeSet | StateChanged
+
+
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """What the autopilot is told at each step."""
+
+    p_neu: Vec3
+    v_neu: Vec3
+    heading_rad: float
+    touching: bool
+    """The feet are on something."""
+    voltage_v: float
+    used_mah: float
+
+
+class Pilot:
+    """State that modes read and change. Positions are in the frame, as estimated."""
+
+    def __init__(self, frame: Frame, parameters: Parameters, boot_s: float) -> None:
+        self.frame = frame
+        self.parameters = parameters
+        self.boot_s = boot_s
+        self.mission = MissionSteps()
+        self.now_s = 0.0
+        self.armed = self.flying = self.crashed = False
+        self.home_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.home_known = False
+        self.speed_m_s: float | None = None
+        """Replaces WPNAV_SPEED until the mode changes."""
+        self.heading_goal_rad = 0.0
+        self.facing_fixed = False
+        """A heading was commanded: the next waypoint does not turn the vehicle."""
+        self.p_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.v_neu: Vec3 = (0.0, 0.0, 0.0)
+        self.target: Motion = (self.p_neu, self.v_neu, (0.0, 0.0, 0.0))
+        """Where the vehicle should be now, and how it should be moving."""
+        self.control = PositionControl()
+        self._events: list[Event] = []
+
+    @property
+    def ready(self) -> bool:
+        return self.now_s >= self.boot_s * READY_SHARE
+
+    @property
+    def has_fix(self) -> bool:
+        return self.now_s >= self.boot_s * FIX_SHARE
+
+    @property
+    def position_ok(self) -> bool:
+        return self.now_s >= self.boot_s
+
+    def take_events(self) -> list[Event]:
+        """What has happened since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def tell(self, event: Event) -> None:
+        self._events.append(event)
+
+    def say(self, severity: int, text: str) -> None:
+        self.tell(Text(severity, text))
+
+    def axes(self, speed_m_s: float | None = None) -> Axes:
+        return self.parameters.axes(speed_m_s)
+
+    def near(self, goal_neu: Vec3) -> bool:
+        return math.dist(self.p_neu, goal_neu) <= self.parameters["WPNAV_RADIUS"] / 100
+
+    def place(self, step: Step) -> Vec3:
+        """Where a step is in the frame."""
+        lat, lon = step.lat_deg, step.lon_deg
+        n, e, _ = self.frame.neu_from_geodetic(lat, lon, 0.0) if lat or lon else self.p_neu
+        return n, e, step.alt_m + (self.home_neu[2] if step.above == "home" else -self.frame.alt_amsl_m)
+
+    def face(self, goal_neu: Vec3, *, at_least_m: float = 0.0) -> None:
+        """Turn to a place, unless it is nearer than that."""
+        north, east = goal_neu[0] - self.p_neu[0], goal_neu[1] - self.p_neu[1]
+        if math.hypot(north, east) > at_least_m:
+            self.heading_goal_rad = math.atan2(east, north) % (2 * math.pi)
+
+    def turn_to(self, heading_rad: float) -> None:
+        self.heading_goal_rad = heading_rad
+        self.facing_fixed = True
+
+    def change_speed(self, kind: int, speed_m_s: float) -> Answer:
+        """0 and 1: over ground; 2: climb; 3: descent."""
+        if not 0 < speed_m_s < math.inf:
+            return "failed"
+        if kind in (2, 3):
+            self.parameters.set("WPNAV_SPEED_UP" if kind == 2 else "WPNAV_SPEED_DN", 100 * speed_m_s)
+        else:
+            self.speed_m_s = min(speed_m_s, FASTEST_M_S)
+        return "accepted"
+
+    def apply(self, step: Step) -> None:
+        """A mission step that sets something."""
+        first, second, _, relative = step.values
+        if step.kind == "speed":
+            self.change_speed(int(first), second)
+        elif step.kind == "yaw":
+            turn = math.radians(first)
+            self.turn_to(self.heading_goal_rad + turn if relative else turn)

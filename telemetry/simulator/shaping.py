@@ -1,0 +1,125 @@
+"""A target that moves to where it is wanted with limited speed, acceleration and jerk.
+
+ArduCopter leads its position controller this way in GUIDED, LOITER, take-off, return and landing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from planning.flight_time.scurve import Axes
+from telemetry.simulator.frame import Vec3
+
+JERK_M_S3 = 5.0
+"""ArduCopter's PSC_JERK_XY and PSC_JERK_Z."""
+BRAKING_SHARE = 0.57
+"""Vertical deceleration on the approach over the highest acceleration, from the recorded take-offs."""
+FLAT_BRAKING_SHARE = 0.293
+"""The same over ground, from the recorded GUIDED flight."""
+NEAR_PER_S = 2.0
+"""Speed over distance on the last metres."""
+SPEED_PER_S = 4.0
+"""Acceleration over a difference of speed, while that is small."""
+JERK_SHARE = 0.4
+"""How much of the jerk limit the change of a large difference of speed counts on."""
+AT_REST_M_S = 0.02
+STOPPING_STEP_S = 0.02
+LONGEST_STOP = 1000
+
+
+def approach_speed(distance_m: float, decel_m_s2: float) -> float:
+    """Speed from which the rest of the way can be braked: linear near the end, a square root before."""
+    linear_m = decel_m_s2 / NEAR_PER_S**2
+    if distance_m <= linear_m:
+        return NEAR_PER_S * distance_m
+    return math.sqrt(2 * decel_m_s2 * (distance_m - linear_m / 2))
+
+
+class Shaped:
+    """Position, velocity and acceleration of a target, north east up."""
+
+    def __init__(self, p_neu: Vec3, v_neu: Vec3 = (0.0, 0.0, 0.0)) -> None:
+        self.p_neu = p_neu
+        self.v_neu = v_neu
+        self.accel_neu: Vec3 = (0.0, 0.0, 0.0)
+
+    def towards(self, goal_neu: Vec3, axes: Axes, dt_s: float) -> None:
+        """One step to a place, as straight as the limits of climb allow."""
+        axes = _along(goal_neu, self.p_neu, axes)
+        up_m_s = self._vertical_speed(goal_neu[2] - self.p_neu[2], axes)
+        self._step(self._flat_velocity(goal_neu, axes), up_m_s, axes, dt_s)
+
+    def sinking(self, over_neu: Vec3, speed_m_s: float, axes: Axes, dt_s: float) -> None:
+        """One step down at this speed over a place, whatever its height."""
+        self._step(self._flat_velocity(over_neu, axes), -speed_m_s, axes, dt_s)
+
+    def stop(self, axes: Axes, dt_s: float) -> None:
+        """One step of braking, wherever that ends."""
+        self._step((0.0, 0.0), 0.0, axes, dt_s)
+
+    @property
+    def at_rest(self) -> bool:
+        return math.hypot(*self.v_neu) < AT_REST_M_S and math.hypot(*self.accel_neu) < 10 * AT_REST_M_S
+
+    @property
+    def motion(self) -> tuple[Vec3, Vec3, Vec3]:
+        return self.p_neu, self.v_neu, self.accel_neu
+
+    def _flat_velocity(self, goal_neu: Vec3, axes: Axes) -> tuple[float, float]:
+        north, east = goal_neu[0] - self.p_neu[0], goal_neu[1] - self.p_neu[1]
+        distance = math.hypot(north, east)
+        if distance < 1e-6:
+            return 0.0, 0.0
+        speed = min(axes.speed_m_s, approach_speed(distance, FLAT_BRAKING_SHARE * axes.accel_m_s2))
+        return speed * north / distance, speed * east / distance
+
+    def _vertical_speed(self, away_m: float, axes: Axes) -> float:
+        speed = approach_speed(abs(away_m), BRAKING_SHARE * axes.vertical_accel_m_s2)
+        return min(speed, axes.climb_m_s) if away_m > 0 else -min(speed, axes.descent_m_s)
+
+    def _step(self, flat_m_s: tuple[float, float], up_m_s: float, axes: Axes, dt_s: float) -> None:
+        (an, ae, au), (vn, ve, vu), (n, e, u) = self.accel_neu, self.v_neu, self.p_neu
+        north, east = _limited(_wish(flat_m_s[0] - vn), _wish(flat_m_s[1] - ve), axes.accel_m_s2)
+        most = axes.vertical_accel_m_s2
+        up = max(-most, min(most, _wish(up_m_s - vu)))
+        dn, de = _limited(north - an, east - ae, JERK_M_S3 * dt_s)
+        step = JERK_M_S3 * dt_s
+        an, ae, au = an + dn, ae + de, au + max(-step, min(step, up - au))
+        vn, ve, vu = vn + an * dt_s, ve + ae * dt_s, vu + au * dt_s
+        self.accel_neu, self.v_neu = (an, ae, au), (vn, ve, vu)
+        self.p_neu = (n + vn * dt_s, e + ve * dt_s, u + vu * dt_s)
+
+
+def _along(goal_neu: Vec3, p_neu: Vec3, axes: Axes) -> Axes:
+    """The limits of speed on a straight line to the goal: the axis that binds first slows the other."""
+    flat, up = math.hypot(goal_neu[0] - p_neu[0], goal_neu[1] - p_neu[1]), goal_neu[2] - p_neu[2]
+    length = math.hypot(flat, up)
+    if length < 1e-6:
+        return axes
+    vertical = axes.climb_m_s if up > 0 else axes.descent_m_s
+    speed = min(axes.speed_m_s * length / flat if flat else math.inf, vertical * length / abs(up) if up else math.inf)
+    vertical, flat_m_s = speed * abs(up) / length, speed * flat / length
+    return replace(axes, speed_m_s=flat_m_s, climb_m_s=vertical, descent_m_s=vertical)
+
+
+def _wish(change_m_s: float) -> float:
+    """Acceleration that ends a difference of speed without overshoot under limited jerk."""
+    size = abs(change_m_s)
+    return math.copysign(min(SPEED_PER_S * size, math.sqrt(2 * JERK_SHARE * JERK_M_S3 * size)), change_m_s)
+
+
+def _limited(north: float, east: float, most: float) -> tuple[float, float]:
+    size = math.hypot(north, east)
+    return (north, east) if size <= most else (north * most / size, east * most / size)
+
+
+def stopping_point(shaped: Shaped, axes: Axes) -> Vec3:
+    """Where a target that brakes now comes to rest."""
+    ahead = Shaped(shaped.p_neu, shaped.v_neu)
+    ahead.accel_neu = shaped.accel_neu
+    for _ in range(LONGEST_STOP):
+        if ahead.at_rest:
+            break
+        ahead.stop(axes, STOPPING_STEP_S)
+    return ahead.p_neu

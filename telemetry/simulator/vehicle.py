@@ -1,0 +1,118 @@
+"""The simulated vehicle as a whole: truth, sensors and autopilot, advanced in fixed steps of simulated time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from telemetry.simulator.autopilot import Autopilot
+from telemetry.simulator.battery import Battery, Pack
+from telemetry.simulator.dynamics import GRAVITY_M_S2, Airframe, Multirotor
+from telemetry.simulator.frame import Frame, Vec3
+from telemetry.simulator.gnss import Gnss, GnssKind
+from telemetry.simulator.parameters import Parameters
+from telemetry.simulator.pilot import AS_REAL_BOOT_S, Sensed
+from telemetry.simulator.wind import Wind
+from telemetry.simulator.world import FlatGround, Ground
+
+STEP_S = 0.005
+STEPS_PER_LOOK = 4
+"""The ground is looked up every 20 ms: 0.1 m at 5 m/s."""
+GENTLE_M_S = 2.5
+"""A slower touchdown, while landing, is one."""
+STEEP_M = 0.5
+"""Ground that stands this far above the feet was hit from the side."""
+
+
+class SimulatedVehicle:
+    """Depends on nothing but its arguments and the commands given between steps."""
+
+    def __init__(
+        self,
+        frame: Frame,
+        *,
+        ground: Ground | None = None,
+        seed: int = 0,
+        gnss: GnssKind = "rtk",
+        parameters: Parameters | None = None,
+        boot_s: float = AS_REAL_BOOT_S,
+        speedup: float = 1.0,
+    ) -> None:
+        wind_seed, gnss_seed = np.random.SeedSequence(seed).spawn(2)
+        self.frame = frame
+        self.parameters = parameters or Parameters()
+        self.ground = ground or FlatGround()
+        self.wind = Wind(np.random.default_rng(wind_seed))
+        self.gnss = Gnss(gnss, np.random.default_rng(gnss_seed))
+        self.battery = Battery(Pack(capacity_mah=self.parameters["BATT_CAPACITY"]))
+        self.truth = Multirotor(Airframe())
+        self.autopilot = Autopilot(frame, self.parameters, boot_s=boot_s, speedup=speedup)
+        self.wind_neu: Vec3 = (0.0, 0.0, 0.0)
+        self._steps = 0
+        self._ground_m = 0.0
+        self._resting = True
+
+    @property
+    def now_s(self) -> float:
+        """Simulated time since switching on."""
+        return self._steps * STEP_S
+
+    @property
+    def estimated_neu(self) -> Vec3:
+        return self.autopilot.p_neu
+
+    def advance(self, seconds: float) -> None:
+        """Go on by this much simulated time, in whole steps."""
+        for _ in range(round(seconds / STEP_S)):
+            self.step()
+
+    def step(self) -> None:
+        self._steps += 1
+        if self._steps % STEPS_PER_LOOK == 1 and not self._resting:
+            self._ground_m = self.ground.up_m(self.truth.p_neu[0], self.truth.p_neu[1])
+        self.gnss.step(STEP_S)
+        demand = self.autopilot.update(self._sense(), STEP_S)
+        if self.battery.empty and self.autopilot.flying:
+            self.autopilot.crash("Battery empty")
+            demand = None
+        self.battery.step(self._thrust(demand is not None), STEP_S)
+        if demand is None and self._resting:
+            return
+        wind_from = math.radians(self.parameters["SIM_WIND_DIR"])
+        self.wind_neu = self.wind.step(self.parameters["SIM_WIND_SPD"], wind_from, STEP_S)
+        self.truth.step(demand, self.wind_neu, STEP_S)
+        self._meet_ground()
+
+    def _sense(self) -> Sensed:
+        (n, e, u), (vn, ve, vu) = self.truth.p_neu, self.truth.v_neu
+        (dn, de, du), (rn, re, ru) = self.gnss.error_neu, self.gnss.error_rate_neu
+        return Sensed(
+            p_neu=(n + dn, e + de, u + du),
+            v_neu=(vn + rn, ve + re, vu + ru),
+            heading_rad=self.truth.heading_rad,
+            touching=self._resting,
+            voltage_v=self.battery.voltage_v,
+            used_mah=self.battery.used_mah,
+        )
+
+    def _thrust(self, motors: bool) -> float | None:
+        return max(0.0, 1 + self.truth.accel_neu[2] / GRAVITY_M_S2) if motors else None
+
+    def _meet_ground(self) -> None:
+        under_m = self._ground_m - self.truth.p_neu[2]
+        if under_m < 0:
+            self._resting = False
+            return
+        if self._resting:
+            self.truth.rest_on(self._ground_m)
+            return
+        stage, v = self.autopilot.stage, self.truth.v_neu
+        self._resting = True
+        self.autopilot.say(6, f"SIM Hit ground at {math.hypot(*v):.6f} m/s")
+        gentle = abs(v[2]) < GENTLE_M_S and math.hypot(v[0], v[1]) < GENTLE_M_S and under_m < STEEP_M
+        if self.autopilot.flying and not (gentle and stage == "landing"):
+            self.autopilot.crash("Crash: Disarming: hit the ground")
+        if under_m >= STEEP_M:
+            self._ground_m = self.truth.p_neu[2]
+        self.truth.rest_on(self._ground_m)

@@ -1,0 +1,117 @@
+"""A recording of another ground station is opened, judged, played and steered in a real browser."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import Station
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+
+@pytest.fixture
+def reviewed(station: Station, page: Page, shared_data: Path) -> Page:
+    """A page with a real autopilot's .tlog open, over the surface model that it was flown over."""
+    page.goto(station.link)
+    _choose(page, "terrain-file", shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
+    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+    page.get_by_test_id("tab-review").click()
+    _choose(page, "recording-import", _tlog(shared_data))
+    expect(page.get_by_test_id("replay-badge")).to_be_visible()
+    return page
+
+
+def test_a_tlog_is_judged_and_played(reviewed: Page) -> None:
+    page = reviewed
+    expect(page.get_by_test_id("recording-row")).to_contain_text("tlog")
+    expect(page.get_by_test_id("completed")).to_have_text("completed")
+    expect(page.get_by_test_id("cross-track-max")).to_contain_text(re.compile(r"\d\.\d\d\sm"))
+    expect(page.get_by_test_id("flown-distance")).to_contain_text(re.compile(r"\d\.\d\d\sm"))
+
+    page.get_by_test_id("time-chart-histogram").click()
+    expect(page.get_by_test_id("histogram").locator("rect.column").first).to_be_visible()
+    page.get_by_test_id("time-chart-cross_track").click()
+    expect(page.get_by_test_id("playhead")).to_be_visible()
+
+    page.get_by_test_id("review-part-instruments").click()
+    page.get_by_test_id("transport-play").click()
+    expect(page.get_by_test_id("play")).to_have_text("Pause")
+    expect(page.get_by_test_id("instruments-replay").get_by_test_id("above-home")).to_contain_text(re.compile(r"\d"))
+    page.get_by_test_id("play").click()
+    expect(page.get_by_test_id("play")).to_have_text("Play")
+
+
+def test_chart_keys_and_events_steer_the_replay(reviewed: Page) -> None:
+    page = reviewed
+    chart = page.locator(".time-pane .u-over")
+    expect(page.get_by_test_id("playhead")).to_be_visible()
+    box = chart.bounding_box()
+    assert box is not None
+    middle = (box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], middle[1], steps=5)
+    page.mouse.up()
+    length_s = _seconds(page, last=True)
+    _expect_time(page, 0.6 * length_s)
+
+    page.locator(".time-pane header").click(position={"x": 400, "y": 4})
+    page.keyboard.press("ArrowLeft")
+    _expect_time(page, 0.6 * length_s - 10)
+    page.keyboard.press("ArrowRight")
+    _expect_time(page, 0.6 * length_s)
+
+    page.get_by_test_id("review-part-events").click()
+    event = page.get_by_test_id("review-event").nth(3)
+    event.click()
+    expect(event).to_have_attribute("aria-current", "time")
+
+
+def test_a_recording_is_downloaded_closed_and_deleted(reviewed: Page, shared_data: Path) -> None:
+    page = reviewed
+    with page.expect_download() as download:
+        page.get_by_test_id("recording-download").click()
+    assert Path(download.value.path()).read_bytes() == _tlog(shared_data).read_bytes()
+    page.get_by_test_id("review-close").click()
+    expect(page.get_by_test_id("replay-badge")).to_have_count(0)
+    page.get_by_test_id("recording-delete").click()
+    page.get_by_test_id("recording-delete-confirm").click()
+    expect(page.get_by_test_id("recording-row")).to_have_count(0)
+
+
+def test_a_file_that_is_no_recording_is_explained(station: Station, page: Page, tmp_path: Path) -> None:
+    page.goto(station.link)
+    page.get_by_test_id("tab-review").click()
+    fake = tmp_path / "flight.tlog"
+    fake.write_text("not a recording", encoding="utf-8")
+    _choose(page, "recording-import", fake)
+    expect(page.get_by_test_id("section-recordings").get_by_test_id("error-box")).to_contain_text("flight.tlog")
+
+
+def _tlog(shared_data: Path) -> Path:
+    return sorted((shared_data / "logs" / "arducopter").glob("*.tlog"))[0]
+
+
+def _choose(page: Page, testid: str, path: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        page.get_by_test_id(testid).first.click()
+    chooser.value.set_files(str(path))
+
+
+def _seconds(page: Page, *, last: bool = False) -> float:
+    codes = re.findall(r"(\d+):(\d+\.\d)", page.get_by_test_id("replay-time").inner_text())
+    minutes, seconds = codes[-1 if last else 0]
+    return 60 * int(minutes) + float(seconds)
+
+
+def _expect_time(page: Page, wanted_s: float) -> None:
+    """Within a pixel or so of the chart."""
+    for _ in range(300):
+        if abs(_seconds(page) - wanted_s) < 1.5:
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError(f"at {_seconds(page)} s instead of {wanted_s} s")

@@ -1,0 +1,225 @@
+"""``hedgehop upload``, ``fly`` and ``review`` as a pilot uses them, against a simulated vehicle."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from planning.formats.wpl import write_wpl
+from planning.geotiff import write_dsm
+from planning.model import Mission
+from tests.server.cli_runs import Run, hedgehop
+from tests.server.flight_logs import PLAIN, mission
+from tests.server.simulated import simulated_vehicle
+
+SHORT = mission([(50.0, 150.0, 12.0), (90.0, 150.0, 12.0), (90.0, 175.0, 14.0)])
+HOME = f"{SHORT.home.lat_deg:.7f},{SHORT.home.lon_deg:.7f},100"
+KEYS = [
+    "completed", "cross_track_max_m", "cross_track_mean_m", "cross_track_p95_m", "height_error_max_m",
+    "min_distance_m", "lag_s", "duration_s",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Files of a flight, and the vehicle that flies it."""
+
+    dsm: Path
+    mission: Path
+    link: str
+
+
+def write_mission(path: Path, flight: Mission) -> Path:
+    path.write_text(write_wpl(flight))
+    return path
+
+
+@pytest.fixture(scope="module")
+def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
+    folder = tmp_path_factory.mktemp("ground")
+    write_dsm(folder / "plain.tif", PLAIN)
+    with simulated_vehicle(HOME, "--speedup", 15, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
+        yield Ground(folder / "plain.tif", write_mission(folder / "short.waypoints", SHORT), link)
+
+
+@pytest.fixture(scope="module")
+def flight(ground: Ground, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
+    record = tmp_path_factory.mktemp("recordings") / "short.mcap"
+    run = hedgehop(
+        "fly", ground.mission, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk", "--record",
+        record, "--json",
+    )  # fmt: skip
+    return run, record
+
+
+def left_behind() -> set[str]:
+    return {name for name in os.listdir(tempfile.gettempdir()) if name.startswith("hedgehop-") and "raster" not in name}
+
+
+def test_upload(ground: Ground) -> None:
+    before = left_behind()
+    run = hedgehop("upload", ground.mission, "--link", ground.link, "--json")
+    assert run.code == 0, run.err
+    answer = run.json
+    assert list(answer)[:3] == ["verified", "items", "rounded"]
+    assert answer["verified"] is True
+    assert answer["items"] == 5
+    assert all(set(rounded) == {"item", "field", "sent", "kept"} for rounded in answer["rounded"])
+    assert left_behind() <= before
+
+
+def test_upload_for_people(ground: Ground) -> None:
+    run = hedgehop("upload", ground.mission, "--link", ground.link)
+    assert run.out.startswith("VERIFIED: 5 items in ")
+
+
+def test_fly(flight: tuple[Run, Path]) -> None:
+    run, _ = flight
+    assert run.code == 0, run.err
+    answer = run.json
+    assert list(answer)[: len(KEYS)] == KEYS
+    assert answer["completed"] is True
+    assert answer["cross_track_max_m"] < 2.0  # corners are cut
+    assert 10.0 < answer["min_distance_m"] < 13.0
+    assert answer["duration_s"] > 5.0
+    assert answer["certified_distance_m"] == pytest.approx(12.0, abs=0.05)
+    assert "The vehicle is at home" in run.err
+    assert "The mission was flown and the vehicle has landed." in run.err
+
+
+def test_the_record_is_reviewed_alike(flight: tuple[Run, Path], ground: Ground) -> None:
+    run, record = flight
+    again = hedgehop("review", record, "--dsm", ground.dsm, "--json")
+    assert again.code == 0, again.err
+    assert again.json == run.json
+    people = hedgehop("review", record, "--dsm", ground.dsm)
+    assert people.out.startswith("COMPLETED\n")
+    assert "certified 12.00 m" in people.out
+
+
+def test_waypoints_one_at_a_time(ground: Ground) -> None:
+    run = hedgehop(
+        "fly", ground.mission, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk", "--mode", "guided"
+    )
+    assert run.code == 0, run.err
+    assert run.out.startswith("COMPLETED\n")
+
+
+def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:
+    low = write_mission(tmp_path / "low.waypoints", mission([(50.0, 150.0, 3.0), (90.0, 150.0, 3.0)]))
+    run = hedgehop("fly", low, "--link", ground.link, "--dsm", ground.dsm, "--json")
+    assert run.code == 1
+    assert run.json["error"]["code"] == "not_allowed"
+    assert run.json["error"]["where"] == "the check before the start"
+    assert "required" in run.json["error"]["what"]
+    assert "Starting" not in run.err
+
+
+def test_poor_gnss_must_be_accepted(ground: Ground, tmp_path: Path) -> None:
+    profile = tmp_path / "exact.toml"
+    profile.write_text('name = "exact"\nposition_error_m = 0.005\n')
+    run = hedgehop("fly", ground.mission, "--link", ground.link, "--dsm", ground.dsm, "--profile", profile)
+    assert run.code == 1
+    assert "Or accept it: gnss." in run.err
+
+
+@pytest.mark.parametrize("command", ["upload", "fly"])
+def test_wrong_links(command: str, ground: Ground) -> None:
+    run = hedgehop(command, ground.mission, "--link", "/etc/passwd", "--json")
+    assert (run.code, run.json["error"]["code"]) == (2, "link_address")
+
+
+def test_a_port_in_use(ground: Ground) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        run = hedgehop("upload", ground.mission, "--link", f"udpin:127.0.0.1:{taken.getsockname()[1]}", "--json")
+    assert (run.code, run.json["error"]["code"]) == (1, "connection")
+    assert "in use" in run.json["error"]["what"]
+
+
+def test_wrong_files(ground: Ground, tmp_path: Path) -> None:
+    assert hedgehop("fly", tmp_path / "none.plan", "--link", ground.link).code == 2
+    assert hedgehop("fly", ground.mission, "--link", ground.link, "--dsm", tmp_path / "none.tif").code == 2
+    assert hedgehop("fly", ground.mission, "--link", ground.link, "--record", ground.dsm).code == 2
+    assert ground.dsm.stat().st_size > 1000
+
+
+def test_wrong_simulators(tmp_path: Path) -> None:
+    link = ("--link", "tcpin:127.0.0.1:0")
+    for options in (
+        (*link, "--home", "here"),
+        (*link, "--home", "1,2"),
+        (*link, "--home", HOME, "--speedup", 0),
+        (*link, "--home", HOME, "--parameter", "NOSUCH=1"),
+        (*link, "--home", HOME, "--dsm", tmp_path / "none.tif"),
+        ("--link", "/etc/passwd", "--home", HOME),
+    ):
+        run = hedgehop("sim", *options)
+        assert run.code == 2, run
+        assert run.err.startswith("Error: ")
+
+
+def test_review_of_another_stations_log(shared_data: Path) -> None:
+    folder = shared_data / "logs" / "arducopter"
+    dsm = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
+    run = hedgehop("review", folder / "guided.tlog", "--mission", folder / "mission.waypoints", "--dsm", dsm, "--json")
+    assert run.code == 0
+    assert list(run.json)[: len(KEYS)] == KEYS
+    assert run.json["completed"] is False
+    assert run.json["cross_track_max_m"] == pytest.approx(0.16, abs=0.05)
+    assert run.json["min_distance_m"] == pytest.approx(4.97, abs=0.05)
+    true = hedgehop("review", folder / "auto.tlog", "--dsm", dsm, "--json", "--truth")
+    assert true.json["height_error_max_m"] == pytest.approx(0.16, abs=0.05)
+
+
+def test_review_without_figures(shared_data: Path, tmp_path: Path) -> None:
+    run = hedgehop("review", shared_data / "logs" / "arducopter" / "rejects.tlog", "--json")
+    assert run.code == 1
+    assert run.json["completed"] is False
+    assert run.json["cross_track_max_m"] is None
+    foreign = tmp_path / "notes.txt"
+    foreign.write_text("not a flight")
+    assert (hedgehop("review", foreign).code, hedgehop("review", tmp_path / "none").code) == (2, 2)
+
+
+@pytest.mark.slow
+def test_ctrl_c_in_the_air_asks_twice_before_it_commands_the_return(ground: Ground, tmp_path: Path) -> None:
+    record = tmp_path / "cut.mcap"
+    with simulated_vehicle(HOME, "--speedup", 4, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
+        command = [sys.executable, "-c", "from server.cli import main; main()", "fly", str(ground.mission)]
+        command += ["--link", link, "--dsm", str(ground.dsm), "--profile", "mapper-rtk", "--record", str(record)]
+        process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        assert process.stderr is not None
+        with process.stdout, process.stderr:
+            heard = until(process.stderr, "Flying")
+            process.send_signal(signal.SIGINT)
+            heard += until(process.stderr, "The vehicle flies on.")
+            process.send_signal(signal.SIGINT)
+            heard += until(process.stderr, "Return home commanded")
+            heard += process.stderr.read()
+            answer = json.loads(process.stdout.read())
+            assert process.wait(60) == 1, heard
+    assert answer["completed"] is False
+    assert "broke off" in heard
+    assert record.stat().st_size > 10_000
+
+
+def until(stream, words: str) -> str:
+    """What is read up to the line with these words."""
+    heard = ""
+    for line in stream:
+        heard += line
+        if words in line:
+            return heard
+    pytest.fail(f"{words!r} was never said:\n{heard}")

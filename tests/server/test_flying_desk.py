@@ -1,0 +1,315 @@
+"""The flight desk over a vehicle that keeps missions as ArduPilot does: upload, check, moved heights, start, resume."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planning.formats.wpl import read_wpl
+from server import demo, tasks
+from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotReadyError, StaleRevisionError
+from server.file_tasks import make_demo_terrain
+from server.flying.desk import FlightDesk
+from server.flying.work import FlightWork
+from server.jobs import Lane
+from server.library import Library
+from server.schemas import Computation, FlyState, PlanState, ServerMessage, StartFlight
+from telemetry.errors import MissionUnknownError, NoVehicleError, TransferError
+from telemetry.mavlink.storage import as_stored
+from telemetry.mavlink.verify import compare, digest
+from telemetry.messages import FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.requests import Arm, Download, Operator, ReadParameters, StartAuto, StartGuided, Upload
+from telemetry.vehicle import VehicleState
+
+ME = Operator("Anna", 7)
+
+
+class Vehicle:
+    """Behind the link: stores what it gets as ArduPilot does, and remembers what it was told to do."""
+
+    def __init__(self) -> None:
+        self.items: tuple[Any, ...] = ()
+        self.told: list[Any] = []
+        self.swaps_two_items = False
+
+    async def call(self, request: Any) -> Any:
+        if isinstance(request, Upload):
+            self.items = as_stored(request.items, "ardupilot")
+            if self.swaps_two_items:
+                self.items = (self.items[0], self.items[2], self.items[1], *self.items[3:])
+            rounded, differences = compare(request.items, self.items)
+            return UploadReport(not differences, self._onboard(), rounded, differences, 0.1)
+        if isinstance(request, Download):
+            return self._onboard()
+        if isinstance(request, ReadParameters):
+            return {name: 6000.0 if name == "RTL_ALT" else None for name in request.names}
+        self.told.append(request)
+        return None
+
+    def _onboard(self) -> OnboardMission:
+        return OnboardMission(self.items, 0.0, 0.0, 0.0, digest(self.items))
+
+
+class Made:
+    """A library with the demo's surface model and its plan, computed once."""
+
+    def __init__(self, root: Path) -> None:
+        self.library = Library(root)
+        make_demo_terrain(root, demo.TERRAIN_NAME, report=lambda step, share: None)
+        self.library.refresh()
+        terrain = self.library.terrains()[0]
+        plan_id = demo.ensure_plan(self.library, terrain)
+        self.document = self.library.load_plan(plan_id).present
+        directory = self.library.terrain_dir(terrain.id)
+        result, _ = tasks.compute_plan(directory, self.document, report=lambda step, share: None)
+        self.computation = Computation(revision=3, state="ready", result=result)
+
+    def plan(self, **changes: Any) -> PlanState:
+        return PlanState(
+            plan_id="p",
+            revision=3,
+            document=self.document,
+            can_undo=False,
+            can_redo=False,
+            saved_utc="",
+            computation=self.computation.model_copy(update=changes),
+        )
+
+    @property
+    def home(self) -> tuple[float, float]:
+        return self.document.pois[0].lat_deg, self.document.pois[0].lon_deg
+
+    def standing(self, *, east_m: float = 0.0, north_m: float = 0.0) -> VehicleState:
+        """Disarmed and ready, so far from the plan's home."""
+        dsm = self.library.load_terrain(self.library.terrains()[0].id)
+        xy_m = dsm.xy_from_lat_lon(np.array([self.home])) + np.array([[east_m, north_m]])
+        lat_deg, lon_deg = dsm.lat_lon_from_xy(xy_m)[0].tolist()
+        return VehicleState(
+            1,
+            1,
+            autopilot="ardupilot",
+            landed="on_ground",
+            ready_to_arm=True,
+            lat_deg=lat_deg,
+            lon_deg=lon_deg,
+            alt_rel_home_m=0.0,
+            home_lat_deg=lat_deg,
+            home_lon_deg=lon_deg,
+            home_alt_amsl_m=float(dsm.elevation_at(xy_m)[0]),
+            gnss_fix="rtk_fixed",
+            gnss_t_mono_s=0.0,
+            horizontal_accuracy_m=0.02,
+            battery_share=1.0,
+        )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
+    made = Made(tmp_path_factory.mktemp("data"))
+    yield made
+    made.library.close()
+
+
+class Bench:
+    def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane]) -> None:
+        self.vehicle, self.plan = Vehicle(), made.plan()
+        self.state: VehicleState | None = made.standing()
+        self.told: list[FlyState] = []
+        self.records: list[PlanRecord] = []
+        work = FlightWork(
+            made.library, self.vehicle, present_plan=lambda: self.plan, plan_lane=lanes[0], flight_lane=lanes[1]
+        )
+        self.desk = FlightDesk(
+            self.vehicle,
+            work,
+            file=file,
+            present_document=lambda: self.plan.document,
+            vehicle=lambda: self.state,
+            tell=self._tell,
+            publish_plan=self.records.append,
+        )
+        self.desk.on_link(LinkStatus(0.0, state="live", mission_state="unknown"))
+
+    def _tell(self, message: ServerMessage) -> None:
+        assert message.type == "fly"
+        self.told.append(message.fly)
+
+    async def ready(self) -> str:
+        """Uploaded and checked; the digest."""
+        await self.desk.upload(ME, 3)
+        state = await self.desk.check(ME)
+        assert state.preflight is not None
+        assert [row for row in state.preflight.rows if row.state != "good"] == []
+        assert state.onboard.digest is not None
+        return state.onboard.digest
+
+
+@contextlib.asynccontextmanager
+async def lanes() -> AsyncIterator[tuple[Lane, Lane]]:
+    plan, flight = Lane("plan"), Lane("flight")
+    try:
+        yield plan, flight
+    finally:
+        await plan.close()
+        await flight.close()
+
+
+def test_a_flight_from_upload_to_start(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            uploaded = (await bench.desk.upload(ME, 3)).onboard
+            assert (uploaded.state, uploaded.plan_name, uploaded.is_open_plan) == ("verified", "Demo flight", True)
+            assert uploaded.items == len(bench.vehicle.items) > 5
+            assert "whole centimetres" in uploaded.rounded_note
+            with pytest.raises(CheckNeededError, match="not been checked"):
+                await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
+            checked = (await bench.desk.check(ME)).preflight
+            assert checked is not None
+            assert checked.ok
+            assert [row.code for row in checked.rows if row.state != "good"] == []
+            assert checked.min_distance_m is not None
+            assert checked.min_distance_m > 3.3
+            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
+            assert bench.vehicle.told == [StartAuto(ME, uploaded.digest or "")]
+            assert bench.records[-1].digest == uploaded.digest
+            assert '"certified": true' in bench.records[-1].certificate_json
+            assert read_wpl(bench.records[-1].mission_wpl).items
+            assert {state.busy for state in bench.told} >= {"Uploading", "Checking the start", "Starting", ""}
+
+            bench.desk.on_flight(FlightStatus(phase="interrupted", broke_off_at=9))
+            assert bench.desk.state.resume_from_item == 9
+            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", from_item=9))
+            resumed = bench.vehicle.told[-1]
+            assert isinstance(resumed, StartAuto)
+            assert resumed.from_item >= 9
+            assert resumed.climb_to_m is not None
+            assert resumed.climb_to_m > 5.0
+
+            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", way="guided"))
+            script = bench.vehicle.told[-1]
+            assert isinstance(script, StartGuided)
+            assert len(script.targets) > 5
+            assert script.targets[-1].t_s is not None
+
+            again = Bench(made, tmp_path / "onboard.json", both)
+            again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest=uploaded.digest))
+            assert again.desk.state.onboard.plan_name == "Demo flight"
+            again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest="another"))
+            assert (again.desk.state.onboard.plan_name, again.desk.state.onboard.state) == ("", "verified")
+
+    asyncio.run(scenario())
+
+
+def test_another_home_moves_the_heights(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            before = (await bench.desk.upload(ME, 3)).onboard.digest
+            bench.state = made.standing(north_m=14.0)
+            state = await bench.desk.check(ME)
+            assert state.preflight is not None
+            assert state.preflight.rereferenced
+            assert state.preflight.home_shift_m is not None
+            assert abs(state.preflight.home_shift_m) > 0.3
+            assert state.onboard.digest != before
+            assert state.onboard.is_open_plan
+            moved, planned = read_wpl(bench.records[-1].mission_wpl), read_wpl(bench.records[0].mission_wpl)
+            lower_m = planned.items[-2].alt_m - moved.items[-2].alt_m
+            assert lower_m == pytest.approx(state.preflight.home_shift_m, abs=0.02)
+            row = next(row for row in state.preflight.rows if row.code == "home")
+            assert row.state == "good"
+            assert "heights were moved" in row.text
+            await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
+            bench.state = made.standing(north_m=20.0)
+            with pytest.raises(CheckNeededError, match="home has moved"):
+                await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
+
+    asyncio.run(scenario())
+
+
+def test_what_must_be_accepted_is_not_flown_without(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            bench.state = replace(bench.state, gnss_fix="3d", horizontal_accuracy_m=9.0)
+            digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
+            state = await bench.desk.check(ME)
+            assert state.preflight is not None
+            assert [row.code for row in state.preflight.rows if row.state == "accept"] == ["gnss"]
+            with pytest.raises(CheckNeededError, match="GNSS"):
+                await bench.desk.start(ME, StartFlight(digest=digest_))
+            await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss"]))
+            bench.state = replace(bench.state, gnss_fix="no_fix")
+            await bench.desk.check(ME)
+            with pytest.raises(CheckNeededError, match="no fix"):
+                await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))
+
+    asyncio.run(scenario())
+
+
+def test_what_is_not_ready_is_not_uploaded(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            with pytest.raises(StaleRevisionError):
+                await bench.desk.upload(ME, 2)
+            bench.plan = made.plan(state="running")
+            with pytest.raises(NotReadyError):
+                await bench.desk.upload(ME, 3)
+            result = made.computation.result
+            assert result is not None
+            bench.plan = made.plan(result=result.model_copy(update={"certified": False}))
+            with pytest.raises(NotCertifiedError):
+                await bench.desk.upload(ME, 3)
+            assert bench.vehicle.items == ()
+            assert bench.desk.state.busy == ""
+
+    asyncio.run(scenario())
+
+
+def test_a_vehicle_that_keeps_another_mission_is_not_started(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            bench.vehicle.swaps_two_items = True
+            with pytest.raises(TransferError, match="does not hold the mission"):
+                await bench.desk.upload(ME, 3)
+            with pytest.raises(MissionUnknownError):
+                await bench.desk.check(ME)
+            bench.vehicle.swaps_two_items = False
+            digest_ = await bench.ready()
+            bench.vehicle.items = bench.vehicle.items[:-1]
+            with pytest.raises(MissionUnknownError):
+                await bench.desk.check(ME)
+            with pytest.raises(CheckNeededError):
+                await bench.desk.start(ME, StartFlight(digest=digest_))
+            assert bench.vehicle.told == []
+
+    asyncio.run(scenario())
+
+
+def test_one_thing_at_a_time_but_commands_always(made: Made, tmp_path: Path) -> None:
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            first = asyncio.create_task(bench.desk.upload(ME, 3))
+            while not bench.desk.state.busy:
+                await asyncio.sleep(0)
+            with pytest.raises(ConflictError, match="Uploading"):
+                await bench.desk.check(ME)
+            await bench.desk.command(Arm(ME))
+            assert bench.vehicle.told == [Arm(ME)]
+            await first
+            bench.state = None
+            with pytest.raises(NoVehicleError):
+                await bench.desk.check(ME)
+
+    asyncio.run(scenario())

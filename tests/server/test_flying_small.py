@@ -1,0 +1,125 @@
+"""The small parts of flying: the pace of messages, the thinned path, the sentence on rounding, the terrain found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.flying.onboard import rounded_note
+from server.flying.pace import Pace
+from server.flying.track import POINTS_MAX, Track
+from server.library.terrain_of import FlownOver, covers, terrain_of
+from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
+from telemetry.messages import Rounded
+from telemetry.vehicle import VehicleState
+
+STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0)
+
+
+@given(st.lists(st.floats(0.0, 0.2), min_size=50, max_size=300))
+def test_no_second_has_more_messages_than_the_rate_and_its_burst(gaps: list[float]) -> None:
+    pace, now, sent = Pace(20.0, burst=5.0), 100.0, []
+    for gap in gaps:
+        now += gap
+        if pace.wait_s(now) == 0.0:
+            sent.append(now)
+    assert all(sum(at <= t < at + 1.0 for t in sent) <= 25 for at in sent)
+
+
+def test_the_wait_is_just_long_enough() -> None:
+    pace = Pace(20.0, burst=1.0)
+    assert pace.wait_s(10.0) == 0.0
+    wait_s = pace.wait_s(10.01)
+    assert 0.0 < wait_s <= 0.05
+    assert pace.wait_s(10.01 + wait_s + 1e-9) == 0.0
+
+
+def test_a_long_path_is_thinned_and_keeps_its_ends() -> None:
+    track = Track()
+    for k in range(3 * POINTS_MAX):
+        track.add(replace(STATE, t_utc_s=1000.0 + k), None)
+    doc = track.doc("live")
+    assert len(doc.t_s) <= POINTS_MAX
+    assert len(doc.t_s) == len(doc.s_m) == len(doc.alt_rel_home_m) == len(doc.cross_track_m)
+    assert doc.t_s[0] == 0.0
+    assert doc.t_s[-1] > 3 * POINTS_MAX - 20
+    assert doc.t_s == sorted(doc.t_s)
+
+
+def test_a_replays_path_ends_where_it_was_wound_to() -> None:
+    count = 100
+    none: list[float | None] = [None] * count
+    series = ReviewSeries(
+        t_s=[float(k) for k in range(count)],
+        alt_rel_home_m=[float(k) for k in range(count)],
+        reference_alt_rel_home_m=none,
+        ground_rel_home_m=none,
+        cross_track_m=none,
+        s_m=none,
+        distance_to_dsm_m=none,
+    )
+    track = Track()
+    track.load(series, 1000.0, until_utc_s=1040.0)
+    assert track.doc("replay").t_s[-1] == 40.0
+    assert track.add(replace(STATE, t_utc_s=1041.0), None)
+
+
+def test_what_the_vehicle_rounded_is_one_sentence() -> None:
+    heights = [Rounded(k, "altitude", 12.349, 12.34) for k in range(1, 13)]
+    assert rounded_note([]) == ""
+    assert rounded_note(heights) == "The vehicle cut 12 heights to whole centimetres, at most 0.9 cm."
+    both = rounded_note([heights[0], Rounded(3, "parameter 1", 5.6, 5.0)])
+    assert both.endswith("at most 0.9 cm and cut 1 time to whole seconds, at most 0.6 s.")
+
+
+def terrain(name: str, *, south: float, west: float, size: float, resolution_m: float = 1.0) -> TerrainDoc:
+    north, east = south + size, west + size
+    corners = [(north, west), (north, east), (south, east), (south, west)]
+    return TerrainDoc(
+        id=name,
+        name=name,
+        width_px=1,
+        height_px=1,
+        resolution_m=resolution_m,
+        crs="x",
+        vertical_datum=None,
+        unknown_share=0.0,
+        min_m=0.0,
+        max_m=1.0,
+        sha256=f"sha-{name}",
+        spikes=[],
+        warnings=[],
+        corner_lat_lon_deg=[PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in corners],
+        added_utc="",
+    )
+
+
+WIDE, FINE, AWAY = (
+    terrain("wide", south=37.0, west=15.0, size=1.0),
+    terrain("fine", south=37.2, west=15.2, size=0.4, resolution_m=0.1),
+    terrain("away", south=-40.0, west=175.0, size=1.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("flown", "found"),
+    [
+        (FlownOver("away", "sha-wide", ((37.3, 15.3),)), "away"),
+        (FlownOver("gone", "sha-wide", ((37.3, 15.3),)), "wide"),
+        (FlownOver(places=((37.3, 15.3), (37.5, 15.5))), "fine"),
+        (FlownOver(places=((37.3, 15.3), (37.9, 15.5))), "wide"),
+        (FlownOver(places=((37.3, 15.3), (47.9, 15.5))), None),
+        (FlownOver(), None),
+    ],
+)
+def test_the_surface_model_of_a_recording(flown: FlownOver, found: str | None) -> None:
+    doc = terrain_of(flown, [WIDE, FINE, AWAY])
+    assert (None if doc is None else doc.id) == found
+
+
+@given(st.floats(36.5, 38.5), st.floats(14.5, 16.5))
+def test_inside_the_corners(lat_deg: float, lon_deg: float) -> None:
+    assert covers(WIDE, lat_deg, lon_deg) == (37.0 <= lat_deg <= 38.0 and 15.0 <= lon_deg <= 16.0)

@@ -1,0 +1,78 @@
+"""Who is in charge: one session at a time, a token that only grows, also across restarts (S10)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.errors import NotInChargeError, status_of
+from server.lease import Lease
+
+ANNA, BEN = "a" * 64, "b" * 64
+
+
+def test_the_first_one_has_it_and_the_next_one_has_to_take_it(tmp_path: Path) -> None:
+    lease = Lease(tmp_path / "lease.json")
+    assert lease.take_if_free(ANNA)
+    assert not lease.take_if_free(BEN)
+    assert lease.doc_for(ANNA).mine
+    assert (lease.doc_for(BEN).holder, lease.doc_for(BEN).mine) == ("Operator aaaa", False)
+    first = lease.operator(ANNA)
+    before = lease.take(BEN, "Ben")
+    assert before is not None
+    assert before.session_key == ANNA
+    assert lease.operator(BEN).name == "Ben"
+    assert lease.operator(BEN).token > first.token
+
+
+def test_an_observer_is_refused_with_words(tmp_path: Path) -> None:
+    lease = Lease(tmp_path / "lease.json")
+    with pytest.raises(NotInChargeError, match="Nobody is in charge"):
+        lease.operator(ANNA)
+    lease.take(BEN, "Ben")
+    with pytest.raises(NotInChargeError, match="Ben is in charge") as refused:
+        lease.operator(ANNA)
+    assert status_of(refused.value) == 403
+
+
+def test_letting_go_frees_it_and_takes_the_token_away(tmp_path: Path) -> None:
+    lease = Lease(tmp_path / "lease.json")
+    lease.take(ANNA)
+    held = lease.operator(ANNA).token
+    assert not lease.release(BEN)
+    assert lease.release(ANNA)
+    assert lease.doc_for(ANNA).holder is None
+    assert lease.server_operator().token > held
+
+
+def test_a_restart_keeps_the_holder_and_never_lowers_the_token(tmp_path: Path) -> None:
+    file = tmp_path / "lease.json"
+    lease = Lease(file, clock_utc_s=lambda: 2000.0)
+    lease.take(ANNA, "Anna")
+    lease.save()
+    again = Lease(file, clock_utc_s=lambda: 1000.0)
+    assert again.doc_for(ANNA).mine
+    assert again.operator(ANNA).name == "Anna"
+    assert again.operator(ANNA).token > lease.operator(ANNA).token
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"token": "x", "holder": null}', '{"token": 1, "holder": ["a"]}'])
+def test_a_damaged_file_costs_pressing_a_button(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "lease.json"
+    file.write_text(text)
+    lease = Lease(file)
+    assert lease.holder is None
+    assert lease.take_if_free(ANNA)
+
+
+@given(st.lists(st.tuples(st.sampled_from(["take", "release"]), st.sampled_from([ANNA, BEN]), st.floats(0, 4e9))))
+def test_every_change_of_hands_raises_the_token(steps: list[tuple[str, str, float]]) -> None:
+    now = [0.0]
+    lease = Lease(Path("unused-and-missing") / "lease.json", clock_utc_s=lambda: now[0])
+    for step, session, at in steps:
+        now[0], before = at, lease.server_operator().token
+        changed = lease.release(session) if step == "release" else (lease.take(session), True)[1]
+        assert (lease.server_operator().token > before) == changed

@@ -1,0 +1,245 @@
+"""Review of made-up flights, where every figure is known beforehand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planning.formats.wpl import write_wpl
+from planning.model import Home
+from planning.vehicle_profile import dump_profile, load_profile
+from server.review import recording_of, review
+from server.review_curves import STRETCHES, thinned
+from server.schemas.flight import RecordingDoc
+from telemetry.messages import CommandRecord, PlanRecord
+from telemetry.recording.flight import FlightLog
+from telemetry.recording.frame_facts import SentTarget
+from tests.server.flight_logs import PLAIN, ROUTE, START_UTC_S, degrees, log_of, mission, plain, positions
+
+RECORDING = RecordingDoc(
+    id="x", name="x", kind="hedgehop", started_utc="2027-01-15T08:00:00.000Z", duration_s=1.0, bytes=1
+)
+FLOWN = mission(ROUTE)
+
+
+def reviewed(log: FlightLog, **options):
+    return review(log, RECORDING, **options)
+
+
+def figures(log: FlightLog, **options):
+    found = reviewed(log, **options).figures
+    assert found is not None
+    return found
+
+
+def with_plan(log: FlightLog, *, certificate: str = "", sha256: str = PLAIN.sha256) -> FlightLog:
+    plan = PlanRecord(
+        t_utc_s=START_UTC_S,
+        name="Orchard",
+        mission_wpl=write_wpl(FLOWN),
+        digest="d",
+        firmware="ardupilot",
+        terrain_id="t",
+        terrain_name="Hill",
+        terrain_sha256=sha256,
+        home_alt_dsm_m=100.0,
+        vertical_datum=None,
+        profile_toml=dump_profile(replace(load_profile("generic-quad"), max_speed_m_s=4.0, mean_speed_m_s=3.0)),
+        certificate_json=certificate,
+    )
+    return replace(log, mission=None, plan=plan)
+
+
+def test_a_flight_as_planned() -> None:
+    doc = reviewed(log_of(positions(), flown=FLOWN), dsm=PLAIN)
+    found = doc.figures
+    assert found is not None
+    assert found.completed
+    assert found.cross_track_max_m == pytest.approx(0.0, abs=0.02)
+    assert found.height_error_max_m == pytest.approx(0.0, abs=0.05)
+    assert found.duration_s == pytest.approx(50.0, abs=0.5)
+    assert found.min_distance_m == pytest.approx(12.0, abs=0.05)
+    assert found.min_vertical_m == pytest.approx(12.0, abs=0.05)
+    assert found.min_distance_way_home_m == pytest.approx(20.4, abs=0.5)
+    assert found.min_distance_lat_deg == pytest.approx(degrees([(200.0, 150.0)])[0, 0], abs=3e-5)
+    assert doc.first_waypoint_t_s == pytest.approx(10.0, abs=0.3)
+    assert doc.last_waypoint_t_s == pytest.approx(60.0, abs=0.6)
+    assert doc.histogram is not None
+    assert sum(doc.histogram.counts) == found.positions
+
+
+def test_beside_and_above_the_line() -> None:
+    off = [(x, y - 0.7, z + 0.4) if z == 20.0 else (x, y, z) for x, y, z in positions()]
+    found = figures(log_of(off, flown=FLOWN), dsm=PLAIN)
+    assert found.cross_track_p95_m == pytest.approx(0.7, abs=0.02)
+    assert found.height_error_mean_m == pytest.approx(0.4, abs=0.02)
+
+
+def test_without_a_mission_there_are_curves_and_no_figures() -> None:
+    doc = reviewed(log_of(positions()), dsm=PLAIN)
+    assert doc.figures is None
+    assert doc.histogram is None
+    assert min(d for d in doc.series.distance_to_dsm_m if d is not None) == pytest.approx(0.0, abs=0.01)
+    assert set(doc.series.cross_track_m) == {None}
+    assert any("no mission" in note for note in doc.notes)
+
+
+def test_without_a_surface_model_there_are_errors_and_no_distances() -> None:
+    doc = reviewed(log_of(positions(), flown=FLOWN))
+    assert doc.figures is not None
+    assert doc.figures.min_distance_m is None
+    assert doc.figures.cross_track_max_m == pytest.approx(0.0, abs=0.02)
+    assert set(doc.series.distance_to_dsm_m) == {None}
+    assert set(doc.series.ground_rel_home_m) == {None}
+    assert any("no surface model" in note for note in doc.notes)
+
+
+def test_heights_count_from_the_vehicles_own_home() -> None:
+    """Ten metres beside the planned home the ground is 3 m higher: the vehicle flies 3 m higher."""
+    cells = np.array(PLAIN.elevation_m)
+    cells[145:155, 35:45] += 3.0
+    doc = reviewed(log_of(positions(), flown=FLOWN, home=(40.0, 150.0)), dsm=PLAIN.with_elevation(cells))
+    assert doc.figures is not None
+    assert doc.figures.height_error_mean_m == pytest.approx(3.0, abs=0.1)
+    assert any("10.0 m from the plan's, where the surface is 3.00 m higher" in note for note in doc.notes)
+
+
+def test_curves_are_relative_to_the_plans_home_and_equally_long() -> None:
+    series = reviewed(log_of(positions(), flown=FLOWN), dsm=PLAIN).series
+    lengths = {len(curve) for curve in series.model_dump().values()}
+    assert len(lengths) == 1
+    flying = [k for k, s in enumerate(series.s_m) if s is not None]
+    assert [series.reference_alt_rel_home_m[k] for k in flying] == pytest.approx([20.0] * len(flying), abs=0.05)
+    assert series.ground_rel_home_m[0] == pytest.approx(0.0)
+    assert series.cross_track_m[0] is None  # the take-off is not judged
+
+
+def test_a_long_flight_is_thinned_and_keeps_its_peaks() -> None:
+    n = 40_000
+    peaky = np.zeros(n)
+    peaky[[17_003, 17_004, 39_998]] = [5.0, -6.0, 7.0]
+    kept = thinned(n, (peaky, np.full(n, np.nan)))
+    assert len(kept) <= STRETCHES * 3 + 2
+    assert {0, 17_003, 17_004, 39_998, n - 1} <= set(kept.tolist())
+    assert np.all(np.diff(kept) > 0)
+
+
+def test_events_in_the_order_of_time() -> None:
+    log = log_of(positions(), flown=FLOWN)
+    log = replace(log, reached=((START_UTC_S + 0.5, 2),), commands=(CommandRecord(START_UTC_S + 0.2, "Ann", "arm"),))
+    found = reviewed(log, dsm=PLAIN).events
+    assert [event.t_s for event in found] == sorted(event.t_s for event in found)
+    assert {event.kind for event in found} == {"mode", "arm", "item", "text", "command"}
+    warning = next(event for event in found if event.kind == "text")
+    assert (warning.text, warning.severity) == ("Wind is strong", 4)
+
+
+def test_a_recorded_plan_brings_its_mission_profile_and_certificate() -> None:
+    log = with_plan(log_of(positions()), certificate=json.dumps({"min_distance_m": 11.9}))
+    doc = reviewed(log, dsm=PLAIN)
+    assert doc.plan_name == "Orchard"
+    assert doc.figures is not None
+    assert doc.figures.certified_distance_m == 11.9
+    assert doc.figures.predicted_s == pytest.approx(54, abs=3)
+    assert doc.notes == ["The vehicle did not say what it reached: waypoints count where the track is nearest to them."]
+    other = reviewed(with_plan(log_of(positions()), sha256="b" * 64), dsm=PLAIN)
+    assert any("another surface model (Hill)" in note for note in other.notes)
+
+
+def test_a_broken_certificate_and_plan_do_not_stop_the_review() -> None:
+    log = with_plan(log_of(positions(), flown=FLOWN), certificate="{")
+    assert log.plan is not None
+    assert figures(log, dsm=PLAIN).certified_distance_m is None
+    broken = replace(log, mission=FLOWN, plan=replace(log.plan, mission_wpl="rubbish", profile_toml="=", name="x"))
+    doc = reviewed(broken, dsm=PLAIN)
+    assert doc.figures is not None
+    assert any("cannot be read" in note for note in doc.notes)
+
+
+def test_another_mission_can_be_chosen() -> None:
+    beside = mission([(x, y + 2.0, z) for x, y, z in ROUTE])
+    assert figures(log_of(positions(), flown=FLOWN), dsm=PLAIN, mission=beside).cross_track_p95_m == pytest.approx(
+        2.0, abs=0.02
+    )
+
+
+def test_a_flight_that_broke_off() -> None:
+    places = positions()[:110]
+    log = log_of(places, flown=FLOWN)
+    log = replace(log, modes=((START_UTC_S, "AUTO"), (START_UTC_S + 20.0, "RTL")))
+    doc = reviewed(log, dsm=PLAIN)
+    assert doc.figures is not None
+    assert not doc.figures.completed
+    assert doc.last_waypoint_t_s is None
+    assert doc.figures.duration_s == pytest.approx(10.0, abs=0.5)
+    assert any("not reached" in note for note in doc.notes)
+
+
+def test_waypoints_of_another_mission_are_not_used() -> None:
+    log = replace(log_of(positions(), flown=FLOWN), reached=((START_UTC_S + 1.0, 3), (START_UTC_S + 2.0, 4)))
+    doc = reviewed(log, dsm=PLAIN)
+    assert any("another mission" in note for note in doc.notes)
+    assert doc.figures is not None
+    assert doc.figures.completed
+
+
+def test_waypoints_handed_over_one_at_a_time() -> None:
+    sent = degrees([(x, y) for x, y, _ in ROUTE[:2]])
+    targets = tuple(
+        SentTarget(START_UTC_S + 10.0 + k, float(lat), float(lon), 20.0, 6) for k, (lat, lon) in enumerate(sent)
+    )
+    log = replace(
+        log_of([p for p in positions() if p[0] <= 154.0 and p[2] <= 20.0][:200], flown=FLOWN),
+        targets=targets,
+        modes=((START_UTC_S, "GUIDED"), (START_UTC_S + 36.0, "RTL")),
+    )
+    doc = reviewed(log, dsm=PLAIN)
+    assert doc.figures is not None
+    assert not doc.figures.completed
+    assert doc.figures.cross_track_max_m == pytest.approx(4.0, abs=0.9)  # on past the last one
+    assert any("up to item 3 of 5" in note for note in doc.notes)
+
+
+def test_truth_that_nobody_recorded() -> None:
+    doc = reviewed(log_of(positions(), flown=FLOWN), dsm=PLAIN, truth=True)
+    assert any("no true positions" in note for note in doc.notes)
+    assert doc.figures is not None
+
+
+def test_a_log_without_a_position() -> None:
+    doc = reviewed(log_of([], flown=FLOWN), dsm=PLAIN)
+    assert doc.figures is None
+    assert doc.series.t_s == []
+    assert any("no position" in note for note in doc.notes)
+
+
+def test_a_flight_elsewhere_than_its_mission() -> None:
+    far = replace(FLOWN, home=Home(48.0, 10.0, 100.0))
+    away = tuple(replace(item, lat_deg=item.lat_deg + 5.0) if item.lat_deg else item for item in far.items)
+    doc = reviewed(log_of(positions(), flown=replace(far, items=away)), dsm=PLAIN)
+    assert doc.figures is None
+    assert doc.notes
+
+
+def test_a_recording_outside_the_library(tmp_path) -> None:
+    path = tmp_path / "made.mcap"
+    path.write_bytes(b"1234")
+    doc = recording_of(with_plan(log_of(positions())), path)
+    assert (doc.id, doc.bytes, doc.vehicle, doc.plan_name) == ("made.mcap", 4, "ardupilot", "Orchard")
+    assert doc.started_utc == "2027-01-15T08:00:00.000Z"
+    assert plain().sha256 == PLAIN.sha256
+
+
+def test_a_simulation_that_ran_ten_times_as_fast() -> None:
+    log = log_of(positions(), flown=FLOWN, rate_hz=50.0)
+    speed = np.full(len(log.track), 4.0)
+    along = np.isin(np.arange(len(log.track)), np.flatnonzero(np.abs(np.diff(log.track.lon_deg, prepend=0)) > 1e-6))
+    log = replace(log, track=replace(log.track, v_north_m_s=0.0 * speed, v_east_m_s=np.where(along, speed, 0.0)))
+    doc = reviewed(log, dsm=PLAIN)
+    assert doc.figures is not None
+    assert doc.figures.duration_s == pytest.approx(50.0, abs=0.5)
+    assert doc.first_waypoint_t_s == pytest.approx(1.0, abs=0.1)  # of the recording, as all curves are
+    assert any("ran 10 times as fast" in note for note in doc.notes)

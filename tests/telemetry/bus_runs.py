@@ -1,0 +1,55 @@
+"""What tests of the bus share: running to the end within a bound, and a process that takes part."""
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import TypeVar
+
+PATIENCE_S = 90.0
+ROOT = Path(__file__).resolve().parents[2]
+T = TypeVar("T")
+
+
+def run(whole: Callable[[], Awaitable[T]]) -> T:
+    async def bounded() -> T:
+        async with asyncio.timeout(PATIENCE_S):
+            return await whole()
+
+    return asyncio.run(bounded())
+
+
+class Participant:
+    """``python -c BODY NAME FOLDER`` and what it has said so far, line by line."""
+
+    def __init__(self, body: str, name: str, folder: Path) -> None:
+        self.lines: list[str] = []
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", body, name, folder],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+        self._reading = threading.Thread(target=self._read)
+        self._reading.start()
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._reading.join()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    async def says(self, *lines: str) -> None:
+        """Waits until it has said all these lines, in any order."""
+        while not set(lines) <= set(self.lines):
+            assert self._process.poll() is None, "it has ended"
+            await asyncio.sleep(0.02)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip("\n"))

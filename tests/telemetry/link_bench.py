@@ -1,0 +1,96 @@
+"""A link with real sockets for tests: what it publishes is kept, and conditions are waited for."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+from telemetry.mavlink.link import Link, open_link
+from telemetry.messages import (
+    CommandRecord,
+    FlightStatus,
+    LinkStatus,
+    Published,
+    RawFrame,
+    Topic,
+    TransferStatus,
+    VehicleText,
+)
+from telemetry.requests import Operator
+from telemetry.vehicle import VehicleState
+
+PATIENCE_S = 60.0
+ME = Operator("Ann", 1)
+
+
+async def until(condition: Callable[[], object], seconds: float = PATIENCE_S) -> None:
+    async with asyncio.timeout(seconds):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as sock:
+        sock.bind(("127.0.0.1", 0))
+        return sock.getsockname()[1]
+
+
+class Console:
+    """Keeps everything that the link published."""
+
+    def __init__(self) -> None:
+        self.published: list[tuple[str, Published]] = []
+        self.link: Link
+
+    def publish(self, topic: str, message: Published) -> None:
+        self.published.append((topic, message))
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        return [message for _, message in self.published if isinstance(message, kind)]
+
+    def last(self, kind: type[Any]) -> Any:
+        return next((message for _, message in reversed(self.published) if isinstance(message, kind)), None)
+
+    @property
+    def status(self) -> LinkStatus:
+        return self.link.status()
+
+    @property
+    def state(self) -> VehicleState:
+        return self.last(VehicleState) or VehicleState(0, 0)
+
+    @property
+    def flight(self) -> FlightStatus:
+        return self.link.flight.status
+
+    @property
+    def texts(self) -> list[str]:
+        return [text.text for text in self.of(VehicleText)]
+
+    @property
+    def commands(self) -> list[str]:
+        return [record.words for record in self.of(CommandRecord)]
+
+    @property
+    def transfers(self) -> list[TransferStatus]:
+        return self.of(TransferStatus)
+
+    def frames(self, *, sent: bool) -> list[bytes]:
+        return [raw.frame for topic, raw in self.published if isinstance(raw, RawFrame) and raw.sent is sent]
+
+    async def live(self) -> None:
+        await until(lambda: self.status.state == "live")
+
+
+@contextlib.asynccontextmanager
+async def console(**options: Any) -> AsyncIterator[Console]:
+    bench = Console()
+    async with open_link(bench.publish, **options) as link:
+        bench.link = link
+        yield bench
+
+
+__all__ = ["ME", "PATIENCE_S", "Console", "Topic", "console", "free_port", "until"]

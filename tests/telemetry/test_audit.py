@@ -1,0 +1,152 @@
+"""The audit log: written before the command, chained, continued, and honest about tampering and full disks."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.errors import RecordingError, RecordingFullError
+from telemetry.mavlink.audit import AuditLog, check_chain, read_entries
+from telemetry.messages import CommandRecord
+
+
+def record(words: str = "arm", *, t_utc_s: float = 1.0) -> CommandRecord:
+    return CommandRecord(t_utc_s=t_utc_s, operator="Ada", words=words)
+
+
+def written(path: Path, *words: str) -> bytes:
+    with AuditLog(path) as log:
+        for word in words:
+            log.write(record(word))
+    return path.read_bytes()
+
+
+def test_each_command_is_one_line_that_names_the_one_before(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    with AuditLog(path) as log:
+        first = log.write(record("arm"), message="COMMAND_LONG 400")
+        second = log.write(record("upload 88 items"))
+    entries = list(read_entries(path))
+    assert [entry["words"] for entry in entries] == ["arm", "upload 88 items"]
+    assert entries[0]["message"] == "COMMAND_LONG 400"
+    assert entries[0]["hash"] == first == entries[1]["before"]
+    assert entries[1]["hash"] == second
+    assert check_chain(path.read_bytes()) is None
+
+
+def test_a_log_that_exists_is_continued(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    written(path, "arm")
+    content = written(path, "disarm")
+    assert len(content.splitlines()) == 2
+    assert check_chain(content) is None
+    with AuditLog(path) as log:
+        assert log.broken is None
+
+
+def test_only_the_owner_may_read_it(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    written(path, "arm")
+    assert path.stat().st_mode & 0o077 == 0
+
+
+def test_a_changed_line_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    content = written(path, "arm", "start", "land")
+    path.write_bytes(content.replace(b'"start"', b'"stare"'))
+    with AuditLog(path) as log:
+        assert log.broken is not None
+        assert log.broken.line == 2
+
+
+@pytest.mark.parametrize("gone", [0, 1])
+def test_a_removed_line_is_told(tmp_path: Path, gone: int) -> None:
+    lines = written(tmp_path / "audit.jsonl", "arm", "start", "land").splitlines(keepends=True)
+    broken = check_chain(b"".join(line for k, line in enumerate(lines) if k != gone))
+    assert broken is not None
+    assert broken.line == gone + 1
+
+
+def test_swapped_and_foreign_lines_are_told(tmp_path: Path) -> None:
+    one, two, three = written(tmp_path / "audit.jsonl", "arm", "start", "land").splitlines(keepends=True)
+    for content, line in ((two + one + three, 1), (one + b"nonsense\n" + two, 2), (one + b"[1]\n", 2), (b"\xff\n", 1)):
+        broken = check_chain(content)
+        assert broken is not None
+        assert broken.line == line
+
+
+@given(data=st.data())
+def test_any_flipped_bit_is_told(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    path = tmp_path_factory.mktemp("audit") / "audit.jsonl"
+    content = bytearray(written(path, "arm", "start"))
+    place = data.draw(st.integers(0, len(content) - 1))
+    content[place] ^= 1 << data.draw(st.integers(0, 7))
+    assert check_chain(bytes(content)) is not None or same_entries(bytes(content), path.read_bytes())
+
+
+def same_entries(a: bytes, b: bytes) -> bool:
+    """A line end or a blank may be written in another way without a change of what is said."""
+    return [json.loads(line) for line in a.splitlines()] == [json.loads(line) for line in b.splitlines()]
+
+
+def test_a_line_that_was_cut_short_is_told_and_the_next_one_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    content = written(path, "arm", "start")
+    path.write_bytes(content[:-20])
+    with AuditLog(path) as log:
+        assert log.broken is not None
+        assert log.broken.line == 2
+        log.write(record("land"))
+    assert [entry["words"] for entry in read_entries(path)] == ["arm", "land"]
+    assert [entry["before"] for entry in read_entries(path)][1] == next(read_entries(path))["hash"]
+
+
+def test_line_breaks_in_a_name_stay_in_their_line(tmp_path: Path) -> None:
+    content = written(tmp_path / "audit.jsonl", 'evil"\n{"words": "arm"}\r\u2028')
+    assert len(content.splitlines()) == 1
+    assert check_chain(content) is None
+
+
+def test_a_full_disk_is_told_and_leaves_no_half_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "audit.jsonl"
+    written(path, "arm")
+    whole_write = os.write
+    with AuditLog(path) as log:
+
+        def full(descriptor: int, data: Any) -> int:
+            monkeypatch.setattr(os, "write", fails)
+            return whole_write(descriptor, bytes(data[:10]))
+
+        def fails(descriptor: int, data: Any) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr(os, "write", full)
+        with pytest.raises(RecordingFullError, match="was not sent"):
+            log.write(record("start"))
+        monkeypatch.setattr(os, "write", whole_write)
+        log.write(record("land"))
+    content = path.read_bytes()
+    assert check_chain(content) is None
+    assert [entry["words"] for entry in read_entries(path)] == ["arm", "land"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="cannot be written"):
+        AuditLog(tmp_path / "missing" / "audit.jsonl")
+
+
+def test_every_line_is_on_the_disk_before_write_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[int] = []
+    path = tmp_path / "audit.jsonl"
+    really = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(path.stat().st_size) or really(descriptor))
+    with AuditLog(path) as log:
+        log.write(record("arm"))
+        assert synced == [path.stat().st_size]

@@ -1,0 +1,323 @@
+"""A whole flight against a link that plays a vehicle: what is asked in which order, and what stops it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from planning.formats.wpl import read_wpl
+from planning.model import ClearanceParams, VehicleProfile
+from telemetry.errors import (
+    ConnectionFailedError,
+    NotAllowedError,
+    NoVehicleError,
+    RefusedError,
+    SilentError,
+    TransferError,
+)
+from telemetry.flight import fly as fly_module
+from telemetry.flight.fly import FlyOptions, FlyResult, fly
+from telemetry.flight.prepare import Prepared
+from telemetry.messages import (
+    Candidate,
+    ConnectionStatus,
+    ErrorInfo,
+    FlightStatus,
+    LinkStatus,
+    OnboardMission,
+    Topic,
+    UploadReport,
+    VehicleText,
+)
+from telemetry.requests import Connect, Operator, ReadParameters, ReturnHome, StartAuto, StartGuided, Upload
+from telemetry.vehicle import VehicleState
+from tests.server.flight_logs import PLAIN, ROUTE, mission
+from tests.telemetry.small_bus import SmallBus
+from tests.telemetry.test_preflight import hill, state_at
+
+ADDRESS = "tcp:127.0.0.1:5760"
+OPTIONS = FlyOptions(
+    address=ADDRESS,
+    operator=Operator("test", 1),
+    profile=VehicleProfile("quad", position_error_m=1.0, rtl_height_m=30.0),
+    clearance=ClearanceParams(2.0, vehicle_radius_m=0.35, position_error_m=1.0, rtl_height_m=30.0),
+    dsm=PLAIN,
+    name="Orchard",
+    connect_s=1.0,
+    ready_s=1.0,
+)
+PLANNED = mission(ROUTE)
+VEHICLE = Candidate("x", ADDRESS, "127.0.0.1:5760", 1, 1, "ardupilot", 2)
+
+
+class Pilot:
+    """Plays the link node: keeps what it is asked, answers as told, and flies as soon as it is started."""
+
+    def __init__(self, bus: SmallBus, state: VehicleState | None = None) -> None:
+        self.bus, self.state = bus, state or state_at()
+        self.asked: list[Any] = []
+        self.differences: tuple[str, ...] = ()
+        self.refusals: list[Exception] = []
+        self.end = FlightStatus(phase="landed", way="auto", targets=5)
+        self.tells = True
+
+    async def call(self, request: Any) -> Any:
+        self.asked.append(request)
+        if isinstance(request, Connect):
+            self._tell()
+        elif isinstance(request, Upload):
+            onboard = OnboardMission(request.items, None, None, None, f"digest {len(self.asked)}")
+            return UploadReport(not self.differences, onboard, (), self.differences, 0.1)
+        elif isinstance(request, ReadParameters):
+            return {"RTL_ALT": 3000.0}
+        elif isinstance(request, StartAuto | StartGuided):
+            if self.refusals:
+                raise self.refusals.pop(0)
+            self.bus.publish(Topic.FLIGHT, replace(self.end, since_utc_s=time.time()))
+        return None
+
+    def _tell(self) -> None:
+        if self.tells:
+            self.bus.publish(Topic.VEHICLE, self.state)
+            self.bus.publish(Topic.LINK, LinkStatus(0.0, adopted=VEHICLE, state="live"))
+
+    def of(self, kind: type) -> list[Any]:
+        return [request for request in self.asked if isinstance(request, kind)]
+
+
+class Heard:
+    """Who is told; keeps it."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.prepared: Prepared | None = None
+        self.states = 0
+
+    def tell(self, text: str) -> None:
+        self.lines.append(text)
+
+    def on_start(self, prepared: Prepared) -> None:
+        self.prepared = prepared
+
+    def on_state(self, state: VehicleState, flight: FlightStatus) -> None:
+        self.states += 1
+
+
+def flown(pilot: Pilot, options: FlyOptions = OPTIONS, flight=PLANNED) -> tuple[FlyResult, Heard]:
+    heard = Heard()
+    return asyncio.run(fly(pilot, pilot.bus, flight, options, heard)), heard
+
+
+def test_the_order_of_things() -> None:
+    pilot = Pilot(SmallBus())
+    result, heard = flown(pilot)
+    assert [type(request) for request in pilot.asked] == [Connect, Upload, ReadParameters, StartAuto]
+    assert pilot.asked[0].adopt
+    assert pilot.asked[-1].digest == result.upload.onboard.digest
+    assert result.completed
+    assert result.text == "The mission was flown and the vehicle has landed."
+    assert heard.prepared is not None
+    assert any("clearance: At least 12.00 m" in line for line in heard.lines)
+
+
+def test_what_is_flown_is_put_on_record() -> None:
+    pilot = Pilot(SmallBus())
+    result, _ = flown(pilot)
+    record = pilot.bus.last[Topic.PLAN]
+    assert record.name == "Orchard"
+    assert record.digest == result.upload.onboard.digest
+    assert record.terrain_sha256 == PLAIN.sha256
+    assert '"certified": true' in record.certificate_json
+    assert len(read_wpl(record.mission_wpl).items) == len(PLANNED.items)
+
+
+def test_guided() -> None:
+    pilot = Pilot(SmallBus())
+    flown(pilot, replace(OPTIONS, way="guided"))
+    start = pilot.of(StartGuided)[0]
+    assert [target.item for target in start.targets] == [2, 3, 4]
+    assert start.takeoff_alt_rel_home_m == pytest.approx(20.0)
+    assert start.end == "rtl"
+
+
+def test_heights_are_moved_to_suit_the_ground_where_the_vehicle_stands() -> None:
+    pilot = Pilot(SmallBus(), state_at((80.0, 150.0)))
+    result, heard = flown(pilot, replace(OPTIONS, dsm=hill()))
+    first, second = pilot.of(Upload)
+    assert second.items[1].alt_m == pytest.approx(first.items[1].alt_m - 3.0, abs=0.011)
+    assert result.preflight.ok()
+    assert not result.preflight.needs_rereference
+    assert pilot.of(StartAuto)[0].digest == result.upload.onboard.digest
+    assert any("+3.00 m" in line for line in heard.lines)
+    assert result.mission.home.alt_dsm_m == pytest.approx(103.0)
+
+
+def test_a_check_that_fails_stops_before_the_start() -> None:
+    low = replace(PLANNED, items=tuple(replace(i, alt_m=9.0) if i.command == 16 else i for i in PLANNED.items))
+    pilot = Pilot(SmallBus())
+    with pytest.raises(NotAllowedError, match="check before the start"):
+        flown(pilot, flight=low)
+    assert pilot.of(StartAuto) == []
+    assert Topic.PLAN not in pilot.bus.last
+
+
+def test_what_can_be_accepted_is_named_and_accepted() -> None:
+    poor = state_at(gnss_fix="3d", horizontal_accuracy_m=2.5)
+    with pytest.raises(NotAllowedError, match=r"Or accept it: gnss\."):
+        flown(Pilot(SmallBus(), poor))
+    result, _ = flown(Pilot(SmallBus(), poor), replace(OPTIONS, accept=frozenset({"gnss"})))
+    assert result.completed
+
+
+def test_without_a_surface_model_it_flies_unchecked() -> None:
+    result, _ = flown(Pilot(SmallBus()), replace(OPTIONS, dsm=None))
+    assert result.completed
+    assert result.preflight.certificate is None
+
+
+def test_a_vehicle_that_is_not_ready_is_waited_for() -> None:
+    pilot = Pilot(SmallBus(), state_at(ready_to_arm=False))
+
+    async def later() -> FlyResult:
+        async def becomes_ready() -> None:
+            await asyncio.sleep(0.2)
+            pilot.bus.publish(Topic.VEHICLE, state_at())
+
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(becomes_ready())
+            return await fly(pilot, pilot.bus, PLANNED, replace(OPTIONS, ready_s=60.0), Heard())
+
+    assert asyncio.run(later()).completed
+
+
+def test_refused_arming_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fly_module, "ARM_AGAIN_S", 0.01)
+    pilot = Pilot(SmallBus())
+    pilot.refusals = [RefusedError("The vehicle refused to arm: Need Position Estimate.")] * 2
+    result, heard = flown(pilot, replace(OPTIONS, ready_s=60.0))
+    assert result.completed
+    assert len(pilot.of(StartAuto)) == 3
+    assert sum("Not yet" in line for line in heard.lines) == 2
+
+
+def test_refused_for_good() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.refusals = [RefusedError("The vehicle refused to arm.")] * 100
+    with pytest.raises(RefusedError):
+        flown(pilot, replace(OPTIONS, ready_s=0.0))
+
+
+def test_silence_is_not_tried_again() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.refusals = [SilentError("No answer.")]
+    with pytest.raises(SilentError):
+        flown(pilot)
+
+
+def test_another_mission_on_board() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.differences = ("Item 3: the command is 20, not 16 as sent.",)
+    with pytest.raises(TransferError, match="Item 3"):
+        flown(pilot)
+
+
+def test_nobody_is_heard() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.tells = False
+    with pytest.raises(NoVehicleError, match="within 0 s"):
+        flown(pilot, replace(OPTIONS, connect_s=0.1))
+
+
+def test_a_connection_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("telemetry.flight.prepare.FAILED_PATIENCE_S", 0.0)
+    pilot = Pilot(SmallBus())
+    pilot.tells = False
+    error = ErrorInfo("connection", "Port 14550 is in use by another program.", ADDRESS, "End it, or use another port.")
+    pilot.bus.publish(Topic.LINK, LinkStatus(0.0, connections=(ConnectionStatus(ADDRESS, "failed", error),)))
+    with pytest.raises(ConnectionFailedError, match="in use by another program"):
+        flown(pilot)
+
+
+def test_a_flight_that_broke_off() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.end = FlightStatus(phase="interrupted", targets=5, broke_off_at=3)
+    result, _ = flown(pilot)
+    assert not result.completed
+    assert "broke off at item 3 of 5, where it can go on" in result.text
+
+
+def test_going_on_where_a_flight_broke_off() -> None:
+    pilot = Pilot(SmallBus())
+    result, heard = flown(pilot, replace(OPTIONS, from_item=3))
+    start = pilot.of(StartAuto)[0]
+    assert (start.from_item, start.climb_to_m) == (3, 20.0)
+    assert start.digest == result.upload.onboard.digest
+    assert any("Going on at item 3" in line for line in heard.lines)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"from_item": 9}, "no item 9"),
+        ({"from_item": 3, "dsm": None}, "surface model"),
+        ({"from_item": 5}, "Nothing is left"),
+        ({"from_item": 3, "way": "guided"}, "one at a time"),
+    ],
+)
+def test_going_on_is_refused(changes, words) -> None:
+    pilot = Pilot(SmallBus())
+    with pytest.raises(NotAllowedError, match=words):
+        flown(pilot, replace(OPTIONS, **changes))
+    assert pilot.of(StartAuto) == []
+
+
+def test_the_end_of_an_earlier_flight_is_not_taken_for_this_ones() -> None:
+    pilot = Pilot(SmallBus())
+    pilot.bus.publish(Topic.FLIGHT, FlightStatus(phase="interrupted", broke_off_at=2, since_utc_s=time.time() - 60.0))
+    result, _ = flown(pilot)
+    assert result.completed
+
+
+def test_going_home_on_request_and_words_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fly_module, "FOLLOW_S", 0.02)
+    pilot, heard = Pilot(SmallBus()), Heard()
+    pilot.end = FlightStatus(phase="flying", target=3, targets=5)
+
+    async def flight() -> FlyResult:
+        go_home = asyncio.Event()
+
+        async def on_the_way() -> None:
+            while not pilot.of(StartAuto):
+                await asyncio.sleep(0.01)
+            pilot.bus.publish(Topic.TEXT, VehicleText(0.0, 4, "Battery low"))
+            pilot.bus.publish(Topic.LINK, LinkStatus(0.0, adopted=VEHICLE, state="lost"))
+            await asyncio.sleep(0.1)
+            pilot.bus.publish(Topic.LINK, LinkStatus(0.0, adopted=VEHICLE, state="live"))
+            await asyncio.sleep(0.1)
+            go_home.set()
+            while not pilot.of(ReturnHome):
+                await asyncio.sleep(0.01)
+            await asyncio.sleep(0.1)
+            ended = FlightStatus(phase="interrupted", broke_off_at=3, targets=5, since_utc_s=time.time() + 1)
+            pilot.bus.publish(Topic.FLIGHT, ended)
+
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(on_the_way())
+            return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
+
+    result = asyncio.run(flight())
+    assert not result.completed
+    assert len(pilot.of(ReturnHome)) == 1
+    for line in ("Vehicle: Battery low", "Communication lost: the vehicle flies on by itself", "Communication is back"):
+        assert line in heard.lines
+    assert heard.states > 2
+
+
+def test_nothing_stays_subscribed() -> None:
+    pilot = Pilot(SmallBus())
+    flown(pilot)
+    assert pilot.bus.subscriptions == []

@@ -1,0 +1,141 @@
+"""The link node as processes see it: asked over the bus, killed in flight, and found again as it was."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from telemetry.bus import Bus
+from telemetry.errors import AddressError, MissionUnknownError, NoVehicleError
+from telemetry.link_client import LinkClient
+from telemetry.mavlink.audit import check_chain, read_entries
+from telemetry.messages import FlightStatus, LinkStatus, ServerAlive, Topic
+from telemetry.node_lock import running_node
+from telemetry.requests import Arm, Connect, Operator, ReadParameters, StartAuto, Upload
+from telemetry.simulator.run import SimOptions, flying
+from telemetry.vehicle import VehicleState
+from tests.telemetry.bus_runs import ROOT, run
+from tests.telemetry.link_bench import free_port, until
+from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items
+
+ME = Operator("Ann", 7)
+
+
+class Node:
+    """The process, and what it publishes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.runtime = folder, folder / "run"
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self.last: dict[type, Any] = {}
+
+    def start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "telemetry.nodes.link", "--runtime", str(self.runtime), *arguments]
+        process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL)
+        self._processes.append(process)
+        return process
+
+    def end(self) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait()
+
+    @property
+    def status(self) -> LinkStatus:
+        return self.last.get(LinkStatus, LinkStatus(0.0))
+
+    @property
+    def state(self) -> VehicleState:
+        return self.last.get(VehicleState, VehicleState(0, 0))
+
+    @property
+    def flight(self) -> FlightStatus:
+        return self.last.get(FlightStatus, FlightStatus())
+
+    async def listen(self, bus: Bus) -> None:
+        async for _, message in bus.subscribe("**", keep_all=True):
+            self.last[type(message)] = message
+
+
+async def stand_for_a_server(bus: Bus) -> None:
+    while True:
+        bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
+        await asyncio.sleep(0.5)
+
+
+@contextlib.asynccontextmanager
+async def station(folder: Path) -> AsyncIterator[tuple[Node, LinkClient]]:
+    node = Node(folder)
+    async with await Bus.open(node.runtime, "server") as bus:
+        tasks = [asyncio.create_task(part) for part in (node.listen(bus), stand_for_a_server(bus))]
+        try:
+            yield node, LinkClient(bus)
+        finally:
+            node.end()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def test_it_is_asked_over_the_bus_and_its_errors_arrive_as_they_are(tmp_path: Path) -> None:
+    async def whole() -> None:
+        async with station(tmp_path) as (node, client):
+            process = node.start()
+            with pytest.raises(AddressError, match="no serial device"):
+                await client.call(Connect(ME, "/etc/passwd"))
+            with pytest.raises(NoVehicleError, match="No vehicle"):
+                await client.call(Arm(ME))
+            assert await client.call(Connect(ME, f"udpin:127.0.0.1:{free_port()}")) is None
+            process.terminate()
+            await until(lambda: process.poll() is not None)
+            assert process.returncode == 0
+
+    run(whole)
+
+
+def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flight(tmp_path: Path) -> None:
+    async def whole() -> None:
+        options = SimOptions(LAT_DEG, LON_DEG, ALT_M, link="tcpin:127.0.0.1:0", speedup=4.0, boot_s=0.5)
+        async with flying(options) as simulator, station(tmp_path) as (node, client):
+            process = node.start("--link", simulator.address.replace("tcpin", "tcp"))
+            await until(lambda: node.status.state == "live" and node.state.ready_to_arm and node.state.estimator_ok)
+            assert running_node(node.runtime, "link") is not None
+            report = await client.call(Upload(ME, items(6), LAT_DEG, LON_DEG, ALT_M))
+            assert report.verified
+            assert await client.call(ReadParameters(("RTL_ALT",))) == {"RTL_ALT": 1500.0}
+            with pytest.raises(MissionUnknownError):
+                await client.call(StartAuto(ME, "another"))
+            await client.call(StartAuto(ME, report.onboard.digest))
+            await until(lambda: node.flight.phase == "flying")
+            facts = running_node(node.runtime, "link")
+            assert facts is not None
+            assert not facts.replaceable
+            since = node.flight.since_utc_s
+
+            process.kill()
+            process.wait()
+            node.last.clear()
+            node.start()
+            await until(lambda: node.status.mission_state == "verified" and node.flight.phase == "flying")
+            assert node.status.mission_digest == report.onboard.digest
+            assert node.flight.since_utc_s == since
+            assert (node.status.adopted and node.status.adopted.system_id) == 1
+            await until(lambda: node.flight.phase == "landed")
+            await until(lambda: (facts := running_node(node.runtime, "link")) is not None and facts.replaceable)
+
+            audit = tmp_path / "audit.jsonl"
+            assert check_chain(audit.read_bytes()) is None
+            words = [entry["words"] for entry in read_entries(audit)]
+            assert words[0] == "upload 8 items"
+            assert words[-1] == f"start mission {report.onboard.digest[:12]} at item 1"
+
+    run(whole)

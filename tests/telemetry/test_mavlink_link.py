@@ -1,0 +1,372 @@
+"""The link on real sockets with radios that a test speaks for: strangers, twins, noise, silence, the operator."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import pty
+import socket
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.errors import (
+    AddressError,
+    NotAllowedError,
+    NoVehicleError,
+    RecordingFullError,
+    RefusedError,
+)
+from telemetry.messages import CommandRecord, LinkStatus
+from telemetry.requests import (
+    Adopt,
+    Arm,
+    Connect,
+    Disarm,
+    Disconnect,
+    Download,
+    Operator,
+    Release,
+    ReturnHome,
+    Upload,
+)
+from tests.telemetry.bus_runs import run
+from tests.telemetry.fake_vehicle import UdpVehicle, ack, beat
+from tests.telemetry.frames import ARMED, attitude, ground_station_heartbeat, heartbeat, packed
+from tests.telemetry.link_bench import ME, Console, console, free_port, until
+
+
+@contextlib.asynccontextmanager
+async def radio(port: int, *, message: Any = None, **ids: int) -> AsyncIterator[UdpVehicle]:
+    """A vehicle that beats ten times a second."""
+    vehicle = UdpVehicle(port, **ids)
+    task = asyncio.create_task(beat(vehicle, message=message))
+    try:
+        yield vehicle
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        vehicle.close()
+
+
+@contextlib.asynccontextmanager
+async def listening(*, adopt: bool, **options: Any) -> AsyncIterator[tuple[Console, int]]:
+    port = free_port()
+    async with console(**options) as bench:
+        await bench.link.handle(Connect(ME, f"udpin:127.0.0.1:{port}", adopt))
+        yield bench, port
+
+
+def test_nothing_is_sent_to_a_stranger_until_it_is_adopted() -> None:
+    async def whole() -> None:
+        async with listening(adopt=False) as (bench, port), radio(port) as vehicle:
+            await until(lambda: bench.status.candidates)
+            before = len(bench.of(LinkStatus))
+            await until(lambda: len(bench.of(LinkStatus)) > before + 2)
+            assert vehicle.heard == []
+            assert bench.frames(sent=True) == []
+            (candidate,) = bench.status.candidates
+            await bench.link.handle(Adopt(ME, candidate.id))
+            await until(lambda: {"HEARTBEAT", "COMMAND_LONG", "TIMESYNC"} <= vehicle.kinds())
+            (own,) = {(m.get_srcSystem(), m.get_srcComponent()) for m in vehicle.heard}
+            assert own == (255, 190)
+            assert bench.status.adopted == candidate
+            assert bench.commands == [f"adopt {candidate.id}"]
+
+    run(whole)
+
+
+def test_after_a_release_nothing_is_sent_any_more() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            await until(lambda: "HEARTBEAT" in vehicle.kinds())
+            await bench.link.handle(Release(ME))
+            vehicle.heard.clear()
+            before = len(bench.of(LinkStatus))
+            await until(lambda: len(bench.of(LinkStatus)) > before + 2)
+            assert vehicle.heard == []
+            assert (bench.status.state, bench.status.adopted) == ("none", None)
+
+    run(whole)
+
+
+def test_heartbeats_go_to_a_far_end_that_the_operator_named() -> None:
+    async def whole() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.bind(("127.0.0.1", 0))
+            sock.setblocking(False)
+            async with console() as bench:
+                await bench.link.handle(Connect(ME, f"udpout:127.0.0.1:{sock.getsockname()[1]}"))
+                frame = await asyncio.get_running_loop().sock_recv(sock, 100)
+                message: Any = mavlink.MAVLink(None).decode(bytearray(frame))
+                assert (message.get_type(), message.type, message.autopilot) == ("HEARTBEAT", 6, 8)
+
+    run(whole)
+
+
+def test_another_ground_station_is_never_the_vehicle() -> None:
+    async def whole() -> None:
+        message = ground_station_heartbeat()
+        async with (
+            listening(adopt=True) as (bench, port),
+            radio(port, message=message, system=254) as station,
+        ):
+            await until(lambda: bench.status.connections[0].received_messages > 3)
+            assert (bench.status.adopted, bench.status.candidates) == (None, ())
+            async with radio(port) as vehicle:
+                await bench.live()
+                assert bench.status.adopted is not None
+                assert bench.status.adopted.peer == f"127.0.0.1:{vehicle.port}"
+                await until(lambda: "HEARTBEAT" in vehicle.kinds())
+                assert station.heard == []
+
+    run(whole)
+
+
+def test_a_twin_with_the_same_id_does_not_mix_in() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            async with radio(port, message=heartbeat(base_mode=ARMED, custom_mode=6)) as twin:
+                await until(lambda: bench.status.warnings)
+                twin.send(*[attitude(k) for k in range(20)])
+                vehicle.send(attitude(5))
+                await until(lambda: bench.state.attitude_t_mono_s is not None)
+                assert not bench.state.armed
+                assert "system id 1" in bench.status.warnings[0]
+                assert twin.heard == []
+
+    run(whole)
+
+
+def test_stray_packets_between_the_vehicles_cost_no_message() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            before = len(bench.frames(sent=False))
+            for k in range(500):
+                vehicle.send(attitude(k))
+                if k % 5 == 0:
+                    vehicle.send_bytes(b"\xfd\xff\x00")
+                await asyncio.sleep(0)
+            frames = {packed(attitude(k))[10:-2] for k in range(500)}
+            await until(lambda: frames <= {frame[10:-2] for frame in bench.frames(sent=False)[before:]})
+            assert bench.status.connections[0].bad_bytes >= 300
+
+    run(whole)
+
+
+def test_a_vehicle_without_figures_has_none() -> None:
+    async def whole() -> None:
+        nan = float("nan")
+        async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            vehicle.send(mavlink.MAVLink_attitude_message(1, nan, nan, nan, nan, nan, nan))
+            await until(lambda: bench.state.attitude_t_mono_s is not None)
+            assert (bench.state.roll_rad, bench.state.heading_rad) == (None, None)
+
+    run(whole)
+
+
+def test_a_silent_vehicle_is_lost_and_a_command_says_so() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port):
+            async with radio(port):
+                await bench.live()
+            await until(lambda: bench.status.state == "lost")
+            with pytest.raises(NoVehicleError, match="link to the vehicle is lost"):
+                await bench.link.handle(Arm(ME))
+            assert [s.state for s in bench.of(LinkStatus) if s.state == "stale"]
+            async with radio(port):  # from another port of the same host
+                await bench.live()
+
+    run(whole)
+
+
+def test_commands_without_a_vehicle_are_refused() -> None:
+    async def whole() -> None:
+        async with console() as bench:
+            for request in (Arm(ME), ReturnHome(ME), Download(ME), Upload(ME, (), 0.0, 0.0, 0.0)):
+                with pytest.raises(NoVehicleError, match="No vehicle is adopted"):
+                    await bench.link.handle(request)
+            with pytest.raises(NoVehicleError, match="not heard"):
+                await bench.link.handle(Adopt(ME, "somebody"))
+            with pytest.raises(AddressError):
+                await bench.link.handle(Connect(ME, "/etc/passwd"))
+            with pytest.raises(NotAllowedError, match="no connection"):
+                await bench.link.handle(Disconnect(ME, "tcp:127.0.0.1:5760"))
+
+    run(whole)
+
+
+def test_connecting_twice_is_connecting_once_and_disconnecting_ends_it() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port):
+            await bench.link.handle(Connect(ME, f"udpin://127.0.0.1:{port}", True))
+            assert len(bench.status.connections) == 1
+            async with radio(port):
+                await bench.live()
+                await bench.link.handle(Disconnect(ME, f"udpin:127.0.0.1:{port}"))
+                assert (bench.status.connections, bench.status.adopted) == ((), None)
+
+            def is_free() -> bool:
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock, contextlib.suppress(OSError):
+                    sock.bind(("127.0.0.1", port))
+                    return True
+                return False
+
+            await until(is_free)
+
+    run(whole)
+
+
+def test_whoever_was_relieved_can_send_nothing() -> None:
+    async def whole() -> None:
+        async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            await bench.link.handle(Connect(Operator("Bob", 2), "udpin:127.0.0.1:1", False))
+            vehicle.heard.clear()
+            with pytest.raises(NotAllowedError, match="not in charge"):
+                await bench.link.handle(ReturnHome(ME))
+            assert bench.commands == []
+            assert not any(m.get_type() == "COMMAND_LONG" and m.command == 176 for m in vehicle.heard)
+
+    run(whole)
+
+
+class Disk:
+    """Takes the place of the audit log."""
+
+    def __init__(self, vehicle: UdpVehicle | None = None) -> None:
+        self.full = False
+        self.vehicle = vehicle
+        self.written: list[tuple[str, int]] = []
+
+    def write(self, record: CommandRecord) -> None:
+        if self.full:
+            raise RecordingFullError("No space is left.")
+        commands = [m for m in self.vehicle.of("COMMAND_LONG") if m.command == 400] if self.vehicle else []
+        self.written.append((record.words, len(commands)))
+
+
+async def answering(vehicle: UdpVehicle, results: dict[int, int], words: bytes = b"") -> None:
+    """Acknowledges commands as told, until it is cancelled."""
+    answered = 0
+    while True:
+        for message in vehicle.heard[answered:]:
+            if message.get_type() == "COMMAND_LONG" and message.command in results:
+                vehicle.send(ack(message.command, results[message.command]))
+                if words:
+                    vehicle.send(mavlink.MAVLink_statustext_message(2, words))
+        answered = len(vehicle.heard)
+        await asyncio.sleep(0.01)
+
+
+@contextlib.asynccontextmanager
+async def commanded(results: dict[int, int], words: bytes = b"") -> AsyncIterator[tuple[Console, UdpVehicle, Disk]]:
+    disk = Disk()
+    async with listening(adopt=True, audit=disk) as (bench, port), radio(port) as vehicle:
+        disk.vehicle = vehicle
+        await bench.live()
+        task = asyncio.create_task(answering(vehicle, results, words))
+        try:
+            yield bench, vehicle, disk
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
+def test_a_command_is_written_down_before_it_is_sent() -> None:
+    async def whole() -> None:
+        async with commanded({400: 0}) as (bench, vehicle, disk):
+            await bench.link.handle(Arm(ME))
+            assert disk.written == [("arm", 0)]
+            assert [m.param1 for m in vehicle.of("COMMAND_LONG") if m.command == 400] == [1.0]
+            assert bench.commands == ["arm"]
+
+    run(whole)
+
+
+def test_a_refused_arming_carries_the_vehicles_words() -> None:
+    async def whole() -> None:
+        async with commanded({400: 4}, b"Arm: Compass not calibrated") as (bench, _, _):
+            with pytest.raises(RefusedError, match="Compass not calibrated"):
+                await bench.link.handle(Arm(ME))
+            await until(lambda: "Arm: Compass not calibrated" in bench.texts)
+
+    run(whole)
+
+
+def test_a_full_disk_forbids_arming_but_never_the_way_home() -> None:
+    async def whole() -> None:
+        async with commanded({400: 0, 176: 0}) as (bench, vehicle, disk):
+            disk.full = True
+            with pytest.raises(RecordingFullError):
+                await bench.link.handle(Arm(ME))
+            assert not [m for m in vehicle.of("COMMAND_LONG") if m.command == 400]
+            await bench.link.handle(ReturnHome(ME))
+            assert [m.param2 for m in vehicle.of("COMMAND_LONG") if m.command == 176] == [6.0]
+            assert "No space" in bench.flight.hint
+
+    run(whole)
+
+
+def test_motors_are_not_stopped_in_the_air() -> None:
+    async def whole() -> None:
+        async with commanded({400: 0}) as (bench, vehicle, _):
+            vehicle.send(mavlink.MAVLink_extended_sys_state_message(0, 2))
+            await until(lambda: bench.state.landed == "in_air")
+            with pytest.raises(NotAllowedError, match="in the air"):
+                await bench.link.handle(Disarm(ME))
+            vehicle.send(mavlink.MAVLink_extended_sys_state_message(0, 1))
+            await until(lambda: bench.state.landed == "on_ground")
+            await bench.link.handle(Disarm(ME))
+            assert [m.param1 for m in vehicle.of("COMMAND_LONG") if m.command == 400] == [0.0]
+
+    run(whole)
+
+
+def test_without_a_console_the_heartbeat_stops_after_the_grace_and_starts_again() -> None:
+    async def whole() -> None:
+        age_s = 0.0
+        absent = listening(adopt=True, grace_s=5.0, server_age_s=lambda: age_s)
+        async with absent as (bench, port), radio(port) as vehicle:
+            await bench.live()
+            await until(lambda: vehicle.of("HEARTBEAT"))
+            age_s = 6.0
+            before = len(vehicle.of("HEARTBEAT"))
+            told = len(bench.of(LinkStatus))
+            await until(lambda: len(bench.of(LinkStatus)) > told + 3)
+            assert len(vehicle.of("HEARTBEAT")) <= before + 1
+            age_s = 0.1
+            await until(lambda: len(vehicle.of("HEARTBEAT")) > before + 1)
+
+    run(whole)
+
+
+def test_a_wrong_baud_rate_is_said() -> None:
+    async def whole() -> None:
+        master, slave = pty.openpty()
+        name = os.ttyname(slave)
+        try:
+            async with console() as bench:
+                await bench.link.handle(Connect(ME, f"{name}:115200"))
+                await until(lambda: bench.link.lines[f"{name}:115200"].connection.state == "open")
+                assert bench.status.connections[0].state == "waiting"
+                for k in range(20):
+                    os.write(master, bytes((7 * k + 13 * j) % 251 for j in range(50)))
+                    await asyncio.sleep(0.01)
+                await until(lambda: bench.status.connections[0].error)
+                error = bench.status.connections[0].error
+                assert error is not None
+                assert "115200 baud" in error.what
+                assert "57600" in error.advice
+        finally:
+            os.close(master)
+            os.close(slave)
+
+    run(whole)

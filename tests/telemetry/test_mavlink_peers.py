@@ -1,0 +1,117 @@
+"""Who becomes the vehicle, who stays a stranger, and whose messages never mix in."""
+
+from telemetry.mavlink.peers import FORGET_S, MOST_CANDIDATES, Peers, Source
+from tests.telemetry.frames import attitude, ground_station_heartbeat, heard, heartbeat
+
+UDP = "udpin:0.0.0.0:14550"
+HERE = Source(UDP, "10.0.0.2:4000", 1, 1)
+
+
+def at(peer: str = "10.0.0.2:4000", *, address: str = UDP, system: int = 1, component: int = 1) -> Source:
+    return Source(address, peer, system, component)
+
+
+def adopted(now_s: float = 0.0) -> Peers:
+    peers = Peers()
+    peers.hear(HERE, heard(heartbeat()), now_s)
+    candidate = peers.find(HERE.id, now_s)
+    assert candidate is not None
+    peers.adopt(candidate, now_s)
+    return peers
+
+
+def test_an_autopilots_heartbeat_makes_a_candidate() -> None:
+    peers = Peers()
+    assert peers.hear(HERE, heard(attitude()), 0.0) == "stranger"
+    assert peers.candidates(0.0) == ()
+    assert peers.hear(HERE, heard(heartbeat()), 0.0) == "stranger"
+    (candidate,) = peers.candidates(0.0)
+    assert (candidate.id, candidate.autopilot) == ("udpin:0.0.0.0:14550/10.0.0.2:4000/1/1", "ardupilot")
+
+
+def test_another_ground_station_never_counts_as_a_vehicle() -> None:
+    peers = Peers()
+    peers.adopt_first_of(UDP, wanted=True)
+    message = heard(ground_station_heartbeat())
+    peers.hear(HERE, message, 0.0)
+    assert not peers.wants(HERE, message)
+    assert peers.candidates(0.0) == ()
+
+
+def test_the_first_autopilot_is_wanted_where_that_was_asked_for() -> None:
+    peers, message = Peers(), heard(heartbeat())
+    assert not peers.wants(HERE, message)
+    peers.adopt_first_of(UDP, wanted=True)
+    assert peers.wants(HERE, message)
+    assert not peers.wants(at(address="tcp:x:1"), message)
+    peers.adopt_first_of(UDP, wanted=True, only=(7, 1))
+    assert not peers.wants(HERE, message)
+    assert peers.wants(at(system=7), message)
+
+
+def test_what_was_released_is_not_adopted_again_by_itself() -> None:
+    peers = Peers()
+    peers.adopt_first_of(UDP, wanted=True)
+    message = heard(heartbeat())
+    peers.hear(HERE, message, 0.0)
+    candidate = peers.find(HERE.id, 0.0)
+    assert candidate is not None
+    peers.adopt(candidate, 0.0)
+    assert not peers.wants(HERE, message)
+    peers.release()
+    assert not peers.wants(HERE, message)
+    assert peers.candidates(0.0) == (candidate,)
+
+
+def test_candidates_are_forgotten_and_bounded() -> None:
+    peers = Peers()
+    for k in range(3 * MOST_CANDIDATES):
+        peers.hear(at(f"10.0.0.2:{k}", system=1 + k % 250), heard(heartbeat()), 0.0)
+    assert len(peers.candidates(0.0)) == MOST_CANDIDATES
+    assert peers.candidates(FORGET_S) == ()
+
+
+def test_messages_of_the_vehicles_other_components_are_its_own() -> None:
+    assert adopted().hear(at(component=154), heard(attitude(), component=154), 0.1) == "adopted"
+
+
+def test_a_second_vehicle_with_the_same_id_does_not_mix_in_and_is_warned_of() -> None:
+    peers = adopted()
+    twin = at("10.0.0.9:4000")
+    assert peers.hear(twin, heard(attitude()), 1.0) == "imposter"
+    assert peers.hear(twin, heard(heartbeat()), 1.0) == "stranger"
+    (warning,) = peers.warnings(1.0)
+    assert "system id 1" in warning
+    assert "10.0.0.9:4000" in warning
+    assert peers.adopted is not None
+    assert peers.adopted.peer == HERE.peer
+    assert [candidate.peer for candidate in peers.candidates(1.0)] == ["10.0.0.9:4000"]
+    assert peers.warnings(20.0) == ()
+
+
+def test_a_vehicle_with_another_id_is_a_candidate_without_a_warning() -> None:
+    peers = adopted()
+    assert peers.hear(at(system=2), heard(heartbeat(), system=2), 1.0) == "stranger"
+    assert len(peers.candidates(1.0)) == 1
+    assert peers.warnings(1.0) == ()
+
+
+def test_a_vehicle_that_was_lost_may_come_back_from_another_port_of_its_host() -> None:
+    peers, again = adopted(), at("10.0.0.2:4001")
+    assert peers.hear(again, heard(heartbeat()), 1.0) == "stranger"
+    assert peers.hear(again, heard(heartbeat()), 5.0) == "moved"
+    assert peers.adopted is not None
+    assert peers.adopted.peer == "10.0.0.2:4001"
+    assert peers.hear(HERE, heard(attitude()), 5.1) == "imposter"
+
+
+def test_not_from_another_host_or_connection() -> None:
+    peers = adopted()
+    assert peers.hear(at("10.0.0.9:4000"), heard(heartbeat()), 9.0) == "stranger"
+    assert peers.hear(at(address="tcpin:0.0.0.0:5760"), heard(heartbeat()), 9.0) == "stranger"
+
+
+def test_after_hanging_up_it_may_come_back_at_once() -> None:
+    peers = adopted()
+    peers.gone(UDP, HERE.peer)
+    assert peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 0.1) == "moved"

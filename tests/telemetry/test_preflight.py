@@ -1,0 +1,299 @@
+"""The check before the start, moved heights, and going on with a mission that broke off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planning.clearance import certify
+from planning.dsm import Dsm
+from planning.flown import flown_line
+from planning.model import ClearanceParams, Home, Mission, MissionItem, VehicleProfile
+from telemetry.errors import NotAllowedError
+from telemetry.flight.parameters import return_settings
+from telemetry.flight.preflight import Preflight, Row, actual_home, check
+from telemetry.flight.rereference import rereference
+from telemetry.flight.resume import plan_resumption, resume_item
+from telemetry.mavlink.items import items_from_mission
+from telemetry.messages import OnboardMission
+from telemetry.vehicle import VehicleState
+from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
+
+PROFILE = VehicleProfile("quad", position_error_m=1.0, rtl_height_m=30.0)
+CLEARANCE = ClearanceParams(2.0, vehicle_radius_m=0.35, position_error_m=1.0, rtl_height_m=30.0)
+PLANNED = mission(ROUTE)
+HOME = (50.0, 150.0)
+PARAMETERS = {"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 3.0}
+
+
+def state_at(place: tuple[float, float] = HOME, **changes) -> VehicleState:
+    lat, lon = (float(v) for v in degrees([place])[0])
+    ready = VehicleState(
+        1, 1, autopilot="ardupilot", mode="GUIDED", landed="on_ground", ready_to_arm=True,
+        lat_deg=lat, lon_deg=lon, alt_rel_home_m=0.0, home_lat_deg=lat, home_lon_deg=lon, home_alt_amsl_m=80.0,
+        gnss_t_mono_s=1.0, gnss_fix="rtk_fixed", horizontal_accuracy_m=0.02, estimator_ok=True, battery_share=0.95,
+    )  # fmt: skip
+    return replace(ready, **changes)
+
+
+def onboard(flown: Mission = PLANNED) -> OnboardMission:
+    return OnboardMission(items_from_mission(flown), None, None, None, "digest")
+
+
+def checked(state: VehicleState | None = None, flown: Mission = PLANNED, **changes) -> Preflight:
+    given_ = {"dsm": PLAIN, "profile": PROFILE, "clearance": CLEARANCE, "planned_home": PLANNED.home}
+    parameters = changes.pop("parameters", PARAMETERS)
+    read_back = changes.pop("onboard", onboard(flown))
+    return check(read_back, state or state_at(), parameters, **(given_ | changes))
+
+
+def row(found: Preflight, code: str) -> Row:
+    return next(r for r in found.rows if r.code == code)
+
+
+def hill(height_m: float = 3.0) -> Dsm:
+    """A flat mound of 20 m around 30 m east of the planned home."""
+    cells = np.array(PLAIN.elevation_m)
+    cells[140:160, 70:90] += height_m
+    return PLAIN.with_elevation(cells)
+
+
+def test_all_is_well() -> None:
+    found = checked()
+    assert [r.code for r in found.rows] == ["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready"]
+    assert {r.state for r in found.rows} == {"good"}
+    assert found.ok()
+    assert found.home_shift_m == pytest.approx(0.0)
+    assert found.min_distance_m == pytest.approx(12.0, abs=0.01)
+    assert found.in_the_way() == ()
+
+
+def test_what_was_read_back_is_judged() -> None:
+    low = replace(PLANNED, items=tuple(replace(i, alt_m=9.0) if i.command == 16 else i for i in PLANNED.items))
+    found = checked(flown=low)
+    assert row(found, "clearance").state == "bad"
+    assert "1.00 m" in row(found, "clearance").text
+    assert not found.ok(("clearance",))
+
+
+@pytest.mark.parametrize(("read_back", "state"), [(None, "unknown"), (OnboardMission((), None, None, None, ""), "bad")])
+def test_no_mission(read_back, state) -> None:
+    found = checked(onboard=read_back)
+    assert row(found, "mission").state == state
+    assert not found.ok(("mission", "clearance", "rtl_height"))
+
+
+def test_higher_ground_at_home_needs_other_heights() -> None:
+    found = checked(state_at((80.0, 150.0)), dsm=hill())
+    assert found.needs_rereference
+    assert found.home_shift_m == pytest.approx(3.0)
+    home = row(found, "home")
+    assert home.state == "bad"
+    assert "30.0 m from the plan's home, where the surface is 3.00 m higher" in home.text
+    assert not found.ok(("home",))
+
+
+def test_other_heights_keep_the_line_where_it_is() -> None:
+    dsm, state = hill(), state_at((80.0, 150.0))
+    home = actual_home(state, dsm)
+    assert home is not None
+    moved = rereference(PLANNED, 3.0, home=home)
+    again = checked(state, moved, dsm=dsm, planned_home=home, rereferenced_m=3.0)
+    assert again.ok()
+    assert not again.needs_rereference
+    assert "moved down by 3.00 m" in row(again, "home").text
+    before, after = flown_line(PLANNED, dsm), flown_line(moved, dsm)
+    assert after.points_m[-1, 2] == pytest.approx(before.points_m[-1, 2], abs=0.011)
+    assert after.points_m[-1, 2] >= before.points_m[-1, 2] - 1e-9
+    assert after.takeoff_alt_dsm_m == pytest.approx(before.takeoff_alt_dsm_m, abs=0.011)
+
+
+def test_the_way_from_another_place_is_judged_too() -> None:
+    """Between where the vehicle stands and the first waypoint there is the tower, higher than the take-off."""
+    low_first = mission([(150.0, 150.0, 6.0), (50.0, 150.0, 20.0)], home=(150.0, 150.0))
+    assert checked(state_at((150.0, 150.0)), low_first, planned_home=low_first.home).ok()
+    found = checked(state_at((250.0, 150.0)), low_first, planned_home=low_first.home)
+    assert row(found, "clearance").state == "bad"
+    assert "100.0 m from the plan's home" in row(found, "home").text
+
+
+@given(shift_m=st.floats(-30, 30), alts=st.lists(st.floats(-20, 60), min_size=1, max_size=5))
+def test_moved_heights_are_never_lower_and_hardly_higher(shift_m, alts) -> None:
+    items = tuple(MissionItem(16, 3, lat_deg=1.0, lon_deg=2.0, alt_m=round(a, 2) + 0.002) for a in alts)
+    before = Mission(Home(1.0, 2.0, 0.0), items)
+    for old, new in zip(before.items, rereference(before, shift_m).items, strict=True):
+        kept_m = math.trunc(float(np.float32(new.alt_m) * np.float32(100))) / 100  # as vehicles store it
+        assert kept_m + shift_m >= old.alt_m - 0.002 - 1e-4
+        assert kept_m + shift_m <= old.alt_m + 0.022
+        assert kept_m != 0.0
+
+
+def test_heights_above_sea_level_are_not_moved_but_compared() -> None:
+    amsl = replace(PLANNED, items=tuple(replace(i, frame=0, alt_m=i.alt_m + 100.0) for i in PLANNED.items[:-1]))
+    assert rereference(amsl, 3.0).items == amsl.items
+    above_sea = replace(PLAIN, vertical_datum="EGM2008 height")
+    close = checked(state_at(alt_amsl_m=100.1), amsl, dsm=above_sea)
+    assert row(close, "home").state == "good"
+    off = checked(state_at(alt_amsl_m=101.5), amsl, dsm=above_sea)
+    assert row(off, "home").state == "bad"
+    assert "1.50 m higher" in row(off, "home").text
+    assert row(checked(state_at(alt_amsl_m=100.1), amsl), "home").state == "unknown"
+
+
+def test_home_is_where_a_disarmed_vehicle_stands() -> None:
+    lat, lon = (float(v) for v in degrees([(80.0, 150.0)])[0])
+    moved = state_at(lat_deg=lat, lon_deg=lon)
+    standing, flying = actual_home(moved, PLAIN), actual_home(replace(moved, armed=True), PLAIN)
+    assert standing is not None
+    assert flying is not None
+    assert standing.lon_deg == pytest.approx(lon)
+    assert flying.lon_deg == pytest.approx(moved.home_lon_deg)
+    nowhere = replace(moved, lat_deg=None, lon_deg=None, home_lat_deg=None, home_lon_deg=None)
+    assert actual_home(nowhere, PLAIN) is None
+    assert row(checked(nowhere), "home").state == "unknown"
+
+
+def test_home_off_the_model() -> None:
+    assert row(checked(state_at((-50.0, 150.0))), "home").state == "bad"
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({"horizontal_accuracy_m": 0.9}, "good"),
+        ({"horizontal_accuracy_m": 2.5, "gnss_fix": "3d"}, "accept"),
+        ({"horizontal_accuracy_m": None, "gnss_fix": "3d"}, "accept"),
+        ({"horizontal_accuracy_m": None}, "good"),
+        ({"gnss_fix": "2d"}, "bad"),
+        ({"gnss_fix": "no_fix"}, "bad"),
+        ({"gnss_fix": "none", "gnss_t_mono_s": None}, "unknown"),
+        ({"estimator_ok": False}, "bad"),
+    ],
+)
+def test_gnss(changes, state) -> None:
+    found = checked(state_at(**changes))
+    assert row(found, "gnss").state == state
+    assert found.ok(("gnss",)) is (state in ("good", "accept"))
+    assert found.ok() is (state == "good")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "state", "words"),
+    [
+        ({"RTL_ALT": 3000.0}, "good", "returns at 30.00 m"),
+        ({"RTL_ALT_M": 30.0, "RTL_ALT": None}, "good", "returns at 30.00 m"),
+        ({"RTL_ALT": 900.0}, "good", "returns at 9.00 m"),  # it keeps its own 20 m, which is more
+        ({}, "accept", "does not tell its return height"),
+        ({"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 1.0}, "accept", "climbs less"),
+        ({"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 0.0}, "good", "returns at"),
+    ],
+)
+def test_return_height(parameters, state, words) -> None:
+    found = row(checked(parameters=parameters), "rtl_height")
+    assert found.state == state
+    assert words in found.text
+
+
+def test_a_return_height_that_is_not_enough() -> None:
+    below = mission([(50.0, 150.0, 6.0), (50.0, 200.0, 6.0), (250.0, 200.0, 6.0), (250.0, 150.0, 6.0)])
+    found = checked(flown=below, parameters={"RTL_ALT": 500.0})
+    assert row(found, "rtl_height").state == "bad"
+    assert row(found, "rtl_height").mend == "Set RTL_ALT 1000 cm on the vehicle."
+    assert row(found, "clearance").state == "good"
+    assert checked(flown=below).ok()
+
+
+def test_return_settings_of_each_firmware() -> None:
+    assert return_settings({"RTL_RETURN_ALT": 45.0}, "px4").height_m == 45.0
+    assert return_settings({"RTL_RETURN_ALT": 45.0, "RTL_CONE_ANG": 30.0}, "px4").steep_enough is False
+    assert return_settings({"RTL_ALT": math.nan}, "ardupilot").height_m is None
+    assert return_settings({"RTL_ALT_M": 12.0}, "ardupilot").value_for(12.3) == "RTL_ALT_M 13 m"
+
+
+@pytest.mark.parametrize(("share", "state"), [(0.9, "good"), (0.30, "accept"), (0.05, "bad"), (None, "accept")])
+def test_battery(share, state) -> None:
+    assert row(checked(state_at(battery_share=share)), "battery").state == state
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({"ready_to_arm": False}, "bad"),
+        ({"ready_to_arm": None}, "good"),
+        ({"critical": True}, "bad"),
+        ({"armed": True, "landed": "in_air"}, "bad"),
+    ],
+)
+def test_ready(changes, state) -> None:
+    assert row(checked(state_at(**changes)), "ready").state == state
+
+
+def test_without_a_surface_model_all_that_needs_one_can_only_be_accepted() -> None:
+    found = checked(dsm=None)
+    assert {r.code for r in found.in_the_way()} == {"clearance", "home", "rtl_height", "battery"}
+    assert {r.state for r in found.in_the_way()} == {"accept"}
+    assert found.certificate is None
+
+
+def test_an_item_that_cannot_be_judged() -> None:
+    jump = replace(PLANNED, items=(*PLANNED.items[:-1], MissionItem(177, 2), PLANNED.items[-1]))
+    found = checked(flown=jump)
+    assert row(found, "clearance").state == "bad"
+    assert "jumps to another item" in row(found, "clearance").text
+    nowhere = replace(PLANNED, items=(MissionItem(16, 3, lat_deg=120.0, lon_deg=1.0, alt_m=3.0),))
+    assert row(checked(flown=nowhere), "clearance").state == "bad"
+
+
+# Going on
+
+
+def test_going_on_at_the_item_that_was_flown_to() -> None:
+    with_speed = replace(PLANNED, items=(MissionItem(178, 2, (1.0, 2.0, -1.0, 0.0)), *PLANNED.items))
+    assert resume_item(with_speed, 4) == 4
+    assert resume_item(with_speed, 1) == 3  # speed and take-off are no places to go on at
+    for number in (0, 6, 7):
+        with pytest.raises(NotAllowedError):
+            resume_item(with_speed, number)
+
+
+def test_the_way_back_is_as_high_as_needed() -> None:
+    low = mission([(50.0, 150.0, 20.0), (250.0, 200.0, 5.0), (250.0, 150.0, 5.0)])
+    found = plan_resumption(low, 4, PLAIN, CLEARANCE)
+    assert found.from_item == 4
+    assert found.needed_m == pytest.approx(10.0, abs=0.01)
+    assert found.climb_to_m == pytest.approx(10.1, abs=0.11)
+    assert found.certificate.certified
+    assert found.certificate.min_distance_m >= 2.0
+    assert plan_resumption(low, 3, PLAIN, CLEARANCE).climb_to_m >= 5.0
+
+
+def test_the_way_back_at_a_height_of_the_pilots_choice() -> None:
+    low = mission([(50.0, 150.0, 20.0), (250.0, 200.0, 5.0), (250.0, 150.0, 5.0)])
+    assert plan_resumption(low, 4, PLAIN, CLEARANCE, climb_to_m=15.0).climb_to_m == 15.0
+    with pytest.raises(NotAllowedError, match=r"not clear at 6\.0 m.*Climb to 10\.1 m") as caught:
+        plan_resumption(low, 4, PLAIN, CLEARANCE, climb_to_m=6.0)
+    assert caught.value.where == "the way from home to item 4"
+
+
+def test_no_way_back_over_unknown_terrain() -> None:
+    cells = np.array(PLAIN.elevation_m)
+    cells[:, 180:190] = np.nan
+    with pytest.raises(NotAllowedError, match="does not know"):
+        plan_resumption(PLANNED, 4, PLAIN.with_elevation(cells), CLEARANCE)
+
+
+def test_what_was_set_before_is_named() -> None:
+    with_speed = replace(PLANNED, items=(MissionItem(178, 2, (1.0, 2.0, -1.0, 0.0)), *PLANNED.items))
+    assert plan_resumption(with_speed, 4, PLAIN, CLEARANCE).skipped == (1,)
+
+
+def test_the_rest_is_certified_as_the_certificate_would() -> None:
+    found = plan_resumption(PLANNED, 3, PLAIN, CLEARANCE)
+    rest = replace(PLANNED, items=(PLANNED.items[0], *PLANNED.items[2:]))
+    whole = certify(PLAIN, flown_line(rest, PLAIN), CLEARANCE)
+    assert found.certificate.min_distance_m == pytest.approx(whole.min_distance_m, abs=0.01)

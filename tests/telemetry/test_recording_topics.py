@@ -1,0 +1,27 @@
+"""What is recorded: everything, and every kind of message knows how."""
+
+from __future__ import annotations
+
+from telemetry.bus.wire import EACH_ARRIVES
+from telemetry.messages import MESSAGE_TYPES, REPLAY_PREFIX, Topic
+from telemetry.recording.schemas import codec_of
+from telemetry.recording.topics import EVENTS, LATEST, NOT_RECORDED, RECORDED, raw_channel_topic
+
+
+def test_every_topic_is_recorded_or_left_out_on_purpose() -> None:
+    assert set(Topic) == RECORDED | NOT_RECORDED
+    assert RECORDED == LATEST | EVENTS
+    assert not any(topic.startswith(REPLAY_PREFIX) for topic in RECORDED)
+
+
+def test_what_arrives_one_by_one_on_the_bus_is_an_event_here() -> None:
+    assert EACH_ARRIVES <= EVENTS
+
+
+def test_every_recorded_message_has_a_schema() -> None:
+    names = {codec_of(MESSAGE_TYPES[topic]).schema_name for topic in RECORDED}
+    assert len(names) == len(RECORDED)
+
+
+def test_directions_have_channels_of_their_own() -> None:
+    assert raw_channel_topic(True) != raw_channel_topic(False)

@@ -1,0 +1,217 @@
+import { useState } from "preact/hooks";
+import type { Candidate, ConnectionStatus } from "../messages";
+import { count, number } from "../format";
+import { adopted, isInAir, lease, linkStatus, vehicle } from "../store/flying";
+import { pending } from "../store/outcomes";
+import { Button } from "../ui/Button";
+import { ErrorPanel } from "../ui/ErrorBox";
+import { Icon } from "../ui/Icon";
+import { Section } from "../ui/Section";
+import { adopt, connectTo, disconnect, giveControl, release, startSimulator } from "./commands";
+import { linkWords } from "./words";
+
+const PLACE = "connection";
+
+const EXAMPLES = [
+  { address: "udpin:0.0.0.0:14550", note: "listen, as most radios send" },
+  { address: "tcp:127.0.0.1:5760", note: "SITL, telemetry bridges" },
+  { address: "/dev/ttyUSB0:57600", note: "telemetry radio" },
+  { address: "/dev/ttyACM0:115200", note: "USB cable" },
+];
+
+const KINDS: Readonly<Record<number, string>> = {
+  1: "plane",
+  2: "quadrotor",
+  3: "coaxial",
+  4: "helicopter",
+  13: "hexarotor",
+  14: "octorotor",
+  15: "tricopter",
+};
+
+const AUTOPILOTS: Readonly<Record<string, string>> = { ardupilot: "ArduPilot", px4: "PX4" };
+
+const describe = (found: Candidate) =>
+  `${AUTOPILOTS[found.autopilot] ?? "Unknown autopilot"} ${KINDS[found.vehicle_type] ?? "vehicle"}, system ${found.system_id}`;
+
+function AddressForm() {
+  const [address, setAddress] = useState("");
+  const submit = (event: Event) => {
+    event.preventDefault();
+    if (address.trim()) void connectTo(address.trim());
+  };
+  return (
+    <form class="address-form" onSubmit={submit}>
+      <label class="field text">
+        <span>Address</span>
+        <input
+          type="text"
+          autocomplete="off"
+          spellcheck={false}
+          placeholder={EXAMPLES[0]?.address}
+          value={address}
+          data-testid="link-address"
+          onInput={(event) => setAddress(event.currentTarget.value)}
+        />
+      </label>
+      <ul class="examples" aria-label="Examples">
+        {EXAMPLES.map((example) => (
+          <li key={example.address}>
+            <button type="button" class="link" onClick={() => setAddress(example.address)}>
+              {example.address}
+            </button>
+            <span class="muted"> {example.note}</span>
+          </li>
+        ))}
+      </ul>
+      <button
+        type="submit"
+        class="button"
+        disabled={!lease.value.mine || address.trim() === "" || pending.value.has(PLACE)}
+        data-testid="link-connect"
+      >
+        <Icon name="plug" /> {pending.value.has(PLACE) ? "Connecting…" : "Connect"}
+      </button>
+    </form>
+  );
+}
+
+const STATES = { open: "open", waiting: "nothing heard yet", failed: "failed, tried again" } as const;
+
+function ConnectionRow({ connection }: { connection: ConnectionStatus }) {
+  const { address, state, error, received_messages, bad_bytes } = connection;
+  return (
+    <li data-testid="connection-row">
+      <div class="row">
+        <span class="connection-name">
+          <strong>{address}</strong>
+          <span class={state === "failed" ? "says-bad" : "muted"}>
+            {state === "open" ? `${number(received_messages)} messages` : STATES[state]}
+            {bad_bytes > 0 && ` · ${number(bad_bytes)} bytes unreadable`}
+          </span>
+        </span>
+        <Button
+          kind="quiet"
+          class="small"
+          icon="cross"
+          title={`Close ${address}`}
+          disabled={!lease.value.mine || isInAir.value}
+          testid="link-disconnect"
+          onClick={() => void disconnect(address)}
+        />
+      </div>
+      {error && <ErrorPanel error={error} />}
+    </li>
+  );
+}
+
+function Candidates({ found }: { found: readonly Candidate[] }) {
+  if (found.length === 0) return null;
+  return (
+    <>
+      <p class="hint">Heard, and nothing is sent to it until you use it:</p>
+      <ul class="candidates">
+        {found.map((candidate) => (
+          <li class="row" key={candidate.id} data-testid="candidate-row">
+            <span class="connection-name">
+              <strong>{describe(candidate)}</strong>
+              <span class="muted">{candidate.peer || candidate.address}</span>
+            </span>
+            <Button
+              testid="adopt"
+              disabled={!lease.value.mine || isInAir.value}
+              onClick={() => void adopt(candidate.id)}
+            >
+              Use
+            </Button>
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
+function Adopted({ used }: { used: Candidate }) {
+  const firmware = vehicle.value?.firmware_version;
+  return (
+    <div class="row adopted" data-testid="adopted">
+      <Icon name="drone" />
+      <span class="connection-name">
+        <strong>{describe(used)}</strong>
+        <span class="muted">
+          {firmware ? `${firmware} · ` : ""}
+          {used.address}
+        </span>
+      </span>
+      <Button
+        kind="quiet"
+        disabled={!lease.value.mine || isInAir.value}
+        title={isInAir.value ? "Not in the air" : "Send nothing to it any more"}
+        testid="release"
+        onClick={() => void release()}
+      >
+        Release
+      </Button>
+    </div>
+  );
+}
+
+/** The simulator is the primary action below, until a connection waits for somebody. */
+function NoVehicle({ waits }: { waits: boolean }) {
+  return (
+    <div class="no-vehicle" data-testid="no-vehicle">
+      <p>Connect a vehicle, or try everything with a simulated one over the open plan.</p>
+      {waits && (
+        <Button
+          icon="drone"
+          testid="start-simulator"
+          disabled={pending.value.has(PLACE) || !lease.value.mine}
+          onClick={() => void startSimulator(PLACE)}
+        >
+          Start the simulator
+        </Button>
+      )}
+    </div>
+  );
+}
+
+/** How to reach a vehicle, which one is commanded, and what is wrong with the way to it. */
+export function ConnectionSection() {
+  const status = linkStatus.value?.status ?? null;
+  const used = adopted.value;
+  const summary = used
+    ? linkWords(status, null).text
+    : count(status?.candidates.length ?? 0, "vehicle") + " heard";
+  return (
+    <Section
+      id={PLACE}
+      title="Connection"
+      icon="plug"
+      summary={status || used ? summary : "no vehicle"}
+      startsOpen={!used}
+    >
+      {used ? <Adopted used={used} /> : <NoVehicle waits={Boolean(status?.connections.length)} />}
+      <Candidates found={status?.candidates ?? []} />
+      {status && status.connections.length > 0 && (
+        <ul class="connections" aria-label="Connections">
+          {status.connections.map((connection) => (
+            <ConnectionRow key={connection.address} connection={connection} />
+          ))}
+        </ul>
+      )}
+      {used ? (
+        <details class="details">
+          <summary>Another connection…</summary>
+          <AddressForm />
+        </details>
+      ) : (
+        <AddressForm />
+      )}
+      {lease.value.mine && used && (
+        <button type="button" class="link" data-testid="give-control" onClick={() => void giveControl()}>
+          Hand over control
+        </button>
+      )}
+    </Section>
+  );
+}

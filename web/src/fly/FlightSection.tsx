@@ -1,0 +1,95 @@
+import { bytes, duration } from "../format";
+import { adopted, flight, isInAir, lease, recorded_s, recorder, vehicle } from "../store/flying";
+import { pending } from "../store/outcomes";
+import { Button } from "../ui/Button";
+import { ErrorPanel } from "../ui/ErrorBox";
+import { HoldButton } from "../ui/HoldButton";
+import { Done, Outcome } from "../ui/Outcome";
+import { Section } from "../ui/Section";
+import { arm, disarm, land, startRecording, stopRecording } from "./commands";
+import { armedWord } from "./words";
+
+const PLACE = "flight";
+
+function Actions() {
+  const state = vehicle.value;
+  const mine = lease.value.mine;
+  const common = { place: PLACE, disabled: !mine };
+  return (
+    <div class="row wrap minor-actions">
+      {state?.armed ? (
+        <>
+          <HoldButton
+            {...common}
+            label="Land"
+            icon="land"
+            disabled={!mine || !isInAir.value}
+            title="Come down here and now"
+            testid="land"
+            onHold={() => void land()}
+          />
+          <HoldButton
+            {...common}
+            label="Disarm"
+            icon="power"
+            disabled={!mine || isInAir.value}
+            title={isInAir.value ? "Only on the ground" : "Stop the motors"}
+            testid="disarm"
+            onHold={() => void disarm()}
+          />
+        </>
+      ) : (
+        <HoldButton
+          {...common}
+          label="Arm"
+          icon="power"
+          title="Switch the motors on; Start does it by itself"
+          testid="arm"
+          onHold={() => void arm()}
+        />
+      )}
+    </div>
+  );
+}
+
+function Recorder() {
+  const status = recorder.value?.status;
+  const seconds = recorded_s.value;
+  return (
+    <div class="recorder">
+      <div class="row">
+        <span class="connection-name">
+          <strong>{status?.recording ? `Recording ${duration(seconds)}` : "Not recording"}</strong>
+          <span class="muted">
+            {status?.recording
+              ? `${status.name ?? ""} · ${bytes(status.bytes)}`
+              : "Starts by itself on arming"}
+          </span>
+        </span>
+        <Button
+          disabled={!lease.value.mine || pending.value.has("recorder")}
+          testid={status?.recording ? "record-stop" : "record-start"}
+          onClick={() => void (status?.recording ? stopRecording() : startRecording())}
+        >
+          {status?.recording ? "Stop" : "Record"}
+        </Button>
+      </div>
+      {status?.error && <ErrorPanel error={status.error} />}
+      <Outcome place="recorder" />
+    </div>
+  );
+}
+
+/** What is seldom needed while flying by plan, and the recorder. */
+export function FlightSection() {
+  if (!adopted.value) return null;
+  const phase = flight.live.value?.phase ?? "idle";
+  const summary = phase === "interrupted" ? "broken off" : armedWord(vehicle.value).toLowerCase();
+  return (
+    <Section id={PLACE} title="Vehicle" icon="drone" summary={summary} startsOpen>
+      <Actions />
+      <Done place={PLACE} />
+      <Recorder />
+    </Section>
+  );
+}

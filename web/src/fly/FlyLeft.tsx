@@ -1,0 +1,58 @@
+import { adopted, isInAir, linkStatus } from "../store/flying";
+import { closeReview } from "../review/commands";
+import { isReplaying } from "../store/review";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+import { ConnectionSection } from "./Connection";
+import { FlightSection } from "./FlightSection";
+import { NextAction } from "./NextAction";
+import { OnboardSection } from "./Onboard";
+import { PreflightSection } from "./Preflight";
+
+/** All pages share the 3D view: it shows the recording that any of them reviews. */
+function ReviewOpen() {
+  if (!isReplaying.value) return null;
+  return (
+    <div class="callout wrap-row review-open" data-testid="review-open">
+      <Icon name="info" />
+      <p>A recording is open for review: the 3D view shows it, not the vehicle.</p>
+      <Button testid="close-review" onClick={() => void closeReview()}>
+        Close the recording
+      </Button>
+    </div>
+  );
+}
+
+/** Such as a second vehicle with the same number: read before anything else. */
+function LinkWarnings() {
+  const warnings = linkStatus.value?.status.warnings ?? [];
+  return (
+    <>
+      {warnings.map((warning) => (
+        <p class="callout link-warning" key={warning} data-testid="link-warning">
+          <Icon name="warning" /> <span>{warning}</span>
+        </p>
+      ))}
+    </>
+  );
+}
+
+/** From the connection to the flight, with the next step as the one primary action. */
+export function FlyLeft() {
+  // A vehicle that is there needs the least room: its connection closes once it is used.
+  const hasTrouble = linkStatus.value?.status.connections.some((connection) => connection.state === "failed");
+  return (
+    <>
+      <div class="panel-scroll">
+        <ReviewOpen />
+        <LinkWarnings />
+        <ConnectionSection key={adopted.value && !hasTrouble ? "used" : "open"} />
+        {isInAir.value && <FlightSection />}
+        <OnboardSection />
+        <PreflightSection />
+        {!isInAir.value && <FlightSection />}
+      </div>
+      <NextAction />
+    </>
+  );
+}

@@ -1,0 +1,92 @@
+import { DASH, deviation, duration, metres, percent } from "../format";
+import type { FollowDoc, VehicleState } from "../messages";
+import { document_ } from "../store/state";
+import { Bar } from "../ui/Bar";
+import { Icon } from "../ui/Icon";
+import { REACH, followsPlan, markerShare, tolerance_m, verdictOf } from "./deviation";
+
+interface ErrorProps {
+  label: string;
+  value_m: number | null;
+  allowed_m: number;
+  /** Off the line means something only while the plan is flown. */
+  judged: boolean;
+  words: { more: string; less: string };
+  testid: string;
+}
+
+const NOTES = { within: "", beyond: "beyond tolerance", far: "far off", unknown: "" } as const;
+
+/** A deviation to either side on a bar with its tolerance, and as a number. */
+function SignedBar({ label, value_m, allowed_m, judged, words, testid }: ErrorProps) {
+  const verdict = judged ? verdictOf(value_m, allowed_m) : "unknown";
+  const band = 100 / REACH;
+  return (
+    <div class={`signed ${verdict}`} data-testid={testid} data-verdict={verdict}>
+      <span class="signed-label">{label}</span>
+      <span class="signed-value">
+        {NOTES[verdict] && <Icon name="warning" size={16} />}
+        {deviation(value_m, words)}
+        {NOTES[verdict] && <span class="visually-hidden">, {NOTES[verdict]}</span>}
+      </span>
+      <span class="signed-bar" aria-hidden="true" title={`Tolerance ±${metres(allowed_m, 2)}`}>
+        <span class="band" style={{ left: `${50 - band / 2}%`, width: `${band}%` }} />
+        <span class="zero" />
+        {value_m !== null && (
+          <span class="marker" style={{ left: `${markerShare(value_m, allowed_m) * 100}%` }} />
+        )}
+      </span>
+    </div>
+  );
+}
+
+function behindWords(behind_s: number | null): string {
+  if (behind_s === null) return DASH;
+  const size = Math.round(Math.abs(behind_s));
+  if (size < 1) return "on time";
+  return `${duration(size)} ${behind_s > 0 ? "behind plan" : "ahead of plan"}`;
+}
+
+interface Props {
+  state: VehicleState | null;
+  follow: FollowDoc | null;
+  isOld: boolean;
+}
+
+/** How well the plan is being followed, how far it is flown, and how long it will take. */
+export function Following({ state, follow, isOld }: Props) {
+  const profile = document_.value?.profile;
+  const judged = followsPlan(state);
+  const allowed_m = profile ? tolerance_m(profile) : 1;
+  const progress = follow?.progress ?? null;
+  return (
+    <section class={`instrument following ${isOld ? "old" : ""}`} aria-label="Following the plan">
+      <SignedBar
+        label="Cross-track"
+        value_m={follow?.cross_track_m ?? null}
+        allowed_m={allowed_m}
+        judged={judged}
+        words={{ more: "right", less: "left" }}
+        testid="cross-track"
+      />
+      <SignedBar
+        label="Height error"
+        value_m={follow?.height_error_m ?? null}
+        allowed_m={allowed_m}
+        judged={judged}
+        words={{ more: "high", less: "low" }}
+        testid="height-error"
+      />
+      <div class="progress">
+        <span class="progress-share" data-testid="progress">
+          {percent(progress)}
+        </span>
+        <Bar label="Flown of the plan" share={progress ?? 0} />
+        <span class="progress-left" data-testid="time-left">
+          {follow?.time_left_s == null ? DASH : `${duration(follow.time_left_s)} left`}
+        </span>
+        <span class="muted progress-behind">{behindWords(follow?.behind_plan_s ?? null)}</span>
+      </div>
+    </section>
+  );
+}

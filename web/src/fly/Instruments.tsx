@@ -1,0 +1,55 @@
+import { withUnit } from "../format";
+import { age_s, isStale, type Group } from "../store/ages";
+import { now_ms } from "../store/clock";
+import { heard, linkStatus, silence_s, type Source } from "../store/flying";
+import { link } from "../store/state";
+import { Icon } from "../ui/Icon";
+import { Attitude } from "./Attitude";
+import { Following } from "./Following";
+import { Supplies } from "./Supplies";
+import { Tiles } from "./Tiles";
+
+/** "3 s old" for what is greyed, nothing for what is fresh. */
+function ageOf(source: Source, group: Group): { isOld: boolean; age: string } {
+  const from = heard[source].value;
+  const isOld = isStale(from, group, now_ms.value);
+  const seconds = age_s(from, group, now_ms.value);
+  return { isOld, age: isOld && seconds !== null ? `${withUnit(Math.floor(seconds), "s")} old` : "" };
+}
+
+const isLost = () => link.value === "lost" || linkStatus.value?.status.state === "lost";
+
+/** Over the attitude, so that nothing moves: the values below stay, greyed. */
+function Lost() {
+  const pageLost = link.value === "lost";
+  const seconds = silence_s.value;
+  return (
+    <div class="lost" role="alert" data-testid="link-lost">
+      <Icon name="warning" size={28} />
+      <strong>{pageLost ? "This page has lost the server" : "Communication lost"}</strong>
+      {seconds !== null && <span class="lost-seconds">{withUnit(Math.floor(seconds), "s")}</span>}
+      <span>{pageLost ? "It keeps trying." : "Last values below. The vehicle follows its failsafe."}</span>
+    </div>
+  );
+}
+
+/** The same instruments for the vehicle and for a recording. */
+export function Instruments({ source }: { source: Source }) {
+  const message = heard[source].value?.message ?? null;
+  const state = message?.state ?? null;
+  const follow = message?.follow ?? null;
+  const lost = source === "live" && isLost();
+  const [attitude, position] = [ageOf(source, "attitude"), ageOf(source, "position")];
+  return (
+    <div class="instruments" data-testid={`instruments-${source}`}>
+      <div class="attitude-holder">
+        <Attitude state={state} isOld={attitude.isOld} />
+        {lost && <Lost />}
+        {position.age && !lost && <span class="age position-age">{position.age}</span>}
+      </div>
+      <Tiles state={state} follow={follow} isOld={position.isOld} />
+      <Following state={state} follow={follow} isOld={position.isOld} />
+      <Supplies state={state} battery={ageOf(source, "battery")} gnss={ageOf(source, "gnss")} />
+    </div>
+  );
+}

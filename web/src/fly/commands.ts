@@ -1,0 +1,100 @@
+import { computed, signal } from "@preact/signals";
+import type { CheckRow, FlyState, StartFlight } from "../messages";
+import { fly } from "../store/flying";
+import { order, say } from "../store/outcomes";
+import { allSent } from "../store/plan";
+import { plan } from "../store/state";
+
+/** Everything that is asked of the vehicle from this page, each with the place where its outcome appears. */
+
+export type Accepted = NonNullable<StartFlight["accept"]>[number];
+
+/** What the operator chose for the next start. */
+export const way = signal<"auto" | "guided">("auto");
+const marks = signal<{ checked_utc: string; codes: ReadonlySet<Accepted> }>({
+  checked_utc: "",
+  codes: new Set(),
+});
+/** What is accepted of the present check: another check must be accepted anew. */
+export const accepted = computed<ReadonlySet<Accepted>>(() =>
+  marks.value.checked_utc === checkedAt() ? marks.value.codes : new Set(),
+);
+const checkedAt = () => fly.value?.preflight?.checked_utc ?? "";
+/** Resume where the flight broke off, if it did. */
+export const resumes = signal(true);
+
+export const isAcceptable = (code: CheckRow["code"]): code is Accepted =>
+  code === "gnss" || code === "battery" || code === "rtl_height";
+
+export function accept(code: Accepted, yes: boolean): void {
+  const next = new Set(accepted.value);
+  if (yes) next.add(code);
+  else next.delete(code);
+  marks.value = { checked_utc: checkedAt(), codes: next };
+}
+
+/** Pause and Return stand in the status bar, in every view. */
+export const SAFETY = "safety";
+const FLIGHT = "flight";
+export const NEXT = "next";
+
+export const holdPosition = () =>
+  order({ place: SAFETY, path: "/api/flight/pause", done: "The vehicle holds its position." });
+export const returnHome = () =>
+  order({ place: SAFETY, path: "/api/flight/return", done: "The vehicle returns home." });
+
+export const arm = () => order({ place: FLIGHT, path: "/api/flight/arm", done: "Armed." });
+export const disarm = () => order({ place: FLIGHT, path: "/api/flight/disarm", done: "Disarmed." });
+export const land = () =>
+  order({ place: FLIGHT, path: "/api/flight/land", done: "The vehicle lands here and now." });
+
+export const pauseFlight = () =>
+  order({ place: NEXT, path: "/api/flight/pause", done: "Paused: it holds its position." });
+export const resumeFlight = () =>
+  order({ place: NEXT, path: "/api/flight/resume", done: "The flight goes on." });
+
+async function takeFly(answer: Response | null): Promise<boolean> {
+  if (!answer) return false;
+  fly.value = (await answer.json()) as FlyState;
+  return true;
+}
+
+export async function uploadPlan(place: string): Promise<void> {
+  await allSent();
+  const revision = plan.value?.revision;
+  if (revision === undefined) return;
+  const done = await takeFly(await order({ place, path: "/api/flight/upload", body: { revision } }));
+  if (done) say(place, "On board: read back and verified.");
+}
+
+export async function checkStart(): Promise<void> {
+  await takeFly(await order({ place: NEXT, path: "/api/flight/check" }));
+}
+
+export async function startFlight(): Promise<void> {
+  const digest = fly.value?.onboard.digest;
+  if (!digest) return;
+  const from = resumes.value ? fly.value?.resume_from_item : null;
+  const body: StartFlight = { way: way.value, digest, accept: [...accepted.value], from_item: from ?? 1 };
+  await order({ place: NEXT, path: "/api/flight/start", body, done: "Started." });
+}
+
+const CONNECTION = "connection";
+
+export const connectTo = (address: string) =>
+  order({ place: CONNECTION, path: "/api/link/connect", body: { address, adopt: true } });
+export const disconnect = (address: string) =>
+  order({ place: CONNECTION, path: "/api/link/disconnect", body: { address } });
+export const adopt = (candidate: string) =>
+  order({ place: CONNECTION, path: "/api/link/adopt", body: { candidate } });
+export const release = () => order({ place: CONNECTION, path: "/api/link/release" });
+export const startSimulator = (place: string) => order({ place, path: "/api/link/simulator" });
+
+export const LEASE = "lease";
+export const takeControl = () =>
+  order({ place: LEASE, path: "/api/lease/take", body: {}, done: "You are in charge." });
+export const giveControl = () =>
+  order({ place: LEASE, path: "/api/lease/release", done: "Nobody is in charge now." });
+
+export const startRecording = () => order({ place: "recorder", path: "/api/recorder/start" });
+export const stopRecording = () => order({ place: "recorder", path: "/api/recorder/stop" });

@@ -1,0 +1,32 @@
+import type { ProfileDoc, VehicleState } from "../messages";
+
+/** How far beside the planned line the vehicle may be, and where that is on a bar. */
+
+/** What the required clearance allows for following the path, beside the position error. */
+const FOLLOWING_ERROR_M = 0.5;
+
+export const tolerance_m = (profile: Pick<ProfileDoc, "position_error_m">) =>
+  profile.position_error_m + FOLLOWING_ERROR_M;
+
+export type Verdict = "within" | "beyond" | "far" | "unknown";
+
+export function verdictOf(error_m: number | null | undefined, allowed_m: number): Verdict {
+  if (error_m === null || error_m === undefined || !Number.isFinite(error_m)) return "unknown";
+  const size = Math.abs(error_m);
+  return size <= allowed_m ? "within" : size <= 2 * allowed_m ? "beyond" : "far";
+}
+
+/** Whether the plan is being flown: on the ground, and on the way up or home, nothing is amiss off its line. */
+export function followsPlan(state: Pick<VehicleState, "armed" | "landed" | "mode"> | null): boolean {
+  if (!state?.armed || (state.landed !== "in_air" && state.landed !== null)) return false;
+  return /AUTO|GUIDED|MISSION|OFFBOARD/i.test(state.mode);
+}
+
+/** The bar reaches this many tolerances to either side. */
+export const REACH = 3;
+
+/** The marker's place on the bar, 0 (left end) to 1 (right end); beyond the ends it stays there. */
+export function markerShare(error_m: number, allowed_m: number): number {
+  const share = 0.5 + error_m / (2 * REACH * allowed_m);
+  return Math.min(1, Math.max(0, share));
+}

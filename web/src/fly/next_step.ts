@@ -1,0 +1,85 @@
+import type { CheckRow, FlightStatus, FlyState, LinkStatus, TransferStatus, VehicleState } from "../messages";
+import type { VerdictKind } from "../store/results";
+import { isAcceptable, type Accepted } from "./commands";
+
+/** What the page knows when it says what comes next. */
+export interface Facts {
+  link: LinkStatus | null;
+  vehicle: VehicleState | null;
+  flight: FlightStatus | null;
+  fly: FlyState | null;
+  transfer: TransferStatus | null;
+  inAir: boolean;
+  mine: boolean;
+  accepted: ReadonlySet<Accepted>;
+  /** How long ago the start was checked. */
+  check_age_s: number;
+  /** Why the open plan cannot be uploaded now; null: it can. */
+  obstacle: string | null;
+}
+
+/** The one thing to do next; `why` says why it cannot be done yet, or what it waits for. */
+export type Step =
+  | { id: "simulator" | "adopt" | "take_control"; why?: string }
+  | { id: "upload" | "check" | "start" | "pause" | "resume"; why?: string }
+  | { id: "wait"; why: string };
+
+/** The server refuses a start on an older check. */
+const FRESH_S = 120;
+
+export const openChecks = (rows: readonly CheckRow[]) =>
+  rows.filter((row) => row.state === "bad" || row.state === "unknown");
+
+export const unaccepted = (rows: readonly CheckRow[], accepted: ReadonlySet<Accepted>) =>
+  rows.filter((row) => row.state === "accept" && !(isAcceptable(row.code) && accepted.has(row.code)));
+
+/** A connection that waits is given its time; the simulator stays at hand above. */
+function connecting(link: LinkStatus | null): Step {
+  if (link?.candidates.length) return { id: "adopt" };
+  const isWaiting = link?.connections.some((connection) => connection.state !== "failed");
+  return isWaiting ? { id: "wait", why: "Waiting for a vehicle…" } : { id: "simulator" };
+}
+
+function inFlight(facts: Facts): Step | null {
+  const phase = facts.flight?.phase ?? "idle";
+  if (phase === "arming") return { id: "wait", why: "Arming…" };
+  if (phase === "taking_off") return { id: "pause" };
+  if (phase === "flying") return { id: "pause" };
+  if (phase === "paused") return { id: "resume" };
+  if (phase === "returning") return { id: "wait", why: "On the way home" };
+  if (!facts.inAir) return null;
+  return { id: "wait", why: `In the air in ${facts.vehicle?.mode || "an unknown mode"}, not by Hedgehop` };
+}
+
+function onGround(facts: Facts): Step {
+  const { fly, accepted, obstacle } = facts;
+  const onboard = fly?.onboard;
+  if (onboard?.state !== "verified" || (!onboard.is_open_plan && obstacle === null)) {
+    return obstacle ? { id: "upload", why: obstacle } : { id: "upload" };
+  }
+  const rows = fly?.preflight?.rows;
+  if (!rows) return { id: "check" };
+  if (facts.check_age_s > FRESH_S) return { id: "check", why: "The check is older than two minutes" };
+  if (openChecks(rows).length > 0) return { id: "check", why: "Mend what stands above, then check again" };
+  const left = unaccepted(rows, accepted).length;
+  if (left > 0) return { id: "start", why: "Tick what you accept first" };
+  return { id: "start" };
+}
+
+export function nextStep(facts: Facts): Step {
+  const { link, transfer, fly } = facts;
+  if (!facts.mine) return { id: "take_control" };
+  if (!link?.adopted) return connecting(link);
+  if (transfer?.phase === "sending" || transfer?.phase === "reading_back" || fly?.busy) {
+    return { id: "wait", why: fly?.busy || "Talking to the vehicle" };
+  }
+  return inFlight(facts) ?? onGround(facts);
+}
+
+/** Why nothing can be uploaded, by the verdict on the open plan. */
+export function uploadObstacle(verdict: VerdictKind): string | null {
+  if (verdict === "none") return "Plan a path first";
+  if (verdict === "error") return "The plan has an error: see Plan";
+  if (verdict === "not_certified") return "The plan is NOT CERTIFIED: mend it in Plan";
+  return verdict === "computing" ? "Computing the plan…" : null;
+}

@@ -1,0 +1,232 @@
+import { useState } from "preact/hooks";
+import { bytes, count, day, duration } from "../format";
+import type { RecordingDoc } from "../messages";
+import { chooseFiles } from "../shell/keyboard";
+import { goTo } from "../shell/views";
+import { sendRecording } from "../store/files";
+import { pending } from "../store/outcomes";
+import { isPlaying, recordings, review } from "../store/review";
+import { library } from "../store/state";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+import { Done, Outcome } from "../ui/Outcome";
+import { Section } from "../ui/Section";
+import { Check } from "../ui/fields";
+import {
+  PLAYING,
+  RECORDINGS,
+  againstOpenPlan,
+  closeReview,
+  deleteRecording,
+  fileOf,
+  imported,
+  openReview,
+  terrainChoice,
+  togglePlaying,
+} from "./commands";
+
+/** Recordings that were dropped or chosen: imported, and the last of them opened. */
+export function takeRecordings(files: readonly File[]): void {
+  if (files.length > 0) goTo("review");
+  files.forEach((file) => void sendRecording(file, imported));
+}
+
+function Import({ isFirst }: { isFirst: boolean }) {
+  return (
+    <div class={`drop-zone ${isFirst ? "first" : ""}`} data-testid="recording-drop">
+      {isFirst && <p>Drop a .tlog or .mcap anywhere on this page. Flights are recorded by themselves.</p>}
+      <div class="row">
+        <Button
+          icon="import"
+          testid="recording-import"
+          onClick={() => chooseFiles(".tlog,.mcap", takeRecordings)}
+        >
+          Open a recording…
+        </Button>
+      </div>
+    </div>
+  );
+}
+
+function RowActions({ recording, isOpen }: { recording: RecordingDoc; isOpen: boolean }) {
+  const [asks, setAsks] = useState(false);
+  if (asks) {
+    return (
+      <span class="row confirm">
+        <Button
+          kind="danger"
+          testid="recording-delete-confirm"
+          onClick={() => void deleteRecording(recording.id).then(() => setAsks(false))}
+        >
+          Delete for good
+        </Button>
+        <Button kind="quiet" onClick={() => setAsks(false)}>
+          Keep
+        </Button>
+      </span>
+    );
+  }
+  return (
+    <span class="row-actions">
+      <a
+        class="button quiet bare small"
+        href={fileOf(recording)}
+        download
+        title={`Download ${recording.name}`}
+        aria-label={`Download ${recording.name}`}
+        data-testid="recording-download"
+      >
+        <Icon name="export" />
+      </a>
+      <Button
+        kind="quiet"
+        class="small"
+        icon="trash"
+        disabled={isOpen}
+        title={isOpen ? "Close it before deleting" : `Delete ${recording.name}`}
+        testid="recording-delete"
+        onClick={() => setAsks(true)}
+      />
+    </span>
+  );
+}
+
+function Row({ recording }: { recording: RecordingDoc }) {
+  const isOpen = review.value?.recording.id === recording.id;
+  const facts = [
+    recording.duration_s === null ? "length unknown" : duration(recording.duration_s),
+    bytes(recording.bytes),
+    recording.kind === "tlog" ? "tlog" : recording.vehicle,
+  ].filter(Boolean);
+  return (
+    <li class={`recording ${isOpen ? "current" : ""}`} data-testid="recording-row" data-open={isOpen}>
+      <button
+        type="button"
+        class="pick"
+        aria-pressed={isOpen}
+        disabled={pending.value.has(RECORDINGS)}
+        title={recording.name}
+        data-testid="recording-open"
+        onClick={() => !isOpen && void openReview(recording.id)}
+      >
+        <span class="radio" aria-hidden="true" />
+        <span class="recording-text">
+          <strong>{recording.started_utc ? day(recording.started_utc) : recording.name}</strong>
+          <span class="muted">{facts.join(" · ")}</span>
+          <span class="muted name">{recording.plan_name || recording.name}</span>
+        </span>
+      </button>
+      <RowActions recording={recording} isOpen={isOpen} />
+      {recording.fault && (
+        <p class="fault">
+          <Icon name="warning" size={16} /> {recording.fault}
+        </p>
+      )}
+    </li>
+  );
+}
+
+function Recordings() {
+  const all = recordings.value;
+  return (
+    <Section
+      id="recordings"
+      title="Recordings"
+      icon="folder"
+      summary={all === null ? "…" : count(all.length, "flight")}
+      startsOpen
+    >
+      <Done place={RECORDINGS} />
+      {all !== null && all.length > 0 && (
+        <ul class="pick-list recordings" aria-label="Recordings">
+          {all.map((recording) => (
+            <Row key={recording.id} recording={recording} />
+          ))}
+        </ul>
+      )}
+      {pending.value.has(RECORDINGS) && (
+        <p class="hint" role="status">
+          Working on it…
+        </p>
+      )}
+      <Import isFirst={all?.length === 0} />
+    </Section>
+  );
+}
+
+/** What the flight is judged against: which surface model, which plan. */
+function Judge() {
+  const open = review.value;
+  if (!open) return null;
+  const again = () => void openReview(open.recording.id);
+  return (
+    <Section id="judge" title="Judged against" icon="target" summary={open.plan_name || "no plan"} startsOpen>
+      <label class="field wide">
+        <span>Surface model</span>
+        <select
+          data-testid="review-terrain"
+          value={terrainChoice.value ?? ""}
+          onChange={(event) => {
+            terrainChoice.value = event.currentTarget.value || null;
+            again();
+          }}
+        >
+          <option value="">
+            {open.terrain_name && terrainChoice.value === null ? open.terrain_name : "As flown"}
+          </option>
+          {library.value.terrains.map((entry) => (
+            <option key={entry.id} value={entry.id}>
+              {entry.name}
+            </option>
+          ))}
+        </select>
+      </label>
+      <Check
+        label="The plan that is open, instead of the recorded one"
+        checked={againstOpenPlan.value}
+        testid="review-open-plan"
+        onChange={(yes) => {
+          againstOpenPlan.value = yes;
+          again();
+        }}
+      />
+      <Button kind="quiet" icon="cross" testid="review-close" onClick={() => void closeReview()}>
+        Close this recording
+      </Button>
+    </Section>
+  );
+}
+
+function Play() {
+  const isOpen = review.value !== null;
+  const playing = isPlaying.value;
+  return (
+    <footer class="primary-action">
+      <Outcome place={PLAYING} />
+      {!isOpen && <p class="muted action-hint">Choose a recording first</p>}
+      <Button
+        kind="primary"
+        class="wide"
+        icon={playing ? "pause" : "play"}
+        disabled={!isOpen}
+        testid="play"
+        onClick={togglePlaying}
+      >
+        {playing ? "Pause" : "Play"}
+      </Button>
+    </footer>
+  );
+}
+
+/** Which flight is looked at, against what, and Play as the one primary action. */
+export function ReviewLeft() {
+  return (
+    <>
+      <div class="panel-scroll">
+        <Recordings />
+        <Judge />
+      </div>
+      <Play />
+    </>
+  );
+}

@@ -1,0 +1,91 @@
+import { signal } from "@preact/signals";
+import { day, duration } from "../format";
+import type { ReviewDoc } from "../messages";
+import { Instruments } from "../fly/Instruments";
+import { review } from "../store/review";
+import { Segmented } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+import { EventList } from "./EventList";
+import { Figures } from "./Figures";
+
+type Part = "figures" | "instruments" | "events";
+
+const part = signal<Part>("figures");
+
+function Notes({ open }: { open: ReviewDoc }) {
+  const all = [...(open.recording.fault ? [open.recording.fault] : []), ...open.notes];
+  if (all.length === 0) return null;
+  return (
+    <section class="facts">
+      <h2>Please note</h2>
+      <ul class="warnings" data-testid="review-notes">
+        {all.map((note) => (
+          <li key={note}>
+            <Icon name="warning" />
+            <span>{note}</span>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+function Head({ open }: { open: ReviewDoc }) {
+  return (
+    <header class="replay-head">
+      <strong class="replay-word">REPLAY</strong>
+      <span>{day(open.start_utc)}</span>
+      <span class="muted replay-name" title={open.recording.name}>
+        {duration(open.duration_s)} · {open.plan_name || open.recording.name}
+      </span>
+    </header>
+  );
+}
+
+/** What is true about a recorded flight: all of it where there is room, one part at a time where there is not. */
+export function ReviewRight() {
+  const open = review.value;
+  if (!open) {
+    return (
+      <div class="panel-scroll truth" tabIndex={0}>
+        <div class="teaching">
+          <p>
+            How far beside the plan, how near the surface model, how late: the figures of a flight appear
+            here.
+          </p>
+          <p>Recordings of other ground stations (.tlog) are opened just the same.</p>
+        </div>
+      </div>
+    );
+  }
+  return (
+    <div class="review-right" data-part={part.value}>
+      <Head open={open} />
+      <div class="review-parts">
+        <Segmented
+          label="Part"
+          testid="review-part"
+          value={part.value}
+          options={[
+            { value: "figures", label: "Figures" },
+            { value: "instruments", label: "Instruments" },
+            { value: "events", label: "Events" },
+          ]}
+          onChange={(next) => (part.value = next)}
+        />
+      </div>
+      <div class="panel-scroll truth" tabIndex={0}>
+        <div class="part part-instruments">
+          <Instruments source="replay" />
+        </div>
+        <div class="part part-figures">
+          <Figures review={open} />
+          <Notes open={open} />
+        </div>
+        <div class="part part-events">
+          <EventList review={open} />
+        </div>
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,79 @@
+import type uPlot from "uplot";
+import type { ReviewDoc } from "../messages";
+import type { Size } from "../chart/altitude";
+import { drawUnknown } from "../chart/draw";
+import { chartOptions } from "../chart/options";
+import type { Palette } from "../chart/palette";
+import { gaps, heightRange } from "../chart/transform";
+import { axisTime } from "./time";
+
+export interface Pointing {
+  hover: (at_s: number | null) => void;
+  pick: (at_s: number, isOver: boolean) => void;
+}
+
+interface Made {
+  options: uPlot.Options;
+  data: uPlot.AlignedData;
+}
+
+/** Nothing is written above these charts. */
+const TOP_PX = 8;
+
+const noPoints = { points: { show: false } };
+
+/** Altitude above home against time: ground, the plan at the nearest place, and what was flown. */
+export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette, pointing: Pointing): Made {
+  const { t_s, ground_rel_home_m, reference_alt_rel_home_m, alt_rel_home_m } = review.series;
+  const unknown = gaps(t_s, ground_rel_home_m);
+  const options = chartOptions({
+    ...size,
+    palette,
+    yLabel: "m above home",
+    range: heightRange([ground_rel_home_m, reference_alt_rel_home_m, alt_rel_home_m]),
+    series: [
+      {
+        stroke: palette.groundLine,
+        fill: palette.ground,
+        width: 1.5,
+        ...noPoints,
+        fillTo: (u) => u.scales["y"]?.min ?? 0,
+      } as uPlot.Series,
+      { stroke: palette.replayed, width: 2.5, ...noPoints },
+      { stroke: palette.path, width: 1.75, dash: [7, 5], ...noPoints },
+    ],
+    drawUnder: (u) => drawUnknown(u, unknown, palette),
+    draw: () => undefined,
+    onHover: pointing.hover,
+    onPick: pointing.pick,
+    xText: axisTime,
+    top: TOP_PX,
+  });
+  return { options, data: [t_s, ground_rel_home_m, alt_rel_home_m, reference_alt_rel_home_m] };
+}
+
+/** Cross-track error against time, right of the line positive. */
+export function crossTrackOverTime(
+  review: ReviewDoc,
+  size: Size,
+  palette: Palette,
+  pointing: Pointing,
+): Made {
+  const { t_s, cross_track_m } = review.series;
+  const sizes = cross_track_m.map((value) => (value === null ? null : Math.abs(value)));
+  const most = Math.max(0.1, ...sizes.map((value) => value ?? 0)) * 1.1;
+  const options = chartOptions({
+    ...size,
+    palette,
+    yLabel: "m right of line",
+    range: [-most, most],
+    series: [{ stroke: palette.replayed, width: 2, ...noPoints }],
+    drawUnder: () => undefined,
+    draw: () => undefined,
+    onHover: pointing.hover,
+    onPick: pointing.pick,
+    xText: axisTime,
+    top: TOP_PX,
+  });
+  return { options, data: [t_s, cross_track_m] };
+}

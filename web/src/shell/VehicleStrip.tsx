@@ -1,0 +1,238 @@
+import { clock, duration } from "../format";
+import { LEASE, SAFETY, holdPosition, returnHome, takeControl } from "../fly/commands";
+import { batteryLevel, batteryWord, fixLevel, fixWord, linkWords, modeWord, nodeWord } from "../fly/words";
+import { isStale } from "../store/ages";
+import { now_ms } from "../store/clock";
+import {
+  adopted,
+  heard,
+  latched,
+  lease,
+  linkStatus,
+  recorded_s,
+  recorder,
+  silence_s,
+  troubledNodes,
+  vehicle,
+} from "../store/flying";
+import { pending } from "../store/outcomes";
+import { isReplaying, review } from "../store/review";
+import { severityWord } from "../store/texts";
+import { Chip } from "../ui/Chip";
+import { HoldButton } from "../ui/HoldButton";
+import { Icon } from "../ui/Icon";
+import { Outcome } from "../ui/Outcome";
+import { activeView, goTo } from "./views";
+
+/** Known to be disarmed just now. In doubt the vehicle may be in the air. */
+function isParked(): boolean {
+  return vehicle.value?.armed === false && !isStale(heard.live.value, "heartbeat", now_ms.value);
+}
+
+/** Always at the same place while a vehicle is connected: stop where you are, and come back. */
+function Safety() {
+  const mine = lease.value.mine;
+  const mayCommand = mine && !isParked();
+  const title = mine
+    ? mayCommand
+      ? undefined
+      : "The vehicle is disarmed"
+    : "You observe: take control first";
+  return (
+    <div class="safety" role="group" aria-label="Safety">
+      {isReplaying.value && <strong class="live-tag">LIVE</strong>}
+      <button
+        type="button"
+        class="button hold-position"
+        disabled={!mayCommand}
+        aria-disabled={pending.value.has(SAFETY)}
+        title={title ?? "Stop and hold the position, at once"}
+        data-testid="hold-position"
+        onClick={() => !pending.value.has(SAFETY) && void holdPosition()}
+      >
+        <Icon name="pause" />
+        <span>Hold</span>
+      </button>
+      <HoldButton
+        label="Return"
+        icon="return"
+        kind="return"
+        place={SAFETY}
+        disabled={!mayCommand}
+        title={title ?? "Return home and land"}
+        testid="return-home"
+        onHold={() => void returnHome()}
+      />
+      <div class="safety-says">
+        <Outcome place={SAFETY} />
+      </div>
+    </div>
+  );
+}
+
+function VehicleChips() {
+  const state = vehicle.value;
+  const live = heard.live.value;
+  const words = linkWords(linkStatus.value?.status ?? null, silence_s.value);
+  const old = (group: "heartbeat" | "battery" | "gnss") => isStale(live, group, now_ms.value);
+  return (
+    <>
+      <Chip
+        icon="drone"
+        text={modeWord(state)}
+        note={state?.armed ? "armed" : "disarmed"}
+        stale={old("heartbeat")}
+        level={state?.critical ? "bad" : "neutral"}
+        testid="chip-mode"
+        class="mode"
+        title={state?.critical ? "The vehicle reports a failsafe" : "Mode and mission item"}
+      />
+      <Chip
+        icon="signal"
+        {...words}
+        testid="chip-link"
+        class="link-chip"
+        title="Link quality and round trip"
+      />
+      <Chip
+        icon="satellite"
+        text={fixWord(state)}
+        note={state?.satellites == null ? "" : String(state.satellites)}
+        stale={old("gnss")}
+        level={fixLevel(state)}
+        testid="chip-gnss"
+        class="gnss"
+        title="GNSS fix and satellites"
+      />
+      <Chip
+        icon="battery"
+        text={batteryWord(state)}
+        stale={old("battery")}
+        level={batteryLevel(state)}
+        testid="chip-battery"
+        class="battery"
+        title="Battery left"
+      />
+    </>
+  );
+}
+
+function Recording() {
+  const error = recorder.value?.status.error;
+  const seconds = recorded_s.value;
+  if (error)
+    return <Chip icon="warning" text="Not recording" level="bad" title={error.what} testid="chip-rec" />;
+  if (seconds === null) return null;
+  return (
+    <span class="chip rec" data-testid="chip-rec" title="This flight is being recorded">
+      <span class="rec-dot" aria-hidden="true" />
+      <strong>REC</strong> {duration(seconds)}
+    </span>
+  );
+}
+
+/** The newest message that nobody has acknowledged, and nodes that ended: to be seen in every view. */
+function Alerts() {
+  const worst = latched.value[0];
+  const node = troubledNodes.value[0];
+  return (
+    <>
+      {worst && (
+        <button type="button" class="chip bad alert" data-testid="chip-alert" onClick={() => goTo("fly")}>
+          <Icon name="warning" size={16} />
+          <strong>{severityWord(worst.severity)}</strong>
+          <span class="alert-text">{worst.text}</span>
+          <span class="visually-hidden">
+            , heard {clock(new Date(worst.last_utc_s * 1000).toISOString())}
+          </span>
+        </button>
+      )}
+      {linkStatus.value?.status.warnings[0] && (
+        <Chip
+          icon="warning"
+          text="Link warning"
+          level="near"
+          title={linkStatus.value.status.warnings.join(" ")}
+          testid="chip-link-warning"
+        />
+      )}
+      {node && (
+        <Chip
+          icon="warning"
+          text={`${nodeWord(node.name)} ${node.state === "restarting" ? "starts again" : node.state}`}
+          level="near"
+          title={node.text}
+          testid="chip-node"
+        />
+      )}
+    </>
+  );
+}
+
+function Replaying() {
+  const open = review.value;
+  if (!open) return null;
+  return (
+    <button
+      type="button"
+      class="replay-badge"
+      data-testid="replay-badge"
+      title={`Open for review: ${open.recording.name}`}
+      onClick={() => goTo("review")}
+    >
+      REPLAY
+    </button>
+  );
+}
+
+function Operator() {
+  const { holder, mine } = lease.value;
+  const text = mine ? "In charge" : holder ? "Observer" : "Nobody in charge";
+  return (
+    <div class="operator">
+      <Chip
+        icon={mine ? "user" : "eye"}
+        text={text}
+        title={mine ? "You command the vehicle" : holder ? `${holder} is in charge` : "Take control to fly"}
+        testid="chip-operator"
+      />
+      {!mine && (
+        <HoldButton
+          label="Take control"
+          icon="user"
+          place={LEASE}
+          title={holder ? `Takes the command from ${holder}` : "You will command the vehicle"}
+          testid="take-control"
+          onHold={() => void takeControl()}
+        />
+      )}
+      <div class="operator-says">
+        <Outcome place={LEASE} />
+      </div>
+    </div>
+  );
+}
+
+/** Vehicle, link, recording and operator, in every view: there as soon as there is anything of it to say. */
+export function VehicleStrip() {
+  const hasVehicle = adopted.value !== null;
+  const isNeeded = hasVehicle || review.value !== null || activeView.value.id !== "plan";
+  if (!isNeeded) return <div class="no-strip" />;
+  return (
+    <section class="vehicle-strip" aria-label="Vehicle" data-testid="vehicle-strip">
+      {hasVehicle ? (
+        <>
+          <Safety />
+          <VehicleChips />
+        </>
+      ) : (
+        <Chip icon="drone" text="No vehicle" testid="chip-mode" title="Connect one in Fly" />
+      )}
+      <Recording />
+      <span class="spring" />
+      <Alerts />
+      <Replaying />
+      <Operator />
+    </section>
+  );
+}

@@ -1,0 +1,126 @@
+import { computed, signal, type Signal } from "@preact/signals";
+import type {
+  FlightMessage,
+  FlightStatus,
+  FlyMessage,
+  FlyState,
+  LeaseDoc,
+  LeaseMessage,
+  LinkMessage,
+  LinkStatus,
+  NodeDoc,
+  NodesMessage,
+  RecorderMessage,
+  RecorderStatus,
+  TextMessage,
+  TrackMessage,
+  TransferMessage,
+  TransferStatus,
+  VehicleMessage,
+} from "../messages";
+import type { Heard } from "./ages";
+import { now_ms } from "./clock";
+import { acknowledge, isLatched, withText, type TextEntry } from "./texts";
+import { emptyTrack, extend, trackFrom, type Track } from "./track";
+
+/** The vehicle, the link to it and what may be done with it, as the server last said. */
+export type FlyingMessage =
+  | VehicleMessage
+  | TrackMessage
+  | TextMessage
+  | LinkMessage
+  | TransferMessage
+  | FlightMessage
+  | FlyMessage
+  | LeaseMessage
+  | NodesMessage
+  | RecorderMessage;
+
+/** Where values come from: the vehicle, or a recording. */
+export type Source = VehicleMessage["source"];
+
+type BySource<T> = Record<Source, Signal<T>>;
+
+export const heard: BySource<Heard | null> = { live: signal(null), replay: signal(null) };
+export const tracks: Record<Source, Track> = { live: emptyTrack(), replay: emptyTrack() };
+/** Counts up whenever a track has changed. */
+export const trackVersion: BySource<number> = { live: signal(0), replay: signal(0) };
+export const flight: BySource<FlightStatus | null> = { live: signal(null), replay: signal(null) };
+export const texts = signal<readonly TextEntry[]>([]);
+export const linkStatus = signal<{ status: LinkStatus; received_ms: number } | null>(null);
+export const transfer = signal<TransferStatus | null>(null);
+export const fly = signal<FlyState | null>(null);
+export const lease = signal<LeaseDoc>({ holder: null, mine: false });
+export const nodes = signal<readonly NodeDoc[]>([]);
+export const recorder = signal<{ status: RecorderStatus; received_ms: number } | null>(null);
+
+/** The one vehicle that is commanded. */
+export const adopted = computed(() => linkStatus.value?.status.adopted ?? null);
+/** What the adopted vehicle last said of itself. */
+export const vehicle = computed(() => (adopted.value ? (heard.live.value?.message.state ?? null) : null));
+export const latched = computed(() => texts.value.filter(isLatched));
+export const troubledNodes = computed(() =>
+  nodes.value.filter((node) => node.state === "restarting" || (node.state !== "running" && node.text !== "")),
+);
+
+/** Seconds since the vehicle was last heard, growing while the page hears nothing either; null: never heard. */
+export const silence_s = computed(() => {
+  const known = linkStatus.value;
+  if (!known || known.status.silent_s === null) return null;
+  return known.status.silent_s + Math.max(0, now_ms.value - known.received_ms) / 1000;
+});
+
+/** Length of the running recording; null when nothing is being recorded. */
+export const recorded_s = computed(() => {
+  const status = recorder.value?.status;
+  if (!status?.recording || status.started_utc_s === null) return null;
+  return Math.max(0, (performance.timeOrigin + now_ms.value) / 1000 - status.started_utc_s);
+});
+
+export const isInAir = computed(() => {
+  const state = vehicle.value;
+  if (!state?.armed) return false;
+  return state.landed === null ? flight.live.value?.phase !== "idle" : state.landed !== "on_ground";
+});
+
+export function acknowledgeText(id: number): void {
+  texts.value = acknowledge(texts.value, id);
+}
+
+/** Takes one message about the vehicle. */
+export function takeFlying(message: FlyingMessage, received_ms: number): void {
+  switch (message.type) {
+    case "vehicle":
+      heard[message.source].value = { message, received_ms };
+      if (extend(tracks[message.source], message)) trackVersion[message.source].value += 1;
+      return;
+    case "track":
+      tracks[message.track.source] = trackFrom(message.track);
+      trackVersion[message.track.source].value += 1;
+      return;
+    case "text":
+      // A recording's words stand in its list of events.
+      if (message.source === "live") texts.value = withText(texts.value, message.text);
+      return;
+    case "link":
+      linkStatus.value = { status: message.link, received_ms };
+      return;
+    case "transfer":
+      transfer.value = message.transfer;
+      return;
+    case "flight":
+      flight[message.source].value = message.flight;
+      return;
+    case "fly":
+      fly.value = message.fly;
+      return;
+    case "lease":
+      lease.value = message.lease;
+      return;
+    case "nodes":
+      nodes.value = message.nodes;
+      return;
+    case "recorder":
+      recorder.value = { status: message.recorder, received_ms };
+  }
+}

@@ -1,0 +1,44 @@
+import { batch } from "@preact/signals";
+import type { ServerMessage } from "../messages";
+import { fly, flight, heard, linkStatus, nodes, recorder, transfer } from "./flying";
+import { replay, review } from "./review";
+
+/**
+ * After a lost connection the server tells anew what holds. Until then the page keeps what it knew, so that Hold and
+ * Return stay where they are; what has not been told again after a while is no longer so.
+ */
+const GRACE_MS = 3000;
+
+const FORGET: Partial<Record<string, () => void>> = {
+  link: () => (linkStatus.value = null),
+  transfer: () => (transfer.value = null),
+  fly: () => (fly.value = null),
+  nodes: () => (nodes.value = []),
+  recorder: () => (recorder.value = null),
+  review: () => (review.value = null),
+  replay: () => (replay.value = null),
+  "flight live": () => (flight.live.value = null),
+  "flight replay": () => (flight.replay.value = null),
+  "vehicle live": () => (heard.live.value = null),
+  "vehicle replay": () => (heard.replay.value = null),
+};
+
+const confirmed = new Set<string>();
+let timer: ReturnType<typeof setTimeout> | undefined;
+
+/** Notes that the server has told this since the page was connected. */
+export function confirm(message: ServerMessage): void {
+  if (timer !== undefined)
+    confirmed.add("source" in message ? `${message.type} ${message.source}` : message.type);
+}
+
+export function forgetUnconfirmed(): void {
+  clearTimeout(timer);
+  confirmed.clear();
+  timer = setTimeout(() => {
+    timer = undefined;
+    batch(() => {
+      for (const [what, forget] of Object.entries(FORGET)) if (!confirmed.has(what)) forget?.();
+    });
+  }, GRACE_MS);
+}

@@ -1,0 +1,114 @@
+import { describe, expect, it } from "vitest";
+import { nextStep, uploadObstacle, type Facts } from "../src/fly/next_step";
+import type { CheckRow, FlightStatus, OnboardDoc, PreflightDoc, TransferStatus } from "../src/messages";
+import { flyState, linkStatus, vehicleState } from "./flight_samples";
+
+const facts = (fields: Partial<Facts> = {}): Facts => ({
+  link: linkStatus(),
+  vehicle: vehicleState({ armed: false, landed: "on_ground" }),
+  flight: { phase: "idle" } as FlightStatus,
+  fly: flyState(),
+  transfer: null,
+  inAir: false,
+  mine: true,
+  accepted: new Set(),
+  check_age_s: 0,
+  obstacle: null,
+  ...fields,
+});
+
+const onboard = (fields: Partial<OnboardDoc> = {}): OnboardDoc =>
+  ({ ...flyState().onboard, state: "verified", digest: "d", is_open_plan: true, ...fields }) as OnboardDoc;
+const row = (state: CheckRow["state"], code: CheckRow["code"] = "gnss"): CheckRow => ({
+  code,
+  state,
+  text: "",
+  mend: "",
+});
+const checked = (...rows: CheckRow[]) =>
+  flyState({ onboard: onboard(), preflight: { ok: true, rows } as PreflightDoc });
+const phase = (name: FlightStatus["phase"]) => ({ phase: name }) as FlightStatus;
+
+describe("the next step", () => {
+  it("without a vehicle is the simulator, what was heard, or waiting", () => {
+    expect(nextStep(facts({ link: null })).id).toBe("simulator");
+    expect(nextStep(facts({ link: linkStatus({ adopted: null }) })).id).toBe("simulator");
+    const candidates = [{ id: "a" }] as never;
+    expect(nextStep(facts({ link: linkStatus({ adopted: null, candidates }) })).id).toBe("adopt");
+    const connections = [{ state: "waiting" }] as never;
+    expect(nextStep(facts({ link: linkStatus({ adopted: null, connections }) })).id).toBe("wait");
+  });
+
+  it("of an observer is to take control", () => {
+    expect(nextStep(facts({ mine: false })).id).toBe("take_control");
+    expect(nextStep(facts({ mine: false, flight: phase("flying"), inAir: true })).id).toBe("take_control");
+  });
+
+  it("goes from upload over check to start", () => {
+    expect(nextStep(facts())).toEqual({ id: "upload" });
+    expect(nextStep(facts({ obstacle: "Computing" }))).toEqual({ id: "upload", why: "Computing" });
+    expect(nextStep(facts({ fly: flyState({ onboard: onboard() }) }))).toEqual({ id: "check" });
+    expect(nextStep(facts({ fly: checked(row("good")) }))).toEqual({ id: "start" });
+  });
+
+  it("waits while anything is being done", () => {
+    const transfer = { phase: "sending", done: 1, total: 9 } as TransferStatus;
+    expect(nextStep(facts({ transfer })).id).toBe("wait");
+    expect(nextStep(facts({ fly: flyState({ busy: "Checking the start" }) }))).toEqual({
+      id: "wait",
+      why: "Checking the start",
+    });
+  });
+
+  it("is to upload again when the plan has changed since", () => {
+    const fly = { ...checked(row("good")), onboard: onboard({ is_open_plan: false, plan_name: "Old" }) };
+    expect(nextStep(facts({ fly })).id).toBe("upload");
+    expect(nextStep(facts({ fly, obstacle: "No plan" })).id).toBe("start");
+  });
+
+  it("is no start while anything is bad or unknown", () => {
+    for (const state of ["bad", "unknown"] as const) {
+      expect(nextStep(facts({ fly: checked(row("good"), row(state, "ready")) })).id).toBe("check");
+    }
+  });
+
+  it("is a start once what must be accepted is ticked", () => {
+    const fly = checked(row("accept", "gnss"), row("accept", "battery"));
+    expect(nextStep(facts({ fly, accepted: new Set(["gnss"]) }))).toMatchObject({
+      id: "start",
+      why: expect.stringContaining("Tick"),
+    });
+    expect(nextStep(facts({ fly, accepted: new Set(["gnss", "battery"]) }))).toEqual({ id: "start" });
+  });
+
+  it("is never a start when something is to be accepted that nobody may accept", () => {
+    expect(nextStep(facts({ fly: checked(row("accept", "clearance")) }))).toMatchObject({
+      why: expect.stringContaining("Tick"),
+    });
+  });
+
+  it("is another check when the last one is old", () => {
+    expect(nextStep(facts({ fly: checked(row("good")), check_age_s: 200 })).id).toBe("check");
+  });
+
+  it("in flight is pause, resume or waiting", () => {
+    const fly = checked(row("good"));
+    const inAir = true;
+    expect(nextStep(facts({ fly, inAir, flight: phase("flying") })).id).toBe("pause");
+    expect(nextStep(facts({ fly, inAir, flight: phase("paused") })).id).toBe("resume");
+    expect(nextStep(facts({ fly, inAir, flight: phase("returning") })).id).toBe("wait");
+    expect(nextStep(facts({ fly, inAir, vehicle: vehicleState({ mode: "LOITER" }) }))).toMatchObject({
+      id: "wait",
+      why: expect.stringContaining("LOITER"),
+    });
+  });
+});
+
+describe("an upload", () => {
+  it("needs a certified plan", () => {
+    expect(uploadObstacle("certified")).toBeNull();
+    for (const verdict of ["none", "error", "not_certified", "computing"] as const) {
+      expect(uploadObstacle(verdict)).toBeTruthy();
+    }
+  });
+});
