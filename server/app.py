@@ -16,6 +16,7 @@ from server.logs import configure_logging
 from server.settings import Settings
 from server.web import create_app
 from server.wiring import make_workspace, open_flying
+from telemetry.mavlink.address import parse_address
 
 WEBSOCKET_LIMIT_BYTES = 1024**2
 """From browsers; what goes to them has no limit."""
@@ -24,8 +25,10 @@ SHUTDOWN_S = 5
 
 
 def run(settings: Settings, *, demo: bool = False) -> None:
-    """Serves until interrupted. Raises ``StartError`` or ``DataDirError`` with what to do."""
+    """Serves until interrupted. Raises StartError, DataDirError, AddressError or BusError with what to do."""
     configure_logging(settings.log_level)
+    for address in settings.link:
+        parse_address(address)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
         app = create_app(settings, library, make_workspace, open_flying, demo=demo)
         server = AnnouncingServer(app, settings)

@@ -10,6 +10,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = ("mapping", "planning", "telemetry", "server")
+NAMED_BY_CONTRACTS = (
+    *(f"planning/{name}" for name in ("clearance", "certificate", "surface", "dilation", "geotiff")),
+    *(f"telemetry/simulator/{name}" for name in ("autopilot", "dynamics", "battery", "gnss", "world")),
+    *(f"telemetry/{name}" for name in ("bus", "link_client", "recording/replay", "mavlink/link")),
+    *(f"telemetry/nodes/{name}" for name in ("link", "replay")),
+)
 
 
 def lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
@@ -31,8 +37,11 @@ def small_house(tmp_path: Path) -> Path:
     for floor in FLOORS:
         (tmp_path / floor).mkdir()
         (tmp_path / floor / "__init__.py").touch()
-    for module in ("clearance", "certificate", "surface", "dilation", "geotiff"):
-        (tmp_path / "planning" / f"{module}.py").touch()
+    for module in NAMED_BY_CONTRACTS:
+        path = tmp_path / f"{module}.py"
+        path.parent.mkdir(exist_ok=True)
+        (path.parent / "__init__.py").touch()
+        path.touch()
     return tmp_path
 
 
@@ -59,6 +68,16 @@ def test_the_raster_module_may_open_rasters(small_house: Path) -> None:
             "planning/certificate.py",
             "import planning.dilation",
             "The certificate is independent of the planner",
+        ),
+        (
+            "telemetry/simulator/gnss.py",
+            "import pymavlink.mavutil",
+            "The simulated world and its dynamics know no MAVLink",
+        ),
+        (
+            "telemetry/nodes/replay.py",
+            "import telemetry.link_client",
+            "What plays recordings back cannot reach a vehicle",
         ),
     ],
 )

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.following.lag import lag_s
+from planning.following.lag import lag_s, planned_s
 from planning.following.nearest import Deviations, follow_track
 from planning.following.reference import Reference
 from planning.following.surface import SurfaceDistance
-from planning.following.track import Track, Window, judged_window
+from planning.following.track import REACHED_M, Track, Window, judged_window
 from planning.model import F64
 
 AT_HOME_M = 3.0
@@ -116,6 +116,7 @@ def _figures(
     size_m, above_m = np.abs(on_line.cross_track_m), on_line.height_error_m
     home, rate = _way_home(reference, track, window), track.clock_rate
     edges_m, counts = _histogram(size_m)
+    gone_s = _gone_s(reference, on_line)
     below = None if height_m is None else height_m[window.judged]
     return TrackFigures(
         start_s=window.start_s,
@@ -124,8 +125,8 @@ def _figures(
         told_by=window.told_by,
         positions=int(window.judged.sum()),
         flight_s=rate * (window.end_s - window.start_s),
-        predicted_s=reference.flight_s if math.isfinite(reference.flight_s) else None,
-        lag_s=lag_s(reference, rate * track.t_s[window.judged], on_line, rate * window.start_s),
+        predicted_s=reference.flight_s - gone_s if math.isfinite(reference.flight_s) else None,
+        lag_s=lag_s(reference, rate * track.t_s[window.judged], on_line, rate * window.start_s - gone_s),
         cross_track=_spread(size_m),
         height=_spread(np.abs(above_m)),
         height_lowest_m=float(above_m.min()),
@@ -138,6 +139,14 @@ def _figures(
         histogram_edges_m=edges_m,
         histogram_counts=counts,
     )
+
+
+def _gone_s(reference: Reference, on_line: Deviations) -> float:
+    """Planned time before the place where a flight began that was taken up in the middle: it is on time there."""
+    if on_line.s_m[0] <= REACHED_M:
+        return 0.0
+    gone_s = planned_s(reference, int(on_line.leg[0]), float(on_line.share[0])) - reference.takeoff_s
+    return gone_s if math.isfinite(gone_s) else 0.0
 
 
 def _part(found: Deviations, chosen: NDArray[np.bool_]) -> Deviations:

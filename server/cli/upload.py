@@ -31,7 +31,7 @@ def upload(mission: o.MissionFile, link: o.Link, as_json: o.AsJson = False) -> N
         if as_json:
             print_json(_summary(report))
         else:
-            typer.echo("\n".join(_lines(report)))
+            typer.echo("\n".join(upload_lines(report)))
         raise typer.Exit(DONE if report.verified else FAILED)
 
 
@@ -52,7 +52,8 @@ def _summary(report: UploadReport) -> dict[str, Any]:
     }
 
 
-def _lines(report: UploadReport) -> list[str]:
+def upload_lines(report: UploadReport) -> list[str]:
+    """What came of it, for people."""
     items = f"{len(report.onboard.items)} items in {report.seconds:.1f} s"
     if not report.verified:
         return [f"NOT VERIFIED: {items}, and the vehicle holds something else", *(f"  {d}" for d in report.differences)]

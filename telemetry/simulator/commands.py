@@ -12,8 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from telemetry.simulator.autopilot import Autopilot
 from telemetry.simulator.frame import Vec3
 from telemetry.simulator.mission import Step
+from telemetry.simulator.mode_numbers import MODE_NAMES
 from telemetry.simulator.pilot import Answer
-from telemetry.simulator.streams import MODE_NAMES
 
 RESULTS: dict[Answer, int] = {"accepted": 0, "denied": 2, "unsupported": 3, "failed": 4}
 FORCE = 21196

@@ -108,3 +108,15 @@ class Multirotor:
         n, e, u = self.p_neu
         self.accel_neu, self.v_neu = (an, ae, au), (vn, ve, vu)
         self.p_neu = (n + vn * dt_s, e + ve * dt_s, u + vu * dt_s)
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """w x y z of a rotation from north-east-down to the body."""
+    cr, sr, cp, sp = math.cos(roll / 2), math.sin(roll / 2), math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

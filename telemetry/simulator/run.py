@@ -13,7 +13,6 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.errors import ParameterError
-from planning.geotiff import read_dsm
 from telemetry.simulator.battery import Pack
 from telemetry.simulator.frame import Frame
 from telemetry.simulator.gnss import GnssKind
@@ -195,13 +194,20 @@ def _vehicle(options: SimOptions) -> SimulatedVehicle:
         parameters.set(name, value)
     return SimulatedVehicle(
         frame,
-        ground=SurfaceGround(read_dsm(options.dsm), frame) if options.dsm else None,
+        ground=_surface(options.dsm, frame) if options.dsm else None,
         seed=options.seed,
         gnss=options.gnss,
         parameters=parameters,
         boot_s=options.boot_s,
         speedup=options.speedup,
     )
+
+
+def _surface(path: Path, frame: Frame) -> SurfaceGround:
+    # What reads rasters takes a second to load; level ground starts without it.
+    from planning.geotiff import read_dsm
+
+    return SurfaceGround(read_dsm(path), frame)
 
 
 def _check(options: SimOptions) -> None:

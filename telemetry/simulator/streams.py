@@ -9,16 +9,12 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulator.dynamics import GRAVITY_M_S2
+from telemetry.simulator.dynamics import GRAVITY_M_S2, quaternion
 from telemetry.simulator.mission_protocol import MissionProtocol
+from telemetry.simulator.mode_numbers import MODE_NUMBERS
 from telemetry.simulator.pilot import AS_REAL_BOOT_S
 from telemetry.simulator.vehicle import SimulatedVehicle
 
-MODE_NUMBERS = {
-    "STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "CIRCLE": 7, "LAND": 9,
-    "DRIFT": 11, "SPORT": 13, "POSHOLD": 16, "BRAKE": 17, "SMART_RTL": 21,
-}  # fmt: skip
-MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
 CAPABILITIES = (
     wire.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     | wire.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
@@ -284,18 +280,6 @@ class Streams:
     def _geodetic(self, p_neu: tuple[float, float, float]) -> tuple[int, int, float]:
         lat, lon, alt_m = self._vehicle.frame.geodetic_from_neu(p_neu)
         return round(lat * 1e7), round(lon * 1e7), alt_m
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """w x y z of a rotation from north-east-down to the body."""
-    cr, sr, cp, sp = math.cos(roll / 2), math.sin(roll / 2), math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 def _mm(metres: float) -> int:

@@ -6,22 +6,28 @@ sends; the server, its link node and a page without a browser are real ones. Pri
 
 from __future__ import annotations
 
+import contextlib
 import math
+import signal
 import sys
 import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from affine import Affine
 from pyproj import CRS
 
 from planning.dsm import Dsm
+from server.library import Library
 from server.library.terrains import store_terrain
 from server.schemas import PlanDoc, PoiDoc
-from tests.server.simulated import Simulated
-from tests.server.station import Station, ok, station
+from tests.server.simulated import simulated_vehicle
+from tests.server.station import ok
+from tests.server.test_flying_process import Server
+from tests.server.test_process import free_port
 
 _WEST_M, _SOUTH_M, _CELL_M = 500_000.0, 4_175_000.0, 0.1
 
@@ -46,26 +52,32 @@ def route(dsm: Dsm) -> list[PoiDoc]:
 
 
 class Listener(threading.Thread):
-    """A page without a browser: takes every message as it comes."""
+    """A page without a browser, which only takes and looks at every message."""
 
-    def __init__(self, page: Station) -> None:
+    def __init__(self, server: Server) -> None:
         super().__init__(daemon=True)
-        self._page = page
+        self._server = server
         self.latencies_s: list[float] = []
         self.heartbeat_hz: list[float] = []
         self.computing = True
+        self.ended = False
         self._seen: float | None = None
 
     def run(self) -> None:
-        while True:
-            message = self._page.until(lambda each: each.type in ("vehicle", "link", "plan"), 600.0)
-            if message.type == "plan":
-                self.computing = message.plan.computation.state == "running"
-            elif message.type == "link":
-                self.heartbeat_hz.append(message.link.heartbeat_hz)
-            elif message.state is not None and message.state.position_t_mono_s not in (None, self._seen):
-                self._seen = message.state.position_t_mono_s
-                self.latencies_s.append(time.monotonic() - message.state.position_t_mono_s)
+        self._server.until(self._take)
+
+    def _take(self, message: dict[str, Any]) -> bool:
+        now_s = time.monotonic()
+        if message["type"] == "plan":
+            self.computing = message["plan"]["computation"]["state"] == "running"
+        elif message["type"] == "link":
+            self.heartbeat_hz.append(message["link"]["heartbeat_hz"])
+        elif message["type"] == "vehicle" and message["state"] is not None:
+            came_s = message["state"]["position_t_mono_s"]
+            if came_s not in (None, self._seen):
+                self._seen = came_s
+                self.latencies_s.append(now_s - came_s)
+        return self.ended
 
     def report(self, what: str) -> None:
         latencies_ms = 1000 * np.array(self.latencies_s or [math.nan])
@@ -73,37 +85,44 @@ class Listener(threading.Thread):
         beats = [hz for hz in self.heartbeat_hz if hz > 0]
         sys.stdout.write(
             f"{what}: {len(self.latencies_s)} positions, packet to page p50 {p50:.1f} ms, p99 {p99:.1f} ms, "
-            f"most {most:.0f} ms; heartbeat {min(beats, default=math.nan):.2f} to {max(beats, default=math.nan):.2f} Hz\n"
+            f"most {most:.0f} ms; heartbeat {min(beats, default=math.nan):.2f} "
+            f"to {max(beats, default=math.nan):.2f} Hz\n"
         )
+        sys.stdout.flush()
         self.latencies_s, self.heartbeat_hz = [], []
 
 
 def main(seconds: float = 30.0, megapixels: float = 132.0) -> None:
-    with tempfile.TemporaryDirectory() as folder, station(Path(folder), flies=True) as page:
-        dsm = rolling_dsm(megapixels)
-        store_terrain(page.server.parts.library.root, dsm, name="Rolling")
-        page.server.parts.library.refresh()
-        terrain = page.server.parts.library.terrains()[0]
-        pois = route(dsm)
-        with Simulated(pois[0].lat_deg, pois[0].lon_deg, 100.0) as vehicle:
-            ok(page.http.post("/api/link/connect", json={"address": vehicle.address}))
-            page.until(
-                lambda each: each.type == "vehicle" and each.state is not None and each.state.lat_deg is not None
-            )
-            listener = Listener(page)
-            listener.start()
-            time.sleep(5.0)
-            listener.report("settling")
-            time.sleep(seconds)
-            listener.report("nothing else going on")
-            document = PlanDoc(terrain_id=terrain.id, pois=pois)
-            began = time.monotonic()
-            page.put(document)
-            time.sleep(1.0)
-            while listener.computing and time.monotonic() - began < 600:
-                time.sleep(0.2)
-            took = time.monotonic() - began
-            listener.report(f"while {dsm.elevation_m.size / 1e6:.0f} Mpx were planned on for {took:.0f} s")
+    dsm = rolling_dsm(megapixels)
+    pois = route(dsm)
+    home = f"{pois[0].lat_deg:.7f},{pois[0].lon_deg:.7f},100"
+    with tempfile.TemporaryDirectory() as folder, simulated_vehicle(home) as address:
+        with contextlib.closing(Library(Path(folder))) as library:
+            terrain = store_terrain(library.root, dsm, name="Rolling")
+        server = Server(Path(folder), address, port=free_port())
+        try:
+            measure(server, PlanDoc(terrain_id=terrain.id, pois=pois), seconds, dsm.elevation_m.size / 1e6)
+        finally:
+            server.end(signal.SIGTERM)
+
+
+def measure(server: Server, document: PlanDoc, seconds: float, megapixels: float) -> None:
+    server.until(lambda m: m["type"] == "vehicle" and m["state"] is not None and m["state"]["lat_deg"] is not None)
+    listener = Listener(server)
+    listener.start()
+    time.sleep(5.0)
+    listener.report("settling")
+    time.sleep(seconds)
+    listener.report("nothing else going on")
+    began, revision = time.monotonic(), ok(server.http.get("/api/state")).json()["plan"]["revision"]
+    body = {"base_revision": revision, "label": "Plan", "document": document.model_dump()}
+    ok(server.http.put("/api/plan", json=body))
+    time.sleep(1.0)
+    while listener.computing:
+        time.sleep(0.2)
+    listener.report(f"while {megapixels:.0f} Mpx were planned on for {time.monotonic() - began:.0f} s")
+    listener.ended = True
+    listener.join()
 
 
 if __name__ == "__main__":

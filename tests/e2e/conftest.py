@@ -26,6 +26,9 @@ KNOWN_ERROR = "Evaluating a string as JavaScript violates the following Content 
 GONE = "WebSocket connection to"
 """A page says so while its server is away, which one test brings about."""
 
+REFUSED = re.compile(r"the server responded with a status of (400|409|422|502|504)\b")
+"""What the server refuses, the page explains; the browser notes it as well."""
+
 FLAGS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
@@ -153,7 +156,7 @@ def page(browser: Browser) -> Iterator[Page]:
     page.on("pageerror", lambda error: errors.append(str(error)))
     yield page
     context.close()
-    errors = [error for error in errors if not error.startswith(GONE)]
+    errors = [error for error in errors if not error.startswith(GONE) and not REFUSED.search(error)]
     foreign = {origin for origin in asked if not origin.startswith(("http://127.0.0.1:", "data:", "blob:"))}
     assert not foreign
     assert not [error for error in errors if KNOWN_ERROR not in error]

@@ -126,6 +126,8 @@ def test_a_flight_taken_up_in_the_middle():
     figures = figures_of(Track(t_s[later], xyz_m[later]))
     assert figures.completed
     assert figures.start_s == pytest.approx(35.1, abs=0.11)
+    assert figures.lag_s == pytest.approx(0.0, abs=0.1)
+    assert figures.predicted_s == pytest.approx(figures.flight_s, abs=0.2)
 
 
 def test_waypoints_handed_over_one_by_one_go_on_to_the_end_of_the_span():

@@ -18,6 +18,8 @@ import pytest
 from planning.formats.wpl import write_wpl
 from planning.geotiff import write_dsm
 from planning.model import Mission
+from server.cli.upload import upload_lines
+from telemetry.messages import OnboardMission, Rounded, UploadReport
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import simulated_vehicle
@@ -78,9 +80,17 @@ def test_upload(ground: Ground) -> None:
     assert left_behind() <= before
 
 
-def test_upload_for_people(ground: Ground) -> None:
-    run = hedgehop("upload", ground.mission, "--link", ground.link)
-    assert run.out.startswith("VERIFIED: 5 items in ")
+def test_upload_in_words() -> None:
+    onboard = OnboardMission((), None, None, None, "")
+    rounded = (Rounded(2, "altitude", 32.94, 32.93), Rounded(3, "parameter 4", None, 0.0))
+    assert upload_lines(UploadReport(True, onboard, rounded, (), 0.5)) == [
+        "VERIFIED: 0 items in 0.5 s, read back",
+        "  item 2: altitude 32.94 is kept as 32.93",
+        "  item 3: parameter 4 not given is kept as 0",
+    ]
+    refused = upload_lines(UploadReport(False, onboard, (), ("Item 3: the command is 20, not 16 as sent.",), 0.5))
+    assert refused[0].startswith("NOT VERIFIED")
+    assert "Item 3" in refused[1]
 
 
 def test_fly(flight: tuple[Run, Path]) -> None:

@@ -239,7 +239,7 @@ def test_what_must_be_accepted_is_not_flown_without(made: Made, tmp_path: Path) 
     async def scenario() -> None:
         async with lanes() as both:
             bench = Bench(made, tmp_path / "onboard.json", both)
-            bench.state = replace(bench.state, gnss_fix="3d", horizontal_accuracy_m=9.0)
+            bench.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
             digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
             state = await bench.desk.check(ME)
             assert state.preflight is not None
@@ -247,7 +247,7 @@ def test_what_must_be_accepted_is_not_flown_without(made: Made, tmp_path: Path) 
             with pytest.raises(CheckNeededError, match="GNSS"):
                 await bench.desk.start(ME, StartFlight(digest=digest_))
             await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss"]))
-            bench.state = replace(bench.state, gnss_fix="no_fix")
+            bench.state = replace(made.standing(), gnss_fix="no_fix")
             await bench.desk.check(ME)
             with pytest.raises(CheckNeededError, match="no fix"):
                 await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))

@@ -10,7 +10,7 @@ import pytest
 
 from server.schemas import FlyState, ReviewDoc, Snapshot
 from tests.server.running import PASSWORD
-from tests.server.simulated import Simulated
+from tests.server.simulated import simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
 
 pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
@@ -34,17 +34,18 @@ def planned(ground_station: Station) -> Station:
 
 
 @pytest.fixture(scope="module")
-def vehicle(planned: Station) -> Iterator[Simulated]:
+def vehicle(planned: Station) -> Iterator[str]:
     """At the plan's home, with the return height that the plan counts on, connected and ready."""
     document, result = planned.state.document, planned.state.computation.result
     assert result is not None
     home = document.pois[0]
-    rtl_cm = 100.0 * document.profile.rtl_height_m
-    with Simulated(home.lat_deg, home.lon_deg, result.home_alt_dsm_m, speedup=SPEEDUP, RTL_ALT=rtl_cm) as made:
-        ok(planned.http.post("/api/link/connect", json={"address": made.address}))
+    place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{result.home_alt_dsm_m:.3f}"
+    rtl = f"RTL_ALT={100 * document.profile.rtl_height_m:.0f}"
+    with simulated_vehicle(place, "--speedup", SPEEDUP, "--parameter", rtl) as address:
+        ok(planned.http.post("/api/link/connect", json={"address": address}))
         planned.until(lambda m: m.type == "vehicle" and _is_ready(m.state), LONG_S)
-        yield made
-        ok(planned.http.post("/api/link/disconnect", json={"address": made.address}))
+        yield address
+        ok(planned.http.post("/api/link/disconnect", json={"address": address}))
 
 
 def _is_ready(state: Any) -> bool:
@@ -83,7 +84,7 @@ def test_without_a_vehicle_commands_say_so(planned: Station) -> None:
     assert planned.http.post("/api/flight/check").status_code == 409
 
 
-def test_a_flight_is_uploaded_checked_flown_recorded_and_reviewed(planned: Station, vehicle: Simulated) -> None:
+def test_a_flight_is_uploaded_checked_flown_recorded_and_reviewed(planned: Station, vehicle: str) -> None:
     uploaded = FlyState.model_validate_json(
         ok(planned.http.post("/api/flight/upload", json={"revision": planned.state.revision})).text
     )

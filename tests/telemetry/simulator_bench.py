@@ -38,7 +38,7 @@ class Bench:
         self.endpoint = Endpoint(self.vehicle)
         self.endpoint.connect("gcs")
         self.heard: list[Heard] = []
-        self._heartbeat = heartbeat
+        self.heartbeat = heartbeat
         self._ours, self._theirs = wire.MAVLink(None, 255, 190), wire.MAVLink(None, 1, 1)
         self._reader = wire.MAVLink(None)
         self._next_beat_s = 0.0
@@ -56,7 +56,7 @@ class Bench:
     def advance(self, seconds: float) -> None:
         end_s = self.now_s + seconds
         while self.now_s < end_s - SLICE_S / 2:
-            if self._heartbeat and self.now_s >= self._next_beat_s:
+            if self.heartbeat and self.now_s >= self._next_beat_s:
                 self._next_beat_s = self.now_s + 1
                 self.send(wire.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
             self.vehicle.advance(SLICE_S)

@@ -21,7 +21,7 @@ MISSION = """QGC WPL 110
 @pytest.fixture
 def mavproxy() -> None:
     if importlib.util.find_spec("MAVProxy") is None:
-        pytest.skip("MAVProxy is not installed: pip install --no-deps MAVProxy==1.8.75")
+        pytest.skip("MAVProxy is not installed: pip install --no-deps -r requirements-peers.txt")
 
 
 @pytest.mark.slow

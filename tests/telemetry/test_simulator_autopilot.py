@@ -301,11 +301,11 @@ def test_after_a_landing_the_mission_begins_anew() -> None:
 
 def test_a_silent_ground_station_brings_it_home() -> None:
     bench = hovering(10.0, FS_GCS_ENABLE=1)
-    bench._heartbeat = False
+    bench.heartbeat = False
     bench.until(lambda: "GCS Failsafe" in bench.texts(), 20)
     assert bench.last("HEARTBEAT").custom_mode == RTL
     assert bench.last("HEARTBEAT").system_status == 5
-    bench._heartbeat = True
+    bench.heartbeat = True
     bench.until(lambda: "GCS Failsafe Cleared" in bench.texts(), 20)
     assert bench.vehicle.autopilot.mode.name == "RTL"
 

@@ -188,9 +188,10 @@ def test_no_command_upsets_it(
 ) -> None:
     bench = thrown_at
     place = [int(value * 1e7) if math.isfinite(value) and abs(value) < 200 else 0 for value in params[4:6]]
+    rest: tuple[Any, ...] = (*params[:4], *place, params[6])
     order: Any = wire.MAVLink_command_long_message(1, 1, command, 0, *params)
     if as_int:
-        order = wire.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *params[:4], *place, params[6])
+        order = wire.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *rest)
     answers = [answer for answer in bench.send(order) if answer.get_type() == "COMMAND_ACK"]
     assert [answer.command for answer in answers] == [command]
     bench.advance(0.04)
@@ -201,7 +202,9 @@ def test_no_command_upsets_it(
 @given(st.integers(0, 65535), st.integers(0, 12), st.tuples(*[st.floats(width=32)] * 9))
 def test_no_target_upsets_it(thrown_at: Bench, mask: int, frame: int, numbers: tuple[float, ...]) -> None:
     bench = thrown_at
-    bench.send(wire.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *numbers, 0.0, math.nan))
-    bench.send(wire.MAVLink_set_position_target_global_int_message(0, 1, 1, frame, mask, 0, 0, *numbers[:8], math.nan))
+    local: tuple[Any, ...] = (*numbers, 0.0, math.nan)
+    bench.send(wire.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *local))
+    above: tuple[Any, ...] = (0, 0, *numbers[:8], math.nan)
+    bench.send(wire.MAVLink_set_position_target_global_int_message(0, 1, 1, frame, mask, *above))
     bench.advance(0.04)
     assert all(math.isfinite(value) for value in (*bench.vehicle.truth.p_neu, bench.vehicle.truth.heading_rad))

@@ -30,7 +30,7 @@ class Station:
     """A ground station on a stream or datagrams; ``old`` speaks MAVLink 1."""
 
     def __init__(
-        self, send: Callable[[bytes], None], receive: Callable[[], Awaitable[bytes]], *, old: bool = False
+        self, send: Callable[[bytes], object], receive: Callable[[], Awaitable[bytes]], *, old: bool = False
     ) -> None:
         self._send, self._receive, self._old = send, receive, old
         self._out, self._in = wire.MAVLink(None, 255, 190), wire.MAVLink(None)
@@ -83,7 +83,7 @@ def test_by_udp_both_ways(scheme: str) -> None:
                     data, theirs = await loop.sock_recvfrom(ours, 4096)
                     return data
 
-                station = Station(lambda data: ours.sendto(data, theirs) and None, receive)
+                station = Station(lambda data: ours.sendto(data, theirs), receive)
                 if scheme == "udpin":
                     station.send(HEARTBEAT)
                 await station.wait_for("HEARTBEAT")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import os
 import socket
 from typing import Any
 
@@ -21,9 +23,9 @@ class _Tcp(Connection):
 
     async def _read(self, peer: Peer, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Until the far end hangs up."""
-        _notice_dead_peers(writer)
         self._writers[peer] = writer
         try:
+            _notice_dead_peers(writer)
             while data := await reader.read(READ_BYTES):
                 self.receiver.received(peer, data)
         finally:
@@ -44,10 +46,10 @@ class _Tcp(Connection):
 class TcpClient(_Tcp):
     async def _stay_open(self) -> None:
         try:
-            connecting = asyncio.open_connection(self.address.host, self.address.port)
-            reader, writer = await asyncio.wait_for(connecting, CONNECT_S)
+            async with asyncio.timeout(CONNECT_S):
+                reader, writer = await asyncio.open_connection(self.address.host, self.address.port)
         except TimeoutError as error:
-            raise OSError(110, "no answer") from error
+            raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from error
         self._opened()
         await self._read(f"{self.address.host}:{self.address.port}", reader, writer)
 

@@ -11,6 +11,7 @@ export type Accepted = NonNullable<StartFlight["accept"]>[number];
 
 /** What the operator chose for the next start. */
 export const way = signal<"auto" | "guided">("auto");
+const checkedAt = () => fly.value?.preflight?.checked_utc ?? "";
 const marks = signal<{ checked_utc: string; codes: ReadonlySet<Accepted> }>({
   checked_utc: "",
   codes: new Set(),
@@ -19,7 +20,6 @@ const marks = signal<{ checked_utc: string; codes: ReadonlySet<Accepted> }>({
 export const accepted = computed<ReadonlySet<Accepted>>(() =>
   marks.value.checked_utc === checkedAt() ? marks.value.codes : new Set(),
 );
-const checkedAt = () => fly.value?.preflight?.checked_utc ?? "";
 /** Resume where the flight broke off, if it did. */
 export const resumes = signal(true);
 

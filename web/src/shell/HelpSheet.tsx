@@ -12,12 +12,16 @@ const STEPS = [
   "Give a surface model: drop a GeoTIFF anywhere, or use the demo.",
   "Add points: press A and click the surface, or drop a file of points.",
   "Choose the vehicle, then tune R and H until the verdict on the right says CERTIFIED.",
-  "Export the mission and the report.",
+  "Fly: connect a vehicle or the simulator, upload, check, then hold Start for a second.",
+  "Hold and Return stay in the second line of the page, in every view.",
+  "Review: open the recording that every flight leaves, or a .tlog, and play it.",
 ];
 
 const TERMS = [
   ["R, H", "The safe surface keeps this far away sideways (R) and this high above (H) from everything."],
   ["Clearance", "Smallest distance in space between the line that will be flown and the surface model."],
+  ["Above home, above DSM", "Height over the take-off place, and over the surface model straight below."],
+  ["Cross-track", "How far beside the planned line; height error: how far above or below it."],
   ["m above home", "Heights count from the surface model at the home point."],
 ];
 
@@ -43,7 +47,7 @@ export function HelpSheet() {
     <Dialog title="Help" testid="help-sheet" onClose={() => (openDialog.value = null)}>
       <div class="help">
         <section>
-          <h3>From terrain to mission</h3>
+          <h3>From terrain to flight</h3>
           <ol>
             {STEPS.map((step) => (
               <li key={step}>{step}</li>
