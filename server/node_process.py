@@ -94,20 +94,6 @@ class NodeProcess:
         return True
 
 
-def _inheritable() -> list[int]:
-    """What a child would get besides its own files: the bus locks the server's name by such a handle, and a node that
-    outlives the server would go on holding it."""
-    handles = [int(name) for name in os.listdir("/proc/self/fd")]
-    return [handle for handle in handles if handle > 2 and _is_inheritable(handle)]
-
-
-def _is_inheritable(handle: int) -> bool:
-    try:
-        return os.get_inheritable(handle)
-    except OSError:  # the folder's own handle, closed by now
-        return False
-
-
 def bound_log(log: Path) -> None:
     """Keeps the newest part of a log that has grown too long. Nodes append, so they go on writing at its end."""
     with contextlib.suppress(OSError):
@@ -119,6 +105,16 @@ def bound_log(log: Path) -> None:
             file.truncate(0)
             file.seek(0)
             file.write(newest[newest.find(b"\n") + 1 :])
+
+
+def _inheritable() -> list[int]:
+    """Open files that a child would get. Zenoh's lock is one: held by a node, it would keep the next server out."""
+    fds = []
+    for fd in map(int, os.listdir("/proc/self/fd")):
+        with contextlib.suppress(OSError):  # closed meanwhile
+            if fd > 2 and os.get_inheritable(fd):
+                fds.append(fd)
+    return fds
 
 
 def _environment() -> dict[str, str]:

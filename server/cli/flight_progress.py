@@ -35,7 +35,7 @@ class FlightProgress:
             self._reference = reference_line(prepared.mission, self._options.dsm, self._options.profile)
 
     def on_state(self, state: VehicleState, flight: FlightStatus) -> None:
-        self.in_flight = flight.phase in FLYING
+        self.in_flight = flight.phase in FLYING or state.armed
         parts = [flight.phase.replace("_", " ")]
         if flight.target is not None:
             parts.append(f"item {flight.target} of {flight.targets}")

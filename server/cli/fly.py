@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import shutil
 import signal
+import tempfile
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -32,6 +33,7 @@ from server.errors import StorageError
 from server.review import recording_of, review
 from server.schemas.review import ReviewDoc
 from server.stopwatch import StepTimer
+from telemetry.errors import TelemetryError
 from telemetry.flight.fly import FlyOptions, FlyResult
 from telemetry.flight.fly import fly as conduct
 from telemetry.mavlink.address import parse_address
@@ -159,10 +161,17 @@ class _Conductor:
             )
         finally:
             end_progress()
-            await station.bus.call("recorder", StopRecording(), result=type(None), timeout_s=NODE_TIMEOUT_S)
-            if self._record is not None:
-                await asyncio.to_thread(shutil.copyfile, recording, self._record)
+            await self._end_recording(station, recording)
         return result, await asyncio.to_thread(_judge, recording, options.dsm)
+
+    async def _end_recording(self, station: Station, recording: Path) -> None:
+        """What was recorded is kept also when the recorder does not answer or the place for it is full by now."""
+        try:
+            await station.bus.call("recorder", StopRecording(), result=type(None), timeout_s=NODE_TIMEOUT_S)
+        except TelemetryError as error:
+            say(f"Note: {error}")
+        if self._record is not None:
+            await asyncio.to_thread(keep_recording, recording, self._record)
 
     def _on_interrupt(self) -> None:
         assert self._task is not None
@@ -178,6 +187,17 @@ class _Conductor:
         else:
             say("The vehicle is left to itself: nobody watches it any more.")
             self._task.cancel()
+
+
+def keep_recording(recording: Path, record: Path) -> None:
+    """Raises StorageError when it cannot be written there; it then says where it stays."""
+    try:
+        shutil.copyfile(recording, record)
+    except OSError as error:
+        kept = Path(tempfile.mkdtemp(prefix="hedgehop-kept-")) / recording.name
+        shutil.move(recording, kept)
+        what = f"The recording cannot be written: {error.strerror or error}."
+        raise StorageError(what, where=str(record), advice=f"It is kept as {kept}: move it away from there.") from error
 
 
 def _judge(recording: Path, dsm: Dsm | None) -> ReviewDoc:

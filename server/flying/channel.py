@@ -21,12 +21,14 @@ from server.schemas import (
 from telemetry.messages import FlightStatus, VehicleText
 from telemetry.vehicle import VehicleState
 
-RATE_HZ, BURST = 20.0, 8.0
-HOMES_APART_M = 1.0
+RATE_HZ, BURST = 20.0, 20.0
+"""Of positions: the link sends no more on average, so that in flight none waits; a fast replay sends many more."""
+QUIET_S = 0.05
+"""What is no new position waits for the next one, but no longer."""
 
 
 class Channel:
-    """Publishes each state as soon as it comes, but no faster than pages draw; lives on the event loop."""
+    """Publishes each new position as soon as it comes, but no faster than pages draw; lives on the event loop."""
 
     def __init__(
         self,
@@ -48,16 +50,16 @@ class Channel:
 
     def on_state(self, state: VehicleState) -> None:
         """A new flight begins where the vehicle arms: its path starts afresh."""
-        begins = state.armed and (self.state is None or not self.state.armed)
-        self.state = state
+        before, self.state = self.state, state
+        begins = state.armed and (before is None or not before.armed)
         if begins and self._source == "live":
             self.restart_track()
-        if self._waiting is None:
-            wait_s = self._pace.wait_s(self._now_mono_s())
-            if wait_s == 0.0:
-                self._publish()
-            else:
-                self._waiting = asyncio.get_running_loop().call_later(wait_s, self._due)
+        moved = before is None or before.position_t_mono_s != state.position_t_mono_s
+        wait_s = self._pace.wait_s(self._now_mono_s()) if moved else QUIET_S
+        if wait_s == 0.0:
+            self._publish()
+        elif self._waiting is None:
+            self._waiting = asyncio.get_running_loop().call_later(wait_s, self._publish)
 
     def on_flight(self, flight: FlightStatus) -> None:
         self.flight = flight
@@ -97,13 +99,10 @@ class Channel:
     def close(self) -> None:
         if self._waiting is not None:
             self._waiting.cancel()
-
-    def _due(self) -> None:
-        self._waiting = None
-        self._pace.wait_s(self._now_mono_s())
-        self._publish()
+            self._waiting = None
 
     def _publish(self) -> None:
+        self.close()
         state = self.state
         self.follow = None if state is None else self.follower.follow(state, self.flight)
         if state is not None and (state.armed or self._source == "replay"):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from planning.model import Mission
 from planning.vehicle_profile import dump_profile
-from telemetry.errors import RefusedError
+from telemetry.errors import RefusedError, TelemetryError
 from telemetry.flight.preflight import Preflight
 from telemetry.flight.prepare import FlyOptions, Prepared, Report, connect, prepare
 from telemetry.flight.records import plan_record
@@ -24,6 +25,8 @@ __all__ = ["FlyOptions", "FlyResult", "Observer", "fly"]
 ARM_AGAIN_S = 2.0
 FOLLOW_S = 1.0
 """How often progress is told."""
+HEARTBEAT_S = 2.5
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +77,13 @@ async def fly(
         prepared = await prepare(client, watch, mission, options, report)
         bus.publish(Topic.PLAN, _record(prepared, options))
         observer.on_start(prepared)
-        started_utc_s = await _start(client, watch, prepared, options, report)
-        flight = await _follow(client, watch, options, observer, started_utc_s, go_home)
+        watcher = _Watcher(client, watch, options, observer, go_home)
+        try:
+            started_utc_s = await _start(client, watch, prepared, options, report)
+        except TelemetryError as error:
+            await watcher.down_after(error)
+            raise
+        flight = await watcher.follow(started_utc_s)
     completed = flight.phase == "landed" and flight.broke_off_at is None
     return FlyResult(completed, _ending(flight), prepared.mission, prepared.upload, prepared.preflight, flight)
 
@@ -108,32 +116,69 @@ def _start_request(prepared: Prepared, options: FlyOptions) -> StartAuto | Start
     return StartGuided(options.operator, script.targets, script.takeoff_alt_rel_home_m, end=script.end)
 
 
-async def _follow(
-    client: Asks,
-    watch: Watch,
-    options: FlyOptions,
-    observer: Observer,
-    started_utc_s: float,
-    go_home: asyncio.Event | None,
-) -> FlightStatus:
-    """To the landing. A lost link is said, not an end: the vehicle flies on, and may be heard again."""
-    phase, heard, sent_home, report = "", True, False, observer.tell
-    while True:
-        ended = await watch.until(lambda seen: _ended(seen, started_utc_s), timeout_s=FOLLOW_S)
-        if ended is not None:
-            return ended
-        if watch.flight.phase != phase:
-            phase = watch.flight.phase
-            report(phase.replace("_", " ").capitalize())
-        if watch.link is not None and (watch.link.state != "lost") != heard:
-            heard = not heard
-            report("Communication is back" if heard else "Communication lost: the vehicle flies on by itself")
-        if go_home is not None and go_home.is_set() and not sent_home:
-            sent_home = True
-            report("Return home commanded")
-            await client.call(ReturnHome(options.operator))
+class _Watcher:
+    """Tells how the flight goes, and commands the return once it is asked for."""
+
+    def __init__(
+        self, client: Asks, watch: Watch, options: FlyOptions, observer: Observer, go_home: asyncio.Event | None
+    ) -> None:
+        self._client, self._watch, self._options = client, watch, options
+        self._observer, self._go_home = observer, go_home
+        self._phase, self._hint, self._heard = "", "", True
+
+    async def follow(self, started_utc_s: float) -> FlightStatus:
+        """To the landing. A lost link is said, not an end: the vehicle flies on, and may be heard again."""
+        return await self._until(lambda seen: _ended(seen, started_utc_s))
+
+    async def down_after(self, error: TelemetryError) -> None:
+        """A start may fail after the vehicle has armed: it is not left alone before its motors stand still."""
+        if not await self._is_armed():
+            return
+        self._observer.tell(f"The start went wrong, and the vehicle is armed: {error}")
+        await self._until(lambda seen: True if seen.vehicle is None or not seen.vehicle.armed else None)
+
+    async def _is_armed(self) -> bool:
+        """By a heartbeat of now: the last one may be from before the order to arm."""
+        now_s = time.monotonic()
+        await self._watch.until(
+            lambda seen: True if seen.vehicle and (seen.vehicle.heartbeat_t_mono_s or 0.0) > now_s else None,
+            timeout_s=HEARTBEAT_S,
+        )
+        return self._watch.vehicle is not None and self._watch.vehicle.armed
+
+    async def _until(self, over: Callable[[Watch], T | None]) -> T:
+        while True:
+            ended = await self._watch.until(over, timeout_s=FOLLOW_S)
+            if ended is not None:
+                return ended
+            self._tell()
+            if self._go_home is not None and self._go_home.is_set():
+                await self._return_home(self._go_home)
+
+    def _tell(self) -> None:
+        watch, report = self._watch, self._observer.tell
+        if watch.flight.phase != self._phase:
+            self._phase = watch.flight.phase
+            report(self._phase.replace("_", " ").capitalize())
+        if watch.flight.hint != self._hint:
+            self._hint = watch.flight.hint
+            if self._hint:
+                report(self._hint)
+        if watch.link is not None and (watch.link.state != "lost") != self._heard:
+            self._heard = not self._heard
+            report("Communication is back" if self._heard else "Communication lost: the vehicle flies on by itself")
         if watch.vehicle is not None:
-            observer.on_state(watch.vehicle, watch.flight)
+            self._observer.on_state(watch.vehicle, watch.flight)
+
+    async def _return_home(self, wanted: asyncio.Event) -> None:
+        """Again and again until it is obeyed: a failure must not end the watch over a vehicle in the air."""
+        self._observer.tell("Return home commanded")
+        try:
+            await self._client.call(ReturnHome(self._options.operator))
+        except TelemetryError as error:
+            self._observer.tell(f"It was not obeyed and is commanded again: {error}")
+        else:
+            wanted.clear()
 
 
 def _ended(watch: Watch, started_utc_s: float) -> FlightStatus | None:

@@ -134,7 +134,7 @@ class GuidedScript:
             return self._interrupt("Paused before the take-off.")
         if self.phase == "flying":
             self.phase, self.hint = "paused", ""
-            return self._go_to(self._here(), now_s)
+            return self._go_to(self._here(), now_s, holds=True)
         if self.phase == "taking_off":
             self.phase, self.hint = "paused", "It climbs to the height of the take-off first."
         return []
@@ -193,7 +193,7 @@ class GuidedScript:
     def _hold(self, state: VehicleState, now_s: float) -> list[Action]:
         if self._handover is not None:
             return self._again_if_needed(state, now_s)
-        return self._go_to(self._here(), now_s) if self._is_up(state, now_s) else []
+        return self._go_to(self._here(), now_s, holds=True) if self._is_up(state, now_s) else []
 
     def _return(self, state: VehicleState, now_s: float) -> list[Action]:
         if not state.armed or (state.landed == "on_ground" and self._watch.seen):
@@ -239,8 +239,8 @@ class GuidedScript:
         self._speed_m_s = speed_m_s
         return self._errand.begin(self._orders.change_speed(speed_m_s), now_s)
 
-    def _go_to(self, place: Place, now_s: float) -> list[Action]:
-        self._handover = Handover(place, radius_m=self._request.waypoint_radius_m)
+    def _go_to(self, place: Place, now_s: float, *, holds: bool = False) -> list[Action]:
+        self._handover = Handover(place, radius_m=self._request.waypoint_radius_m, holds=holds)
         return self._send_place(now_s)
 
     def _send_place(self, now_s: float) -> list[Action]:
@@ -253,7 +253,8 @@ class GuidedScript:
         if not self._handover.must_be_sent_again(state, now_s):
             return []
         if self._handover.sendings >= SLOW_TARGET_SENDINGS:
-            self.hint = f"The vehicle does not fly to item {self.target.item}, which it was sent again and again."
+            does = "hold its position" if self.phase == "paused" else f"fly to item {self.target.item}"
+            self.hint = f"The vehicle does not {does}, though it was told again and again."
         return self._send_place(now_s)
 
     def _go_home(self, now_s: float) -> list[Action]:

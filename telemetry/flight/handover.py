@@ -14,6 +14,8 @@ SAME_PLACE_M = 1.0
 ANSWER_S = 0.7
 """A POSITION_TARGET_GLOBAL_INT that was on its way when the target was sent shows the old one."""
 STUCK_S = 2.0
+HOLD_AGAIN_S, HELD_M = 1.0, 2.0
+"""A lost order to hold would let the vehicle fly on; the same place given twice does no harm."""
 NEARER_M, MOVING_M_S = 0.3, 0.3
 OLD_POSITION_S = 2.0
 
@@ -37,8 +39,10 @@ def _offset_m(place: Place, lat_deg: float, lon_deg: float) -> tuple[float, floa
 
 
 class Handover:
-    def __init__(self, place: Place, *, radius_m: float) -> None:
+    def __init__(self, place: Place, *, radius_m: float, holds: bool = False) -> None:
+        """``holds``: the vehicle is to stay there; moving on is no sign that it has taken the place."""
         self.place = place
+        self._holds = holds
         self.sendings = 0
         self._radius_m = radius_m
         self._taken: bool | None = None
@@ -67,10 +71,12 @@ class Handover:
         waited_s = now_s - self._sent_s
         if self._taken is False:
             return waited_s >= ANSWER_S
-        return waited_s >= STUCK_S and not self._seems_to_go(state)
+        return waited_s >= (HOLD_AGAIN_S if self._holds else STUCK_S) and not self._seems_to_go(state)
 
     def _seems_to_go(self, state: VehicleState) -> bool:
         left_m = away_m(state, self.place)
+        if self._holds:
+            return left_m <= max(self._radius_m, HELD_M)
         moving = (state.ground_speed_m_s or 0.0) > MOVING_M_S or abs(state.climb_m_s or 0.0) > MOVING_M_S
         return moving or left_m <= self._radius_m or left_m < self._away_when_sent_m - NEARER_M
 

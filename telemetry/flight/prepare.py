@@ -18,6 +18,7 @@ from telemetry.flight.preflight import SMALL_HOLE_M2, Preflight, actual_home, ch
 from telemetry.flight.rereference import rereference
 from telemetry.flight.resume import Resumption, plan_resumption
 from telemetry.flight.watch import Asks, Watch
+from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.items import items_from_mission
 from telemetry.messages import ErrorInfo, UploadReport
 from telemetry.requests import Connect, Operator, ReadParameters, Upload
@@ -69,13 +70,15 @@ async def connect(
     Raises ConnectionFailedError when it cannot be opened, NoVehicleError when nobody is heard.
     """
     report(f"Connecting to {address}")
+    text = parse_address(address).text
     await client.call(Connect(operator, address, adopt=True))
     give_up_s = asyncio.get_running_loop().time() + FAILED_PATIENCE_S
 
     def found(seen: Watch) -> VehicleState | ErrorInfo | None:
         if seen.link is None:
             return None
-        if seen.link.adopted is not None and seen.link.state == "live" and seen.vehicle is not None:
+        adopted = seen.link.adopted
+        if adopted is not None and adopted.address == text and seen.link.state == "live" and seen.vehicle is not None:
             return seen.vehicle
         hopeless = asyncio.get_running_loop().time() >= give_up_s
         return next((c.error for c in seen.link.connections if hopeless and c.state == "failed"), None)

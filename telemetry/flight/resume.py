@@ -19,6 +19,8 @@ from planning.mission_items import MIN_TAKEOFF_M
 from planning.model import Certificate, ClearanceParams, Mission, MissionItem
 from telemetry.errors import NotAllowedError
 
+CHANGE_SPEED = 178
+"""The link node sets speeds again."""
 HEADROOM_M = 0.1
 """Above what is needed, so that centimetres that the vehicle cuts do not count."""
 
@@ -35,7 +37,7 @@ class Resumption:
     certificate: Certificate
     """Of everything from the take-off on."""
     skipped: tuple[int, ...]
-    """Items before it that set something (speed, camera, region of interest) and are not carried out again."""
+    """Items before it that set something (camera, region of interest) and are not carried out again; speeds are."""
 
 
 def resume_item(mission: Mission, broke_off_at: int) -> int:
@@ -84,7 +86,8 @@ def plan_resumption(
         raise NotAllowedError(
             what, where=where, advice=f"Climb to {least_m:.1f} m." if height_m < least_m else reason.mend
         )
-    skipped = tuple(k for k in range(1, number) if stays(mission.items[k - 1].command))
+    before = enumerate(mission.items[: number - 1], start=1)
+    skipped = tuple(k for k, item in before if stays(item.command) and item.command != CHANGE_SPEED)
     return Resumption(number, height_m, max(0.0, needed_m), certificate, skipped)
 
 

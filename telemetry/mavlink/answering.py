@@ -11,6 +11,7 @@ from telemetry.errors import NotAllowedError, NoVehicleError
 
 if TYPE_CHECKING:
     from telemetry.mavlink.link import Link
+    from telemetry.mavlink.piloting import Pilot
 
 
 class Answering:
@@ -62,10 +63,9 @@ class Answering:
 
     async def _upload(self, request: requests.Upload) -> object:
         _, pilot, transfers = self._link.need_vehicle()
-        if pilot.flies_mission:
-            what = "A mission is being flown: replacing it would send the vehicle somewhere else."
-            raise NotAllowedError(what, advice="Land first.")
+        _refuse_in_mission(pilot)
         await self._record(request, f"upload {len(request.items)} items")
+        _refuse_in_mission(pilot)  # a start may have come while the disk was waited for
         return await transfers.upload(request)
 
     async def _download(self, request: requests.Download) -> object:
@@ -90,12 +90,14 @@ class Answering:
         _, pilot, transfers = self._link.need_vehicle()
         _refuse_while(transfers.is_busy)
         await self._record(request, f"start mission {request.digest[:12]} at item {request.from_item}")
+        _refuse_while(transfers.is_busy)
         await pilot.start_auto(request)
 
     async def _start_guided(self, request: requests.StartGuided) -> None:
         _, pilot, transfers = self._link.need_vehicle()
         _refuse_while(transfers.is_busy)
         await self._record(request, f"fly {len(request.targets)} targets in GUIDED")
+        _refuse_while(transfers.is_busy)
         await pilot.start_guided(request)
 
     # Whatever makes a flight end well is tried over a link that seems lost, too.
@@ -122,6 +124,12 @@ class Answering:
 
     async def _record(self, request: Any, words: str, *, must: bool = True) -> None:
         await self._link.trail.record(request.operator, words, must=must)
+
+
+def _refuse_in_mission(pilot: Pilot) -> None:
+    if pilot.flies_mission:
+        what = "A mission is being flown: replacing it would send the vehicle somewhere else."
+        raise NotAllowedError(what, advice="Land first.")
 
 
 def _refuse_while(busy: bool) -> None:

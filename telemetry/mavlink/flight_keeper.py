@@ -50,6 +50,10 @@ class FlightKeeper:
         """The start was refused; the vehicle is where it was."""
         self.status = FlightStatus(hint=hint)
 
+    def broke_off_start(self, hint: str) -> None:
+        """The start was interrupted by another command when the vehicle had left the ground already."""
+        self.status, self._was_armed = replace(self.status, phase="taking_off", hint=hint), True
+
     def say(self, hint: str) -> None:
         if hint != self.status.hint:
             self.status = replace(self.status, hint=hint)

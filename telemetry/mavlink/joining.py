@@ -9,6 +9,7 @@ from planning.formats.commands import FLOWN_TO
 from telemetry.errors import NotAllowedError
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.flight_keeper import sequence_of
+from telemetry.mavlink.going_on import check_same_mission, set_speeds
 from telemetry.messages import Item
 from telemetry.requests import StartAuto
 from telemetry.vehicle import VehicleState
@@ -33,7 +34,7 @@ class JoinMission:
         if request.climb_to_m is None or not request.climb_to_m > 0:
             what = f"To go on at item {request.from_item} a height for the way there is needed."
             raise NotAllowedError(what, advice="Let the height be worked out from the surface model.")
-        self._vehicle, self._item = vehicle, request.from_item
+        self._vehicle, self._item, self._digest = vehicle, request.from_item, request.digest
         self._climb_to_m = request.climb_to_m
         self._place = self._find_place()
         self.is_active = self.is_done = False
@@ -55,11 +56,12 @@ class JoinMission:
         try:
             accepted()
             await self._fly_there()
-            await self._vehicle.obey(
-                self._vehicle.orders.mission_item(sequence_of(self._item, self._vehicle.state.autopilot))
-            )
-            await self._vehicle.obey(self._vehicle.orders.mission_mode())
+            vehicle = self._vehicle
+            check_same_mission(vehicle.onboard, self._digest)
+            await vehicle.obey(vehicle.orders.mission_item(sequence_of(self._item, vehicle.state.autopilot)))
+            await vehicle.obey(vehicle.orders.mission_mode())
             self.is_done = True
+            await set_speeds(vehicle, self._item)
         finally:
             self.is_active = False
 

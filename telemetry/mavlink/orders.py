@@ -21,6 +21,7 @@ HOLD_MODES: dict[Autopilot, tuple[str, ...]] = {"ardupilot": ("BRAKE", "GUIDED")
 GUIDED_MODES: dict[Autopilot, str] = {"ardupilot": "GUIDED", "px4": "OFFBOARD"}
 RETURN_MODES = frozenset({"RTL", "SMART_RTL", "AUTO_RTL"})
 LAND_MODES = frozenset({"LAND", "PRECLAND"})
+ANY_THROTTLE = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,10 @@ class Orders:
             *place,
         )
         return Order(message)
+
+    def change_speed(self, kind: int, speed_m_s: float) -> Order:
+        """``kind``: SPEED_TYPE. Holds until the next change of the flight mode."""
+        return Order(self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE))
 
     def mission_item(self, sequence: int) -> Order:
         """``sequence`` as the vehicle counts."""

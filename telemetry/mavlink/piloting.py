@@ -10,8 +10,10 @@ from typing import Any
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
 from telemetry.flight.guided import GuidedScript
 from telemetry.mavlink.adopted import AdoptedVehicle
-from telemetry.mavlink.flight_keeper import FlightKeeper, sequence_of
+from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
+from telemetry.mavlink.going_on import check_same_mission, set_speeds
 from telemetry.mavlink.joining import JoinMission
+from telemetry.mavlink.mode_change import change_mode
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.procedures import Accepted, Procedures, Spawn
 from telemetry.requests import StartAuto, StartGuided
@@ -39,6 +41,8 @@ class Pilot:
         self._procedures, self._read_parameter = Procedures(spawn, flight.say), read_parameter
         self._script_since_s: float | None = None
         self._script_accepted: Accepted = lambda: None
+        self._started_digest: str | None = None
+        """Of the mission that is under way, if it was started from here."""
 
     @property
     def script_flies(self) -> bool:
@@ -68,6 +72,8 @@ class Pilot:
             return  # it has just been adopted: nobody knows yet whether it is armed
         if self.script is not None:
             self._follow_script(self.script)
+        if not self.flight.is_under_way:
+            self._started_digest = None
         joining = self.join is not None and self.join.is_active
         if self.script is None:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
@@ -86,10 +92,9 @@ class Pilot:
         await self.vehicle.obey(self.vehicle.orders.arm())
 
     async def disarm(self) -> None:
-        state = self.vehicle.state
-        low = state.alt_rel_home_m is None or state.alt_rel_home_m < LOW_M
-        if state.landed in IN_THE_AIR or (state.landed is None and not low):
+        if self._is_in_the_air:
             raise NotAllowedError("The vehicle is in the air: its motors are not stopped.", advice="Land it first.")
+        self._end_current()
         await self.vehicle.obey(self.vehicle.orders.disarm())
 
     async def start_auto(self, request: StartAuto) -> None:
@@ -121,16 +126,13 @@ class Pilot:
         if self.script_flies:
             assert self.script is not None
             self._tell_script(self.script.pause(time.monotonic()))
-            if self.script_flies and self.script.phase != "paused":
-                advice = "Wait until it is up, or land it."
-                raise NotAllowedError(f"The script cannot pause while it is {self._doing()}.", advice=advice)
-            return
+            if not self.script_flies or self.script.phase == "paused":
+                return
         state = self.vehicle.state
-        if not state.armed or state.landed == "on_ground":
+        starts = self.flight.is_under_way or self._procedures.is_under_way  # it may leave the ground any moment
+        if not starts and (not state.armed or state.landed == "on_ground"):
             raise NotAllowedError("Nothing is being flown that could be paused.")
-        self._end_current()
-        modes = HOLD_MODES.get(state.autopilot, ())
-        await self.vehicle.obey_first(*(self.vehicle.orders.mode(name) for name in modes))
+        await self._change_mode(*HOLD_MODES.get(state.autopilot, ("HOLD",)))
 
     async def resume(self) -> None:
         if self.script_flies:
@@ -144,6 +146,8 @@ class Pilot:
         if join is not None and not join.is_done:
             await self._procedures.take_over(join.go_on)
             return
+        if self._started_digest is not None:
+            check_same_mission(self.vehicle.onboard, self._started_digest)
         await self._check_goes_on()
         await self._procedures.take_over(self._mission_mode)
 
@@ -177,38 +181,56 @@ class Pilot:
             raise NotAllowedError(what, advice="Start it at an item that it has.")
 
     def _check_on_ground(self) -> None:
-        if self.vehicle.state.armed and self.vehicle.state.landed in IN_THE_AIR:
+        if self.vehicle.state.armed and self._is_in_the_air:
             raise NotAllowedError("The vehicle is already flying.", advice="Land it first, or resume what is paused.")
 
     async def _start_auto(self, request: StartAuto, accepted: Accepted) -> None:
         vehicle, items = self.vehicle, self.vehicle.onboard.mission
         self.flight.begin(len(items.items) if items else 0, time.time(), first=request.from_item)
+        self._started_digest = request.digest
         try:
             if self.join is not None:
                 await self.join.take_off()
             else:
-                await self._begin_mission()
+                await self._begin_mission(request.digest)
+                await vehicle.wait_until(lambda state: state.armed, timeout_s=10, what="arm")
         except (TelemetryError, asyncio.CancelledError) as error:
-            self.flight.cancel(str(error) or SUPERSEDED)
+            self._start_ended(str(error) or SUPERSEDED)
             raise
         if self.join is not None:
             await self.join.go_on(accepted)
-        else:
-            await vehicle.wait_until(lambda state: state.armed, timeout_s=10, what="arm")
 
-    async def _begin_mission(self) -> None:
+    def _start_ended(self, why: str) -> None:
+        if self.flight.status.phase != "arming":
+            return  # it is on its way, and seen to be
+        if self.vehicle.state.armed and self._is_in_the_air:
+            self.flight.broke_off_start(why)
+        else:
+            self.flight.cancel(why)
+
+    @property
+    def _is_in_the_air(self) -> bool:
+        """By its height where the vehicle does not say."""
+        state = self.vehicle.state
+        if state.landed is None:
+            return state.alt_rel_home_m is not None and state.alt_rel_home_m >= LOW_M
+        return state.landed in IN_THE_AIR
+
+    async def _begin_mission(self, digest: str) -> None:
         """ArduPilot does not arm in AUTO; PX4 takes off as soon as it is armed in its mission mode."""
         vehicle, orders = self.vehicle, self.vehicle.orders
-        first = sequence_of(1, vehicle.state.autopilot)
-        if (vehicle.state.mission_item or 0) > first:
+        first, at = sequence_of(1, vehicle.state.autopilot), vehicle.state.mission_item
+        if at is None or at > first:  # not known: it may be where an earlier flight broke off
             await vehicle.obey(orders.mission_item(first))
         if vehicle.firmware == "ardupilot":
             await vehicle.obey(orders.mode("GUIDED"))
             await self._arm_if_needed()
+            check_same_mission(vehicle.onboard, digest)
             await vehicle.obey(orders.mission_mode())
             await vehicle.obey(orders.start_mission())
         else:
             await vehicle.obey(orders.mission_mode())
+            check_same_mission(vehicle.onboard, digest)
             await self._arm_if_needed()
             await vehicle.obey(orders.start_mission())
 
@@ -218,6 +240,9 @@ class Pilot:
 
     async def _mission_mode(self, accepted: Accepted) -> None:
         await self.vehicle.obey(self.vehicle.orders.mission_mode())
+        accepted()
+        if self.vehicle.firmware == "ardupilot":
+            await set_speeds(self.vehicle, item_of(self.vehicle.state) or 1)
 
     async def _check_goes_on(self) -> None:
         if self.vehicle.firmware != "ardupilot":
@@ -227,17 +252,14 @@ class Pilot:
             advice = f"Return home, set {RESTART_PARAMETER} to 0, and start where the flight broke off."
             raise NotAllowedError(what, advice=advice)
 
-    async def _change_mode(self, name: str) -> None:
-        """Obeyed before anything else; what was under way ends first, so that it sends nothing in between."""
+    async def _change_mode(self, *names: str) -> None:
+        """To the first of ``names`` that is not refused. What was under way ends first and sends nothing any more."""
         self._end_current()
-        await self.vehicle.obey(self.vehicle.orders.mode(name))
+        await self._procedures.take_over(lambda accepted: change_mode(self.vehicle, names, accepted))
 
     def _tell_script(self, actions: list[Any]) -> None:
         if self.script is not None:
             self.vehicle.exchanges.perform(self.script, actions)
-
-    def _doing(self) -> str:
-        return self.script.phase.replace("_", " ") if self.script else "idle"
 
     def _end_current(self) -> None:
         self._procedures.end()

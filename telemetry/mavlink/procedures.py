@@ -21,6 +21,10 @@ class Procedures:
         self._spawn, self._say = spawn, say
         self._current: asyncio.Task[None] | None = None
 
+    @property
+    def is_under_way(self) -> bool:
+        return self._current is not None and not self._current.done()
+
     def end(self) -> None:
         if self._current is not None:
             self._current.cancel()

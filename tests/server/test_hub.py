@@ -18,11 +18,17 @@ from server.schemas import (
     HoverProfile,
     JobDoc,
     JobMessage,
+    LeaseDoc,
+    LeaseMessage,
     NoticeMessage,
     PlanMessage,
     SelectionDoc,
     SelectionMessage,
+    Source,
+    TextMessage,
+    VehicleMessage,
 )
+from telemetry.messages import VehicleText
 from tests.server.fakes import notice, plan_state, snapshot
 
 
@@ -261,5 +267,39 @@ def test_what_was_set_aside_is_told_to_every_page() -> None:
         bench.hub.greet_with([told])
         for socket in (await bench.join(), await bench.join()):
             assert socket.types() == ["snapshot", "notice"]
+
+    run(scenario)
+
+
+def test_live_and_replayed_vehicles_do_not_replace_each_other_and_words_all_arrive() -> None:
+    def vehicle(source: Source) -> VehicleMessage:
+        return VehicleMessage(source=source, now_mono_s=0.0, state=None, follow=None)
+
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        socket.flowing.clear()
+        bench.hub.publish(notice("taken out of the queue and stuck"))
+        await settled()
+        for number in range(5):
+            bench.hub.publish(vehicle("live"))
+            bench.hub.publish(vehicle("replay"))
+            bench.hub.publish(TextMessage(source="live", text=VehicleText(0.0, 6, str(number))))
+        socket.flowing.set()
+        await settled()
+        later = socket.sent[2:]
+        assert [m["source"] for m in later if m["type"] == "vehicle"] == ["live", "replay"]
+        assert [m["text"]["text"] for m in later if m["type"] == "text"] == ["0", "1", "2", "3", "4"]
+
+    run(scenario)
+
+
+def test_each_session_is_told_what_is_its_own() -> None:
+    async def scenario(bench: Bench) -> None:
+        anna, ben = await bench.join(session="anna"), await bench.join(session="ben")
+        bench.hub.publish_each(lambda session: LeaseMessage(lease=LeaseDoc(holder="Anna", mine=session == "anna")))
+        bench.hub.publish_to("ben", notice("for Ben"))
+        await settled()
+        assert [m["lease"]["mine"] for s in (anna, ben) for m in s.sent if m["type"] == "lease"] == [True, False]
+        assert (anna.types().count("notice"), ben.types().count("notice")) == (0, 1)
 
     run(scenario)

@@ -12,6 +12,7 @@ import pytest
 
 from server.node_process import LOG_BYTES, bound_log
 from server.supervisor import NodeState, Supervisor
+from telemetry.bus import Bus
 from telemetry.node_lock import NodeFacts, running_node, running_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -216,6 +217,20 @@ def test_a_link_node_is_kept_until_it_says_that_it_may_go(folder: Path) -> None:
             await until(lambda: (facts := running_node(folder, "link")) is not None and facts.replaceable)
             await watched.supervisor.start("link", ["--b"])
             await until(lambda: (facts := running_node(folder, "link")) is not None and facts.arguments[-1] == "--b")
+            await watched.supervisor.stop("link")
+
+    run(whole)
+
+
+def test_a_node_holds_nothing_of_the_server_that_started_it(folder: Path) -> None:
+    async def whole() -> None:
+        async with await Bus.open(folder, "server"), supervised(folder) as watched:
+            await watched.supervisor.start("link", [])
+            facts = await watched.running("link")
+            held = [os.readlink(path) for path in Path(f"/proc/{facts.pid}/fd").iterdir() if path.is_symlink()]
+            assert [path for path in held if "server" in path] == []
+        async with await Bus.open(folder, "server"), supervised(folder) as watched:  # of a server that comes later
+            assert await watched.running("link") == facts
             await watched.supervisor.stop("link")
 
     run(whole)

@@ -289,7 +289,9 @@ def test_no_way_back_over_unknown_terrain() -> None:
 
 def test_what_was_set_before_is_named() -> None:
     with_speed = replace(PLANNED, items=(MissionItem(178, 2, (1.0, 2.0, -1.0, 0.0)), *PLANNED.items))
-    assert plan_resumption(with_speed, 4, PLAIN, CLEARANCE).skipped == (1,)
+    assert plan_resumption(with_speed, 4, PLAIN, CLEARANCE).skipped == ()  # the link node sets speeds again
+    with_camera = replace(PLANNED, items=(MissionItem(206, 2, (5.0, 0.0, 1.0, 0.0)), *PLANNED.items))
+    assert plan_resumption(with_camera, 4, PLAIN, CLEARANCE).skipped == (1,)
 
 
 def test_the_rest_is_certified_as_the_certificate_would() -> None:

@@ -16,6 +16,8 @@ interface Frame {
   onHover: (at: number | null) => void;
   /** The place under the pressed pointer, where a press means something. */
   onPick?: (at: number, isOver: boolean) => void;
+  /** Of the horizontal axis; what the curves cover if left out. */
+  xRange?: Span;
   /** How the horizontal axis is written; in metres if left out. */
   xText?: (value: number) => string;
   /** Room above the chart, for names of places. */
@@ -61,6 +63,9 @@ function pickPlugin(onPick: NonNullable<Frame["onPick"]>): uPlot.Plugin {
   return { hooks: { ready } };
 }
 
+/** A range without a length still gets one. */
+const spread = ([from, to]: Span): [number, number] => [from, to > from ? to : from + 1];
+
 function hoverPlugin(onHover: Frame["onHover"]): uPlot.Plugin {
   return {
     hooks: {
@@ -85,7 +90,7 @@ export function chartOptions(frame: Frame): uPlot.Options {
     legend: { show: false },
     cursor: { drag: { x: false, y: false }, points: { show: false }, y: false, x: false },
     scales: {
-      x: { time: false, range: (_, min, max) => [min, max > min ? max : min + 1] },
+      x: { time: false, range: (_, min, max) => spread(frame.xRange ?? [min, max]) },
       y: { range: () => [frame.range[0], frame.range[1]] },
     },
     axes: [

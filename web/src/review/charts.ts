@@ -46,6 +46,7 @@ export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette
     draw: () => undefined,
     onHover: pointing.hover,
     onPick: pointing.pick,
+    xRange: [0, review.duration_s],
     xText: axisTime,
     top: TOP_PX,
   });
@@ -72,6 +73,7 @@ export function crossTrackOverTime(
     draw: () => undefined,
     onHover: pointing.hover,
     onPick: pointing.pick,
+    xRange: [0, review.duration_s],
     xText: axisTime,
     top: TOP_PX,
   });

@@ -54,9 +54,9 @@ export function playhead(
   return Math.min(end_utc_s - start_utc_s, Math.max(0, at_utc_s - start_utc_s + since_s));
 }
 
-/** The time that all of the Review view shows; null: nothing is open. */
+/** The time that all of the Review view shows, from the start until the replay says more; null: nothing is open. */
 export const playhead_s = computed(() =>
-  review.value ? (seeking.value?.at_s ?? playhead(replay.value, now_ms.value)) : null,
+  review.value ? (seeking.value?.at_s ?? playhead(replay.value, now_ms.value) ?? 0) : null,
 );
 export const isPlaying = computed(() => replay.value?.status.playing ?? false);
 export const isReplaying = computed(() => review.value !== null);

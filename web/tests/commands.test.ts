@@ -1,0 +1,29 @@
+import { beforeEach, describe, expect, it } from "vitest";
+import { accept, accepted } from "../src/fly/commands";
+import { fly } from "../src/store/flying";
+import type { PreflightDoc } from "../src/messages";
+import { flyState } from "./flight_samples";
+
+const checkedAt = (checked_utc: string) =>
+  flyState({ preflight: { checked_utc, rows: [] } as unknown as PreflightDoc });
+
+describe("what the operator accepts", () => {
+  beforeEach(() => {
+    fly.value = checkedAt("2026-01-01T00:00:00Z");
+  });
+
+  it("is ticked one by one, and unticked", () => {
+    accept("gnss", true);
+    accept("battery", true);
+    accept("gnss", false);
+    expect([...accepted.value]).toEqual(["battery"]);
+  });
+
+  it("holds for the check that was read, not for the next one", () => {
+    accept("gnss", true);
+    fly.value = checkedAt("2026-01-01T00:05:00Z");
+    expect(accepted.value.size).toBe(0);
+    accept("battery", true);
+    expect([...accepted.value]).toEqual(["battery"]);
+  });
+});
