@@ -134,9 +134,11 @@ class Supervisor:
     def _started(self, node: _Node) -> NodeProcess | None:
         try:
             return NodeProcess.start(self._runtime_dir, node.name, self._package, self._all_arguments(node.arguments))
-        except OSError as error:
-            log.error("The %s node cannot be started: %s", node.name, error)
-            node.last_end = f"The {node.name} node cannot be started ({error.strerror})"
+        except Exception as error:
+            # Whatever it is: the server and the other nodes go on without this one.
+            log.exception("The %s node cannot be started.", node.name)
+            why = error.strerror if isinstance(error, OSError) else type(error).__name__
+            node.last_end = f"The {node.name} node cannot be started ({why})"
             return None
 
     async def _watch(self, node: _Node, process: NodeProcess) -> bool:

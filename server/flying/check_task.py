@@ -18,7 +18,7 @@ from planning.dsm import Dsm
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.holes import fill_holes
-from planning.model import ClearanceParams
+from planning.model import ClearanceParams, Mission
 from planning.request import PlanRequest
 from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
@@ -52,6 +52,10 @@ class Checked:
     """Of what was read back; empty when there is none."""
     moved: Moved | None
     """What has to be uploaded before the check can be made anew."""
+    mission: Mission | None = None
+    """What was read back, as it will be flown from where the vehicle stands."""
+    clearance: ClearanceParams | None = None
+    """What was demanded of it, with the vehicle's own return height."""
 
 
 def check_start(
@@ -82,7 +86,7 @@ def check_start(
     )
     certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
-    return Checked(_doc(found, rereferenced_m), certificate, moved)
+    return Checked(_doc(found, rereferenced_m), certificate, moved, found.mission, found.clearance)
 
 
 def clearance_of(record: PlanRecord) -> ClearanceParams:
@@ -108,18 +112,15 @@ def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
 
 
 def climb_for_resuming(
-    directory: Path, record: PlanRecord, state: VehicleState, from_item: int, *, report: Progress
+    directory: Path, mission: Mission, clearance: ClearanceParams, from_item: int, *, report: Progress
 ) -> tuple[int, float]:
     """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
-    from telemetry.flight.preflight import SMALL_HOLE_M2, actual_home
+    from telemetry.flight.preflight import SMALL_HOLE_M2
     from telemetry.flight.resume import plan_resumption
 
     report("Finding the way back into the mission", None)
-    dsm = load_terrain(directory)
-    mission, home = read_wpl(record.mission_wpl), actual_home(state, dsm)
-    surface, _ = fill_holes(dsm, max_area_m2=SMALL_HOLE_M2)
-    at = mission if home is None else replace(mission, home=home)
-    way = plan_resumption(at, from_item, surface, clearance_of(record))
+    surface, _ = fill_holes(load_terrain(directory), max_area_m2=SMALL_HOLE_M2)
+    way = plan_resumption(mission, from_item, surface, clearance)
     return way.from_item, way.climb_to_m
 
 

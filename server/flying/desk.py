@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from server.errors import ConflictError
+from server.errors import CheckNeededError, ConflictError
 from server.flying.asking import Asks
 from server.flying.check_task import Checked
 from server.flying.onboard import Onboard, is_plan, onboard, read_onboard, write_onboard
@@ -40,7 +40,7 @@ class Works(Protocol):
 
     async def guided(self, record: PlanRecord) -> GuidedPlan: ...
 
-    async def way_back(self, record: PlanRecord, state: VehicleState, from_item: int) -> tuple[int, float]: ...
+    async def way_back(self, record: PlanRecord, checked: Checked, from_item: int) -> tuple[int, float]: ...
 
 
 class FlightDesk:
@@ -79,7 +79,7 @@ class FlightDesk:
     def state(self) -> FlyState:
         return FlyState(
             onboard=self._onboard_doc(),
-            preflight=None if self._ready is None else self._ready.doc,
+            preflight=None if self._ready is None else self._ready.checked.doc,
             resume_from_item=self._flight.broke_off_at,
             busy=self._busy,
         )
@@ -88,7 +88,7 @@ class FlightDesk:
 
     def on_link(self, status: LinkStatus) -> None:
         self._status = status
-        if self._ready is not None and status.mission_digest not in (None, self._ready.digest):
+        if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
         self.refresh()
 
@@ -109,6 +109,7 @@ class FlightDesk:
         async with self._doing("Uploading"):
             self._ready = None
             made = await self._works.made_upload(revision)
+            _check_firmware(made.record, self._state())
             await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
         return self.state
 
@@ -116,23 +117,28 @@ class FlightDesk:
         """Raises MissionUnknownError when what is on board did not come from here."""
         async with self._doing("Checking the start"):
             self._ready = None
-            checked = await self._checked(operator)
+            vehicle, state = self._vehicle_id(), self._state()
+            checked = await self._checked(operator, state)
             if (moved := checked.moved) is not None:
                 self._set_busy("Moving the heights to the vehicle's home")
                 await self._send(operator, moved.items, moved.record, moved.home)
-                checked = await self._checked(operator, rereferenced_m=moved.shift_m)
-            self._ready = Ready(checked.doc, self._digest(), self._state(), time.monotonic())
+                checked = await self._checked(operator, state, rereferenced_m=moved.shift_m)
+            if vehicle != self._vehicle_id():
+                raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
+            self._ready = Ready(checked, self._digest(), vehicle, state, time.monotonic())
             await self._certified(checked.certificate_json)
         return self.state
 
     async def start(self, operator: Operator, body: StartFlight) -> None:
         """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted."""
         async with self._doing("Starting"):
-            state = self._state()
-            check_start(self._ready, body, state, time.monotonic())
+            ready = check_start(self._ready, body, self._state(), time.monotonic())
             record = self._known_record(body.digest)
+            request = await self._start_request(operator, body, record, ready)
+            # What was prepared meanwhile may have taken its time.
+            check_start(self._ready, body, self._state(), time.monotonic())
             self._publish_plan(replace(record, t_utc_s=time.time()))
-            await self._link.call(await self._start_request(operator, body, record, state))
+            await self._link.call(request)
 
     async def command(self, request: LinkRequest) -> None:
         """At any time: whatever else is being done, the vehicle can be told to hold, return or land."""
@@ -156,12 +162,16 @@ class FlightDesk:
         self._publish_plan(kept.record)
         await asyncio.to_thread(write_onboard, self._file, kept)
 
-    async def _checked(self, operator: Operator, *, rereferenced_m: float | None = None) -> Checked:
+    async def _checked(
+        self, operator: Operator, state: VehicleState, *, rereferenced_m: float | None = None
+    ) -> Checked:
         mission = await self._link.call(Download(operator))
-        return await self._works.checked(self._known_record(mission.digest), mission, self._state(), rereferenced_m)
+        record = self._known_record(mission.digest)
+        _check_firmware(record, state)
+        return await self._works.checked(record, mission, state, rereferenced_m)
 
     async def _start_request(
-        self, operator: Operator, body: StartFlight, record: PlanRecord, state: VehicleState
+        self, operator: Operator, body: StartFlight, record: PlanRecord, ready: Ready
     ) -> StartAuto | StartGuided:
         if body.way == "guided":
             if body.from_item != 1:
@@ -172,7 +182,7 @@ class FlightDesk:
             return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
         if body.from_item == 1:
             return StartAuto(operator, body.digest)
-        from_item, climb_to_m = await self._works.way_back(record, state, body.from_item)
+        from_item, climb_to_m = await self._works.way_back(record, ready.checked, body.from_item)
         return StartAuto(operator, body.digest, from_item, climb_to_m)
 
     async def _certified(self, certificate_json: str) -> None:
@@ -193,6 +203,12 @@ class FlightDesk:
         if state is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         return state
+
+    def _vehicle_id(self) -> str:
+        adopted = None if self._status is None else self._status.adopted
+        if adopted is None:
+            raise NoVehicleError("No vehicle is adopted.", advice="Connect to one first.")
+        return adopted.id
 
     def _digest(self) -> str:
         return "" if self._onboard is None else self._onboard.record.digest
@@ -226,6 +242,25 @@ class FlightDesk:
     def _set_busy(self, what: str) -> None:
         self._busy = what
         self.refresh()
+
+
+def _still_holds(ready: Ready, status: LinkStatus) -> bool:
+    """A status from before the end of the check says nothing about it."""
+    if status.t_mono_s < ready.checked_mono_s:
+        return True
+    same = status.adopted is not None and status.adopted.id == ready.vehicle
+    return same and status.mission_state == "verified" and status.mission_digest == ready.digest
+
+
+def _check_firmware(record: PlanRecord, state: VehicleState) -> None:
+    if state.autopilot != "other" and state.autopilot != record.firmware:
+        raise NotAllowedError(
+            f"The plan was made for {_FIRMWARES[record.firmware]}, the vehicle flies {_FIRMWARES[state.autopilot]}.",
+            advice="Choose the vehicle's own profile in Plan, then upload again.",
+        )
+
+
+_FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 def _not_verified(report: UploadReport) -> TransferError:

@@ -102,10 +102,12 @@ class Follower:
         self._following, progress = follow_on(self._following, followed.reference, xyz_m, state.t_utc_s)
         at, self._share = self._following.at, progress.share
         assert at is not None
+        # On the ground, and while it rises to the line, nothing is an error yet.
+        on_line = state.armed and self._following.begun
         return {
             "s_m": at.s_m,
-            "cross_track_m": at.cross_track_m,
-            "height_error_m": at.height_error_m,
+            "cross_track_m": at.cross_track_m if on_line else None,
+            "height_error_m": at.height_error_m if on_line else None,
             "progress": progress.share,
             "time_left_s": progress.time_left_s,
             # On the ground nobody is late.

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from server.errors import CheckNeededError
+from server.flying.check_task import Checked
 from server.placing import metres_apart
-from server.schemas import PreflightDoc, StartFlight
+from server.schemas import StartFlight
 from telemetry.vehicle import VehicleState
 
 FRESH_S = 120.0
 """Long enough to read the check and to hold the button; the vehicle must not have moved meanwhile."""
-HOME_MOVED_M, HOME_ROSE_M = 2.0, 0.5
+MOVED_M, ROSE_M = 3.0, 2.0
+"""More than a standing receiver and barometer wander in that time."""
 _AGAIN = "Press Check again."
 
 
@@ -19,31 +21,43 @@ _AGAIN = "Press Check again."
 class Ready:
     """A check that was made, and what it holds for."""
 
-    doc: PreflightDoc
+    checked: Checked
     digest: str
+    vehicle: str
+    """Id of the candidate that was adopted."""
     state: VehicleState
-    """As it was then."""
+    """As it was judged."""
     checked_mono_s: float
 
 
-def check_start(ready: Ready | None, body: StartFlight, state: VehicleState, now_mono_s: float) -> None:
-    """Raises CheckNeededError with the first reason why this start is not allowed."""
+def check_start(ready: Ready | None, body: StartFlight, state: VehicleState, now_mono_s: float) -> Ready:
+    """The check that allows this start. Raises CheckNeededError with the first reason why there is none."""
     if ready is None or ready.digest != body.digest:
         raise CheckNeededError("This mission has not been checked before the start.", advice="Press Check first.")
     if now_mono_s - ready.checked_mono_s > FRESH_S:
         raise CheckNeededError(f"The check is {now_mono_s - ready.checked_mono_s:.0f} s old.", advice=_AGAIN)
-    if _home_moved(ready.state, state):
-        raise CheckNeededError("The vehicle's home has moved since the check.", advice=_AGAIN)
-    for row in ready.doc.rows:
+    if _has_moved(ready.state, state):
+        raise CheckNeededError("The vehicle was moved after the check.", advice=_AGAIN)
+    for row in ready.checked.doc.rows:
         if row.state in ("bad", "unknown"):
             raise CheckNeededError(row.text, advice=row.mend or _AGAIN)
         if row.state == "accept" and row.code not in body.accept:
             raise CheckNeededError(row.text, advice="Accept it, or mend it and check again.")
+    return ready
 
 
-def _home_moved(then: VehicleState, now: VehicleState) -> bool:
-    if then.home_lat_deg is None or then.home_lon_deg is None or now.home_lat_deg is None or now.home_lon_deg is None:
+def _has_moved(then: VehicleState, now: VehicleState) -> bool:
+    """A disarmed vehicle takes its home where it stands, so that place counts, not the home of its last flight."""
+    places = _place(then), _place(now)
+    if places[0] is None or places[1] is None or then.alt_amsl_m is None or now.alt_amsl_m is None:
         return True
-    apart_m = metres_apart((then.home_lat_deg, then.home_lon_deg), (now.home_lat_deg, now.home_lon_deg))
-    rose_m = abs((now.home_alt_amsl_m or 0.0) - (then.home_alt_amsl_m or 0.0))
-    return apart_m > HOME_MOVED_M or rose_m > HOME_ROSE_M
+    rose_m = 0.0 if now.armed else abs(now.alt_amsl_m - then.alt_amsl_m)
+    return metres_apart(places[0], places[1]) > MOVED_M or rose_m > ROSE_M
+
+
+def _place(state: VehicleState) -> tuple[float, float] | None:
+    if state.armed:
+        lat_deg, lon_deg = state.home_lat_deg, state.home_lon_deg
+    else:
+        lat_deg, lon_deg = state.lat_deg, state.lon_deg
+    return None if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)

@@ -59,9 +59,11 @@ class FlightWork:
         """Raises MissionError for a mission that the navigation script cannot fly."""
         return await self._flight_lane.call(guided_targets, record)
 
-    async def way_back(self, record: PlanRecord, state: VehicleState, from_item: int) -> tuple[int, float]:
+    async def way_back(self, record: PlanRecord, checked: Checked, from_item: int) -> tuple[int, float]:
         """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
-        return await self._flight_lane.call(climb_for_resuming, self._directory(record), record, state, from_item)
+        return await self._flight_lane.call(
+            climb_for_resuming, self._directory(record), checked.mission, checked.clearance, from_item
+        )
 
     def _directory(self, record: PlanRecord) -> Path:
         terrain = self._terrain(FlownOver(record.terrain_id, record.terrain_sha256))

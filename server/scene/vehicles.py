@@ -31,6 +31,11 @@ class Vehicles:
     def dsm(self) -> Dsm | None:
         return None if self._drawing is None else self._drawing.dsm
 
+    def place_m(self) -> F64 | None:
+        """(3,) x, y, alt_dsm of the replayed vehicle if there is one, else of the live one."""
+        pose = self._poses["replay"] or self._poses["live"]
+        return None if pose is None else pose.place_m
+
     def move(self, source: Source, pose: VehiclePose | None) -> None:
         """None: the vehicle is nowhere on this model."""
         if pose is None and self._poses[source] is None:

@@ -75,10 +75,12 @@ class SceneView:
         self._put({"cursor": self._cursor_nodes()})
 
     async def frame(self, page_id: str, target: Target) -> None:
-        """Moves the camera of one page: to the terrain, the plan, from above, the worst point, the selected POI."""
+        """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, vehicle."""
         client = self._client(page_id)
         if client is not None and self._drawn is not None:
-            _move(client, shot(self._drawn, target, aspect=client.camera.aspect), self._drawn)
+            vehicle_m = self.vehicles.place_m()
+            pose = shot(self._drawn, target, aspect=client.camera.aspect, vehicle_m=vehicle_m)
+            _move(client, pose, self._drawn)
 
     def sample_under(self, page_id: str, x: float, y: float) -> float | None:
         """The distance flown ``s_m`` at the path's place under a page's pointer; None when it points elsewhere.

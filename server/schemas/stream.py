@@ -225,10 +225,10 @@ class SetSelection(Strict):
 
 
 class FrameView(Strict):
-    """Move this page's camera: to the whole terrain, the plan, from above, or the worst point."""
+    """Move this page's camera: to the whole terrain, the plan, from above, the worst point, or the vehicle."""
 
     type: Literal["frame_view"] = "frame_view"
-    target: Literal["terrain", "plan", "top", "worst", "poi"]
+    target: Literal["terrain", "plan", "top", "worst", "poi", "vehicle"]
 
 
 ClientMessage = Annotated[

@@ -18,13 +18,12 @@ class StatePublisher:
         self._waiting: VehicleState | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._last: VehicleState | None = None
-        self._last_s = float("-inf")
+        self._last_s = self._last_position_s = float("-inf")
 
     def offer(self, state: VehicleState) -> None:
         """Latest wins. The first one, and a new position, does not wait."""
         loop = asyncio.get_running_loop()
-        moved = self._last is None or state.position_t_mono_s != self._last.position_t_mono_s
-        due_s = self._last_s + (SOONEST_S if moved else PERIOD_S)
+        due_s = self._last_position_s + SOONEST_S if self._has_moved(state) else self._last_s + PERIOD_S
         self._waiting = state
         if loop.time() >= due_s:
             self._flush()
@@ -39,8 +38,14 @@ class StatePublisher:
         self._stop_timer()
         if self._waiting is not None:
             state, self._waiting = self._waiting, None
-            self._last, self._last_s = state, asyncio.get_running_loop().time()
+            self._last_s = asyncio.get_running_loop().time()
+            if self._has_moved(state):
+                self._last_position_s = self._last_s
+            self._last = state
             self._publish(state)
+
+    def _has_moved(self, state: VehicleState) -> bool:
+        return self._last is None or state.position_t_mono_s != self._last.position_t_mono_s
 
     def _stop_timer(self) -> None:
         if self._timer is not None:

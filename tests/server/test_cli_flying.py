@@ -18,7 +18,9 @@ import pytest
 from planning.formats.wpl import write_wpl
 from planning.geotiff import write_dsm
 from planning.model import Mission
+from server.cli.fly import keep_recording
 from server.cli.upload import upload_lines
+from server.errors import StorageError
 from telemetry.messages import OnboardMission, Rounded, UploadReport
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
@@ -233,3 +235,14 @@ def until(stream, words: str) -> str:
         if words in line:
             return heard
     pytest.fail(f"{words!r} was never said:\n{heard}")
+
+
+def test_a_recording_that_cannot_be_written_where_it_should_stays(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    recording = tmp_path / "flight.mcap"
+    recording.write_bytes(b"precious")
+    with pytest.raises(StorageError, match="cannot be written") as caught:
+        keep_recording(recording, tmp_path / "gone" / "flight.mcap")
+    (kept,) = tmp_path.glob("hedgehop-kept-*/flight.mcap")
+    assert kept.read_bytes() == b"precious"
+    assert str(kept) in caught.value.advice

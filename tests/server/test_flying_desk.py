@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,10 +22,10 @@ from server.flying.work import FlightWork
 from server.jobs import Lane
 from server.library import Library
 from server.schemas import Computation, FlyState, PlanState, ServerMessage, StartFlight
-from telemetry.errors import MissionUnknownError, NoVehicleError, TransferError
+from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
 from telemetry.mavlink.storage import as_stored
 from telemetry.mavlink.verify import compare, digest
-from telemetry.messages import FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
 from telemetry.requests import Arm, Download, Operator, ReadParameters, StartAuto, StartGuided, Upload
 from telemetry.vehicle import VehicleState
 
@@ -55,6 +56,9 @@ class Vehicle:
 
     def _onboard(self) -> OnboardMission:
         return OnboardMission(self.items, 0.0, 0.0, 0.0, digest(self.items))
+
+
+QUAD = Candidate("udp/1/1", "udpin:127.0.0.1:14550", "127.0.0.1:9", 1, 1, "ardupilot", 2)
 
 
 class Made:
@@ -99,6 +103,7 @@ class Made:
             ready_to_arm=True,
             lat_deg=lat_deg,
             lon_deg=lon_deg,
+            alt_amsl_m=float(dsm.elevation_at(xy_m)[0]),
             alt_rel_home_m=0.0,
             home_lat_deg=lat_deg,
             home_lon_deg=lon_deg,
@@ -135,7 +140,7 @@ class Bench:
             tell=self._tell,
             publish_plan=self.records.append,
         )
-        self.desk.on_link(LinkStatus(0.0, state="live", mission_state="unknown"))
+        self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
 
     def _tell(self, message: ServerMessage) -> None:
         assert message.type == "fly"
@@ -229,8 +234,43 @@ def test_another_home_moves_the_heights(made: Made, tmp_path: Path) -> None:
             assert "heights were moved" in row.text
             await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
             bench.state = made.standing(north_m=20.0)
-            with pytest.raises(CheckNeededError, match="home has moved"):
+            with pytest.raises(CheckNeededError, match="was moved"):
                 await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
+
+    asyncio.run(scenario())
+
+
+def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(made: Made, tmp_path: Path) -> None:
+    def status(digest_: str, **changes: Any) -> LinkStatus:
+        now = LinkStatus(time.monotonic(), adopted=QUAD, mission_state="verified", mission_digest=digest_)
+        return replace(now, **changes)
+
+    async def scenario() -> None:
+        async with lanes() as both:
+            bench = Bench(made, tmp_path / "onboard.json", both)
+            digest_ = await bench.ready()
+            bench.desk.on_link(status(digest_))
+            bench.desk.on_link(LinkStatus(0.0, mission_state="unknown"))
+            assert bench.desk.state.preflight is not None, "a status from before the check takes nothing back"
+            others: list[dict[str, Any]] = [
+                {"adopted": replace(QUAD, id="udp/2/1", system_id=2)},
+                {"mission_state": "unknown"},
+                {"mission_digest": "another"},
+            ]
+            for changes in others:
+                bench.desk.on_link(status(digest_))
+                await bench.desk.check(ME)
+                bench.desk.on_link(status(digest_, **changes))
+                assert bench.desk.state.preflight is None
+            bench.desk.on_link(status(digest_))
+            await bench.desk.check(ME)
+            # Its home is where it took off last; what counts is where it stands.
+            bench.state = replace(made.standing(), lat_deg=made.home[0] + 1e-4)
+            with pytest.raises(CheckNeededError, match="was moved"):
+                await bench.desk.start(ME, StartFlight(digest=digest_))
+            bench.state = replace(made.standing(), autopilot="px4")
+            with pytest.raises(NotAllowedError, match="made for ArduPilot"):
+                await bench.desk.check(ME)
 
     asyncio.run(scenario())
 

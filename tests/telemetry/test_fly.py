@@ -317,6 +317,72 @@ def test_going_home_on_request_and_words_on_the_way(monkeypatch: pytest.MonkeyPa
     assert heard.states > 2
 
 
+class Deaf(Pilot):
+    """The first order to return is lost."""
+
+    async def call(self, request: Any) -> Any:
+        answer = await super().call(request)
+        if isinstance(request, ReturnHome):
+            if len(self.of(ReturnHome)) == 1:
+                raise SilentError("No answer.")
+            ended = FlightStatus(phase="interrupted", broke_off_at=3, targets=5, since_utc_s=time.time() + 1)
+            self.bus.publish(Topic.FLIGHT, ended)
+        return answer
+
+
+def test_a_return_that_is_not_obeyed_is_commanded_again_and_the_flight_watched_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(fly_module, "FOLLOW_S", 0.02)
+    pilot, heard = Deaf(SmallBus()), Heard()
+    pilot.end = FlightStatus(phase="flying", target=3, targets=5)
+
+    async def flight() -> FlyResult:
+        go_home = asyncio.Event()
+        go_home.set()
+        return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
+
+    assert not asyncio.run(flight()).completed
+    assert len(pilot.of(ReturnHome)) == 2
+    assert any("commanded again" in line for line in heard.lines)
+
+
+class Surprising(Pilot):
+    """Its vehicle takes off although the answer to the start is lost."""
+
+    async def call(self, request: Any) -> Any:
+        if isinstance(request, StartAuto):
+            self.bus.publish(Topic.VEHICLE, state_at(armed=True, landed="in_air"))
+        if isinstance(request, ReturnHome):
+            self.bus.publish(Topic.VEHICLE, state_at())
+        return await super().call(request)
+
+
+def test_a_vehicle_that_took_off_although_the_start_went_wrong_is_watched_to_the_ground(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(fly_module, "FOLLOW_S", 0.02)
+    monkeypatch.setattr(fly_module, "HEARTBEAT_S", 0.1)
+    pilot, heard = Surprising(SmallBus()), Heard()
+    pilot.refusals = [SilentError("No answer.")]
+
+    async def flight() -> FlyResult:
+        go_home = asyncio.Event()
+        go_home.set()
+        return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
+
+    with pytest.raises(SilentError, match="No answer"):
+        asyncio.run(flight())
+    assert len(pilot.of(ReturnHome)) == 1
+    assert any("the vehicle is armed" in line for line in heard.lines)
+
+
+def test_a_vehicle_of_another_connection_is_not_taken_for_this_ones() -> None:
+    pilot = Pilot(SmallBus())
+    with pytest.raises(NoVehicleError):
+        flown(pilot, replace(OPTIONS, address="tcp:127.0.0.1:5770", connect_s=0.1))
+
+
 def test_nothing_stays_subscribed() -> None:
     pilot = Pilot(SmallBus())
     flown(pilot)

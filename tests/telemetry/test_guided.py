@@ -13,6 +13,8 @@ from pymavlink import mavutil
 
 from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided import GuidedEnd, GuidedScript
+from telemetry.flight.handover import Handover
+from telemetry.flight.orders import Place
 from telemetry.mavlink.actions import Action, Done, Failed, Progress, Send
 from telemetry.messages import GuidedTarget
 from telemetry.reduce import reduce
@@ -354,3 +356,18 @@ def replay(messages: list[tuple[float, Any]], asked: StartGuided, *, from_s: flo
                 place = (action.message.lat_int, action.message.lon_int, action.message.alt)
                 out.setdefault(place, (t, action.message))
     return list(out.values())
+
+
+def test_an_order_to_hold_that_got_lost_is_given_again_though_the_vehicle_moves() -> None:
+    here = Place(-37.0, 175.0, 10.0, 800.0)
+    flying_on = VehicleState(
+        1, 1, position_t_mono_s=100.0, lat_deg=-36.9999, lon_deg=175.0, alt_rel_home_m=10.0, ground_speed_m_s=3.0
+    )
+    again = {}
+    for holds in (False, True):
+        handover = Handover(here, radius_m=0.5, holds=holds)
+        handover.sent(flying_on, 98.0)
+        again[holds] = handover.must_be_sent_again(flying_on, 100.5)
+    assert again == {False: False, True: True}
+    held = replace(flying_on, lat_deg=-37.00001)
+    assert not handover.must_be_sent_again(held, 100.5)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import threading
 from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError
-from telemetry.messages import FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
+from telemetry.messages import CommandRecord, FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
 from telemetry.requests import (
     Arm,
     Connect,
@@ -130,6 +132,77 @@ def test_a_mission_is_paused_resumed_broken_off_and_gone_on_with() -> None:
             reached = [s.target for s in bench.of(FlightStatus) if s.phase == "flying"][-4:]
             assert reached == sorted(reached)
             assert min(t for t in reached if t) >= at
+
+    run(whole)
+
+
+def test_speeds_are_set_again_and_a_replaced_mission_is_not_resumed() -> None:
+    slow = Item(178, 2, (1.0, 2.5, -1.0, 0.0), 0.0, 0.0, 0.0)
+
+    async def whole() -> None:
+        async with simulated() as (bench, simulator):
+            first, *rest = items(8)
+            report = await upload(bench, (first, slow, *rest))
+            await start(bench, StartAuto(ME, report.onboard.digest))
+            await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 3)
+            await bench.link.handle(Pause(ME))
+            await phase(bench, "paused")
+            assert simulator.vehicle.autopilot.speed_m_s is None
+            await bench.link.handle(Resume(ME))
+            await until(lambda: simulator.vehicle.autopilot.speed_m_s == 2.5)
+            await bench.link.handle(Pause(ME))
+            await phase(bench, "paused")
+            assert bench.link.vehicle is not None
+            bench.link.vehicle.onboard.forget()
+            with pytest.raises(MissionUnknownError, match="not known any more"):
+                await bench.link.handle(Resume(ME))
+            await bench.link.handle(ReturnHome(ME))
+            await phase(bench, "returning")
+
+    run(whole)
+
+
+def test_the_way_home_of_the_script_can_be_paused() -> None:
+    async def whole() -> None:
+        async with simulated(speedup=5.0) as (bench, _):
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await start(bench, StartGuided(ME, TARGETS, 10.0))
+            await phase(bench, "returning")
+            await bench.link.handle(Pause(ME))
+            await until(lambda: bench.state.mode == "BRAKE")
+            assert bench.flight.phase == "interrupted"
+
+    run(whole)
+
+
+class SlowDisk:
+    """An audit log whose disk takes its time over an upload of six items."""
+
+    def __init__(self) -> None:
+        self.goes_on = threading.Event()
+
+    def write(self, record: CommandRecord) -> object:
+        if record.words.startswith("upload 6"):
+            self.goes_on.wait(60)
+        return None
+
+
+def test_an_upload_that_waited_for_the_disk_does_not_meet_a_started_mission() -> None:
+    async def whole() -> None:
+        disk = SlowDisk()
+        options = SimOptions(LAT_DEG, LON_DEG, ALT_M, link="tcpin:127.0.0.1:0", speedup=15.0, boot_s=0.5)
+        async with flying(options) as simulator, console(audit=disk) as bench:
+            await bench.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
+            await bench.live()
+            await upload(bench)
+            late = asyncio.create_task(bench.link.handle(Upload(ME, items(4), LAT_DEG, LON_DEG, ALT_M)))
+            try:
+                await until(lambda: "upload 6 items" in bench.commands)
+                bench.link.flight.begin(5, 1.7e9)
+            finally:
+                disk.goes_on.set()
+            with pytest.raises(NotAllowedError, match="being flown"):
+                await late
 
     run(whole)
 

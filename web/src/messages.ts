@@ -852,10 +852,10 @@ export interface SetSelection {
   selection: SelectionDoc;
 }
 
-/** Move this page's camera: to the whole terrain, the plan, from above, or the worst point. */
+/** Move this page's camera: to the whole terrain, the plan, from above, the worst point, or the vehicle. */
 export interface FrameView {
   type: "frame_view";
-  target: "terrain" | "plan" | "top" | "worst" | "poi";
+  target: "terrain" | "plan" | "top" | "worst" | "poi" | "vehicle";
 }
 
 export type ServerMessage =

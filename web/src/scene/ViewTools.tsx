@@ -1,7 +1,14 @@
+import { computed } from "@preact/signals";
+import { heard } from "../store/flying";
 import { Button } from "../ui/Button";
 import type { ViewDoc } from "../messages";
 import { result, view } from "../store/state";
 import { frame, setView } from "../store/stream";
+
+/** Flown or replayed, it is somewhere. Told once: its values change twenty times a second. */
+const hasVehicle = computed(
+  () => (heard.live.value ?? heard.replay.value)?.message.state?.lat_deg != null,
+);
 
 type Layer = "show_surface" | "show_path" | "show_unknown";
 
@@ -63,6 +70,15 @@ export function ViewTools() {
           </svg>
           <span>N up</span>
         </button>
+        {hasVehicle.value && (
+          <Button
+            kind="quiet"
+            icon="drone"
+            title="Show the vehicle"
+            testid="view-vehicle"
+            onClick={() => frame("vehicle")}
+          />
+        )}
         {result.value?.worst && (
           <Button
             kind="quiet"

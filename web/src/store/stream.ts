@@ -28,6 +28,6 @@ export function setSelection(fields: Partial<SelectionDoc>): void {
   send({ type: "set_selection", selection: selection.value });
 }
 
-export type FrameTarget = "terrain" | "plan" | "top" | "worst" | "poi";
+export type FrameTarget = "terrain" | "plan" | "top" | "worst" | "poi" | "vehicle";
 
 export const frame = (target: FrameTarget) => send({ type: "frame_view", target });
