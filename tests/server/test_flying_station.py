@@ -119,10 +119,19 @@ def test_a_flight_is_uploaded_checked_flown_recorded_and_reviewed(planned: Stati
     assert review.terrain_name.startswith("Demo hillside")
 
     ok(planned.http.post("/api/review/play", json={"playing": True, "at_s": 5.0, "speed": 2.0}))
-    replayed = planned.until(lambda m: m.type == "vehicle" and m.source == "replay" and m.state is not None)
-    assert replayed.state.system_id == 1
-    wound = planned.until(lambda m: m.type == "track" and m.track.source == "replay" and len(m.track.t_s) > 1)
-    assert wound.track.t_s == sorted(wound.track.t_s)
+    # In either order.
+    replayed: dict[str, Any] = {}
+
+    def both_came(m: Any) -> bool:
+        if m.type == "vehicle" and m.source == "replay" and m.state is not None:
+            replayed["vehicle"] = m.state
+        elif m.type == "track" and m.track.source == "replay" and len(m.track.t_s) > 1:
+            replayed["track"] = m.track
+        return len(replayed) == 2
+
+    planned.until(both_came)
+    assert replayed["vehicle"].system_id == 1
+    assert replayed["track"].t_s == sorted(replayed["track"].t_s)
     assert planned.http.delete(f"/api/recordings/{doc.id}").status_code == 409
     ok(planned.http.post("/api/review/close"))
     assert planned.until(lambda m: m.type == "review").review is None

@@ -1,17 +1,26 @@
 """What tests of the bus share: running to the end within a bound, and a process that takes part."""
 
 import asyncio
+import contextlib
 import os
 import subprocess
 import sys
+import tempfile
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
 PATIENCE_S = 90.0
 ROOT = Path(__file__).resolve().parents[2]
 T = TypeVar("T")
+
+
+@contextlib.contextmanager
+def short_folder() -> Iterator[Path]:
+    """pytest's own folders have paths that may be too long for sockets."""
+    with tempfile.TemporaryDirectory(prefix="bus-", dir="/tmp") as folder:
+        yield Path(folder)
 
 
 def run(whole: Callable[[], Awaitable[T]]) -> T:

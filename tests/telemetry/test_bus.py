@@ -4,6 +4,7 @@ import asyncio
 import os
 import socket
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,12 +13,13 @@ from telemetry.bus import Bus
 from telemetry.errors import BusError
 from telemetry.messages import PlanRecord, RawFrame, ServerAlive, Topic, VehicleText
 from telemetry.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
+from tests.telemetry.bus_runs import run, short_folder
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return tmp_path / "run"
+def folder() -> Iterator[Path]:
+    with short_folder() as short:
+        yield short / "run"
 
 
 def state(system_id: int) -> VehicleState:

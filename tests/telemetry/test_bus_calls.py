@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from telemetry.requests import (
     StopRecording,
     Upload,
 )
-from tests.telemetry.bus_runs import run
+from tests.telemetry.bus_runs import run, short_folder
 
 OPERATOR = Operator("Ada", 7)
 ARM = Arm(OPERATOR)
@@ -34,8 +34,9 @@ Handler = Callable[[Any], Awaitable[object]]
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return tmp_path / "run"
+def folder() -> Iterator[Path]:
+    with short_folder() as short:
+        yield short / "run"
 
 
 def with_link(folder: Path, handler: Handler, use: Callable[[Bus], Awaitable[object]]) -> None:

@@ -9,7 +9,7 @@ import pytest
 from telemetry.bus import Bus
 from telemetry.errors import BusError
 from telemetry.messages import ServerAlive
-from tests.telemetry.bus_runs import Participant, run
+from tests.telemetry.bus_runs import Participant, run, short_folder
 
 # Publishes a number made of its name again and again, answers calls with it, and prints whom it hears.
 BODY = """
@@ -40,8 +40,9 @@ def hears(name: str) -> str:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return tmp_path / "run"
+def folder() -> Iterator[Path]:
+    with short_folder() as short:
+        yield short / "run"
 
 
 @pytest.fixture

@@ -6,9 +6,7 @@ import { result, view } from "../store/state";
 import { frame, setView } from "../store/stream";
 
 /** Flown or replayed, it is somewhere. Told once: its values change twenty times a second. */
-const hasVehicle = computed(
-  () => (heard.live.value ?? heard.replay.value)?.message.state?.lat_deg != null,
-);
+const hasVehicle = computed(() => (heard.live.value ?? heard.replay.value)?.message.state?.lat_deg != null);
 
 type Layer = "show_surface" | "show_path" | "show_unknown";
 
