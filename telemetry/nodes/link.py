@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import math
 import sys
 import time
 from pathlib import Path
@@ -21,6 +22,8 @@ from telemetry.requests import LinkRequest
 
 LOOK_EVERY_S = 0.5
 UNATTENDED_S = 60.0
+GIVEN_UP_S = 600.0
+"""Without a server, and without a word of a vehicle that was armed."""
 FIND_AGAIN_S = 30.0
 """After a restart: how long the vehicle that was adopted may take to be heard before it counts as gone."""
 
@@ -46,11 +49,11 @@ class LinkNode:
         self._link.flight.take_up(memory.flight)
 
     async def run(self) -> None:
-        """Until nobody needs it any more: no server for a minute, and no armed vehicle."""
+        """Until nobody needs it any more: no server for a minute, and no armed vehicle that can be heard."""
         while True:
             may_end = self._may_end()
             self._context.set_replaceable(may_end)
-            if may_end and self._context.unattended_s() > UNATTENDED_S:
+            if self._context.unattended_s() > (UNATTENDED_S if may_end else self._patience_s()):
                 return
             await self._remember()
             await asyncio.sleep(LOOK_EVERY_S)
@@ -61,6 +64,12 @@ class LinkNode:
             self._expected = False
             return not vehicle.state.armed
         return not self._is_expected
+
+    def _patience_s(self) -> float:
+        """With an armed vehicle: for ever while it is heard."""
+        vehicle = self._link.vehicle
+        heard_s = None if vehicle is None else vehicle.state.heartbeat_t_mono_s
+        return GIVEN_UP_S if heard_s is None or time.monotonic() - heard_s > GIVEN_UP_S else math.inf
 
     @property
     def _is_expected(self) -> bool:

@@ -28,6 +28,8 @@ WORK_EVERY_S = 0.1
 _STATUS_EVERY_S = 1.0
 _UNATTENDED_S = 60.0
 _MOST_UNREAD = 20_000
+_GIVEN_UP_S = 600.0
+"""Without a word of the vehicle, when there is no server either."""
 
 
 class RecorderNode:
@@ -39,6 +41,7 @@ class RecorderNode:
         self._disk = ThreadPoolExecutor(1, thread_name_prefix="recording")
         self._told: RecorderStatus | None = None
         self._dropped = 0
+        self._heard_mono_s = time.monotonic()
 
     async def run(self) -> None:
         """Until nobody needs it any more; a running recording is finished when this is cancelled."""
@@ -58,6 +61,8 @@ class RecorderNode:
         subscription = self._bus.subscribe("**", keep_all=True, limit=_MOST_UNREAD)
         try:
             async for topic, message in subscription:
+                if topic == Topic.VEHICLE:
+                    self._heard_mono_s = time.monotonic()
                 self._recorder.on_message(topic, message)
                 if subscription.dropped + self._recorder.dropped > self._dropped:
                     self._dropped = subscription.dropped + self._recorder.dropped
@@ -66,10 +71,14 @@ class RecorderNode:
             subscription.close()
 
     async def _work(self) -> None:
-        while self._recorder.recording or self._context.unattended_s() < _UNATTENDED_S:
+        while self._context.unattended_s() < _UNATTENDED_S or self._has_work():
             await self._write()
             self._context.set_replaceable(not self._recorder.recording)
             await asyncio.sleep(WORK_EVERY_S)
+
+    def _has_work(self) -> bool:
+        """A recording of a flight goes on without a server, but not of one that nobody has heard of for long."""
+        return self._recorder.recording and time.monotonic() - self._heard_mono_s < _GIVEN_UP_S
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()

@@ -15,6 +15,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from server.settings import default_console_dir
+from telemetry.node_lock import running_nodes
 
 # The browser renders in software while other tests keep the processors busy.
 PATIENCE_MS = 120_000
@@ -81,6 +82,13 @@ class Station:
             self._process.kill()
             self._process.communicate()
             raise AssertionError("the server did not stop within 20 s of SIGTERM") from None
+        finally:
+            self._end_nodes()
+
+    def _end_nodes(self) -> None:
+        """With an armed vehicle they outlive their server on purpose."""
+        for facts in running_nodes(self.data_dir / "run"):
+            os.kill(facts.pid, signal.SIGKILL)
 
 
 class SimulatedVehicle:
