@@ -57,9 +57,14 @@ def upload_lines(report: UploadReport) -> list[str]:
     items = f"{len(report.onboard.items)} items in {report.seconds:.1f} s"
     if not report.verified:
         return [f"NOT VERIFIED: {items}, and the vehicle holds something else", *(f"  {d}" for d in report.differences)]
-    rounded = [f"  item {r.item}: {r.field} {_value(r.sent)} is kept as {_value(r.kept)}" for r in report.rounded]
+    rounded = [
+        f"  item {r.item}: {r.field} {_value(r.field, r.sent)} is kept as {_value(r.field, r.kept)}"
+        for r in report.rounded
+    ]
     return [f"VERIFIED: {items}, read back", *rounded]
 
 
-def _value(value: float | None) -> str:
-    return "not given" if value is None else f"{value:.9g}"
+def _value(field: str, value: float | None) -> str:
+    """Vehicles keep single precision: more digits than it has are noise, but for places, which are whole numbers."""
+    digits = 10 if field in ("latitude", "longitude") else 7
+    return "not given" if value is None else f"{value:.{digits}g}"

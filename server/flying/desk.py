@@ -96,6 +96,11 @@ class FlightDesk:
         self._flight = flight
         self.refresh()
 
+    def on_disarmed(self) -> None:
+        """A flight changes what was checked before it, the battery above all."""
+        self._ready = None
+        self.refresh()
+
     def refresh(self) -> None:
         """Tells the pages, if there is anything new; also when the open plan has changed."""
         if (state := self.state) != self._told:

@@ -193,6 +193,8 @@ class Flying:
         self.live.on_state(state)
         if self.armed != was_armed:
             self._workspace.picture.again()
+        if was_armed and not state.armed:
+            self.desk.on_disarmed()
 
     async def _on_link(self, status: LinkStatus) -> None:
         self._present.tell(LinkMessage(link=status))

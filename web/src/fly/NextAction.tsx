@@ -1,6 +1,9 @@
 import { count } from "../format";
-import { fly, flight, lease, linkStatus, transfer } from "../store/flying";
+import { openReview } from "../review/commands";
+import { goTo } from "../shell/views";
+import { fly, flight, isInAir, lease, linkStatus, recorder, transfer } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { recordings } from "../store/review";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
@@ -12,7 +15,7 @@ import {
   checkStart,
   pauseFlight,
   resumeFlight,
-  resumes,
+  resumeFrom,
   startFlight,
   startSimulator,
   takeControl,
@@ -38,7 +41,7 @@ export function TransferBar() {
 }
 
 function startLabel(): string {
-  const from = resumes.value ? fly.value?.resume_from_item : null;
+  const from = resumeFrom.value;
   return from ? `Resume at item ${from}` : "Start";
 }
 
@@ -107,6 +110,27 @@ function Primary({ step }: { step: Step }) {
   }
 }
 
+/** After the landing, the short way to what was flown. */
+function LastFlight() {
+  const phase = flight.live.value?.phase;
+  const last = recordings.value?.find((recording) => recording.kind === "hedgehop");
+  const hasFlown = phase === "landed" || phase === "interrupted";
+  if (!hasFlown || !last || isInAir.value || recorder.value?.status.recording) return null;
+  return (
+    <Button
+      class="wide"
+      icon="play"
+      testid="review-flight"
+      onClick={() => {
+        goTo("review");
+        void openReview(last.id);
+      }}
+    >
+      Review this flight
+    </Button>
+  );
+}
+
 /** The next step of the flight, at the bottom of the left panel. */
 export function NextAction() {
   const step = presentStep();
@@ -116,6 +140,7 @@ export function NextAction() {
   return (
     <footer class="primary-action" data-testid="next-action" data-step={step.id}>
       <Outcome place={NEXT} />
+      <LastFlight />
       <TransferBar />
       {hint && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}

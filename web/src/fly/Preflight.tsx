@@ -6,7 +6,7 @@ import { Button, Segmented } from "../ui/Button";
 import { Icon, type IconName } from "../ui/Icon";
 import { Section } from "../ui/Section";
 import { Check } from "../ui/fields";
-import { NEXT, accept, accepted, checkStart, isAcceptable, resumes, way } from "./commands";
+import { NEXT, accept, accepted, checkStart, isAcceptable, resumeFrom, resumes, way, wayToFly } from "./commands";
 import { openChecks, unaccepted } from "./next_step";
 
 const MARKS: Record<CheckRow["state"], { icon: IconName; word: string }> = {
@@ -99,6 +99,7 @@ export function PreflightSection() {
   const state = fly.value;
   if (!adopted.value || !state || state.onboard.state !== "verified") return null;
   const { preflight } = state;
+  const goesOn = resumeFrom.value !== null;
   return (
     <Section
       id="preflight"
@@ -139,10 +140,17 @@ export function PreflightSection() {
         <Segmented
           label="Way of flying"
           testid="way"
-          value={way.value}
+          value={wayToFly.value}
           options={[
             { value: "auto", label: "AUTO", title: "The autopilot flies the mission on board" },
-            { value: "guided", label: "GUIDED", title: "Hedgehop hands over one waypoint at a time" },
+            {
+              value: "guided",
+              label: "GUIDED",
+              title: goesOn
+                ? "A flight that broke off goes on in AUTO"
+                : "Hedgehop hands over one waypoint at a time",
+              disabled: goesOn,
+            },
           ]}
           onChange={(next) => (way.value = next)}
         />

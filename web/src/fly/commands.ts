@@ -23,6 +23,11 @@ export const accepted = computed<ReadonlySet<Accepted>>(() =>
 /** Resume where the flight broke off, if it did. */
 export const resumes = signal(true);
 
+/** Item at which the next start goes on; null: it begins anew. */
+export const resumeFrom = computed(() => (resumes.value ? (fly.value?.resume_from_item ?? null) : null));
+/** A navigation script begins at the first waypoint: what broke off goes on in AUTO. */
+export const wayToFly = computed(() => (resumeFrom.value === null ? way.value : "auto"));
+
 export const isAcceptable = (code: CheckRow["code"]): code is Accepted =>
   code === "gnss" || code === "battery" || code === "rtl_height";
 
@@ -74,8 +79,12 @@ export async function checkStart(): Promise<void> {
 export async function startFlight(): Promise<void> {
   const digest = fly.value?.onboard.digest;
   if (!digest) return;
-  const from = resumes.value ? fly.value?.resume_from_item : null;
-  const body: StartFlight = { way: way.value, digest, accept: [...accepted.value], from_item: from ?? 1 };
+  const body: StartFlight = {
+    way: wayToFly.value,
+    digest,
+    accept: [...accepted.value],
+    from_item: resumeFrom.value ?? 1,
+  };
   await order({ place: NEXT, path: "/api/flight/start", body, done: "Started." });
 }
 
