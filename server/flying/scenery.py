@@ -56,9 +56,10 @@ class Scenery:
             self._placer = Placer(dsm)
             for actor in self._actors.values():
                 actor.forget()
-        for actor in self._actors.values():
+        for source, actor in self._actors.items():
             actor.move(self._stage, self._placer)
-            if with_tracks:
+            # A replay leaves states out when it runs fast or jumps; its whole line is drawn from the recording.
+            if with_tracks and source == "live":
                 actor.draw_track(self._stage, self._placer)
 
 

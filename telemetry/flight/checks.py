@@ -133,7 +133,8 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
     if not settings.steep_enough:
         text = "Close to home the vehicle climbs less on its return than the certificate takes for granted."
         return Row("rtl_height", "accept", text, "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45).")
-    return Row("rtl_height", "good", f"The vehicle returns at {height_m:.2f} m; the ways home need {_up(needed_m)} m.")
+    need = f"the ways home need {_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
+    return Row("rtl_height", "good", f"The vehicle returns at {height_m:.2f} m; {need}.")
 
 
 def battery_row(state: VehicleState, profile: VehicleProfile, predicted_s: float | None) -> Row:

@@ -204,6 +204,11 @@ def test_a_flight_from_upload_to_start(made: Made, tmp_path: Path) -> None:
             assert len(script.targets) > 5
             assert script.targets[-1].t_s is not None
 
+            bench.desk.on_disarmed()
+            assert bench.desk.state.preflight is None
+            with pytest.raises(CheckNeededError, match="not been checked"):
+                await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
+
             again = Bench(made, tmp_path / "onboard.json", both)
             again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest=uploaded.digest))
             assert again.desk.state.onboard.plan_name == "Demo flight"

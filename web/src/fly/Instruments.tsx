@@ -24,7 +24,7 @@ function Lost() {
   const pageLost = link.value === "lost";
   const seconds = silence_s.value;
   return (
-    <div class="lost" role="alert" data-testid="link-lost">
+    <div class="lost-notice" role="alert" data-testid="link-lost">
       <Icon name="warning" size={28} />
       <strong>{pageLost ? "This page has lost the server" : "Communication lost"}</strong>
       {seconds !== null && <span class="lost-seconds">{withUnit(Math.floor(seconds), "s")}</span>}

@@ -59,6 +59,11 @@ function summaryOf(preflight: PreflightDoc | null | undefined): string {
   return unaccepted(preflight.rows, accepted.value).length > 0 ? "to be accepted" : "ready";
 }
 
+/** The next action asks to mend, or to tick, what stands here. */
+const needsAttention = (preflight: PreflightDoc | null | undefined) =>
+  preflight != null &&
+  (openChecks(preflight.rows).length > 0 || unaccepted(preflight.rows, accepted.value).length > 0);
+
 function Shift({ preflight }: { preflight: PreflightDoc }) {
   if (!preflight.rereferenced || preflight.home_shift_m === null) return null;
   return (
@@ -107,6 +112,7 @@ export function PreflightSection() {
       icon="check"
       summary={isInAir.value ? "in the air" : summaryOf(preflight)}
       startsOpen={!isInAir.value}
+      isUrgent={!isInAir.value && needsAttention(preflight)}
     >
       {preflight ? (
         <>

@@ -1,6 +1,6 @@
 import { metres } from "../format";
 import { trackVersion, tracks } from "../store/flying";
-import { isReplaying } from "../store/review";
+import { review } from "../store/review";
 import { result, terrain, view } from "../store/state";
 
 function HeightScale() {
@@ -28,7 +28,8 @@ function Key({ kind, label, title }: { kind: string; label: string; title?: stri
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
 export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
-  const isReview = isReplaying.value;
+  // A recording over no known surface model is not drawn: the plan stays in view.
+  const isReview = Boolean(review.value?.terrain_name);
   const planned = result.value !== null && !isReview;
   const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;

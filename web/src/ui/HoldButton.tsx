@@ -52,19 +52,26 @@ export function HoldButton(props: Props) {
     show(0);
     if (hold.release() === "early") setWords("Hold it for one second");
   };
-  const step = (now: number) => {
-    show(hold.share(now));
-    if (hold.completes(now)) {
-      setWords("");
-      show(0);
-      act.current();
-    } else if (hold.isHeld) frame.current = requestAnimationFrame(step);
+  const finish = () => {
+    setWords("");
+    show(0);
+    act.current();
   };
-  const start = () => {
+  const step = (now_ms: number) => {
+    show(hold.share(now_ms));
+    if (hold.completes(now_ms)) finish();
+    else if (hold.isHeld) frame.current = requestAnimationFrame(step);
+  };
+  // By the time of the events: a page that draws slowly hears late of a hold that was long enough.
+  const start = (pressed_ms: number) => {
     if (disabled || hold.isHeld) return;
     setWords("Keep holding");
-    hold.press(performance.now());
+    hold.press(pressed_ms);
     frame.current = requestAnimationFrame(step);
+  };
+  const letGo = (released_ms: number) => {
+    if (!disabled && hold.completes(released_ms)) finish();
+    stop();
   };
   useEffect(() => {
     if (words === "" || words === "Keep holding") return undefined;
@@ -81,17 +88,17 @@ export function HoldButton(props: Props) {
     const element = event.currentTarget as HTMLElement;
     // A finger is captured by what it touched: only without that does leaving the button show.
     if (element.hasPointerCapture(event.pointerId)) element.releasePointerCapture(event.pointerId);
-    start();
+    start(event.timeStamp);
   };
   const onKeyDown = (event: KeyboardEvent) => {
     if (!isHoldKey(event)) return;
     event.preventDefault();
-    if (!event.repeat) start();
+    if (!event.repeat) start(event.timeStamp);
   };
   const onKeyUp = (event: KeyboardEvent) => {
     if (!isHoldKey(event)) return;
     event.preventDefault();
-    stop();
+    letGo(event.timeStamp);
   };
   const onClick = (event: MouseEvent) => {
     // Pointers count their clicks, and the keys' own are held back above.
@@ -111,8 +118,8 @@ export function HoldButton(props: Props) {
         aria-describedby={`${id}-how`}
         data-testid={testid}
         onPointerDown={onPointerDown}
-        onPointerUp={stop}
-        onPointerLeave={stop}
+        onPointerUp={(event) => letGo(event.timeStamp)}
+        onPointerLeave={(event) => letGo(event.timeStamp)}
         onPointerCancel={stop}
         onContextMenu={(event) => event.preventDefault()}
         onKeyDown={onKeyDown}

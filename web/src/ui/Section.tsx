@@ -12,6 +12,8 @@ interface Props {
   /** What the section holds, in a few words, read while it is closed. */
   summary?: string;
   startsOpen?: boolean;
+  /** Something in it must be seen: it cannot be closed meanwhile. */
+  isUrgent?: boolean;
   children: ComponentChildren;
 }
 
@@ -27,9 +29,10 @@ function consequence(id: string): ErrorDoc | null {
 }
 
 /** A collapsible part of the left panel; errors of its edits appear at its top, and open it. */
-export function Section({ id, title, icon, summary, startsOpen = false, children }: Props) {
+export function Section({ id, title, icon, summary, startsOpen = false, isUrgent = false, children }: Props) {
   const wrong = consequence(id);
-  const open = sectionIsOpen(id, startsOpen) || errors.value[id] !== undefined || wrong !== null;
+  const isWrong = errors.value[id] !== undefined || wrong !== null;
+  const open = sectionIsOpen(id, startsOpen) || isUrgent || isWrong;
   return (
     <section class={`section ${open ? "open" : ""}`} data-section={id} data-testid={`section-${id}`}>
       <h2>
