@@ -6,7 +6,17 @@ import { Button, Segmented } from "../ui/Button";
 import { Icon, type IconName } from "../ui/Icon";
 import { Section } from "../ui/Section";
 import { Check } from "../ui/fields";
-import { NEXT, accept, accepted, checkStart, isAcceptable, resumeFrom, resumes, way, wayToFly } from "./commands";
+import {
+  NEXT,
+  accept,
+  accepted,
+  checkStart,
+  isAcceptable,
+  resumeFrom,
+  resumes,
+  way,
+  wayToFly,
+} from "./commands";
 import { openChecks, unaccepted } from "./next_step";
 
 const MARKS: Record<CheckRow["state"], { icon: IconName; word: string }> = {
