@@ -20,7 +20,7 @@ STEP_S = 0.005
 STEPS_PER_LOOK = 4
 """The ground is looked up every 20 ms: 0.1 m at 5 m/s."""
 GENTLE_M_S = 2.5
-"""A slower touchdown, while landing, is one."""
+"""A slower touch is no crash while it lands, nor while it takes off beside a small step of the ground."""
 STEEP_M = 0.5
 """Ground that stands this far above the feet was hit from the side."""
 
@@ -111,7 +111,7 @@ class SimulatedVehicle:
         self._resting = True
         self.autopilot.say(6, f"SIM Hit ground at {math.hypot(*v):.6f} m/s")
         gentle = abs(v[2]) < GENTLE_M_S and math.hypot(v[0], v[1]) < GENTLE_M_S and under_m < STEEP_M
-        if self.autopilot.flying and not (gentle and stage == "landing"):
+        if self.autopilot.flying and not (gentle and stage in ("takeoff", "landing")):
             self.autopilot.crash("Crash: Disarming: hit the ground")
         if under_m >= STEEP_M:
             self._ground_m = self.truth.p_neu[2]

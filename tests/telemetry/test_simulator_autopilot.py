@@ -341,6 +341,29 @@ def test_flying_into_something_is_the_end() -> None:
     assert bench.vehicle.truth.p_neu[0] == pytest.approx(20, abs=0.3)
 
 
+class _Kerb:
+    """A step of 0.1 m that the vehicle drifts onto while it lifts off."""
+
+    def __init__(self) -> None:
+        self._looks = 0
+
+    def up_m(self, north_m: float, east_m: float) -> float:
+        self._looks += 1
+        return 0.1 if self._looks > 5 else 0.0
+
+
+def test_a_step_beside_the_take_off_is_no_crash() -> None:
+    bench = Bench(SimulatedVehicle(HOME, gnss="perfect", boot_s=0.5, ground=_Kerb()))
+    bench.advance(1)
+    bench.command(SET_MODE, 1, GUIDED)
+    bench.command(ARM, 1)
+    bench.command(TAKEOFF, 0, 0, 0, 0, 0, 0, 10)
+    bench.until(lambda: bench.vehicle.autopilot.stage == "flight", 60)
+    assert any(text.startswith("SIM Hit ground") for text in bench.texts())
+    assert "Crash: Disarming: hit the ground" not in bench.texts()
+    assert bench.vehicle.truth.p_neu[2] == pytest.approx(10, abs=1.0)
+
+
 def test_it_flies_by_its_estimate_not_by_the_truth() -> None:
     vehicle = SimulatedVehicle(HOME, gnss="standalone", boot_s=0.5, seed=3)
     bench = Bench(vehicle)
