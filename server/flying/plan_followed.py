@@ -28,7 +28,7 @@ class PlanFollowed:
 
     def want(self, record: PlanRecord | None) -> None:
         """None: nothing is known of what is on board."""
-        if self._key(record) != self._made:
+        if not _same(self._key(record), self._made):
             self._wanted = record
             self._wake.set()
 
@@ -56,3 +56,7 @@ class PlanFollowed:
         if terrain is None:
             return Follower(over=self._open_dsm())
         return Follower(Followed.of(record, self._library.load_terrain(terrain.id)))
+
+
+def _same(key: tuple[str, Dsm | None], made: tuple[str, Dsm | None] | None) -> bool:
+    return made is not None and key[0] == made[0] and key[1] is made[1]
