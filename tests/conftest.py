@@ -11,8 +11,15 @@ from hypothesis import settings
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 
+LONGEST_ID = 80
+
 ROOT = Path(__file__).resolve().parent.parent
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Whole files stand in no test's name: it is told apart by their size."""
+    return f"{len(val)}-long" if isinstance(val, bytes | str) and len(val) > LONGEST_ID else None
 
 
 @pytest.fixture(scope="session")

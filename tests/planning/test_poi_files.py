@@ -23,7 +23,7 @@ def kml(body: str) -> bytes:
 def kmz(text: bytes, name: str = "doc.kml") -> bytes:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(name, text)
+        archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)  # without the time of day
     return packed.getvalue()
 
 
