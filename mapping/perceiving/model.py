@@ -1,0 +1,121 @@
+"""What goes into perception and what comes out of it. Times are those of one monotonic clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.alerts import AlertEvent
+from mapping.obstacles import Found
+from mapping.poses import Pose
+from mapping.radar_targets import Variant
+
+Sensor = Literal["radar", "vision", "ranges"]
+State = Literal["waiting", "running", "blind", "frozen", "stale"]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Of one sensor's perception. Defaults: Bigazzi 2022 and Miccinesi 2022, for the radar."""
+
+    depth_m: float = 10.0
+    fov_rad: float = 24 * np.pi / 180
+    height_m: float = 2.0
+    resolution_m: float = 1.0
+    paper_bare: bool = False
+    """As the papers: no known ground, no corridor, every target believed at once."""
+    radar_variant: Variant = "heading_only"
+    vehicle_radius_m: float = 0.5
+    position_error_m: float = 0.3
+    brake_m_s2: float = 2.5
+    memory_limit_bytes: int = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class RadarScan:
+    t_mono_s: float
+    number: int
+    xyz_m: NDArray[np.floating]
+    """(N, 3) body frame"""
+    radial_speed_m_s: NDArray[np.floating]
+    """(N,) positive: moving away"""
+    snr_db: NDArray[np.floating]
+    """(N,)"""
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cloud:
+    t_mono_s: float
+    number: int
+    xyz_m: NDArray[np.floating]
+    """(N, 3) body frame"""
+    source: str = ""
+    voxel_m: float = 0.0
+    """Edge of the voxels that it was thinned to on board; 0: not thinned."""
+
+
+@dataclass(frozen=True, slots=True)
+class RangeScan:
+    t_mono_s: float
+    number: int
+    bearing_rad: NDArray[np.floating]
+    """(N,) clockwise from the nose"""
+    elevation_rad: NDArray[np.floating]
+    """(N,) above the horizontal plane"""
+    range_m: NDArray[np.floating]
+    """(N,)"""
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPose:
+    """Where the camera's own SLAM believes to be, in its own frame: z up, origin and heading arbitrary."""
+
+    t_mono_s: float
+    position_m: tuple[float, float, float]
+    q_wxyz: tuple[float, float, float, float]
+    tracking: Literal["good", "poor", "lost"] = "good"
+
+
+@dataclass(frozen=True, slots=True)
+class SearchedRegion:
+    """The sector ahead, as it was for this frame."""
+
+    enu_m: tuple[float, float, float]
+    heading_rad: float
+    depth_m: float
+    fov_rad: float
+    height_m: float
+    occupied: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FrameResult:
+    """What one frame, or the passing of time, has come to."""
+
+    t_mono_s: float
+    state: State
+    text: str
+    """For the operator, empty while running."""
+    accepted: bool
+    """The frame is in the map."""
+    dropped_because: str | None = None
+    pose: Pose | None = None
+    points: int = 0
+    """After the gates."""
+    region: SearchedRegion | None = None
+    corridor_m: float = 0.0
+    corridor_occupied: bool = False
+    obstacles: tuple[Found, ...] = ()
+    """In region and corridor, nearest first, at most 16."""
+    sweep_m: tuple[float | None, ...] = ()
+    alerts: tuple[AlertEvent, ...] = ()
+    divergence_m: float | None = None
+
+    def with_alerts(self, more: list[AlertEvent], *, divergence_m: float | None) -> FrameResult:
+        """The same, with what else is to be told."""
+        return replace(self, alerts=(*self.alerts, *more), divergence_m=divergence_m)

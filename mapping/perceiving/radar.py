@@ -1,0 +1,89 @@
+"""Perception from the radar: a global map of everything it has seen, at the vehicle's GNSS position."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.perceiving.base import Perception
+from mapping.perceiving.model import FrameResult, RadarScan, Settings
+from mapping.perceiving.radar_evidence import RadarEvidence, side_lobes
+from mapping.poses import Pose
+from mapping.radar_targets import Gate, in_gate, polar, to_enu
+
+F64 = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+MOST_TARGETS = 2000
+"""In one frame; the AWR1843 sends a few hundred at most."""
+FASTEST_M_S = 200.0
+SNR_LIMITS_DB = (-30.0, 120.0)
+
+
+class RadarPerception(Perception):
+    """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, is "explained"."""
+
+    name = "radar"
+    reach_down = math.tan(Gate().elevation_high_rad)
+    """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
+
+    def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
+        super().__init__(settings, alert_prefix=alert_prefix)
+        self.gate = Gate()
+        self._evidence = RadarEvidence()
+
+    def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
+        """Take one frame; never raises for what is in it."""
+        refusal = self._refusal(scan, now_mono_s)
+        if refusal is not None:
+            return self._drop(scan, refusal, now_mono_s)
+        if not self._has_fix:
+            return self._drop(scan, "no GNSS position", now_mono_s)
+        pose = self.track.at(scan.t_mono_s)
+        if isinstance(pose, str):
+            return self._drop(scan, pose, now_mono_s)
+        columns = self._columns(scan)
+        if columns is None:
+            return self._drop(scan, "columns of different length", now_mono_s)
+        xyz, speed, snr, ghost = self._kept(*columns)
+        self._insert(scan.t_mono_s, pose, xyz, speed, snr, ghost)
+        return self._look(scan.t_mono_s, now_mono_s, pose, len(xyz))
+
+    def _columns(self, scan: RadarScan) -> tuple[F64, F64, F64] | None:
+        xyz = np.asarray(scan.xyz_m, np.float64)
+        speed, snr = np.asarray(scan.radial_speed_m_s, np.float64), np.asarray(scan.snr_db, np.float64)
+        if xyz.ndim != 2 or xyz.shape[1] != 3 or speed.shape != (len(xyz),) or snr.shape != (len(xyz),):
+            return None
+        return xyz, speed, snr
+
+    def _kept(self, xyz: F64, speed: F64, snr: F64) -> tuple[F64, F64, F64, Bools]:
+        """Believable numbers inside the gate, and which of them are side lobes' ghosts; the rest is counted."""
+        finite = np.isfinite(xyz).all(axis=1) & np.isfinite(speed) & np.isfinite(snr)
+        self._count("points: not finite", len(xyz) - int(finite.sum()))
+        xyz, speed, snr = xyz[finite][:MOST_TARGETS], speed[finite][:MOST_TARGETS], snr[finite][:MOST_TARGETS]
+        range_m = np.linalg.norm(xyz, axis=1)
+        good = (range_m >= self.gate.nearest_m) & (range_m <= self.gate.farthest_m)
+        good &= (np.abs(speed) <= FASTEST_M_S) & (snr >= SNR_LIMITS_DB[0]) & (snr <= SNR_LIMITS_DB[1])
+        self._count("points: absurd range, speed or strength", len(good) - int(good.sum()))
+        xyz, speed, snr = xyz[good], speed[good], snr[good]
+        targets = polar(xyz)
+        inside = in_gate(targets, self.gate)
+        self._count("points: outside the gate", len(inside) - int(inside.sum()))
+        return xyz[inside], speed[inside], snr[inside], side_lobes(targets, snr)[inside]
+
+    def _insert(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> None:
+        points = to_enu(xyz, pose.position_enu_m, pose.rotation_enu_body, pose.heading_rad, self.settings.radar_variant)
+        if self.settings.paper_bare:
+            self.map.insert_hits(points)
+            return
+        weight = self._evidence.weights(polar(xyz), snr, speed, pose, self._known_ground)
+        believed, earlier = self._evidence.judge(t_mono_s, points, np.where(ghost, 0.0, weight))
+        self.map.insert_hits(points, explained=~believed)
+        if len(earlier):
+            self.map.mark_explained(np.floor(earlier / self.map.resolution_m).astype(np.int32), False)
+
+    def _forget(self) -> None:
+        super()._forget()
+        self._evidence.clear()

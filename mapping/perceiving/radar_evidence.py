@@ -1,0 +1,175 @@
+"""Which radar targets are believed: what known ground, noise and side lobes cannot account for, seen more than once."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.ground import GroundGrid
+from mapping.ground_beams import BeamShape
+from mapping.poses import Pose
+from mapping.radar_targets import Polar
+
+F64 = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceParams:
+    """Of an AWR1843 and of ground at 77 GHz.
+
+    The rule of known ground alone (a target whose beam cell meets the surface model is explained) would also explain
+    a mast that stands on it, since the radar hardly tells elevations; and it would not explain the many echoes of
+    ground below the gate that the error of the elevation brings into it. How strong a target is tells both apart.
+    """
+
+    beam: BeamShape = field(default_factory=BeamShape)
+    rated_range_m: float = 120.0
+    rated_snr_db: float = 17.8
+    """Mean, of 1 m2 straight ahead at the rated range."""
+    side_6db_rad: float = math.radians(50.0)
+    """Off the axis in azimuth where one antenna's gain is down by 6 dB."""
+    ground_db: float = -13.0
+    """Cross section of ground over the area it shows; earth is -16, bush -11."""
+    above_ground: float = 10.0
+    """So many times stronger than the mean of the ground in its cell no fading echo of ground below the gate is."""
+    above_met_ground: float = 30.0
+    """The same where the ground itself reaches into the gate: rocks, walls and known trees among it."""
+    least_m2: float = 0.01
+    """Nothing smaller is an obstacle that is seen once or twice; noise at close range is far smaller."""
+    low_m: float = 2.0
+    """Above known ground; lower, while it takes off and lands, every echo grazes it and nothing is believed."""
+    elevation_error_rad: float = math.radians(21.0)
+    """Three sigma."""
+    side_lobe_sine: float = 0.357
+    side_lobe_width_sine: float = 0.07
+    side_lobe_range_m: float = 1.5
+    side_lobe_below_db: float = 2.0
+    speed_cell_m_s: float = 0.31
+    speed_error: float = 0.05
+    """Share of the vehicle's speed: its direction and the target's are not known any better."""
+    folded_m_s: float = 67 * 0.31
+    azimuth_sigma_rad: float = math.radians(1.0)
+    """Straight ahead; beside it grows as 1 / cos."""
+    most_aside_m: float = 1.3
+    """A target that may be farther off its place than this (one sigma) is not believed before it is seen from nearer:
+    the map keeps it for good, in a voxel of 1 m."""
+    same_place_m: float = 1.5
+    """Targets within so much of each other, seen from above, are the same thing."""
+    memory_s: float = 1.5
+    enough: float = 2.0
+    """Frames in which a thing must have been seen; doubtful ones count half."""
+
+
+class RadarEvidence:
+    """Remembers targets for a moment, and for good the places that are believed, as columns one metre wide."""
+
+    def __init__(self, params: EvidenceParams | None = None) -> None:
+        self._params = params or EvidenceParams()
+        self.clear()
+
+    def clear(self) -> None:
+        self._recent: deque[tuple[float, F64, F64]] = deque()
+        self._believed: set[tuple[int, int]] = set()
+
+    def judge(self, t_mono_s: float, points_enu: F64, weight: F64) -> tuple[Bools, F64]:
+        """Targets (N, 3) of a frame and the weight of each -> which are believed, and earlier ones that are now.
+
+        The first is (N,), the second (M, 3).
+        """
+        p = self._params
+        while self._recent and self._recent[0][0] < t_mono_s - p.memory_s:
+            self._recent.popleft()
+        kept = weight > 0
+        self._recent.append((t_mono_s, points_enu[kept], weight[kept]))
+        score = np.zeros(len(points_enu))
+        for _, earlier, weights in self._recent:
+            score += _heaviest_near(points_enu, earlier, weights, p.same_place_m)
+        sure = kept & (score >= p.enough)
+        fresh = self._believe(points_enu[sure])
+        believed = sure | np.array([self._column(q) in self._believed for q in points_enu], np.bool_)
+        return believed, self._earlier_near(fresh)
+
+    def _believe(self, points: F64) -> F64:
+        """Those of which the column is believed only now."""
+        fresh = [q for q in points if self._column(q) not in self._believed]
+        self._believed.update(self._column(q) for q in fresh)
+        return np.array(fresh).reshape(-1, 3)
+
+    def _earlier_near(self, fresh: F64) -> F64:
+        if not len(fresh):
+            return fresh
+        near = [
+            earlier[_heaviest_near(earlier, fresh, np.ones(len(fresh)), self._params.same_place_m) > 0]
+            for _, earlier, _ in list(self._recent)[:-1]
+        ]
+        return np.concatenate([np.empty((0, 3)), *near])
+
+    def _column(self, point: F64) -> tuple[int, int]:
+        return math.floor(point[0]), math.floor(point[1])
+
+    def weights(self, targets: Polar, snr_db: F64, radial_speed_m_s: F64, pose: Pose, ground: GroundGrid | None) -> F64:
+        """(N,) what each target counts: 1 unaccounted for, 0.5 doubtful, 0 accounted for."""
+        p = self._params
+        if ground is not None and pose.position_enu_m[2] - ground.up(pose.position_enu_m[None, :])[0] < p.low_m:
+            return np.zeros(len(snr_db))
+        size_m2 = self._cross_section_m2(targets, snr_db)
+        gaps, ground_m2 = np.full(len(size_m2), np.inf), np.zeros(len(size_m2))
+        if ground is not None:
+            gaps, shown_m2 = self._expected(targets, pose, ground)
+            ground_m2 = shown_m2 * 10 ** (p.ground_db / 10)
+        times = np.where(gaps <= 0.0, p.above_met_ground, p.above_ground)
+        strong = size_m2 > np.maximum(p.least_m2, times * ground_m2)
+        fixed = self._is_fixed(targets, radial_speed_m_s, pose)
+        free = gaps > p.elevation_error_rad
+        aside_m = targets.range_m * p.azimuth_sigma_rad / np.maximum(np.cos(targets.azimuth_rad), 0.3)
+        weight = np.where(strong, np.where(fixed, 1.0, 0.5), np.where(free & fixed, 0.5, 0.0))
+        return np.where(aside_m <= p.most_aside_m, weight, 0.0)
+
+    def _expected(self, targets: Polar, pose: Pose, ground: GroundGrid) -> tuple[F64, F64]:
+        """Of the ground: gap and area in the targets' cells."""
+        farthest_m = float(targets.range_m.max(initial=0.0))
+        fan = ground.fan(pose.position_enu_m, pose.rotation_enu_body, farthest_m=farthest_m, shape=self._params.beam)
+        return fan.look(targets.azimuth_rad, targets.range_m)
+
+    def _cross_section_m2(self, targets: Polar, snr_db: F64) -> F64:
+        """From the radar equation, as if straight ahead in elevation."""
+        p = self._params
+        off = np.minimum(np.abs(targets.azimuth_rad) / p.side_6db_rad, 1.0)
+        db = snr_db - p.rated_snr_db + 40 * np.log10(targets.range_m / p.rated_range_m) + 12 * off**2
+        return 10 ** (np.clip(db, -100, 100) / 10)
+
+    def _is_fixed(self, targets: Polar, radial_speed_m_s: F64, pose: Pose) -> Bools:
+        """Whether a target's radial speed is that of a thing that stands still."""
+        p = self._params
+        a = targets.azimuth_rad + pose.heading_rad
+        v = pose.velocity_enu_m_s
+        expected = -(v[0] * np.sin(a) + v[1] * np.cos(a)) * np.cos(targets.elevation_rad)
+        off = np.abs(np.remainder(radial_speed_m_s - expected + p.folded_m_s / 2, p.folded_m_s) - p.folded_m_s / 2)
+        climbing = abs(v[2]) * math.sin(p.elevation_error_rad)
+        return off <= 1.5 * p.speed_cell_m_s + p.speed_error * float(np.linalg.norm(v)) + climbing
+
+
+def side_lobes(targets: Polar, snr_db: F64, params: EvidenceParams | None = None) -> Bools:
+    """(N,) Which targets are ghosts: at the range of a stronger one, where its first side lobe looks.
+
+    Give it all targets of a frame: the stronger one may itself have been measured outside the gate.
+    """
+    p = params or EvidenceParams()
+    sine = np.sin(targets.azimuth_rad)
+    same = np.abs(targets.range_m[:, None] - targets.range_m[None, :]) <= p.side_lobe_range_m
+    aside = np.abs(np.abs(sine[:, None] - sine[None, :]) - p.side_lobe_sine) <= p.side_lobe_width_sine
+    return np.any(same & aside & (snr_db[None, :] > snr_db[:, None] + p.side_lobe_below_db), axis=1)
+
+
+def _heaviest_near(points: F64, others: F64, weights: F64, within_m: float) -> F64:
+    """(N,) largest weight among ``others`` within so much of each point, seen from above; 0 where none is."""
+    if not len(others):
+        return np.zeros(len(points))
+    e = points[:, None, 0] - others[None, :, 0]
+    n = points[:, None, 1] - others[None, :, 1]
+    return np.max(np.where(e * e + n * n <= within_m * within_m, weights[None, :], 0.0), axis=1)

@@ -1,0 +1,231 @@
+"""A sparse occupancy map of any extent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.voxels import query, store
+from mapping.voxels.changes import Changes
+from mapping.voxels.checks import (
+    checked_model,
+    checked_origin,
+    checked_points,
+    checked_range,
+    checked_size,
+    checked_truths,
+)
+from mapping.voxels.marks import NO_GRID, Grid, mark_points
+from mapping.voxels.rays import mark_rays
+from mapping.voxels.update import apply_blocks, apply_grid, assign, mark_explained
+
+F64 = NDArray[np.float64]
+LARGEST_GRID = 512
+"""Voxels a side: 134 MB are set aside, of which a scan fills what its rays cross."""
+
+
+class VoxelMap:
+    """Occupancy in log-odds by OctoMap's rules (Hornung 2013), as both papers keep their maps.
+
+    Each voxel is updated once per scan, hits before misses, log-odds clamped; voxels are half-open cubes of
+    ``resolution_m`` with a corner at the origin, key ``floor(enu / resolution_m)``. ``prob_hit``, ``prob_miss`` and
+    ``clamp`` are OctoMap's; a voxel is occupied when its probability is above ``occupied`` (Bigazzi 2022: 0.5).
+
+    The map holds ``memory_limit_bytes`` at most. What finds no room is refused and counted; what is known goes on being
+    updated. With ``reach_m`` a resolution at which a quarter of the ball of that radius (what a wide camera sees at
+    once) does not fit is refused with CapacityError, which names the resolution that does.
+
+    Lookups may run in another thread while a scan is put in; changing the map takes one thread at a time.
+    """
+
+    def __init__(
+        self,
+        *,
+        resolution_m: float,
+        prob_hit: float = 0.7,
+        prob_miss: float = 0.4,
+        clamp: tuple[float, float] = (0.12, 0.97),
+        occupied: float = 0.5,
+        memory_limit_bytes: int = 1_000_000_000,
+        reach_m: float | None = None,
+    ) -> None:
+        checked_size(resolution_m, reach_m, memory_limit_bytes)
+        self._model = checked_model(prob_hit, prob_miss, clamp, occupied)
+        self._store = store.make_store(memory_limit_bytes)
+        self._resolution_m = float(resolution_m)
+        self._marks = np.zeros(0, np.uint8)
+        self._emptied_at = 0
+
+    def insert(
+        self,
+        points_enu: ArrayLike,
+        *,
+        origin_enu: ArrayLike,
+        max_range_m: float,
+        explained: ArrayLike | None = None,
+        discretize: bool = True,
+    ) -> None:
+        """One scan: hits where ``points_enu`` (N, 3) lie, misses on the way from ``origin_enu`` (3,) to them.
+
+        Beyond ``max_range_m`` a ray is carved up to there and hits nothing. ``explained`` (N,) is each point's verdict,
+        None: all unexplained. ``discretize`` sends one ray per voxel, to its centre, and judges the range there
+        (OctoMap's option of that name); without it every point has a ray of its own. Points that are not finite or
+        more than 2^30 voxels from the map's origin are left out and counted. Raises ParameterError.
+        """
+        points = checked_points(points_enu)
+        origin = checked_origin(origin_enu, self._resolution_m)
+        reach_m = checked_range(max_range_m, self._resolution_m)
+        ends = np.empty((max(1, len(points)), 3))
+        grid = self._grid_around(origin, reach_m)
+        truths = checked_truths(explained, len(points))
+        store.begin_scan(self._store)
+        n_ends = mark_points(self._store, grid, points, truths, self._resolution_m, origin, reach_m, discretize, ends)
+        reached = mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
+        if grid.side:
+            apply_grid(self._store, self._model, grid, reached)
+        else:
+            apply_blocks(self._store, self._model)
+
+    def insert_hits(self, points_enu: ArrayLike, *, explained: ArrayLike | None = None) -> None:
+        """One scan without misses: the radar's map keeps all it has seen (Bigazzi 2022)."""
+        points = checked_points(points_enu)
+        truths = checked_truths(explained, len(points))
+        no_rays = np.empty((0, 3))
+        store.begin_scan(self._store)
+        mark_points(self._store, NO_GRID, points, truths, self._resolution_m, np.zeros(3), math.inf, False, no_rays)
+        apply_blocks(self._store, self._model)
+
+    def assign(self, keys: ArrayLike, occupied: ArrayLike) -> None:
+        """Sets voxels (N, 3) to the clamp's upper bound where ``occupied`` (N,), else to its lower one."""
+        centres = (np.asarray(keys, dtype=np.int64).reshape(-1, 3) + 0.5) * self._resolution_m
+        truths = np.ascontiguousarray(np.broadcast_to(np.asarray(occupied, dtype=np.bool_), len(centres)))
+        assign(self._store, self._model, centres, truths, self._resolution_m)
+
+    def mark_explained(self, keys: ArrayLike, explained: ArrayLike) -> None:
+        """Known voxels (N, 3) become explained or not, ``explained`` (N,) or one truth; others are passed over."""
+        numbers = query.voxels_of(self._store, self.centres(keys), self._resolution_m)
+        truths = np.broadcast_to(np.asarray(explained, dtype=np.bool_), numbers.shape)
+        mark_explained(self._store, self._model, numbers, np.ascontiguousarray(truths))
+
+    def probability(self, points_enu: ArrayLike) -> F64:
+        """(N,) occupancy of the voxels that points (N, 3) lie in; NaN where never seen."""
+        numbers = self._numbers(points_enu)
+        _, log_odds, _ = query.describe(self._store, np.maximum(numbers, 0))
+        return np.where(numbers >= 0, _probability(log_odds), np.nan)
+
+    def explained(self, points_enu: ArrayLike) -> NDArray[np.bool_]:
+        """(N,) whether points (N, 3) lie in explained voxels; False where never seen."""
+        numbers = self._numbers(points_enu)
+        _, _, explained = query.describe(self._store, np.maximum(numbers, 0))
+        return explained & (numbers >= 0)
+
+    def occupied(self, *, explained: bool | None = None) -> F64:
+        """(N, 3) centres of occupied voxels: all, or only those that are ``explained`` or not."""
+        return self.centres(self.occupied_keys(explained=explained))
+
+    def occupied_keys(self, *, explained: bool | None = None) -> NDArray[np.int32]:
+        """(N, 3)"""
+        mask = store.OCCUPIED if explained is None else store.OCCUPIED | store.EXPLAINED
+        value = store.OCCUPIED | (store.EXPLAINED if explained else 0)
+        return query.describe(self._store, query.list_voxels(self._store, mask, value))[0]
+
+    def known(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]:
+        """Keys (N, 3), probability (N,) and explained (N,) of all voxels ever seen."""
+        numbers = query.list_voxels(self._store, store.KNOWN, store.KNOWN)
+        keys, log_odds, explained = query.describe(self._store, numbers)
+        return keys, _probability(log_odds), explained
+
+    def changed_since(self, revision: int, *, ever_hit_only: bool = False) -> Changes:
+        """Voxels that changed after ``revision``; all there are when the map was emptied or too much changed since.
+
+        ``ever_hit_only`` leaves out those that no point has ever lain in: free space, most of what a scan with rays
+        changes, and nothing that anybody draws.
+        """
+        now = self.revision
+        whole = revision < max(self._emptied_at, now - len(self._store.log)) or revision > now
+        if whole:
+            wanted = store.KNOWN | (store.EVER_HIT if ever_hit_only else 0)
+            numbers = query.list_voxels(self._store, wanted, wanted)
+        else:
+            numbers = query.list_changes(self._store, revision, ever_hit_only)
+        keys, log_odds, explained = query.describe(self._store, numbers)
+        return Changes(keys, _probability(log_odds), explained, now, whole)
+
+    def clear(self) -> None:
+        """Forgets all voxels and what was refused; the memory is kept for those to come."""
+        store.empty(self._store)
+        self._emptied_at = self.revision
+
+    def centres(self, keys: ArrayLike) -> F64:
+        """(N, 3) of voxels by key (N, 3)."""
+        return (np.asarray(keys, dtype=np.float64).reshape(-1, 3) + 0.5) * self._resolution_m
+
+    @property
+    def resolution_m(self) -> float:
+        return self._resolution_m
+
+    @property
+    def clamp_log_odds(self) -> tuple[float, float]:
+        return float(self._model.lowest), float(self._model.highest)
+
+    @property
+    def revision(self) -> int:
+        """Grows with every change of a voxel; the same as before: nothing has changed."""
+        return int(self._store.counts[store.REVISION])
+
+    @property
+    def voxel_count(self) -> int:
+        """Known voxels, free or occupied."""
+        return int(self._store.counts[store.N_KNOWN])
+
+    @property
+    def occupied_count(self) -> int:
+        return int(self._store.counts[store.N_OCCUPIED])
+
+    @property
+    def explained_count(self) -> int:
+        """Of the occupied ones."""
+        return int(self._store.counts[store.N_EXPLAINED])
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory in use; what was once filled stays in use."""
+        return store.used_bytes(self._store)
+
+    @property
+    def is_full(self) -> bool:
+        """No further block of voxels finds room."""
+        return int(self._store.counts[store.N_BLOCKS]) == len(self._store.keys)
+
+    @property
+    def refused_updates(self) -> int:
+        """Hits and misses of voxels that found no room, since the map was last emptied."""
+        return int(self._store.counts[store.N_REFUSED])
+
+    @property
+    def rejected_points(self) -> int:
+        """Points that were not finite, or too far out for a key."""
+        return int(self._store.counts[store.N_REJECTED])
+
+    @property
+    def blocks(self) -> store.Store:
+        """The arrays, for kernels of this floor that look things up themselves."""
+        return self._store
+
+    def _numbers(self, points_enu: ArrayLike) -> NDArray[np.int64]:
+        return query.voxels_of(self._store, checked_points(points_enu), self._resolution_m)
+
+    def _grid_around(self, origin: F64, reach_m: float) -> Grid:
+        side = store.SIDE * (2 * math.ceil(reach_m / self._resolution_m / store.SIDE) + 4)
+        if side > LARGEST_GRID:
+            return NO_GRID
+        if len(self._marks) != side**3:
+            self._marks = np.zeros(side**3, np.uint8)
+        lowest = np.floor((origin - reach_m) / self._resolution_m / store.SIDE).astype(np.int64) - 1
+        return Grid(self._marks, side, *(lowest * store.SIDE).tolist())
+
+
+def _probability(log_odds: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.float32(1.0) / (np.float32(1.0) + np.exp(-log_odds))

@@ -1,0 +1,129 @@
+"""First step of a scan: marks voxels in which points lie, and collects the ends of the rays, one per voxel."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mapping.voxels.store import (
+    HIT,
+    IN_BLOCK,
+    N_REFUSED,
+    N_REJECTED,
+    SIDE_BITS,
+    UNEXPLAINED_HIT,
+    touch,
+)
+
+LARGEST_KEY = 1 << 30
+"""Farther out keys would not fit in 32 bits."""
+MAX_RANGE_VOXELS = 1 << 15
+"""How far a ray may go, as in OctoMap."""
+
+
+class Grid(NamedTuple):
+    """A byte for every voxel around the sensor: where the rays of an ordinary scan cross, so that nothing is looked up.
+
+    A scan that is too wide for it (length 0) leaves its marks in the map's own blocks: slower, the same outcome.
+    """
+
+    marks: NDArray[np.uint8]
+    """(side^3,) MISS, HIT, UNEXPLAINED_HIT at (z * side + y) * side + x; zeros between scans"""
+    side: int
+    """A multiple of 8."""
+    x0: int
+    """Key of its lowest voxel, multiples of 8."""
+    y0: int
+    z0: int
+
+
+NO_GRID = Grid(np.zeros(0, np.uint8), 0, 0, 0, 0)
+
+
+@njit(cache=True, nogil=True)
+def mark_points(store, grid, points, unexplained, resolution, origin, max_range, discretize, ends):
+    """Marks the voxels of ``points`` (N, 3) that lie within ``max_range`` of ``origin``; how many ``ends`` there are.
+
+    ``ends`` (M, 3) receives where rays end: with ``discretize`` the centre of every voxel that holds points, once,
+    else every point. M = 0: no rays are wanted. ``unexplained`` has one truth per point, or one for all. Points that
+    are not finite or too far out for a key are counted and left out; so are voxels that no memory is left for.
+    """
+    scale = 1.0 / resolution
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    reach_sq = max_range * max_range
+    in_grid, wanted = grid.side > 0, ends.shape[0] > 0
+    one_verdict = unexplained.size == 1
+    others = np.empty(points.shape[0] if wanted and discretize else 0, np.int64)
+    n_ends, n_others = 0, 0
+    for i in range(points.shape[0]):
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        fx, fy, fz = px * scale, py * scale, pz * scale
+        if not (abs(fx) < LARGEST_KEY and abs(fy) < LARGEST_KEY and abs(fz) < LARGEST_KEY):
+            store.counts[N_REJECTED] += 1
+            continue
+        x, y, z = math.floor(fx), math.floor(fy), math.floor(fz)
+        if discretize:
+            px, py, pz = (x + 0.5) * resolution, (y + 0.5) * resolution, (z + 0.5) * resolution
+        seen = (px - ox) ** 2 + (py - oy) ** 2 + (pz - oz) ** 2 <= reach_sq
+        fresh = True
+        if seen:
+            hit = HIT | UNEXPLAINED_HIT if unexplained[0 if one_verdict else i] else HIT
+            if in_grid:
+                place = ((z - grid.z0) * grid.side + y - grid.y0) * grid.side + x - grid.x0
+                fresh = grid.marks[place] & HIT == 0
+                grid.marks[place] |= np.uint8(hit)
+            else:
+                block = touch(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
+                if block >= 0:
+                    voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
+                    fresh = store.flags[block, voxel] & HIT == 0
+                    store.flags[block, voxel] |= np.uint8(hit)
+                else:
+                    store.counts[N_REFUSED] += 1
+                    seen = False
+        if not wanted:
+            continue
+        if discretize and not seen:
+            others[n_others] = i
+            n_others += 1
+        elif fresh or not discretize:
+            ends[n_ends, 0], ends[n_ends, 1], ends[n_ends, 2] = px, py, pz
+            n_ends += 1
+    if n_others > 0:
+        n_ends = _ends_without_voxel(points, others[:n_others], resolution, ends, n_ends)
+    return n_ends
+
+
+@njit(cache=True, nogil=True)
+def _ends_without_voxel(points, others, resolution, ends, n_ends):
+    """Appends, once each, the centres of voxels that are beyond the range or that were refused."""
+    size = 16
+    while size < 2 * others.size:
+        size *= 2
+    seen = np.full((size, 3), LARGEST_KEY + 1, np.int32)
+    scale = 1.0 / resolution
+    for i in others:
+        x, y, z = math.floor(points[i, 0] * scale), math.floor(points[i, 1] * scale), math.floor(points[i, 2] * scale)
+        if _remember(seen, x, y, z):
+            ends[n_ends, 0], ends[n_ends, 1] = (x + 0.5) * resolution, (y + 0.5) * resolution
+            ends[n_ends, 2] = (z + 0.5) * resolution
+            n_ends += 1
+    return n_ends
+
+
+@njit(cache=True, nogil=True)
+def _remember(table, x, y, z):
+    """Whether the key was not in the set ``table`` (n, 3) yet; it is then. The set must have room."""
+    mask = table.shape[0] - 1
+    h = x * 0x2545F4914F6CDD1D + y * 0x1B873593CC9E2D51 + z * 0x369DEA0F31A53F85
+    place = (h ^ (h >> 29) ^ (h >> 47)) & mask
+    while table[place, 0] != LARGEST_KEY + 1:
+        if table[place, 0] == x and table[place, 1] == y and table[place, 2] == z:
+            return False
+        place = (place + 1) & mask
+    table[place, 0], table[place, 1], table[place, 2] = x, y, z
+    return True

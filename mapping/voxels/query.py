@@ -1,0 +1,105 @@
+"""Looking things up in a map's blocks: voxels by key, everything occupied, everything changed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mapping.voxels.marks import LARGEST_KEY
+from mapping.voxels.store import (
+    EVER_HIT,
+    EXPLAINED,
+    IN_BLOCK,
+    KNOWN,
+    LISTED,
+    N_BLOCKS,
+    OCCUPIED,
+    REVISION,
+    SIDE_BITS,
+    VOXELS,
+    find,
+)
+
+
+@njit(cache=True, nogil=True)
+def voxels_of(store, points, resolution):
+    """(N,) number of the voxel that each of ``points`` (N, 3) lies in, block * 512 + voxel; -1 where none is known."""
+    scale = 1.0 / resolution
+    found = np.full(points.shape[0], -1, np.int64)
+    last_x, last_y, last_z, block = LARGEST_KEY, 0, 0, -1
+    for i in range(points.shape[0]):
+        fx, fy, fz = points[i, 0] * scale, points[i, 1] * scale, points[i, 2] * scale
+        if not (abs(fx) < LARGEST_KEY and abs(fy) < LARGEST_KEY and abs(fz) < LARGEST_KEY):
+            continue
+        x, y, z = math.floor(fx), math.floor(fy), math.floor(fz)
+        bx, by, bz = x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS
+        if bx != last_x or by != last_y or bz != last_z:
+            block = find(store, bx, by, bz)
+            last_x, last_y, last_z = bx, by, bz
+        if block >= 0:
+            voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
+            if store.flags[block, voxel] & KNOWN:
+                found[i] = block * VOXELS + voxel
+    return found
+
+
+@njit(cache=True, nogil=True)
+def list_voxels(store, mask, value):
+    """(N,) numbers of all voxels whose flags under ``mask`` are ``value``."""
+    count = 0
+    blocks = store.counts[N_BLOCKS]
+    only_occupied = value & OCCUPIED != 0
+    for block in range(blocks):
+        if only_occupied and store.occupied[block] == 0:
+            continue
+        for voxel in range(VOXELS):
+            count += store.flags[block, voxel] & mask == value
+    found = np.empty(count, np.int64)
+    n = 0
+    for block in range(blocks):
+        if only_occupied and store.occupied[block] == 0:
+            continue
+        for voxel in range(VOXELS):
+            if n < count and store.flags[block, voxel] & mask == value:
+                found[n] = block * VOXELS + voxel
+                n += 1
+    return found[:n]
+
+
+@njit(cache=True, nogil=True)
+def list_changes(store, revision, ever_hit_only):
+    """(N,) numbers of the voxels that the log holds since ``revision``, each once, the newest change first."""
+    now = store.counts[REVISION]
+    ring = store.log.size - 1
+    found = np.empty(now - revision, np.int64)
+    n = 0
+    for r in range(now - 1, revision - 1, -1):
+        number = np.int64(store.log[r & ring])
+        block, voxel = number // VOXELS, number % VOXELS
+        flags = store.flags[block, voxel]
+        if flags & LISTED or (ever_hit_only and not flags & EVER_HIT):
+            continue
+        store.flags[block, voxel] = flags | LISTED
+        found[n] = number
+        n += 1
+    for i in range(n):
+        store.flags[found[i] // VOXELS, found[i] % VOXELS] &= ~LISTED
+    return found[:n]
+
+
+@njit(cache=True, nogil=True)
+def describe(store, numbers):
+    """Keys (N, 3) int32, log-odds (N,) and explained (N,) of voxels by number."""
+    keys = np.empty((numbers.size, 3), np.int32)
+    log_odds = np.empty(numbers.size, np.float32)
+    explained = np.empty(numbers.size, np.bool_)
+    for i in range(numbers.size):
+        block, voxel = numbers[i] // VOXELS, numbers[i] % VOXELS
+        keys[i, 0] = store.keys[block, 0] * 8 + (voxel & IN_BLOCK)
+        keys[i, 1] = store.keys[block, 1] * 8 + (voxel >> 3 & IN_BLOCK)
+        keys[i, 2] = store.keys[block, 2] * 8 + (voxel >> 6)
+        log_odds[i] = store.log_odds[block, voxel]
+        explained[i] = store.flags[block, voxel] & EXPLAINED != 0
+    return keys, log_odds, explained
