@@ -1,0 +1,85 @@
+"""Exact distance in space between straight lines and voxels, which are closed cubes.
+
+The squared distance of the moving point a + t d to a cube is convex in t and quadratic between the values of t where
+a coordinate passes a face, so its minimum over a segment has a closed form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+F64 = NDArray[np.float64]
+
+
+def nearest_box(points_m: F64, centres_m: F64, half_m: float, *, at_most_m: float = np.inf) -> tuple[float, int]:
+    """Smallest distance of a polyline (K, 3) to cubes with centres (N, 3), and which cube that is.
+
+    Cubes farther than ``at_most_m`` are passed over: (inf, -1) when there is none nearer. 0 inside a cube.
+    """
+    points = np.ascontiguousarray(points_m, np.float64)
+    centres = np.ascontiguousarray(centres_m, np.float64)
+    return _nearest_box(points, centres, half_m, at_most_m)
+
+
+@njit(cache=True, nogil=True)
+def _half_slope(t, a, d, low, high):
+    """Half the derivative of the squared distance by t."""
+    slope = 0.0
+    for k in range(3):
+        p = a[k] + t * d[k]
+        if p < low[k]:
+            slope += d[k] * (p - low[k])
+        elif p > high[k]:
+            slope += d[k] * (p - high[k])
+    return slope
+
+
+@njit(cache=True, nogil=True)
+def segment_box_sq(a, d, low, high):
+    """(smallest squared distance, t) of a + t d, t in [0, 1], to the box between corners ``low`` and ``high``."""
+    left, right = 0.0, 1.0
+    for k in range(3):
+        if d[k] == 0.0:
+            continue
+        for face in (low[k], high[k]):
+            t = (face - a[k]) / d[k]
+            if left < t < right:
+                if _half_slope(t, a, d, low, high) > 0.0:
+                    right = t
+                else:
+                    left = t
+    at_left, at_right = _half_slope(left, a, d, low, high), _half_slope(right, a, d, low, high)
+    if at_left >= 0.0:
+        t = left
+    elif at_right <= 0.0:
+        t = right
+    else:  # the slope is a straight line between the two and passes zero
+        t = left - at_left * (right - left) / (at_right - at_left)
+    sq = 0.0
+    for k in range(3):
+        p = a[k] + t * d[k]
+        out = max(low[k] - p, p - high[k], 0.0)
+        sq += out * out
+    return sq, t
+
+
+@njit(cache=True, nogil=True)
+def _nearest_box(points, centres, half_m, at_most_m):
+    best, which = at_most_m * at_most_m, -1
+    low, high = np.empty(3), np.empty(3)
+    for i in range(points.shape[0] - 1):
+        a, d = points[i], points[i + 1] - points[i]
+        for j in range(centres.shape[0]):
+            apart = 0.0
+            for k in range(3):
+                low[k], high[k] = centres[j, k] - half_m, centres[j, k] + half_m
+                out = max(low[k] - max(a[k], a[k] + d[k]), min(a[k], a[k] + d[k]) - high[k], 0.0)
+                apart += out * out
+            if apart > best or (which >= 0 and apart == best):
+                continue
+            sq, _ = segment_box_sq(a, d, low, high)
+            if sq < best or (which < 0 and sq == best):
+                best, which = sq, j
+    return (np.sqrt(best) if which >= 0 else np.inf), which

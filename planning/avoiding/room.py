@@ -1,0 +1,102 @@
+"""What a way must keep clear of: voxels that were seen, and the surface model around."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.avoiding.boxes import nearest_box
+from planning.certificate.nearest import nearest_distances
+from planning.certificate.pyramid import MaxPyramid, max_pyramid
+from planning.certificate.threads import threads_for
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+
+
+class Surface(Protocol):
+    """A surface model under the map frame; ``mapping.ground.GroundGrid`` is one."""
+
+    @property
+    def up_m(self) -> F32:
+        """(rows, columns) NaN unknown"""
+        ...
+
+    @property
+    def enu_to_cell(self) -> F64:
+        """(2, 3) [row, column] = enu_to_cell @ [east, north, 1]"""
+        ...
+
+    @property
+    def cell_m(self) -> float: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Occupied voxels of one map. Not those that known ground explains: the surface model stands for them."""
+
+    centres_enu_m: F64
+    """(N, 3)"""
+    resolution_m: float
+
+
+class Room:
+    """Distances of polylines (K, 3), ENU. Only what lies within ``reach_m`` of ``around_enu_m`` is looked at."""
+
+    def __init__(self, around_enu_m: F64, reach_m: float, seen: Sequence[Seen], surface: Surface | None) -> None:
+        low, high = around_enu_m.min(axis=0) - reach_m, around_enu_m.max(axis=0) + reach_m
+        self.seen = [near for each in seen if len((near := _within(each, low, high)).centres_enu_m)]
+        self._ground = None if surface is None else _Ground(surface, low[:2], high[:2])
+
+    def seen_m(self, points_enu_m: F64, *, at_most_m: float = np.inf) -> float:
+        """Smallest distance to any voxel; inf when none is nearer than ``at_most_m``."""
+        found = np.inf
+        for each in self.seen:
+            limit = min(at_most_m, found)
+            found = min(found, nearest_box(points_enu_m, each.centres_enu_m, each.resolution_m / 2, at_most_m=limit)[0])
+        return found
+
+    def surface_m(self, points_enu_m: F64) -> float:
+        """Smallest distance to the surface model; unknown terrain and its outside reach up forever. inf without one."""
+        return np.inf if self._ground is None else self._ground.distance_m(points_enu_m)
+
+    def is_clear(self, points_enu_m: F64, keep_m: float) -> bool:
+        return self.seen_m(points_enu_m, at_most_m=keep_m) >= keep_m and self.surface_m(points_enu_m) >= keep_m
+
+
+def _within(seen: Seen, low: F64, high: F64) -> Seen:
+    centres = np.asarray(seen.centres_enu_m, np.float64).reshape(-1, 3)
+    inside = np.all((centres[:, :2] >= low[:2]) & (centres[:, :2] <= high[:2]), axis=1)
+    return Seen(centres[inside], seen.resolution_m)
+
+
+class _Ground:
+    """The part of a surface model over an area, in metres from its first cell's corner: x by columns, y by rows."""
+
+    def __init__(self, surface: Surface, low_m: F64, high_m: F64) -> None:
+        self._to_cell, self._cell_m = surface.enu_to_cell, surface.cell_m
+        corners = np.array([[e, n, 1.0] for e in (low_m[0], high_m[0]) for n in (low_m[1], high_m[1])])
+        cells = corners @ self._to_cell.T
+        rows, columns = surface.up_m.shape
+        r0, c0 = (max(0, math.floor(value)) for value in cells.min(axis=0))
+        r1, c1 = (math.ceil(value) for value in cells.max(axis=0))
+        self._first = np.array([r0, c0], dtype=np.float64)
+        part = surface.up_m[r0 : min(rows, r1), c0 : min(columns, c1)]
+        self._pyramid: MaxPyramid | None = None
+        if part.size:
+            self._pyramid = max_pyramid(np.ascontiguousarray(part, dtype=np.float32), self._cell_m)
+
+    def distance_m(self, points_enu_m: F64) -> float:
+        if self._pyramid is None:
+            return 0.0
+        flat = np.column_stack([points_enu_m[:, :2], np.ones(len(points_enu_m))])
+        rows, columns = ((flat @ self._to_cell.T) - self._first).T * self._cell_m
+        places = np.column_stack([columns, rows, points_enu_m[:, 2]])
+        with threads_for(0):
+            distances, _ = nearest_distances(self._pyramid, places[:-1], places[1:])
+        return float(distances.min())
