@@ -11,6 +11,7 @@ TelemetryError
 ├── TransferError          a mission that did not get across whole
 ├── RecordingError         a recording that cannot be read: foreign, empty, broken from the start
 │   └── RecordingFullError     no space left to record on
+├── SensorLinkError        an agent or ground station that does not speak the sensor link's protocol
 └── BusError               a node that is not there, or messages nobody understands
 """
 
@@ -63,6 +64,10 @@ class RecordingError(TelemetryError):
 
 class RecordingFullError(RecordingError):
     code = "recording_full"
+
+
+class SensorLinkError(TelemetryError):
+    code = "sensor_link"
 
 
 class BusError(TelemetryError):

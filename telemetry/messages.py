@@ -9,6 +9,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
+from telemetry.obstacles import (
+    AvoidanceStatus,
+    GroundNotice,
+    MapDelta,
+    ObstacleAlert,
+    PerceptionSettings,
+    PerceptionStatus,
+)
+from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SimTruth, SlamPose
 from telemetry.vehicle import VehicleState
 
 
@@ -25,6 +34,21 @@ class Topic(StrEnum):
     PLAN = "plan/active"  # PlanRecord, latest wins
     RECORDER = "recorder/status"  # RecorderStatus, latest wins, at 1 Hz and on change
     REPLAY = "replayer/status"  # ReplayStatus, latest wins
+    RADAR_FRAME = "sensor/radar"  # RadarFrame, each arrives
+    CLOUD_FRAME = "sensor/cloud"  # CloudFrame, latest wins: a node that is behind takes the newest
+    SLAM_POSE = "sensor/slam"  # SlamPose, each arrives
+    RANGE_FRAME = "sensor/ranges"  # RangeFrame, each arrives
+    MAP_RADAR = "map/radar"  # MapDelta, each arrives
+    MAP_VISION = "map/vision"
+    MAP_RANGES = "map/ranges"
+    PERCEPTION_RADAR = "perception/radar"  # PerceptionStatus, latest wins
+    PERCEPTION_VISION = "perception/vision"
+    PERCEPTION_RANGES = "perception/ranges"
+    ALERT = "obstacle/alert"  # ObstacleAlert, each arrives
+    GROUND = "ground/active"  # GroundNotice, latest wins
+    PERCEPTION_SETTINGS = "perception/settings"  # PerceptionSettings, latest wins
+    AVOIDANCE = "avoidance/status"  # AvoidanceStatus, latest wins
+    TRUTH = "simulator/truth"  # SimTruth, latest wins, 50 Hz
     SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
 
 
@@ -280,6 +304,17 @@ Published = (
     | RecorderStatus
     | ReplayStatus
     | ServerAlive
+    | RadarFrame
+    | CloudFrame
+    | SlamPose
+    | RangeFrame
+    | MapDelta
+    | PerceptionStatus
+    | ObstacleAlert
+    | GroundNotice
+    | PerceptionSettings
+    | AvoidanceStatus
+    | SimTruth
 )
 """Everything that may be published."""
 
@@ -295,4 +330,19 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.RECORDER: RecorderStatus,
     Topic.REPLAY: ReplayStatus,
     Topic.SERVER: ServerAlive,
+    Topic.RADAR_FRAME: RadarFrame,
+    Topic.CLOUD_FRAME: CloudFrame,
+    Topic.SLAM_POSE: SlamPose,
+    Topic.RANGE_FRAME: RangeFrame,
+    Topic.MAP_RADAR: MapDelta,
+    Topic.MAP_VISION: MapDelta,
+    Topic.MAP_RANGES: MapDelta,
+    Topic.PERCEPTION_RADAR: PerceptionStatus,
+    Topic.PERCEPTION_VISION: PerceptionStatus,
+    Topic.PERCEPTION_RANGES: PerceptionStatus,
+    Topic.ALERT: ObstacleAlert,
+    Topic.GROUND: GroundNotice,
+    Topic.PERCEPTION_SETTINGS: PerceptionSettings,
+    Topic.AVOIDANCE: AvoidanceStatus,
+    Topic.TRUTH: SimTruth,
 }

@@ -1,4 +1,4 @@
-"""What may be asked of the link, recorder and replay nodes, and by whom. All are frozen dataclasses.
+"""What may be asked of the link, perception, recorder and replay nodes, and by whom. All are frozen dataclasses.
 
 ``Operator.token`` is the fencing token of the server's lease: the link node refuses every request that changes
 anything on a vehicle when its token is lower than the highest one it has seen.
@@ -146,6 +146,33 @@ class Land:
     operator: Operator
 
 
+@dataclass(frozen=True, slots=True)
+class SetAvoidance:
+    """Switches climbing over obstacles on or off. ``consent``: of the operator, for a vehicle that is no simulation.
+
+    -> None; NotAllowedError without consent, or for an autopilot for which it is not built
+    """
+
+    operator: Operator
+    enabled: bool
+    consent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FlyManoeuvre:
+    """Flies a prepared way over or around an obstacle in GUIDED, then goes on. -> None
+
+    ``targets`` begin ahead of the vehicle and end on the mission ahead (or above it); ``rejoin_item`` is the item flown
+    to after them, in GUIDED and ``height_offset_m`` higher than planned; None: hold at the last target.
+    """
+
+    operator: Operator
+    kind: Literal["over", "around"]
+    targets: tuple[GuidedTarget, ...]
+    rejoin_item: int | None
+    height_offset_m: float = 0.0
+
+
 LinkRequest = (
     Connect
     | Disconnect
@@ -162,7 +189,20 @@ LinkRequest = (
     | Resume
     | ReturnHome
     | Land
+    | SetAvoidance
+    | FlyManoeuvre
 )
+
+
+# To a perception node: "radar", "vision" or "ranges".
+
+
+@dataclass(frozen=True, slots=True)
+class WholeMap:
+    """Publishes the whole map once more, for those who came late. -> None"""
+
+
+PerceptionRequest = WholeMap
 
 
 # To the recorder node.

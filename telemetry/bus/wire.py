@@ -12,7 +12,20 @@ from telemetry.messages import MESSAGE_TYPES, REPLAY_PREFIX, ErrorInfo, Publishe
 
 T = TypeVar("T")
 
-EACH_ARRIVES = frozenset({Topic.TEXT, Topic.RAW, Topic.COMMAND})
+EACH_ARRIVES = frozenset(
+    {
+        Topic.TEXT,
+        Topic.RAW,
+        Topic.COMMAND,
+        Topic.RADAR_FRAME,
+        Topic.SLAM_POSE,
+        Topic.RANGE_FRAME,
+        Topic.MAP_RADAR,
+        Topic.MAP_VISION,
+        Topic.MAP_RANGES,
+        Topic.ALERT,
+    }
+)
 """Topics that are streams of events. Of all the others only the latest message counts, and it is kept."""
 
 

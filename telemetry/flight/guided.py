@@ -72,6 +72,16 @@ class GuidedScript:
         return self._request.targets[min(self._index, len(self._request.targets) - 1)]
 
     @property
+    def left(self) -> tuple[GuidedTarget, ...]:
+        """From the target that is flown to."""
+        return self._request.targets[self._index :]
+
+    @property
+    def end(self) -> Literal["rtl", "land"]:
+        """What follows the last target."""
+        return self._request.end
+
+    @property
     def behind_s(self) -> float | None:
         """How much later than planned the script is; negative when it is ahead."""
         return self._punctuality.behind_s

@@ -16,7 +16,7 @@ CUSTOM_MODE = 1.0
 IGNORE_ALL_BUT_PLACE = 0b1101_1111_1000
 """POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored."""
 YAW_IS_GIVEN = IGNORE_ALL_BUT_PLACE & ~mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-GROUND_SPEED, ANY_THROTTLE = 1.0, -1.0
+GROUND_SPEED, CLIMB_SPEED, ANY_THROTTLE = 1.0, 2.0, -1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,9 @@ class Orders:
         nan = math.nan
         return self._long(mavlink.MAV_CMD_NAV_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, home_alt_amsl_m + alt_rel_home_m)
 
-    def change_speed(self, speed_m_s: float) -> Message:
-        return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, GROUND_SPEED, speed_m_s, ANY_THROTTLE)
+    def change_speed(self, speed_m_s: float, kind: float = GROUND_SPEED) -> Message:
+        """``kind``: SPEED_TYPE."""
+        return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE)
 
     def go_to(self, place: Place) -> Message:
         lat_e7, lon_e7 = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)

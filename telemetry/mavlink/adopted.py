@@ -27,6 +27,8 @@ from telemetry.vehicle import Autopilot, VehicleState
 
 STALE_S, LOST_S = 1.5, 3.5
 FAST_LINK_BAUD = 400_000
+SIMULATION = b"hedgehop"
+"""What Hedgehop's own simulated vehicle says for its firmware's version; others have a hash of their sources there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,8 @@ class Telling:
     text: Callable[[int, str], None]
     unsure: Callable[[], None]
     sent: Callable[[bytes], None]
+    ordered: Callable[[Message], None] = lambda _: None
+    """Every message before it goes out."""
 
 
 class AdoptedVehicle:
@@ -54,6 +58,8 @@ class AdoptedVehicle:
         self.exchanges = Exchanges(self.send, clock)
         self.heard_s = now_s
         self.capabilities: int | None = None
+        self.is_simulation = False
+        """Hedgehop's own, as it says with its capabilities."""
         self._telling, self._clock = telling, clock
         slow = line.address.kind == "serial" and line.address.baud < FAST_LINK_BAUD
         self._streams = StreamRequests(self.target, candidate.autopilot, slow=slow, now_s=now_s)
@@ -105,6 +111,7 @@ class AdoptedVehicle:
         self.on_tick()
 
     def send(self, message: Message) -> None:
+        self._telling.ordered(message)
         frame = self.line.send(message, self.candidate.peer)
         if frame is not None:
             self._telling.sent(frame)
@@ -161,6 +168,7 @@ class AdoptedVehicle:
         self._streams.on_message(message, now_s)
         if message.get_type() == "AUTOPILOT_VERSION":
             self.capabilities = message.capabilities
+            self.is_simulation = bytes(message.flight_custom_version) == SIMULATION
         if self._boot.has_restarted(message):
             self._restarted(now_s)
         if self.onboard.on_message(message, now_s):

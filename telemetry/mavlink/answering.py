@@ -33,6 +33,8 @@ class Answering:
             requests.Resume: self._resume,
             requests.ReturnHome: self._return_home,
             requests.Land: self._land,
+            requests.SetAvoidance: self._set_avoidance,
+            requests.FlyManoeuvre: self._fly_manoeuvre,
         }
 
     async def answer(self, request: requests.LinkRequest) -> object:
@@ -99,6 +101,22 @@ class Answering:
         await self._record(request, f"fly {len(request.targets)} targets in GUIDED")
         _refuse_while(transfers.is_busy)
         await pilot.start_guided(request)
+
+    async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
+        _, pilot, _ = self._link.need_vehicle()
+        pilot.avoidance.check_autopilot()
+        await self._record(request, f"fly {request.kind} an obstacle, {len(request.targets)} places")
+        await pilot.fly_manoeuvre(request)
+
+    async def _set_avoidance(self, request: requests.SetAvoidance) -> None:
+        _, pilot, _ = self._link.need_vehicle(live=request.enabled)
+        if request.enabled:
+            await pilot.avoidance.check_may_be_enabled(consent=request.consent)
+            await self._record(request, f"avoidance on{', with consent' if request.consent else ''}")
+            pilot.avoidance.enable()
+        else:
+            await self._record(request, "avoidance off", must=False)
+            pilot.avoidance.disable()
 
     # Whatever makes a flight end well is tried over a link that seems lost, too.
 

@@ -23,6 +23,7 @@ from telemetry.mavlink.line import Line
 from telemetry.mavlink.operator_right import OperatorRight
 from telemetry.mavlink.peers import Peers, Source
 from telemetry.mavlink.piloting import Pilot
+from telemetry.mavlink.ranges import RangeReader
 from telemetry.mavlink.state_publisher import StatePublisher
 from telemetry.mavlink.status_teller import StatusTeller
 from telemetry.mavlink.trail import Audit, Trail
@@ -36,6 +37,7 @@ from telemetry.messages import (
     Topic,
     VehicleText,
 )
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
 from telemetry.requests import LinkRequest, Operator
 from telemetry.vehicle import VehicleState
 
@@ -72,7 +74,9 @@ class Link:
         self._states = StatePublisher(lambda state: publish(Topic.VEHICLE, state))
         self._teller = StatusTeller(lambda status: publish(Topic.LINK, status))
         self._told_flight: FlightStatus | None = None
-        self._answering = Answering(self)
+        self._told_avoidance: AvoidanceStatus | None = None
+        self._settings: PerceptionSettings | None = None
+        self._answering, self._ranges = Answering(self), RangeReader()
 
     # Requests.
 
@@ -108,7 +112,13 @@ class Link:
             return
         self.release(forget_wish=False)
         self.peers.adopt(candidate, time.monotonic())
-        telling = Telling(state=self._on_state, text=self._on_text, unsure=self._read_back, sent=self._on_sent)
+        telling = Telling(
+            state=self._on_state,
+            text=self._on_text,
+            unsure=self._read_back,
+            sent=self._on_sent,
+            ordered=self._on_order,
+        )
         vehicle = AdoptedVehicle(candidate, self.lines[candidate.address], telling, time.monotonic)
         self.vehicle = vehicle
         self.transfers = transfers = Transfers(vehicle, lambda status: self.publish(Topic.TRANSFER, status))
@@ -117,6 +127,8 @@ class Link:
             return (await transfers.read_parameters((name,)))[name]
 
         self.pilot = Pilot(vehicle, self.flight, spawn=self.spawn, read_parameter=read_parameter)
+        if self._settings is not None:
+            self.pilot.avoidance.on_settings(self._settings)
         vehicle.send_first()
         self._tell()
         self._read_back()
@@ -162,12 +174,35 @@ class Link:
                 self.vehicle.moved(self.peers.adopted)
             self.publish(Topic.RAW, RawFrame(t_utc_s, False, line.text, bytes(message.get_msgbuf())))
             self.vehicle.on_message(message, t_utc_s)
+            heading_rad = self.vehicle.state.heading_rad
+            ranges = self._ranges.on_message(message, heading_rad=heading_rad, t_mono_s=now_s, t_utc_s=t_utc_s)
+            if ranges is not None:
+                self.publish(Topic.RANGE_FRAME, ranges)
+            if self.pilot is not None:
+                self.pilot.avoidance.on_message(message)
+
+    def on_perception(self, status: PerceptionStatus) -> None:
+        """What a sensor's node says about the regions ahead."""
+        if self.pilot is not None:
+            self.pilot.avoidance.on_perception(status)
+
+    def on_settings(self, settings: PerceptionSettings) -> None:
+        """How deep the regions are, and how large the vehicle is."""
+        self._settings = settings
+        if self.pilot is not None:
+            self.pilot.avoidance.on_settings(settings)
 
     def _gone(self, line: Line, peer: Peer) -> None:
         self.peers.gone(line.text, peer)
 
     def _on_state(self, state: VehicleState) -> None:
         self._states.offer(state)
+        if self.pilot is not None:
+            self.pilot.avoidance.on_state(state)
+
+    def _on_order(self, message: Message) -> None:
+        if self.pilot is not None:
+            self.pilot.avoidance.on_order(message)
 
     def _on_text(self, severity: int, text: str) -> None:
         self.publish(Topic.TEXT, VehicleText(time.time(), severity, text))
@@ -225,7 +260,17 @@ class Link:
         if self.flight.status != self._told_flight:
             self._told_flight = self.flight.status
             self.publish(Topic.FLIGHT, self.flight.status)
+        self._tell_avoidance()
         self._tell()
+
+    def _tell_avoidance(self) -> None:
+        status = AvoidanceStatus() if self.pilot is None else self.pilot.avoidance.status
+        before, self._told_avoidance = self._told_avoidance, status
+        if status == before:
+            return
+        self.publish(Topic.AVOIDANCE, status)
+        if before is not None and before.state != status.state and self._is_guided:
+            self.spawn(self.trail.record(AUTOPILOT, f"avoidance: {status.state}", must=False))
 
     async def _hold(self, pilot: Pilot) -> None:
         with contextlib.suppress(TelemetryError):

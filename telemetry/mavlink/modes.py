@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -61,6 +62,21 @@ def mode_numbers(autopilot: Autopilot, name: str) -> ModeNumbers | None:
             if known == name:
                 return ModeNumbers(main, 0, main << 16)
     return None
+
+
+def commanded_mode(message: Any, autopilot: Autopilot, vehicle_type: int) -> str | None:
+    """The flight mode that a message to the vehicle changes to, None for one that changes none."""
+    kind = message.get_type()
+    if kind == "COMMAND_INT":
+        return "GUIDED" if message.command == mavlink.MAV_CMD_DO_REPOSITION else None
+    if kind != "COMMAND_LONG":
+        return None
+    if message.command == mavlink.MAV_CMD_MISSION_START:
+        return "AUTO"
+    if message.command != mavlink.MAV_CMD_DO_SET_MODE:
+        return None
+    main, sub = int(message.param2), int(message.param3)
+    return mode_name(autopilot, vehicle_type, main << 16 | sub << 24 if autopilot == "px4" else main)
 
 
 def _px4_name(custom_mode: int) -> str | None:

@@ -9,14 +9,17 @@ from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
 from telemetry.flight.guided import GuidedScript
+from telemetry.flight.rest import Rest, rest_from, rest_of_flight
 from telemetry.mavlink.adopted import AdoptedVehicle
+from telemetry.mavlink.avoidance import Avoidance
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
 from telemetry.mavlink.going_on import check_same_mission, set_speeds
 from telemetry.mavlink.joining import JoinMission
 from telemetry.mavlink.mode_change import change_mode
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.procedures import Accepted, Procedures, Spawn
-from telemetry.requests import StartAuto, StartGuided
+from telemetry.requests import FlyManoeuvre, StartAuto, StartGuided
+from telemetry.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
 IN_THE_AIR = ("taking_off", "in_air", "landing")
@@ -38,6 +41,9 @@ class Pilot:
         self.vehicle, self.flight = vehicle, flight
         self.script: GuidedScript | None = None
         self.join: JoinMission | None = None
+        self.avoidance = Avoidance(
+            vehicle, rest=self._rest, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
+        )
         self._procedures, self._read_parameter = Procedures(spawn, flight.say), read_parameter
         self._script_since_s: float | None = None
         self._script_accepted: Accepted = lambda: None
@@ -51,7 +57,8 @@ class Pilot:
     @property
     def is_guided(self) -> bool:
         """The vehicle waits for, or flies to, places that this link hands over."""
-        return self.script_flies or (self.join is not None and self.join.is_active)
+        joins = self.join is not None and self.join.is_active
+        return self.script_flies or joins or self.avoidance.is_engaged
 
     @property
     def flies_mission(self) -> bool:
@@ -70,6 +77,10 @@ class Pilot:
         state = self.vehicle.state
         if state.heartbeat_t_mono_s is None:
             return  # it has just been adopted: nobody knows yet whether it is armed
+        self.avoidance.on_tick()
+        if self.avoidance.is_engaged:
+            self._follow_avoidance()
+            return
         if self.script is not None:
             self._follow_script(self.script)
         if not self.flight.is_under_way:
@@ -77,6 +88,10 @@ class Pilot:
         joining = self.join is not None and self.join.is_active
         if self.script is None:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
+
+    def _follow_avoidance(self) -> None:
+        status = self.avoidance.flight_status(self.flight.status.since_utc_s)
+        self.flight.script(status, armed=self.vehicle.state.armed)
 
     def _follow_script(self, script: GuidedScript) -> None:
         status = script.status(since_utc_s=self._script_since_s)
@@ -122,7 +137,14 @@ class Pilot:
 
         await self._procedures.take_over(fly)
 
+    async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
+        """Raises NotAllowedError when nothing is flown that could be gone on with."""
+        self.avoidance.fly(request, self._rest_after(request))
+
     async def pause(self) -> None:
+        if self.avoidance.is_engaged:
+            self.avoidance.pause()
+            return
         if self.script_flies:
             assert self.script is not None
             self._tell_script(self.script.pause(time.monotonic()))
@@ -135,6 +157,9 @@ class Pilot:
         await self._change_mode(*HOLD_MODES.get(state.autopilot, ("HOLD",)))
 
     async def resume(self) -> None:
+        if self.avoidance.is_engaged:
+            self.avoidance.resume()
+            return
         if self.script_flies:
             assert self.script is not None
             self._tell_script(self.script.resume(time.monotonic()))
@@ -159,10 +184,48 @@ class Pilot:
 
     async def hold(self) -> None:
         """Nobody watches any more: what this link hands over is stopped."""
-        if self.script_flies and self.script is not None:
+        if self.avoidance.is_engaged:
+            self.avoidance.pause()
+        elif self.script_flies and self.script is not None:
             self._tell_script(self.script.pause(time.monotonic()))
         elif self.join is not None and self.join.is_active:
             await self.pause()
+
+    # What avoidance takes over.
+
+    def _rest(self, state: VehicleState) -> Rest | None:
+        """What is left of the flight; None while nothing is flown that avoidance could go on with."""
+        if self.script_flies:
+            script = self.script
+            flies = script is not None and script.phase == "flying"
+            return Rest(script.left, script.end, "guided") if flies and script is not None else None
+        if self.join is not None and self.join.is_active:
+            return None
+        return rest_of_flight(self.vehicle.onboard.mission, state)
+
+    def _rest_after(self, request: FlyManoeuvre) -> Rest:
+        """What is flown after the way past an obstacle."""
+        item = request.rejoin_item
+        if item is None:
+            return Rest((), "hold")
+        rest = self.avoidance.rest
+        if rest is None and self.script_flies and self.script is not None:
+            rest = Rest(self.script.left, self.script.end, "guided")
+        if rest is not None:
+            return Rest(tuple(t for t in rest.targets if t.item >= item), rest.end, rest.way)
+        onboard = self.vehicle.onboard.mission
+        rest = None if onboard is None else rest_from(onboard, item)
+        if rest is None:
+            what = f"What follows from item {item} on cannot be flown in GUIDED."
+            raise NotAllowedError(what, advice="Pause, and fly past the obstacle by hand.")
+        return rest
+
+    def _yield_to_avoidance(self) -> None:
+        """What is under way sends nothing any more."""
+        self._procedures.end()
+        if self.script is not None:
+            self.script.stop(SUPERSEDED)
+            self.script = None
 
     # How they are carried out.
 
@@ -263,5 +326,6 @@ class Pilot:
 
     def _end_current(self) -> None:
         self._procedures.end()
+        self.avoidance.stop()
         if self.script_flies and self.script is not None:
             self.script.stop(SUPERSEDED)

@@ -29,10 +29,12 @@ FAST_HZ: dict[str, float] = {
     "EKF_STATUS_REPORT": 1,
     "ESTIMATOR_STATUS": 1,
     "SYSTEM_TIME": 1,
-    "RC_CHANNELS": 1,
+    "RC_CHANNELS": 5,
     "WIND": 1,
     "WIND_COV": 1,
     "HOME_POSITION": 0.5,
+    "OBSTACLE_DISTANCE": 5,
+    "DISTANCE_SENSOR": 5,
 }
 """For a network."""
 SLOW_HZ = {name: 10.0 if hz > 10 else min(hz, 2.0) for name, hz in FAST_HZ.items()}

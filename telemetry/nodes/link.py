@@ -17,10 +17,13 @@ from telemetry.mavlink.audit import AuditLog
 from telemetry.mavlink.link import Link, open_link
 from telemetry.mavlink.memory import Memory, Wanted, read_memory, write_memory
 from telemetry.mavlink.operator_right import OperatorRight
+from telemetry.messages import Topic
 from telemetry.node import NodeContext, run_node
+from telemetry.obstacles import PerceptionSettings, PerceptionStatus
 from telemetry.requests import LinkRequest
 
 LOOK_EVERY_S = 0.5
+PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
 UNATTENDED_S = 60.0
 GIVEN_UP_S = 600.0
 """Without a server, and without a word of a vehicle that was armed."""
@@ -101,9 +104,24 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
             node = LinkNode(link, context, file)
             await node.take_up(memory, links)
             await bus.serve("link", link.handle, LinkRequest)
+            for topic in (*PERCEPTION, Topic.PERCEPTION_SETTINGS):
+                link.spawn(_listen(bus, link, topic))
             await node.run()
     finally:
         log.close()
+
+
+async def _listen(bus: Bus, link: Link, topic: str) -> None:
+    """The newest word of each sensor: what is older says nothing any more."""
+    subscription = bus.subscribe(topic)
+    try:
+        async for _, message in subscription:
+            if isinstance(message, PerceptionStatus):
+                link.on_perception(message)
+            elif isinstance(message, PerceptionSettings):
+                link.on_settings(message)
+    finally:
+        subscription.close()
 
 
 def main() -> int:

@@ -47,7 +47,8 @@ class Replayer:
             while context.unattended_s() < _UNATTENDED_S:
                 await self._step()
         finally:
-            self._close()
+            async with self._turn:
+                self._close()
 
     async def _step(self) -> None:
         now_s, player = time.monotonic(), self._player
@@ -83,7 +84,10 @@ class Replayer:
 
     async def _play(self, player: Player, request: Play) -> None:
         now_s = time.monotonic()
-        due = player.play(now_s, playing=request.playing, at_utc_s=request.at_utc_s, speed=request.speed)
+        # In a thread: adding up the maps of a long flight takes a while.
+        due = await asyncio.to_thread(
+            player.play, now_s, playing=request.playing, at_utc_s=request.at_utc_s, speed=request.speed
+        )
         await self._give(due)
 
     async def _open(self, path: Path) -> None:

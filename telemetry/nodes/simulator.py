@@ -10,18 +10,22 @@ import argparse
 import asyncio
 import logging
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from planning.errors import DescribedError, ParameterError
 from telemetry.bus import Bus
+from telemetry.messages import Topic
 from telemetry.node import EXIT_ENDED, EXIT_REFUSED, NodeContext, run_node
 from telemetry.simulator.gnss import RECEIVERS
-from telemetry.simulator.run import SimOptions, flying, run
+from telemetry.simulator.gnss_script import read_event
+from telemetry.simulator.run import SimOptions, Simulator, flying, run
 
 _log = logging.getLogger(__name__)
 
 _LOOK_EVERY_S = 0.5
+_TRUTH_EVERY_S = 0.02
 _UNATTENDED_S = 60.0
 
 
@@ -30,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options, runtime = read_options(arguments)
         if runtime:
-            return run_node("simulator", runtime, lambda bus, context: _fly_supervised(bus, context, options))
+            return run_node("simulator", runtime, lambda bus, context: fly_supervised(bus, context, options))
         run(options, announce=lambda line: print(line, flush=True))
     except DescribedError as error:
         print(error, file=sys.stderr)
@@ -38,13 +42,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return EXIT_ENDED
 
 
-async def _fly_supervised(bus: Bus, context: NodeContext, options: SimOptions) -> None:
+async def fly_supervised(bus: Bus, context: NodeContext, options: SimOptions) -> None:
+    """Until the vehicle is disarmed and nobody has been there for long. Raises DescribedError."""
     async with flying(options) as simulator:
         _log.info("%s", simulator.start_line)
         pilot = simulator.vehicle.autopilot
-        while pilot.armed or context.unattended_s() < _UNATTENDED_S:
-            context.set_replaceable(not pilot.armed)
-            await asyncio.sleep(_LOOK_EVERY_S)
+        telling = asyncio.ensure_future(_tell_truth(bus, simulator))
+        try:
+            while (pilot.armed or context.unattended_s() < _UNATTENDED_S) and not telling.done():
+                context.set_replaceable(not pilot.armed)
+                await asyncio.wait((telling,), timeout=_LOOK_EVERY_S)
+        finally:
+            telling.cancel()
+            await asyncio.gather(telling, return_exceptions=True)
+
+
+async def _tell_truth(bus: Bus, simulator: Simulator) -> None:
+    """Where the vehicle really is: simulated sensors look from there."""
+    while True:
+        bus.publish(Topic.TRUTH, simulator.vehicle.sim_truth(time.monotonic(), time.time()))
+        await asyncio.sleep(_TRUTH_EVERY_S)
 
 
 def read_options(arguments: Sequence[str] | None = None) -> tuple[SimOptions, Path | None]:
@@ -62,6 +79,8 @@ def read_options(arguments: Sequence[str] | None = None) -> tuple[SimOptions, Pa
         wind_m_s=given.wind_m_s,
         wind_from_deg=given.wind_from_deg,
         dsm=given.dsm,
+        world=given.world,
+        gnss_script=tuple(read_event(text) for text in given.gnss_event),
         boot_s=given.boot_s,
         endurance_s=given.endurance_s,
         parameters=tuple(read_parameter(text) for text in given.parameter),
@@ -114,6 +133,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--wind-m-s", type=float, default=default.wind_m_s)
     parser.add_argument("--wind-from-deg", type=float, default=default.wind_from_deg)
     parser.add_argument("--dsm", type=Path, help="surface model that stands around the vehicle")
+    parser.add_argument("--world", type=Path, help="world file: what else stands there (docs/worlds.md)")
+    parser.add_argument(
+        "--gnss-event", action="append", default=[], metavar="EVENT", help="loss:60:20 or glitch:60:5:100:90"
+    )
     parser.add_argument("--boot-s", type=float, default=default.boot_s, help="until the position is known")
     parser.add_argument("--endurance-s", type=float, default=default.endurance_s, help="of hovering")
     parser.add_argument("--parameter", action="append", default=[], metavar="NAME=VALUE", help="of the autopilot")

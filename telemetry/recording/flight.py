@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from planning.model import Mission
 from telemetry.messages import CommandRecord, PlanRecord, VehicleText
+from telemetry.obstacles import ObstacleAlert
 from telemetry.recording.frame_facts import SentTarget, TruePosition
 from telemetry.vehicle import VehicleState
 
@@ -78,6 +79,8 @@ class FlightLog:
     plan: PlanRecord | None
     faults: tuple[str, ...]
     """Damage and doubts, in sentences."""
+    alerts: tuple[ObstacleAlert, ...] = ()
+    """Obstacles as they were alerted, in the order of time: where each begins and where it ends."""
 
     @property
     def t_s(self) -> F64:

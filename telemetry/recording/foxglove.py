@@ -1,4 +1,4 @@
-"""Positions, attitude and texts once more in the standard schemas of MCAP viewers, so that these show a flight."""
+"""What MCAP viewers can show of a flight (positions, attitude, texts, radar targets), once more in their schemas."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Any
 import msgspec
 
 from telemetry.messages import Published, VehicleText
+from telemetry.recording import clouds
+from telemetry.sensing import RadarFrame
 from telemetry.vehicle import VehicleState
 
 HOME_FRAME, VEHICLE_FRAME = "home", "vehicle"
@@ -73,6 +75,8 @@ class Standard:
 
 
 def standard_schema(name: str) -> bytes:
+    if name == clouds.SCHEMA_NAME:
+        return clouds.schema()
     return json.dumps({"title": name, **_SCHEMAS[name]}).encode()
 
 
@@ -86,6 +90,8 @@ class Standards:
     def of(self, message: Published) -> Iterator[Standard]:
         if isinstance(message, VehicleText):
             yield _log(message)
+        elif isinstance(message, RadarFrame):
+            yield Standard("foxglove/radar", clouds.SCHEMA_NAME, msgspec.json.encode(clouds.point_cloud(message)))
         elif isinstance(message, VehicleState):
             moved = message.position_t_mono_s != self._position_t_mono_s
             turned = message.attitude_t_mono_s != self._attitude_t_mono_s

@@ -12,6 +12,7 @@ from planning.formats.wpl import read_wpl
 from planning.model import Mission
 from telemetry.errors import RecordingError
 from telemetry.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
+from telemetry.obstacles import ObstacleAlert
 from telemetry.recording.flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
 from telemetry.recording.reader import Recording
@@ -20,7 +21,7 @@ from telemetry.recording.tlog_flight import mission_flown
 from telemetry.reduce import reduce
 from telemetry.vehicle import VehicleState
 
-_READ = (Topic.VEHICLE, Topic.TEXT, Topic.RAW, Topic.PLAN, Topic.COMMAND)
+_READ = (Topic.VEHICLE, Topic.TEXT, Topic.RAW, Topic.PLAN, Topic.COMMAND, Topic.ALERT)
 _GLOBAL_POSITION = 33
 _DECODED = frozenset({_GLOBAL_POSITION, 39, 44, 46, 47, 73, 86, 108})
 """Message ids of positions, missions, reached items, sent targets and the simulator's truth."""
@@ -39,6 +40,7 @@ class _Parts:
         self.texts: list[VehicleText] = []
         self.commands: list[CommandRecord] = []
         self.plans: list[PlanRecord] = []
+        self.alerts: list[ObstacleAlert] = []
         self._decoder = mavlink.MAVLink(None)
 
     def on_state(self, state: VehicleState, t_utc_s: float) -> None:
@@ -92,6 +94,8 @@ def read_mcap_flight(path: Path, data: Data) -> FlightLog:
             parts.commands.append(message)
         elif isinstance(message, PlanRecord):
             parts.plans.append(message)
+        elif isinstance(message, ObstacleAlert) and message.phase != "goes_on":
+            parts.alerts.append(message)
     return _flight_log(recording, parts)
 
 
@@ -124,6 +128,7 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
         mission=_mission(plan, faults) or mission_flown(facts, history),
         plan=plan,
         faults=tuple(faults),
+        alerts=tuple(parts.alerts),
     )
 
 

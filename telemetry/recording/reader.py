@@ -101,16 +101,15 @@ class Recording:
 
     def latest(self, topic: str, until_utc_s: float) -> Entry | None:
         """The last message of a topic up to a time, found without reading what lies between."""
+        return next((entries[-1] for entries in self.backwards(topic, until_utc_s) if entries), None)
+
+    def backwards(self, topic: str, until_utc_s: float) -> Iterator[list[Entry]]:
+        """The messages of a topic up to a time, chunk by chunk, the newest chunk first."""
         until_ns = round(until_utc_s * 1e9)
         chunks = self._places.get(topic, [])
         for number in range(bisect_right(chunks, until_ns, key=lambda chunk: chunk.start_ns) - 1, -1, -1):
-            found = None
-            for entry in self._chunk_entries(chunks[number], (topic,)):
-                if round(entry.t_utc_s * 1e9) <= until_ns:
-                    found = entry
-            if found is not None:
-                return found
-        return None
+            entries = self._chunk_entries(chunks[number], (topic,))
+            yield [entry for entry in entries if round(entry.t_utc_s * 1e9) <= until_ns]
 
     def _chunk_entries(self, chunk: ChunkPlace, topics: Collection[str]) -> Iterator[Entry]:
         try:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,15 +16,18 @@ from pathlib import Path
 
 from telemetry.errors import RecordingError, RecordingFullError
 from telemetry.messages import ErrorInfo, PlanRecord, Published, RecorderStatus
+from telemetry.obstacles import MapDelta
+from telemetry.recording.cloud_budget import CloudBudget, LocalMapBudget
 from telemetry.recording.disk_space import Measure, Space, full, running_out, space_at
 from telemetry.recording.preroll import Preroll, Stamped
 from telemetry.recording.sink import Write, describe
 from telemetry.recording.topics import RECORDED
 from telemetry.recording.trigger import Trigger
+from telemetry.recording.waiting import Waiting
 from telemetry.recording.writer import RecordingWriter
+from telemetry.sensing import CloudFrame
 from telemetry.vehicle import VehicleState
 
-_MOST_WAITING = 100_000
 _TRY_AGAIN_S = 3.0
 _MEASURE_EVERY_S = 1.0
 
@@ -61,9 +63,8 @@ class Recorder:
         self._file: _Open | None = None
         self._asked_name = ""
         self._failed_s: float | None = None
-        self._waiting: deque[Stamped | _Open | _Close] = deque()
-        self.dropped = 0
-        """Messages that a slow disk had no time for."""
+        self._waiting: Waiting[_Open | _Close] = Waiting()
+        self._clouds, self._local_maps = CloudBudget(), LocalMapBudget()
         # Of the writing thread; read by the other one.
         self._writer: RecordingWriter | None = None
         self._written: _Open | None = None
@@ -78,6 +79,11 @@ class Recorder:
         return self._file is not None
 
     @property
+    def dropped(self) -> int:
+        """Messages that a slow disk had no time for."""
+        return self._waiting.dropped
+
+    @property
     def error(self) -> RecordingError | None:
         """Why nothing is being recorded although it should be."""
         failure = self._failure
@@ -88,11 +94,15 @@ class Recorder:
         if topic not in RECORDED:
             return
         stamped = Stamped(self._now(), topic, message)
+        if isinstance(message, CloudFrame) and not self._clouds.takes(len(message.xyz_m), stamped.t_mono_s):
+            return
+        if isinstance(message, MapDelta) and not self._local_maps.takes(message, stamped.t_mono_s):
+            return
         self._preroll.add(stamped)
         if isinstance(message, PlanRecord):
             self._plan_name = message.name
         if self._file is not None:
-            self._enqueue(stamped)
+            self._waiting.put(stamped)
         if isinstance(message, VehicleState):
             self._trigger.on_state(message, stamped.t_mono_s)
             self._follow_trigger()
@@ -141,7 +151,7 @@ class Recorder:
             self._begin()
         elif not self._trigger.wanted:
             if self._file is not None:
-                self._waiting.append(_Close())
+                self._waiting.mark(_Close())
             self._file, self._failed_s, self._asked_name = None, None, ""
 
     def _may_begin(self) -> bool:
@@ -155,16 +165,9 @@ class Recorder:
         utc_s = self._utc()
         self._file = _Open(free_path(self._folder, utc_s, name), name, self._now(), utc_s)
         self._failed_s = None
-        self._waiting.append(self._file)
+        self._waiting.mark(self._file)
         for stamped in self._preroll.take(self._now()):
-            self._enqueue(stamped)
-
-    def _enqueue(self, stamped: Stamped) -> None:
-        """The newest are dropped when the disk does not follow: what was taken before is written in order."""
-        if len(self._waiting) < _MOST_WAITING:
-            self._waiting.append(stamped)
-        else:
-            self.dropped += 1
+            self._waiting.put(stamped)
 
     def _warning(self) -> RecordingFullError | None:
         if self._space is None or self._file is None:
@@ -176,8 +179,7 @@ class Recorder:
     def work(self) -> RecordingError | None:
         """Writes all that waits. Call it ten times a second. An error ends up in the status and is returned, too."""
         failed = None
-        for _ in range(len(self._waiting)):
-            item = self._waiting.popleft()
+        for item in self._waiting.take():
             try:
                 self._do(item)
             except RecordingError as error:

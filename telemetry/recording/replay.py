@@ -99,7 +99,7 @@ class Player:
         self._at_s, self._seen_s = at_utc_s, now_s
         self._rest = self._source.entries(math.nextafter(at_utc_s, math.inf))
         self._waiting = next(self._rest, None)
-        return self._state(now_s)
+        return self._state(now_s) + [self._moved(entry, now_s) for entry in self._source.maps(at_utc_s)]
 
     def _state(self, now_s: float) -> list[Due]:
         self._ages_s = now_s

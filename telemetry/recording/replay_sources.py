@@ -12,14 +12,14 @@ from typing import Protocol
 from telemetry.messages import Topic
 from telemetry.recording.files import foreign, is_mcap, opened
 from telemetry.recording.frame_facts import FrameFacts
+from telemetry.recording.map_history import MapHistory
 from telemetry.recording.reader import Entry, Recording
 from telemetry.recording.tlog import Data
 from telemetry.recording.tlog_flight import looks_like_tlog, states_of, survey
-from telemetry.recording.topics import LATEST, RECORDED
+from telemetry.recording.topics import LATEST, MAPS, NOT_REPLAYED, RECORDED
 from telemetry.vehicle import VehicleState
 
-_REPLAYED = RECORDED - {Topic.RAW, Topic.SERVER}
-"""Frames are for other programs, and a replay is no sign of life of a server."""
+_REPLAYED = RECORDED - NOT_REPLAYED
 _SPACING_S = 0.05
 
 
@@ -39,6 +39,10 @@ class ReplaySource(Protocol):
 
     def latest(self, until_utc_s: float) -> list[Entry]:
         """The last message of each topic that shows a state, up to a time."""
+        ...
+
+    def maps(self, until_utc_s: float) -> list[Entry]:
+        """Every map as it was at that time, whole."""
         ...
 
     def entries(self, from_utc_s: float) -> Iterator[Entry]: ...
@@ -82,6 +86,7 @@ class RecordingSource:
         self.name = recording.name
         self._recording, self._stack = recording, stack
         self._topics = _REPLAYED | ({Topic.RAW} if raw else frozenset())
+        self._maps = [MapHistory(recording, topic) for topic in sorted(MAPS & recording.topics())]
 
     @property
     def start_utc_s(self) -> float:
@@ -98,6 +103,9 @@ class RecordingSource:
     def latest(self, until_utc_s: float) -> list[Entry]:
         found = (self._recording.latest(topic, until_utc_s) for topic in sorted(LATEST & self._topics))
         return [entry for entry in found if entry is not None]
+
+    def maps(self, until_utc_s: float) -> list[Entry]:
+        return [entry for history in self._maps for entry in history.at(until_utc_s)]
 
     def entries(self, from_utc_s: float) -> Iterator[Entry]:
         return self._recording.entries(self._topics, from_utc_s)
@@ -119,6 +127,9 @@ class TlogSource:
         for number in range(bisect_right(self._entries, until_utc_s, key=itemgetter(0)) - 1, -1, -1):
             if self._entries[number].topic == Topic.VEHICLE:
                 return [self._entries[number]]
+        return []
+
+    def maps(self, until_utc_s: float) -> list[Entry]:
         return []
 
     def entries(self, from_utc_s: float) -> Iterator[Entry]:

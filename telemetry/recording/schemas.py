@@ -15,6 +15,8 @@ from typing import Any
 import msgspec
 
 from telemetry.errors import RecordingError
+from telemetry.recording.clouds import CloudCodec
+from telemetry.sensing import CloudFrame
 
 _PLAIN: dict[object, dict[str, str]] = {
     float: {"type": "number"},
@@ -60,11 +62,6 @@ class JsonCodec:
         self.schema_name = f"hedgehop.{kind.__name__}"
         self.schema = json.dumps(json_schema(kind)).encode()
         self._decoder = msgspec.json.Decoder(kind)
-        self._nullable = tuple(
-            field.name
-            for field in dataclasses.fields(kind)
-            if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-        )
 
     def encode(self, message: Any) -> bytes:
         return msgspec.json.encode(_without_none(msgspec.to_builtins(message)))
@@ -82,7 +79,7 @@ class JsonCodec:
         """Fields without a default that were None when written are missing in the JSON."""
         try:
             found = msgspec.json.decode(data, type=dict[str, Any])
-            return msgspec.convert(dict.fromkeys(self._nullable) | found, self.kind)
+            return msgspec.convert(_with_none(found, self.kind), self.kind)
         except msgspec.MsgspecError as error:
             raise self._error(error) from error
 
@@ -91,8 +88,33 @@ class JsonCodec:
 
 
 @cache
-def codec_of(kind: type) -> JsonCodec:
-    return JsonCodec(kind)
+def codec_of(kind: type) -> JsonCodec | CloudCodec:
+    return CloudCodec() if kind is CloudFrame else JsonCodec(kind)
+
+
+@cache
+def _fields(kind: type) -> tuple[tuple[str, Any, bool], ...]:
+    """(name, type, has no default) of every field."""
+    hints = typing.get_type_hints(kind)
+    return tuple(
+        (f.name, hints[f.name], f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING)
+        for f in dataclasses.fields(kind)
+    )
+
+
+def _with_none(value: Any, kind: Any) -> Any:
+    """What ``_without_none`` took away, put back as the type asks for it, also in what is nested."""
+    if isinstance(value, list):
+        kinds = [k for k in typing.get_args(kind) if k is not ...]
+        return [_with_none(v, kinds[0]) if kinds else v for v in value]
+    if not isinstance(value, dict):
+        return value
+    held = next((k for k in (kind, *typing.get_args(kind)) if dataclasses.is_dataclass(k)), None)
+    if held is None:
+        return value
+    gaps = {name: None for name, _, needed in _fields(typing.cast(type, held)) if needed}
+    known = {name: _with_none(value[name], k) for name, k, _ in _fields(typing.cast(type, held)) if name in value}
+    return gaps | value | known
 
 
 def _without_none(value: Any) -> Any:

@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from telemetry.messages import MESSAGE_TYPES, Topic
 
+MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_RANGES})
+"""Told in steps that build on each other: a replay adds them up."""
+
+FRAMES = frozenset({Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.RANGE_FRAME})
+"""What sensors sent: from these maps are built again; a replay does not show them."""
+
+BULKY = MAPS | {Topic.CLOUD_FRAME}
+"""Of what little may wait for the disk: the rest of a flight must not suffer from it."""
+
+NOT_REPLAYED = FRAMES | {Topic.RAW, Topic.SERVER, Topic.TRUTH}
+"""Frames are for other programs, a replay is no sign of life of a server, truth is for simulated sensors."""
+
 NOT_RECORDED = frozenset({Topic.RECORDER, Topic.REPLAY})
 """What recorder and replay say of themselves."""
 
-EVENTS = frozenset({Topic.TEXT, Topic.RAW, Topic.COMMAND, Topic.SERVER})
+EVENTS = frozenset({Topic.TEXT, Topic.RAW, Topic.COMMAND, Topic.SERVER, Topic.ALERT}) | MAPS | FRAMES
 """Topics of which each message counts; of all others the latest is the state of things."""
 
 RECORDED = frozenset(MESSAGE_TYPES) - NOT_RECORDED

@@ -12,6 +12,7 @@ import time
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -33,8 +34,10 @@ ABOUT, PLAN, VEHICLE = "hedgehop", "plan", "vehicle"
 """Names of the metadata that tell what a recording is without reading it."""
 _CHUNK_BYTES = 64 * 1024
 _CHUNK_S = 0.2
+_LARGE_CHUNK_BYTES = 4 * _CHUNK_BYTES
 _MESSAGE = struct.Struct("<BQHIQQ")
 _MESSAGE_OPCODE = 5
+_LATEST_UTC_S = 4e9
 
 
 class RecordingWriter:
@@ -63,6 +66,7 @@ class RecordingWriter:
         self._schemas: dict[str, int] = {}
         self._notes: dict[str, dict[str, str]] = {}
         self._compressor = zstandard.ZstdCompressor(level=3)
+        self._quick_compressor = zstandard.ZstdCompressor(level=1)
         self._last_ns = 0
         self._clear()
         self._sink = Sink(path, write=write)
@@ -84,7 +88,7 @@ class RecordingWriter:
             channel = self._channel(raw_channel_topic(message.sent), message.link, "", b"", RAW_ENCODING)
             self._add(channel, t_ns, _own_time_ns(message, t_ns), message.frame)
         else:
-            codec = codec_of(MESSAGE_TYPES[topic])
+            codec: Any = codec_of(MESSAGE_TYPES[topic])
             channel = self._channel(topic, "", codec.schema_name, codec.schema, "json")
             self._add(channel, t_ns, _own_time_ns(message, t_ns), codec.encode(message))
             self._describe(message)
@@ -184,7 +188,9 @@ class RecordingWriter:
         if not self._index:
             return None, bytes(block), notes
         offset, data = self._sink.size + len(block), bytes(self._chunk)
-        packed = self._compressor.compress(data)
+        # Noise of point clouds packs hardly better for the longer time that others would wait.
+        compressor = self._quick_compressor if len(data) > _LARGE_CHUNK_BYTES else self._compressor
+        packed = compressor.compress(data)
         chunk = _written(
             Chunk(
                 compression="zstd",
@@ -215,4 +221,5 @@ def _written(record: Header | Channel | Schema | Metadata | Chunk) -> bytes:
 def _own_time_ns(message: Published, t_ns: int) -> int:
     """When the message itself says that it is from; when it came for those that do not say."""
     own_utc_s = getattr(message, "t_utc_s", 0.0)
-    return round(own_utc_s * 1e9) if own_utc_s > 0 else t_ns
+    # A sensor elsewhere may say anything, and the file has room for this century.
+    return round(own_utc_s * 1e9) if 0 < own_utc_s < _LATEST_UTC_S else t_ns

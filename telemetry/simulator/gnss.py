@@ -34,7 +34,7 @@ class Receiver:
 RECEIVERS: dict[GnssKind, Receiver] = {
     # The vertical error is that of the fused height (a barometer holds it between fixes), not of GNSS alone.
     "standalone": Receiver(2.5 / CEP_PER_SIGMA, 0.8, 180.0, "3d", 14, 0.85, 2.5, 3.5),
-    "rtk": Receiver(0.02, 0.03, 60.0, "rtk_fixed", 24, 0.6, 0.02, 0.03),
+    "rtk": Receiver(0.05 / math.sqrt(2), 0.05, 60.0, "rtk_fixed", 24, 0.6, 0.05, 0.05),
     "perfect": Receiver(0.0, 0.0, 60.0, "rtk_fixed", 10, 1.21, 0.3, 0.3),
 }
 

@@ -16,12 +16,13 @@ from planning.errors import ParameterError
 from telemetry.simulator.battery import Pack
 from telemetry.simulator.frame import Frame
 from telemetry.simulator.gnss import GnssKind
+from telemetry.simulator.gnss_script import GnssEvent
 from telemetry.simulator.mavlink import Endpoint
 from telemetry.simulator.mission_protocol import Reply
 from telemetry.simulator.parameters import SPECS, Parameters
 from telemetry.simulator.transports import Transport, open_transport, parse_where
 from telemetry.simulator.vehicle import SimulatedVehicle
-from telemetry.simulator.world import SurfaceGround
+from telemetry.simulator.world import Ground, Obstacles, SurfaceGround
 
 SLICE_S = 0.02
 """Simulated time between looks at the streams."""
@@ -46,7 +47,11 @@ class SimOptions:
     wind_m_s: float = 0.0
     wind_from_deg: float = 225.0
     dsm: Path | None = None
-    """Surface model that stands around the vehicle; None: level ground."""
+    """Surface model that stands around the vehicle; None: level ground, or what the world file names."""
+    world: Path | None = None
+    """World file: what else stands there, to fly into (docs/worlds.md)."""
+    gnss_script: tuple[GnssEvent, ...] = ()
+    """When its positions fail."""
     boot_s: float = 3.0
     """Simulated time until the position is known; a real vehicle takes about 40 s."""
     endurance_s: float = 1200.0
@@ -192,22 +197,33 @@ def _vehicle(options: SimOptions) -> SimulatedVehicle:
     )
     for name, value in options.parameters:
         parameters.set(name, value)
+    ground, obstacles = _surroundings(options, frame)
     return SimulatedVehicle(
         frame,
-        ground=_surface(options.dsm, frame) if options.dsm else None,
+        ground=ground,
+        obstacles=obstacles,
         seed=options.seed,
         gnss=options.gnss,
+        gnss_script=options.gnss_script,
         parameters=parameters,
         boot_s=options.boot_s,
         speedup=options.speedup,
     )
 
 
-def _surface(path: Path, frame: Frame) -> SurfaceGround:
-    # What reads rasters takes a second to load; level ground starts without it.
+def _surroundings(options: SimOptions, frame: Frame) -> tuple[Ground | None, Obstacles | None]:
+    # What reads rasters and casts rays takes a second to load; level ground starts without it.
+    if options.dsm is None and options.world is None:
+        return None, None
     from planning.geotiff import read_dsm
 
-    return SurfaceGround(read_dsm(path), frame)
+    dsm = read_dsm(options.dsm) if options.dsm else None
+    if options.world is None:
+        return SurfaceGround(dsm, frame) if dsm else None, None
+    from telemetry.simulator.scene import World
+
+    world = World.load(options.world, frame=frame, dsm=dsm)
+    return world.ground, world
 
 
 def _check(options: SimOptions) -> None:

@@ -33,6 +33,8 @@ TARGET_MASK = 65016
 """Position only, as ArduCopter reports its target."""
 MISSION_STATES = {"not_started": 2, "active": 3, "paused": 4, "complete": 5}
 LANDED_STATES = {"ground": 1, "flight": 2, "takeoff": 3, "landing": 4}
+NO_FIX = 1
+"""A receiver that is there and sees too few satellites."""
 FIXES = {"3d": 3, "rtk_fixed": 6}
 
 
@@ -147,10 +149,11 @@ class Streams:
         return wire.MAVLink_system_time_message(utc_us, self.boot_ms)
 
     def _gps_raw(self) -> MAVLink_message:
-        if not self._pilot.has_fix:
-            return wire.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 65535, 65535, 0, 0, 0)
+        if not self._vehicle.has_fix:
+            lost_us = int(self._vehicle.now_s * 1e6) if self._pilot.has_fix else 0
+            return wire.MAVLink_gps_raw_int_message(lost_us, NO_FIX if lost_us else 0, 0, 0, 0, 65535, 65535, 0, 0, 0)
         receiver = self._vehicle.gnss.receiver
-        lat, lon, alt_m = self._geodetic(self._pilot.p_neu)
+        lat, lon, alt_m = self._geodetic(self._vehicle.reported_neu)
         north, east, _ = self._pilot.v_neu
         return wire.MAVLink_gps_raw_int_message(
             int(self._vehicle.now_s * 1e6),
@@ -169,26 +172,26 @@ class Streams:
         )
 
     def _attitude(self) -> MAVLink_message:
-        roll, pitch, heading = self._vehicle.truth.attitude_rad
+        roll, pitch, heading = self._vehicle.attitude_rad
         return wire.MAVLink_attitude_message(
             self.boot_ms, roll, pitch, math.remainder(heading, 2 * math.pi), 0, 0, self._vehicle.truth.yaw_rate_rad_s
         )
 
     def _attitude_quaternion(self) -> MAVLink_message:
-        q = quaternion(*self._vehicle.truth.attitude_rad)
+        q = quaternion(*self._vehicle.attitude_rad)
         return wire.MAVLink_attitude_quaternion_message(self.boot_ms, *q, 0, 0, self._vehicle.truth.yaw_rate_rad_s)
 
     def _local_position(self) -> MAVLink_message | None:
         if not self._pilot.position_ok:
             return None
-        (n, e, u), (vn, ve, vu) = self._pilot.p_neu, self._pilot.v_neu
+        (n, e, u), (vn, ve, vu) = self._vehicle.reported_neu, self._pilot.v_neu
         return wire.MAVLink_local_position_ned_message(self.boot_ms, n, e, -u, vn, ve, -vu)
 
     def _global_position(self) -> MAVLink_message:
-        heading_cdeg = round(100 * math.degrees(self._vehicle.truth.heading_rad)) % 36000
+        heading_cdeg = round(100 * math.degrees(self._vehicle.attitude_rad[2])) % 36000
         if not self._pilot.has_fix:
             return wire.MAVLink_global_position_int_message(self.boot_ms, 0, 0, 0, 0, 0, 0, 0, heading_cdeg)
-        lat, lon, alt_m = self._geodetic(self._pilot.p_neu)
+        lat, lon, alt_m = self._geodetic(self._vehicle.reported_neu)
         north, east, up = (round(100 * v) for v in self._pilot.v_neu)
         above_home_m = self._pilot.p_neu[2] - self._pilot.home_neu[2]
         return wire.MAVLink_global_position_int_message(
@@ -221,7 +224,7 @@ class Streams:
         return wire.MAVLink_vfr_hud_message(
             math.hypot(north - wn, east - we),
             math.hypot(north, east),
-            int(math.degrees(vehicle.truth.heading_rad)) % 360,
+            int(math.degrees(vehicle.attitude_rad[2])) % 360,
             max(0, min(100, round(HOVER_THROTTLE_PERCENT * share))),
             alt_m if self._pilot.has_fix else 0.0,
             up,
@@ -269,7 +272,7 @@ class Streams:
         return wire.MAVLink_wind_message(parameters["SIM_WIND_DIR"], parameters["SIM_WIND_SPD"], 0)
 
     def _ekf_status(self) -> MAVLink_message:
-        flags = EKF_WITH_POSITION if self._pilot.position_ok else EKF_WITH_TILT
+        flags = EKF_WITH_POSITION if self._pilot.position_ok and self._vehicle.has_fix else EKF_WITH_TILT
         if self._vehicle.now_s < self._pilot.boot_s * 6.2 / AS_REAL_BOOT_S:
             flags = EKF_AT_BOOT
         return wire.MAVLink_ekf_status_report_message(flags, 0.01, 0.004, 0.001, 0.005, 0)

@@ -6,15 +6,18 @@ import math
 
 import numpy as np
 
+from telemetry.sensing import SimTruth
+from telemetry.simulator.attitude import AttitudeError
 from telemetry.simulator.autopilot import Autopilot
 from telemetry.simulator.battery import Battery, Pack
 from telemetry.simulator.dynamics import GRAVITY_M_S2, Airframe, Multirotor
 from telemetry.simulator.frame import Frame, Vec3
 from telemetry.simulator.gnss import Gnss, GnssKind
+from telemetry.simulator.gnss_script import GnssEvent, has_fix, offset_neu
 from telemetry.simulator.parameters import Parameters
 from telemetry.simulator.pilot import AS_REAL_BOOT_S, Sensed
 from telemetry.simulator.wind import Wind
-from telemetry.simulator.world import FlatGround, Ground
+from telemetry.simulator.world import FlatGround, Ground, Obstacles
 
 STEP_S = 0.005
 STEPS_PER_LOOK = 4
@@ -23,6 +26,12 @@ GENTLE_M_S = 2.5
 """A slower touch is no crash while it lands, nor while it takes off beside a small step of the ground."""
 STEEP_M = 0.5
 """Ground that stands this far above the feet was hit from the side."""
+BODY_M, REACH_M = 0.35, 0.3
+"""Height of the rotors over the feet, and how far they reach: a ball that must not touch what stands around."""
+LONGEST_TEXT = 50
+"""Of a STATUSTEXT in one part."""
+STANDING_M = 0.3
+"""What reaches no higher over the feet than this carries the vehicle."""
 
 
 class SimulatedVehicle:
@@ -33,18 +42,27 @@ class SimulatedVehicle:
         frame: Frame,
         *,
         ground: Ground | None = None,
+        obstacles: Obstacles | None = None,
         seed: int = 0,
         gnss: GnssKind = "rtk",
+        gnss_script: tuple[GnssEvent, ...] = (),
         parameters: Parameters | None = None,
         boot_s: float = AS_REAL_BOOT_S,
         speedup: float = 1.0,
     ) -> None:
-        wind_seed, gnss_seed = np.random.SeedSequence(seed).spawn(2)
+        wind_seed, gnss_seed, attitude_seed = np.random.SeedSequence(seed).spawn(3)
         self.frame = frame
         self.parameters = parameters or Parameters()
         self.ground = ground or FlatGround()
+        self.obstacles = obstacles
+        self.gnss_script = gnss_script
+        self.hit: str | None = None
+        """What it crashed into."""
         self.wind = Wind(np.random.default_rng(wind_seed))
         self.gnss = Gnss(gnss, np.random.default_rng(gnss_seed))
+        self.attitude_error = (
+            AttitudeError() if gnss == "perfect" else AttitudeError.drawn(np.random.default_rng(attitude_seed))
+        )
         self.battery = Battery(Pack(capacity_mah=self.parameters["BATT_CAPACITY"]))
         self.truth = Multirotor(Airframe())
         self.autopilot = Autopilot(frame, self.parameters, boot_s=boot_s, speedup=speedup)
@@ -62,6 +80,33 @@ class SimulatedVehicle:
     def estimated_neu(self) -> Vec3:
         return self.autopilot.p_neu
 
+    @property
+    def reported_neu(self) -> Vec3:
+        """The position that is told to others: the estimate, with the script's glitches. Control does without those,
+        as an estimator that refuses a fix does for a while."""
+        (n, e, u), (dn, de, du) = self.autopilot.p_neu, offset_neu(self.gnss_script, self.now_s)
+        return n + dn, e + de, u + du
+
+    @property
+    def has_fix(self) -> bool:
+        """Whether the receiver has one. Without it the vehicle goes on by its inertial estimate."""
+        return self.autopilot.has_fix and has_fix(self.gnss_script, self.now_s)
+
+    @property
+    def attitude_rad(self) -> Vec3:
+        """Roll, pitch, heading as it takes them to be."""
+        return self.attitude_error.reported(self.truth.attitude_rad)
+
+    def sim_truth(self, t_mono_s: float, t_utc_s: float) -> SimTruth:
+        """Where it really is, for simulated sensors."""
+        (n, e, u), (vn, ve, vu) = self.truth.p_neu, self.truth.v_neu
+        roll, pitch, heading = self.truth.attitude_rad
+        frame = self.frame
+        return SimTruth(
+            t_mono_s, t_utc_s, self.now_s, frame.lat_deg, frame.lon_deg, frame.alt_amsl_m,
+            (e, n, u), (ve, vn, vu), roll, pitch, heading, self.autopilot.armed,
+        )  # fmt: skip
+
     def advance(self, seconds: float) -> None:
         """Go on by this much simulated time, in whole steps."""
         for _ in range(round(seconds / STEP_S)):
@@ -70,7 +115,7 @@ class SimulatedVehicle:
     def step(self) -> None:
         self._steps += 1
         if self._steps % STEPS_PER_LOOK == 1 and not self._resting:
-            self._ground_m = self.ground.up_m(self.truth.p_neu[0], self.truth.p_neu[1])
+            self._look_around()
         self.gnss.step(STEP_S)
         demand = self.autopilot.update(self._sense(), STEP_S)
         if self.battery.empty and self.autopilot.flying:
@@ -99,6 +144,20 @@ class SimulatedVehicle:
     def _thrust(self, motors: bool) -> float | None:
         return max(0.0, 1 + self.truth.accel_neu[2] / GRAVITY_M_S2) if motors else None
 
+    def _look_around(self) -> None:
+        n, e, u = self.truth.p_neu
+        self._ground_m = self.ground.up_m(n, e)
+        if self.obstacles is None:
+            return
+        self._ground_m = max(self._ground_m, self.obstacles.top_under_m((e, n, u + STANDING_M)))
+        if self.autopilot.flying and (name := self.obstacles.touching((e, n, u + BODY_M), REACH_M)):
+            self._crash_into(name)
+            self.truth.v_neu = (0.0, 0.0, min(0.0, self.truth.v_neu[2]))
+
+    def _crash_into(self, name: str) -> None:
+        self.hit = name
+        self.autopilot.crash(f"Crash: Disarming: hit {name}"[:LONGEST_TEXT])
+
     def _meet_ground(self) -> None:
         under_m = self._ground_m - self.truth.p_neu[2]
         if under_m < 0:
@@ -112,7 +171,7 @@ class SimulatedVehicle:
         self.autopilot.say(6, f"SIM Hit ground at {math.hypot(*v):.6f} m/s")
         gentle = abs(v[2]) < GENTLE_M_S and math.hypot(v[0], v[1]) < GENTLE_M_S and under_m < STEEP_M
         if self.autopilot.flying and not (gentle and stage in ("takeoff", "landing")):
-            self.autopilot.crash("Crash: Disarming: hit the ground")
+            self._crash_into("the ground")
         if under_m >= STEEP_M:
             self._ground_m = self.truth.p_neu[2]
         self.truth.rest_on(self._ground_m)

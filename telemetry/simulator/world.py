@@ -8,7 +8,7 @@ import numpy as np
 
 from planning.dsm import Dsm
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Frame
+from telemetry.simulator.frame import Frame, Vec3
 
 
 class Ground(Protocol):
@@ -16,6 +16,18 @@ class Ground(Protocol):
 
     def up_m(self, north_m: float, east_m: float) -> float:
         """Metres above the origin of the frame."""
+        ...
+
+
+class Obstacles(Protocol):
+    """What stands on the ground. Places are east, north, up."""
+
+    def touching(self, p_enu: Vec3, radius_m: float) -> str | None:
+        """The name of what a ball of this radius touches."""
+        ...
+
+    def top_under_m(self, p_enu: Vec3) -> float:
+        """Height of the highest thing under a place that carries a vehicle; -inf without one."""
         ...
 
 

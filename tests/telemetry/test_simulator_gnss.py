@@ -23,8 +23,8 @@ def test_half_of_standalone_fixes_are_within_two_and_a_half_metres() -> None:
 
 def test_rtk_is_good_to_centimetres() -> None:
     error = errors("rtk", 1, 3000, 20.0)
-    assert error.std(axis=0) == pytest.approx([0.02, 0.02, 0.03], rel=0.2)
-    assert np.abs(error).max() < 0.2
+    assert error.std(axis=0) == pytest.approx([0.035, 0.035, 0.05], rel=0.2)
+    assert np.abs(error).max() < 0.3
 
 
 def test_perfect_is() -> None:

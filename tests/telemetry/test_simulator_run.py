@@ -5,7 +5,7 @@ import signal
 import socket
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import given, settings
@@ -13,11 +13,17 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.errors import ParameterError
+from telemetry.bus import Bus
 from telemetry.errors import AddressError, ConnectionFailedError
-from telemetry.nodes.simulator import main, read_home, read_options, read_parameter
+from telemetry.messages import Topic
+from telemetry.node import NodeContext
+from telemetry.node_lock import NodeLock
+from telemetry.nodes.simulator import fly_supervised, main, read_home, read_options, read_parameter
+from telemetry.simulator.gnss_script import GnssEvent
 from telemetry.simulator.run import SimOptions, flying
 from telemetry.simulator.transports import parse_where
 from tests.telemetry.simulator_process import HOME, PATIENCE_S, child, end, simulated_vehicle
+from tests.telemetry.small_bus import SmallBus
 
 PLACE: dict[str, Any] = {
     "home_lat_deg": -37.1244507, "home_lon_deg": 175.6892878, "home_alt_amsl_m": 803.24, "boot_s": 0.5, "speedup": 5.0,
@@ -206,6 +212,43 @@ def test_command_line_options() -> None:
     for read, text in ((read_home, "1,2"), (read_home, "a,b,c"), (read_parameter, "RTL_ALT")):
         with pytest.raises(ParameterError):
             read(text)
+
+
+def test_what_stands_around_and_what_fails_by_script_are_options(tmp_path: Path) -> None:
+    options, _ = read_options(
+        ["--home", HOME, "--world", str(tmp_path / "w.json"), "--gnss-event", "loss:60:20", "--gnss-event", "loss:1:2"]
+    )
+    assert options.world == tmp_path / "w.json"
+    assert options.gnss_script == (GnssEvent("loss", 60.0, 20.0), GnssEvent("loss", 1.0, 2.0))
+
+
+def test_a_broken_world_file_ends_it_with_the_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    world = tmp_path / "w.json"
+    world.write_text('{"format": "hedgehop-world", "version": 1, "objects": [{"type": "ball"}]}', encoding="utf-8")
+    assert main(["--home", HOME, "--link", "tcpin:127.0.0.1:0", "--world", str(world)]) == 2
+    assert "w.json: objects[0].type" in capsys.readouterr().err
+
+
+def test_a_node_tells_the_bus_where_its_vehicle_really_is(tmp_path: Path) -> None:
+    bus = SmallBus()
+
+    async def tell() -> None:
+        with NodeLock(tmp_path, "simulator", []) as lock:
+            options = SimOptions(**PLACE, link="tcpin:127.0.0.1:0")
+            node = asyncio.ensure_future(fly_supervised(cast(Bus, bus), NodeContext(lock), options))
+            try:
+                async with asyncio.timeout(PATIENCE_S):
+                    while len(bus.published) < 10 and not node.done():
+                        await asyncio.sleep(0.01)
+            finally:
+                node.cancel()
+                await asyncio.gather(node, return_exceptions=True)
+
+    asyncio.run(tell())
+    assert {topic for topic, _ in bus.published} == {Topic.TRUTH}
+    truths = [message for _, message in bus.published]
+    assert all(truth.position_enu_m == (0.0, 0.0, 0.0) and not truth.armed for truth in truths)
+    assert [truth.t_mono_s for truth in truths] == sorted({truth.t_mono_s for truth in truths})
 
 
 def test_a_wrong_option_ends_with_its_reason(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,1 @@
+"""The sensor link: what a companion computer on the drone sends to the ground station, over one WebSocket."""

@@ -1,0 +1,115 @@
+"""The ground station's end of one sensor link, sans-IO: agent's messages in, frames for the bus and answers out."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from telemetry.agent.wire import (
+    PROTOCOL_VERSION,
+    Cloud,
+    FromAgent,
+    FromServer,
+    Hello,
+    Ping,
+    Pong,
+    Radar,
+    Report,
+    Slam,
+    Welcome,
+    decode_from_agent,
+    points_of,
+    targets_of,
+)
+from telemetry.errors import SensorLinkError
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, packed
+
+LATE_S = 0.5
+FUTURE_S = 0.05
+"""Beyond what clocks that were laid over each other can differ."""
+RATE_OVER_S = 5.0
+NAME_MAX = 40
+
+Frame = RadarFrame | CloudFrame | SlamPose
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What one message of the agent comes to."""
+
+    frame: Frame | None = None
+    answer: FromServer | None = None
+
+
+class Intake:
+    """Lives as long as one connection. Times are this machine's monotonic clock, and UTC for the records."""
+
+    def __init__(self) -> None:
+        self.name = ""
+        self.received = self.lost = self.late = self.refused = 0
+        self._why = ""
+        self._numbers: dict[type[FromAgent], int] = {}
+        self._sizes: deque[tuple[float, int]] = deque()
+
+    def on_data(self, data: bytes, *, now_mono_s: float, now_utc_s: float) -> Taken:
+        """Raises SensorLinkError where the connection must end: the protocol is another. Bad frames are counted."""
+        self._sizes.append((now_mono_s, len(data)))
+        message = decode_from_agent(data)
+        if isinstance(message, Hello):
+            return Taken(answer=self._greet(message, now_mono_s))
+        if not self.name:
+            raise SensorLinkError("An agent must say hello first.", where="sensor link")
+        if isinstance(message, Ping):
+            return Taken(answer=Pong(message.t_s, now_mono_s))
+        try:
+            frame = self._frame(message, now_mono_s, now_utc_s)
+        except SensorLinkError as error:
+            self.refused, self._why = self.refused + 1, str(error)
+            return Taken()
+        self.received += 1
+        return Taken(frame=frame)
+
+    def report(self, now_mono_s: float) -> Report:
+        while self._sizes and self._sizes[0][0] < now_mono_s - RATE_OVER_S:
+            self._sizes.popleft()
+        rate = sum(size for _, size in self._sizes) / RATE_OVER_S
+        why, self._why = self._why, ""
+        return Report(self.received, self.lost, self.late, self.refused, rate, why)
+
+    def _greet(self, hello: Hello, now_mono_s: float) -> Welcome:
+        if hello.version != PROTOCOL_VERSION:
+            raise SensorLinkError(
+                f"The agent speaks version {hello.version} of the sensor link, not {PROTOCOL_VERSION}.",
+                advice="Install the same version of Hedgehop on both computers.",
+            )
+        if not (0 < len(hello.name) <= NAME_MAX and hello.name.isprintable()):
+            raise SensorLinkError(f"An agent's name has 1 to {NAME_MAX} printable characters.", where="sensor link")
+        self.name = hello.name
+        return Welcome(now_mono_s)
+
+    def _frame(self, message: Radar | Cloud | Slam, now_mono_s: float, now_utc_s: float) -> Frame:
+        age_s = now_mono_s - message.t_s
+        if not -FUTURE_S <= age_s < 3600.0:
+            raise SensorLinkError(f"A frame was measured {-age_s:.2f} s from now.", where=type(message).__name__)
+        self.late += age_s > LATE_S
+        if isinstance(message, Slam):
+            if not all(math.isfinite(value) for value in (*message.position_m, *message.q_wxyz)):
+                raise SensorLinkError("A pose holds what is no number.", where="slam")
+            return SlamPose(message.t_s, message.position_m, message.q_wxyz, message.tracking)
+        if isinstance(message, Radar):
+            targets = targets_of(message)
+            self._count(message)
+            xyz_m, speed, snr = packed(targets[:, :3]), packed(targets[:, 3]), packed(targets[:, 4])
+            return RadarFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, speed, snr)
+        points = points_of(message)
+        self._count(message)
+        xyz_m = packed(points)
+        return CloudFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, message.voxel_m)
+
+    def _count(self, message: Radar | Cloud) -> None:
+        """Numbers count up by one; a smaller one is an agent that began anew, or a frame out of order."""
+        last = self._numbers.get(type(message))
+        if last is not None and message.number > last + 1:
+            self.lost += message.number - last - 1
+        self._numbers[type(message)] = message.number

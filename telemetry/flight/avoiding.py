@@ -1,0 +1,257 @@
+"""Avoidance in flight, sans-IO: watches the regions ahead, stops and climbs when one is occupied, and lets go for good
+when a person takes over (Bigazzi 2022, figs 9-10).
+
+It engages only where the region is deep enough to stop in. The link node and simulated scenarios drive the same object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from planning.avoidance import largest_speed_m_s, may_engage
+from telemetry.errors import NotAllowedError
+from telemetry.flight.avoiding_words import status_of
+from telemetry.flight.detour import Detour, DetourParams
+from telemetry.flight.helm import GUIDED, Helm
+from telemetry.flight.pilot_watch import PilotWatch
+from telemetry.flight.regions import Regions, Sight
+from telemetry.flight.rest import Rest
+from telemetry.mavlink.actions import Action, Message
+from telemetry.mavlink.ends import GROUND_STATION
+from telemetry.messages import FlightStatus
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Sensor
+from telemetry.requests import FlyManoeuvre
+from telemetry.vehicle import VehicleState
+
+REACTION_S = 0.2
+"""From the region's word to the vehicle's first braking."""
+LOW_M = 1.0
+
+
+class Avoiding:
+    """Of one ArduPilot multirotor. All methods return what is to be sent to it, at once and in this order.
+
+    ``rest``: what is left of the flight, None when nothing is flown that could be gone on with. ``now_s`` is the
+    clock of ``t_mono_s`` in states and perception. ``on_engage`` is called when it takes the vehicle over, ``on_end``
+    when all is flown and the way home is commanded.
+    """
+
+    def __init__(
+        self,
+        target: tuple[int, int],
+        *,
+        rest: Callable[[VehicleState], Rest | None],
+        settings: PerceptionSettings | None = None,
+        params: DetourParams | None = None,
+        own: tuple[int, int] = GROUND_STATION,
+        on_engage: Callable[[], None] = lambda: None,
+        on_end: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._params, self._rest = params or DetourParams(), rest
+        self._on_engage, self._on_end = on_engage, on_end
+        self._watch = PilotWatch()
+        self.regions = Regions(settings or PerceptionSettings())
+        self._helm = Helm(target, self._watch.asked, own=own)
+        self.detour = Detour(self._helm, self.regions, self._params)
+        self._state: VehicleState | None = None
+        self.enabled = False
+        self.released = ""
+        """Who has taken over; it stays off for this flight."""
+        self._too_fast: Sight | None = None
+        self._now_s = 0.0
+
+    @property
+    def is_engaged(self) -> bool:
+        """It hands over the vehicle's targets now."""
+        return self.detour.is_engaged
+
+    @property
+    def status(self) -> AvoidanceStatus:
+        return status_of(self, self._now_s)
+
+    @property
+    def state(self) -> VehicleState | None:
+        return self._state
+
+    @property
+    def too_fast(self) -> Sight | None:
+        """The region that is not deep enough to stop in at the present speed."""
+        return self._too_fast
+
+    @property
+    def failed(self) -> str:
+        """What the vehicle would not do."""
+        return self._helm.failed
+
+    def flight_status(self, *, since_utc_s: float | None = None) -> FlightStatus:
+        """Of a flight that it has taken over."""
+        detour, target = self.detour, self.detour.target
+        phase = {"holding": "paused", "ceiling": "paused", "ending": "returning"}.get(detour.phase, "flying")
+        last = detour.rest.targets[-1].item if detour.rest.targets else None
+        return FlightStatus(
+            way=detour.rest.way,
+            phase=phase,  # type: ignore[arg-type]
+            target=None if target is None else target.item,
+            targets=last,
+            since_utc_s=since_utc_s,
+            hint=self.status.text,
+        )
+
+    # Switch.
+
+    def enable(self, now_s: float) -> None:
+        """Raises NotAllowedError after a release, until the vehicle has landed."""
+        if self.released:
+            raise NotAllowedError(
+                f"Avoidance stays off for this flight. {self.released}", advice="Switch it on again after the landing."
+            )
+        if not self.enabled:
+            self._watch.begin()
+        self.enabled, self._now_s = True, now_s
+
+    def disable(self, now_s: float) -> list[Action]:
+        """A vehicle that has been taken over goes on as it is: higher than planned, and nothing stops it any more."""
+        self.enabled, self._now_s = False, now_s
+        return []
+
+    def fly(self, request: FlyManoeuvre, rest: Rest, now_s: float) -> list[Action]:
+        """A prepared way, then ``rest`` higher by what the request says. Raises NotAllowedError."""
+        state = self._state
+        if not request.targets:
+            raise NotAllowedError("The way has no places.", advice="Prepare it again.")
+        if state is None or not _is_flying(state):
+            raise NotAllowedError("The vehicle is not in the air.", advice="A way around is flown in flight.")
+        if self.released:
+            raise NotAllowedError(self.released, advice="The pilot flies the vehicle.")
+        self._on_engage()
+        return self.detour.fly(
+            request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
+        )
+
+    def pause(self, now_s: float) -> list[Action]:
+        return self.detour.pause(now_s)
+
+    def resume(self, now_s: float) -> list[Action]:
+        return [] if self._state is None else self.detour.resume(self._state, now_s)
+
+    def stop(self) -> None:
+        """Another command for the vehicle follows: it is let go."""
+        self._helm.let_go()
+        self.detour.forget()
+
+    # What comes in.
+
+    def commanded(self, mode: str, now_s: float) -> None:
+        """A flight mode that this ground station has asked for by other means: it is no pilot's."""
+        self._watch.asked(mode, now_s)
+
+    def on_settings(self, settings: PerceptionSettings) -> None:
+        self.regions.settings = settings
+
+    def on_message(self, message: Message, now_s: float) -> list[Action]:
+        """Any of the vehicle, and those by which others fly it by hand."""
+        self._watch.on_message(message)
+        return [*self._helm.on_message(message, now_s), *self._look(now_s)]
+
+    def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
+        self._state = state
+        if self.released and state.mode != GUIDED:
+            self._helm.let_go()
+        if _is_flying(state):
+            self._watch.on_state(state, now_s)
+        else:
+            self._on_ground(state)
+        return [*self._helm.on_state(state, now_s), *self._look(now_s)]
+
+    def on_perception(self, status: PerceptionStatus, now_s: float) -> list[Action]:
+        self.regions.take(status)
+        return self._look(now_s)
+
+    def on_tick(self, now_s: float) -> list[Action]:
+        return [*self._helm.on_tick(now_s), *self._look(now_s)]
+
+    # What follows.
+
+    def _on_ground(self, state: VehicleState) -> None:
+        self._watch.begin()
+        if not state.armed and (self.is_engaged or self.released):
+            self.released = ""
+            self.stop()
+
+    def _look(self, now_s: float) -> list[Action]:
+        state, self._now_s = self._state, now_s
+        if state is None or self.released:
+            return []
+        if self._watch.words and (self.enabled or self.is_engaged):
+            return self._release(state, now_s)
+        was_ending = self.detour.phase == "ending"
+        actions = self.detour.look(state, now_s)
+        if self.detour.phase == "ending" and not was_ending:
+            self._on_end()
+        if not actions and self.detour.goes_over:
+            seen_by = self.regions.seen_by(now_s)
+            return self.detour.climb_on(seen_by, now_s) if seen_by else []
+        if self.enabled and not actions:
+            actions = self._look_ahead(state, now_s)
+        return actions
+
+    def _look_ahead(self, state: VehicleState, now_s: float) -> list[Action]:
+        going = self.detour.phase == "going" and not self.detour.is_manoeuvre
+        if self.is_engaged and not going:
+            self._too_fast = None
+            return []
+        self._too_fast = next((s for s in self._fresh(now_s) if not self._may_engage(s, state)), None)
+        seen = [sight for sight in self.regions.occupied(now_s) if self._may_engage(sight, state)]
+        if not seen:
+            return []
+        seen_by: frozenset[Sensor] = frozenset(sight.sensor for sight in seen)
+        if going:
+            return self.detour.avoid_again(seen_by, now_s)
+        rest = self._rest(state) if _is_flying(state) else None
+        if rest is None:
+            return []
+        self._on_engage()
+        return self.detour.avoid(rest, seen_by, now_s)
+
+    def _fresh(self, now_s: float) -> list[Sight]:
+        return [sight for sight in self.regions.sights.values() if sight.is_fresh(now_s)]
+
+    def _may_engage(self, sight: Sight, state: VehicleState) -> bool:
+        settings = self.regions.settings
+        return may_engage(
+            sight.depth_m,
+            state.ground_speed_m_s or 0.0,
+            latency_s=self._latency_s(sight),
+            decel_m_s2=settings.brake_m_s2,
+            radius_m=settings.vehicle_radius_m,
+        )
+
+    def largest_speed_m_s(self, now_s: float) -> float | None:
+        """At which every region that counts now still suffices to stop in."""
+        settings = self.regions.settings
+        speeds = [
+            largest_speed_m_s(
+                sight.depth_m,
+                latency_s=self._latency_s(sight),
+                decel_m_s2=settings.brake_m_s2,
+                radius_m=settings.vehicle_radius_m,
+            )
+            for sight in self._fresh(now_s)
+        ]
+        return min(speeds, default=None)
+
+    def _latency_s(self, sight: Sight) -> float:
+        return max(self._params.latency_s, sight.latency_s + REACTION_S)
+
+    def _release(self, state: VehicleState, now_s: float) -> list[Action]:
+        """Where a stick was moved and the mode still is ours the vehicle is stopped once; then nothing more is sent."""
+        self.released = self._watch.words
+        was_engaged = self.is_engaged
+        self.stop()
+        return self._helm.stop(now_s) if was_engaged and state.mode == GUIDED else []
+
+
+def _is_flying(state: VehicleState) -> bool:
+    if state.landed is None:
+        return state.armed and (state.alt_rel_home_m or 0.0) > LOW_M
+    return state.armed and state.landed == "in_air"

@@ -1,0 +1,73 @@
+"""What avoidance says of itself: its state and one short line for the operator."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from telemetry.obstacles import AvoidanceStatus
+
+if TYPE_CHECKING:
+    from telemetry.flight.avoiding import Avoiding
+
+State = AvoidanceStatus.__annotations__["state"]
+SENSOR_WORDS = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
+
+
+def status_of(avoiding: Avoiding, now_s: float) -> AvoidanceStatus:
+    largest_m_s = avoiding.largest_speed_m_s(now_s)
+    return AvoidanceStatus(
+        enabled=avoiding.enabled and not avoiding.released,
+        state=_state(avoiding),
+        text=avoiding.failed or _text(avoiding, now_s, largest_m_s),
+        height_offset_m=round(avoiding.detour.offset_m, 2),
+        largest_speed_m_s=None if largest_m_s is None else round(largest_m_s, 1),
+        sensors=avoiding.regions.counted(now_s),
+    )
+
+
+def _state(avoiding: Avoiding):
+    detour = avoiding.detour
+    if avoiding.released:
+        return "released"
+    if not detour.is_engaged:
+        return "watching" if avoiding.enabled else "off"
+    if detour.phase in ("holding", "ceiling"):
+        return detour.phase
+    if detour.is_manoeuvre:
+        return "manoeuvre"
+    return "offset" if detour.phase in ("going", "ending") else "climbing"
+
+
+def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
+    detour = avoiding.detour
+    if avoiding.released:
+        return f"{avoiding.released} Avoidance is off for this flight."
+    if detour.is_engaged:
+        return _engaged_text(avoiding, now_s)
+    if not avoiding.enabled:
+        return ""
+    if avoiding.too_fast is not None and largest_m_s is not None:
+        speed_m_s = avoiding.state.ground_speed_m_s if avoiding.state else None
+        return (
+            f"Too fast to stop within {avoiding.too_fast.depth_m:g} m: {speed_m_s or 0.0:.1f} m/s,"
+            f" at most {largest_m_s:.1f} m/s."
+        )
+    counted = avoiding.regions.counted(now_s)
+    return "" if counted else "No sensor sees ahead at the moment."
+
+
+def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
+    detour = avoiding.detour
+    if detour.phase == "holding":
+        return detour.why
+    if detour.phase == "ceiling":
+        return "Still not clear at the highest allowed height: it holds. Return home or take over."
+    if detour.phase in ("going", "ending"):
+        if detour.is_manoeuvre:
+            return "On the way around."
+        return f"Goes on {detour.offset_m:.1f} m higher than planned." if detour.offset_m else "Goes on in GUIDED."
+    seen = avoiding.regions.occupied(now_s)
+    what = f"{SENSOR_WORDS[seen[0].sensor]}, {seen[0].distance_m or 0.0:.0f} m ahead" if seen else ""
+    if detour.phase in ("stopping", "taking"):
+        return f"Braking: {what}." if what else "Braking."
+    return f"Climbing: {what}." if what else "Climbing: clear, it levels off."

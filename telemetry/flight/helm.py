@@ -1,0 +1,168 @@
+"""Steers an ArduPilot multirotor in flight: stop, take over in GUIDED, go to a place. One order at a time, sans-IO."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from telemetry.errors import RefusedError, TelemetryError
+from telemetry.flight.errand import Errand, Then
+from telemetry.flight.handover import METRES_PER_DEG, Handover, is_fresh
+from telemetry.flight.orders import GROUND_SPEED, Orders, Place
+from telemetry.mavlink.actions import Action, Message, Send
+from telemetry.mavlink.ends import GROUND_STATION, Ends
+from telemetry.vehicle import VehicleState
+
+STOP_MODES = ("BRAKE", "GUIDED")
+"""In order of preference; a change to GUIDED stops the vehicle too, unless it is in GUIDED already."""
+GUIDED = "GUIDED"
+STANDS_M_S = 0.4
+MODE_SHOWS_S = 3.0
+FALLBACK_DECEL_M_S2 = 1.5
+
+
+class Helm:
+    """``asked``: told of every mode that is commanded. ``failed``: why the last order was not obeyed, or empty."""
+
+    def __init__(
+        self,
+        target: tuple[int, int],
+        asked: Callable[[str, float], None],
+        *,
+        own: tuple[int, int] = GROUND_STATION,
+    ) -> None:
+        self._ends, self.orders = Ends(target, own), Orders("ardupilot", target)
+        self._asked = asked
+        self._errand = Errand(self._ends, self._on_failed)
+        self._mode, self._mode_s = "", 0.0
+        """Commanded last and not given up, and when."""
+        self._handover: Handover | None = None
+        self._state: VehicleState | None = None
+        self._speed: tuple[float, float] | None = None
+        self.failed = ""
+
+    @property
+    def place(self) -> Place | None:
+        """Where it was sent last."""
+        return None if self._handover is None else self._handover.place
+
+    def let_go(self) -> None:
+        """Nothing more is sent."""
+        self._errand = Errand(self._ends, self._on_failed)
+        self._handover, self._mode, self._speed, self.failed = None, "", None, ""
+
+    # What comes in.
+
+    def on_message(self, message: Message, now_s: float) -> list[Action]:
+        if not self._ends.is_from_vehicle(message):
+            return []
+        if message.get_type() == "POSITION_TARGET_GLOBAL_INT" and self._handover is not None:
+            self._handover.on_position_target(message, now_s)
+        return self._errand.on_message(message, now_s)
+
+    def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
+        self._state = state
+        return [*self._errand.on_state(state, now_s), *self._again_if_needed(now_s)]
+
+    def on_tick(self, now_s: float) -> list[Action]:
+        return [*self._errand.on_tick(now_s), *self._mode_again_if_needed(now_s), *self._again_if_needed(now_s)]
+
+    # Orders.
+
+    def stop(self, now_s: float) -> list[Action]:
+        """Brakes and holds."""
+        self._handover, self.failed = None, ""
+        return self.change_mode(STOP_MODES[0], now_s)
+
+    def change_mode(self, mode: str, now_s: float, *, then: Then | None = None) -> list[Action]:
+        """Nothing when it has been commanded already."""
+        if self._mode == mode:
+            return []
+        self._mode = mode
+        return self._command_mode(now_s, then)
+
+    def _command_mode(self, now_s: float, then: Then | None = None) -> list[Action]:
+        mode, self._mode_s, self._speed = self._mode, now_s, None  # a speed is forgotten with a change of mode
+        self._asked(mode, now_s)
+        message = self.orders.set_mode(mode)
+        return self._errand.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
+
+    def go_to(self, place: Place, now_s: float, *, radius_m: float, holds: bool = False) -> list[Action]:
+        """In GUIDED."""
+        self._handover = Handover(place, radius_m=radius_m, holds=holds)
+        return self._send_place(now_s)
+
+    def set_speed(self, speed_m_s: float, now_s: float, kind: float = GROUND_SPEED) -> list[Action]:
+        """Once per speed; ``kind``: SPEED_TYPE."""
+        if self._speed == (kind, speed_m_s):
+            return []
+        self._speed = (kind, speed_m_s)
+        return self._errand.begin(self.orders.change_speed(speed_m_s, kind), now_s)
+
+    # What the vehicle's state shows.
+
+    def has_stopped(self, state: VehicleState, now_s: float) -> bool:
+        speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
+        return state.mode in STOP_MODES and is_fresh(state, now_s) and speed_m_s <= STANDS_M_S
+
+    def has_arrived(self, state: VehicleState, now_s: float) -> bool:
+        return self._handover is not None and self._handover.has_arrived(state, now_s)
+
+    def _mode_again_if_needed(self, now_s: float) -> list[Action]:
+        """An acknowledgement does not say of which mode it is: what does not show is commanded again."""
+        shows = self._state is None or not self._mode or self._state.mode == self._mode
+        waits = self._errand.is_under_way or now_s - self._mode_s < MODE_SHOWS_S
+        return [] if shows or waits else self._command_mode(now_s)
+
+    def _again_if_needed(self, now_s: float) -> list[Action]:
+        if self._handover is None or self._state is None or self._state.mode != GUIDED:
+            return []
+        return self._send_place(now_s) if self._handover.must_be_sent_again(self._state, now_s) else []
+
+    def _send_place(self, now_s: float) -> list[Action]:
+        assert self._handover is not None
+        assert self._state is not None
+        self._handover.sent(self._state, now_s)
+        return [Send(self.orders.go_to(self._handover.place))]
+
+    def _on_failed(self, error: TelemetryError, now_s: float) -> list[Action]:
+        mode, self._mode, self._speed = self._mode, "", None
+        if mode == STOP_MODES[0] and isinstance(error, RefusedError):
+            return self._stop_in_guided(now_s)
+        self.failed = str(error)
+        return []
+
+    def _stop_in_guided(self, now_s: float) -> list[Action]:
+        """For a vehicle without BRAKE."""
+        if self._state is not None and self._state.mode == GUIDED:
+            return self.go_to(stopping_place(self._state), now_s, radius_m=1.0, holds=True)
+        return self.change_mode(GUIDED, now_s)
+
+
+def stopping_place(state: VehicleState) -> Place:
+    """Ahead of the vehicle, where it can stand still."""
+    here = here_of(state)
+    speed_m_s = state.ground_speed_m_s or 0.0
+    seconds = speed_m_s / (2 * FALLBACK_DECEL_M_S2)
+    north_m, east_m = (state.v_north_m_s or 0.0) * seconds, (state.v_east_m_s or 0.0) * seconds
+    return moved(here, north_m, east_m, 0.0)
+
+
+def here_of(state: VehicleState) -> Place:
+    """Where the vehicle is, its nose where it is. Only for a state with a position."""
+    assert state.lat_deg is not None
+    assert state.lon_deg is not None
+    assert state.alt_rel_home_m is not None
+    home_alt_m = math.nan if state.alt_amsl_m is None else state.alt_amsl_m - state.alt_rel_home_m
+    return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, home_alt_m, state.heading_rad)
+
+
+def moved(place: Place, north_m: float, east_m: float, up_m: float) -> Place:
+    shrink = math.cos(math.radians(place.lat_deg))
+    return Place(
+        place.lat_deg + north_m / METRES_PER_DEG,
+        place.lon_deg + east_m / METRES_PER_DEG / shrink,
+        place.alt_rel_home_m + up_m,
+        place.home_alt_amsl_m,
+        place.heading_rad,
+    )

@@ -1,0 +1,80 @@
+"""Targets handed over one at a time in flight: the next when the last is reached and its loiter time has passed."""
+
+from __future__ import annotations
+
+import math
+
+from telemetry.flight.handover import METRES_PER_DEG, is_fresh
+from telemetry.flight.helm import Helm
+from telemetry.flight.orders import Place
+from telemetry.mavlink.actions import Action
+from telemetry.messages import GuidedTarget
+from telemetry.vehicle import VehicleState
+
+RADIUS_M = 0.7
+"""Corners are cut by less than this."""
+LEVEL_LEG_M = 1.0
+"""A shorter leg over ground has no direction that the nose should turn to."""
+
+
+class Legs:
+    """``go`` hands over the present target; ``on_look`` goes on to the next ones and says when all are flown."""
+
+    def __init__(self, helm: Helm, targets: tuple[GuidedTarget, ...]) -> None:
+        self._helm, self.targets = helm, targets
+        self._index = 0
+        self._reached_s: float | None = None
+
+    @property
+    def is_over(self) -> bool:
+        return self._index >= len(self.targets)
+
+    @property
+    def left(self) -> tuple[GuidedTarget, ...]:
+        """From the one that is flown to."""
+        return self.targets[self._index :]
+
+    @property
+    def target(self) -> GuidedTarget | None:
+        """That is flown to, or was last."""
+        return self.targets[min(self._index, len(self.targets) - 1)] if self.targets else None
+
+    def go(self, state: VehicleState, now_s: float) -> list[Action]:
+        self._reached_s = None
+        if self.is_over:
+            return []
+        target = self.targets[self._index]
+        speed = self._helm.set_speed(target.speed_m_s, now_s)
+        return [*speed, *self._helm.go_to(_place(target, state), now_s, radius_m=RADIUS_M)]
+
+    def on_look(self, state: VehicleState, now_s: float) -> list[Action]:
+        if self.is_over:
+            return []
+        if self._reached_s is None and self._helm.has_arrived(state, now_s):
+            self._reached_s = now_s
+        waited = self._reached_s is not None and now_s - self._reached_s >= self.targets[self._index].loiter_s
+        if not waited or not is_fresh(state, now_s):
+            return []
+        self._index += 1
+        return self.go(state, now_s)
+
+
+def _place(target: GuidedTarget, state: VehicleState) -> Place:
+    """The nose turns to where the vehicle goes, if nothing else is asked for: the sensors look that way."""
+    heading_rad = target.heading_rad
+    if heading_rad is None:
+        heading_rad = _bearing_rad(target, state)
+    home_alt_m = math.nan
+    if state.alt_amsl_m is not None and state.alt_rel_home_m is not None:
+        home_alt_m = state.alt_amsl_m - state.alt_rel_home_m
+    return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, home_alt_m, heading_rad)
+
+
+def _bearing_rad(target: GuidedTarget, state: VehicleState) -> float | None:
+    if state.lat_deg is None or state.lon_deg is None:
+        return None
+    north_m = (target.lat_deg - state.lat_deg) * METRES_PER_DEG
+    east_m = (target.lon_deg - state.lon_deg) * METRES_PER_DEG * math.cos(math.radians(target.lat_deg))
+    if math.hypot(north_m, east_m) < LEVEL_LEG_M:
+        return state.heading_rad
+    return math.atan2(east_m, north_m) % math.tau

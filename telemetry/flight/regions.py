@@ -1,0 +1,112 @@
+"""What the sensors say about the region ahead, put together: is it occupied, whose word counts, is it clear again?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
+
+OLD_S = 0.5
+"""A frame or pose older than this says nothing about what is ahead now."""
+CLEAR_FRAMES = 3
+"""One empty frame may be a drop-out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One sensor's newest frame, as far as avoidance is concerned."""
+
+    sensor: Sensor
+    t_mono_s: float
+    counts: bool
+    """It works: it is neither blind nor frozen nor waiting for its first frame."""
+    occupied: bool
+    distance_m: float | None
+    """Of what is nearest in its way."""
+    depth_m: float
+    latency_s: float
+    clear_frames: int
+    """In a row, up to this one."""
+
+    def is_fresh(self, now_s: float) -> bool:
+        return self.counts and now_s - self.t_mono_s <= OLD_S
+
+
+class Regions:
+    """The newest sight of each sensor."""
+
+    def __init__(self, settings: PerceptionSettings) -> None:
+        self.settings = settings
+        self.sights: dict[Sensor, Sight] = {}
+
+    def take(self, status: PerceptionStatus) -> None:
+        """Frames that come late or twice change nothing."""
+        before = self.sights.get(status.sensor)
+        if before is not None and before.counts and status.t_mono_s < before.t_mono_s:
+            return
+        again = before is not None and status.t_mono_s == before.t_mono_s
+        found_m = self._in_the_way_m(status)
+        occupied = found_m is not None
+        counted = 0 if before is None else before.clear_frames
+        self.sights[status.sensor] = Sight(
+            sensor=status.sensor,
+            t_mono_s=status.t_mono_s,
+            counts=status.state == "running",
+            occupied=occupied,
+            distance_m=found_m,
+            depth_m=self._depth_m(status),
+            latency_s=status.latency_s or 0.0,
+            clear_frames=0 if occupied or status.state != "running" else counted + (not again),
+        )
+
+    def counted(self, now_s: float) -> tuple[Sensor, ...]:
+        """Sensors whose word counts at present."""
+        return tuple(sight.sensor for sight in self.sights.values() if sight.is_fresh(now_s))
+
+    def occupied(self, now_s: float) -> tuple[Sight, ...]:
+        """Fresh sights with something in the way, nearest first."""
+        found = [sight for sight in self.sights.values() if sight.occupied and sight.is_fresh(now_s)]
+        return tuple(sorted(found, key=lambda sight: sight.distance_m or 0.0))
+
+    def seen_by(self, now_s: float) -> frozenset[Sensor]:
+        """Sensors that see something in the way."""
+        return frozenset(sight.sensor for sight in self.occupied(now_s))
+
+    def is_clear(self, engaged: frozenset[Sensor], now_s: float) -> bool:
+        """Nobody sees anything, and those who did have seen nothing for several fresh frames."""
+        witnesses = [self.sights[sensor] for sensor in engaged]
+        return not self.occupied(now_s) and all(
+            sight.is_fresh(now_s) and sight.clear_frames >= CLEAR_FRAMES for sight in witnesses
+        )
+
+    def oldest(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
+        """Of the sensors that are counted on: the one whose frames are too old, if there is one."""
+        old = [self.sights[sensor] for sensor in engaged if not self.sights[sensor].is_fresh(now_s)]
+        return min(old, key=lambda sight: sight.t_mono_s, default=None)
+
+    def _depth_m(self, status: PerceptionStatus) -> float:
+        if status.region is not None:
+            return status.region.depth_m
+        of = {
+            "radar": self.settings.radar_depth_m,
+            "vision": self.settings.vision_depth_m,
+            "ranges": self.settings.ranges_depth_m,
+        }
+        return of[status.sensor]
+
+    def _in_the_way_m(self, status: PerceptionStatus) -> float | None:
+        """Distance of what is in the region, or in the corridor no farther than the region is deep and not below it.
+
+        A level region cannot see what stands on a line that climbs or descends; the corridor can.
+        """
+        depth_m = self._depth_m(status)
+        below_m = (status.region.height_m if status.region is not None else self.settings.height_m) / 2
+        near = [o.distance_m for o in status.obstacles if o.region == "roi"]
+        near += [
+            o.distance_m
+            for o in status.obstacles
+            if o.region == "corridor" and o.distance_m <= depth_m and o.height_difference_m > -below_m
+        ]
+        if near:
+            return min(near)
+        return depth_m if status.region is not None and status.region.occupied else None

@@ -1,0 +1,87 @@
+"""What is left of a flight, as targets that can be handed over one at a time at another height."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from planning.certificate.commands import LAND, RETURN_TO_LAUNCH, TAKEOFFS
+from planning.errors import MissionError
+from planning.model import Home, Mission, MissionItem
+from telemetry.flight.handover import METRES_PER_DEG
+from telemetry.flight.targets import guided_plan
+from telemetry.mavlink.flight_keeper import item_of
+from telemetry.messages import GuidedTarget, Item, OnboardMission
+from telemetry.vehicle import VehicleState
+
+LANDS_M = 20.0
+"""From home; nearer than that the way home is a descent, where whatever stands around is not in the way."""
+RETURNS = ("RTL", "SMART_RTL", "AUTO_RTL")
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    targets: tuple[GuidedTarget, ...]
+    end: Literal["rtl", "land", "hold"]
+    """What follows the last target."""
+    way: Literal["auto", "guided"] = "auto"
+
+    def raised(self, by_m: float) -> Rest:
+        """The same, higher."""
+        higher = tuple(replace(t, alt_rel_home_m=t.alt_rel_home_m + by_m) for t in self.targets)
+        return replace(self, targets=higher)
+
+
+def rest_of_flight(onboard: OnboardMission | None, state: VehicleState) -> Rest | None:
+    """Of a mission on board that is flown in AUTO, or of a return; None: nothing that could be gone on with."""
+    if state.mode in RETURNS:
+        return Rest((), "rtl") if _is_away(state) else None
+    return rest_of_mission(onboard, state) if onboard is not None and state.mode == "AUTO" else None
+
+
+def rest_of_mission(onboard: OnboardMission, state: VehicleState) -> Rest | None:
+    """From the item that is flown to now. None during the take-off and the landing, and for what no script can fly."""
+    number = item_of(state)
+    if number is None or not 1 <= number <= len(onboard.items):
+        return None
+    command = onboard.items[number - 1].command
+    if command in TAKEOFFS or command == LAND:
+        return None
+    rest = rest_from(onboard, number)
+    return None if rest is None or (not rest.targets and not _is_away(state)) else rest
+
+
+def rest_from(onboard: OnboardMission, number: int) -> Rest | None:
+    """From an item on, 1 is the first. None for items that no script can fly."""
+    if all(item.command == RETURN_TO_LAUNCH for item in onboard.items[number - 1 :]):
+        return Rest((), "rtl")
+    try:
+        plan = guided_plan(_mission(onboard))
+    except MissionError:
+        return None
+    return Rest(tuple(t for t in plan.targets if t.item >= number), plan.end)
+
+
+def _mission(onboard: OnboardMission) -> Mission:
+    """As the planner knows it. Heights above sea level are counted from the home that the vehicle told."""
+    home = Home(
+        onboard.home_lat_deg or 0.0,
+        onboard.home_lon_deg or 0.0,
+        math.nan if onboard.home_alt_amsl_m is None else onboard.home_alt_amsl_m,
+        "EGM96 height",
+    )
+    return Mission(home, tuple(_item(item) for item in onboard.items))
+
+
+def _item(item: Item) -> MissionItem:
+    p1, p2, p3, p4 = (math.nan if value is None else value for value in item.params)
+    return MissionItem(item.command, item.frame, (p1, p2, p3, p4), item.lat_deg, item.lon_deg, item.alt_m)
+
+
+def _is_away(state: VehicleState) -> bool:
+    at, home = (state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)
+    if at[0] is None or at[1] is None or home[0] is None or home[1] is None:
+        return False
+    east_m = (at[1] - home[1]) * METRES_PER_DEG * math.cos(math.radians(at[0]))
+    return math.hypot((at[0] - home[0]) * METRES_PER_DEG, east_m) > LANDS_M

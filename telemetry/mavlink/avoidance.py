@@ -1,0 +1,128 @@
+"""Avoidance on board of this link: who may switch it on, and what it hears and sends of the adopted vehicle."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+
+from telemetry.errors import NotAllowedError, SilentError
+from telemetry.flight.avoiding import Avoiding
+from telemetry.flight.rest import Rest
+from telemetry.mavlink.actions import Action, Message, Send
+from telemetry.mavlink.adopted import AdoptedVehicle
+from telemetry.mavlink.modes import commanded_mode
+from telemetry.messages import FlightStatus
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.requests import FlyManoeuvre
+from telemetry.vehicle import VehicleState
+
+WHO_IT_IS_S = 3.0
+"""A vehicle that was just adopted is waited for so long to say what it is."""
+
+
+class Avoidance:
+    """Of one adopted vehicle. What it decides is sent at once; it waits for nothing."""
+
+    def __init__(
+        self,
+        vehicle: AdoptedVehicle,
+        *,
+        rest: Callable[[VehicleState], Rest | None],
+        on_engage: Callable[[], None],
+        on_end: Callable[[], None],
+    ) -> None:
+        self._vehicle = vehicle
+        self._avoiding = Avoiding(vehicle.target, rest=rest, on_engage=on_engage, on_end=on_end)
+
+    @property
+    def is_engaged(self) -> bool:
+        return self._avoiding.is_engaged
+
+    @property
+    def is_enabled(self) -> bool:
+        return self._avoiding.enabled
+
+    @property
+    def status(self) -> AvoidanceStatus:
+        return self._avoiding.status
+
+    @property
+    def rest(self) -> Rest | None:
+        """What is left of a flight that was taken over, at its planned heights."""
+        return self._avoiding.detour.rest if self.is_engaged else None
+
+    def flight_status(self, since_utc_s: float | None) -> FlightStatus:
+        return self._avoiding.flight_status(since_utc_s=since_utc_s)
+
+    # Requests.
+
+    def check_autopilot(self) -> None:
+        if self._vehicle.state.autopilot != "ardupilot":
+            raise NotAllowedError("Avoidance is built for ArduPilot only.", advice="Watch the alerts and fly by hand.")
+
+    async def check_may_be_enabled(self, *, consent: bool) -> None:
+        """Raises NotAllowedError: a vehicle that is no simulation climbs by itself only if its operator wants it."""
+        self.check_autopilot()
+        if consent or await self._is_simulation():
+            return
+        raise NotAllowedError(
+            "On a real vehicle avoidance needs your consent: it will stop and climb by itself.",
+            advice="Give it when you switch avoidance on.",
+        )
+
+    async def _is_simulation(self) -> bool:
+        vehicle = self._vehicle
+        with contextlib.suppress(SilentError):  # what does not say that it is simulated is real
+            await vehicle.wait_until(
+                lambda _: vehicle.capabilities is not None, timeout_s=WHO_IT_IS_S, what="say what it is"
+            )
+        return vehicle.is_simulation
+
+    def enable(self) -> None:
+        self._avoiding.enable(time.monotonic())
+
+    def disable(self) -> None:
+        self._perform(self._avoiding.disable(time.monotonic()))
+
+    def fly(self, request: FlyManoeuvre, rest: Rest) -> None:
+        self._perform(self._avoiding.fly(request, rest, time.monotonic()))
+
+    def pause(self) -> None:
+        self._perform(self._avoiding.pause(time.monotonic()))
+
+    def resume(self) -> None:
+        self._perform(self._avoiding.resume(time.monotonic()))
+
+    def stop(self) -> None:
+        """Another command follows."""
+        self._avoiding.stop()
+
+    # What comes in.
+
+    def on_order(self, message: Message) -> None:
+        """What this link sends: a mode that it asks for is no pilot's."""
+        state = self._vehicle.state
+        mode = commanded_mode(message, state.autopilot, state.vehicle_type)
+        if mode is not None:
+            self._avoiding.commanded(mode, time.monotonic())
+
+    def on_message(self, message: Message) -> None:
+        self._perform(self._avoiding.on_message(message, time.monotonic()))
+
+    def on_state(self, state: VehicleState) -> None:
+        self._perform(self._avoiding.on_state(state, time.monotonic()))
+
+    def on_perception(self, status: PerceptionStatus) -> None:
+        self._perform(self._avoiding.on_perception(status, time.monotonic()))
+
+    def on_settings(self, settings: PerceptionSettings) -> None:
+        self._avoiding.on_settings(settings)
+
+    def on_tick(self) -> None:
+        self._perform(self._avoiding.on_tick(time.monotonic()))
+
+    def _perform(self, actions: list[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Send):
+                self._vehicle.send(action.message)

@@ -1,0 +1,75 @@
+"""What of a map has not been told yet, as messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.voxels import VoxelMap
+from telemetry.obstacles import MapDelta, MapOrigin
+from telemetry.perception.deltas import in_parts
+from telemetry.perception.kinds import SensorKind
+
+_NEVER = -1
+
+
+class ChangeTeller:
+    """Of one sensor's map, which may be exchanged for a new one at any time: then that is told whole."""
+
+    def __init__(self, kind: SensorKind, utc_minus_mono_s: float) -> None:
+        self._kind, self._utc_minus_mono_s = kind, utc_minus_mono_s
+        self._map: VoxelMap | None = None
+        self._origin: MapOrigin | None = None
+        self._told = _NEVER
+
+    def forget(self) -> None:
+        """The next time the whole map is told."""
+        self._told = _NEVER
+
+    def changes(self, the_map: VoxelMap, origin: MapOrigin | None, t_mono_s: float) -> list[MapDelta]:
+        """Nothing while nothing has changed, or nobody knows where the map lies."""
+        if origin is None:
+            return []
+        if the_map is not self._map or origin != self._origin:
+            self._map, self._origin, self._told = the_map, origin, _NEVER
+        if the_map.revision == self._told:
+            return []
+        found = the_map.changed_since(self._told, ever_hit_only=True)
+        since, self._told = self._told, found.revision
+        # Of a whole map free space need not be told: what is not named is not there.
+        keep = found.probability > 0.5 if found.whole else np.ones(len(found.keys), np.bool_)
+        if not found.whole and not keep.any():
+            return []
+        kept = np.flatnonzero(keep)
+        kept = kept[np.lexsort(found.keys[kept].T[::-1])]  # neighbours beside each other: half as large on disk
+        head = self._head(found.whole, found.revision, max(since, 0), origin, the_map.resolution_m, t_mono_s)
+        return in_parts(
+            head, found.keys[kept], told_probability(found.probability[kept]), found.explained[kept].astype(np.uint8)
+        )
+
+    def _head(
+        self, whole: bool, revision: int, since: int, origin: MapOrigin, resolution_m: float, t_mono_s: float
+    ) -> MapDelta:
+        return MapDelta(
+            sensor=self._kind.sensor,
+            t_mono_s=t_mono_s,
+            t_utc_s=t_mono_s + self._utc_minus_mono_s,
+            revision=revision,
+            whole=whole,
+            part=0,
+            parts=1,
+            origin=origin,
+            resolution_m=resolution_m,
+            keys=b"",
+            probability=b"",
+            explained=b"",
+            since=since,
+        )
+
+
+def told_probability(probability: NDArray[Any]) -> NDArray[np.uint8]:
+    """255 is 1; above 127 exactly where it is above one half."""
+    scaled = np.rint(np.asarray(probability, np.float64) * 255.0)
+    return np.where(probability > 0.5, np.maximum(scaled, 128), np.minimum(scaled, 127)).astype(np.uint8)

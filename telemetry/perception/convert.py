@@ -1,0 +1,61 @@
+"""From what perception found, in metres of the map, to what travels on the bus, with latitude and longitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from mapping.alerts import AlertEvent
+from mapping.frames import LocalFrame
+from mapping.obstacles import Found
+from mapping.perceiving import SearchedRegion
+from telemetry.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Region, Sensor
+
+
+def frame_of(origin: MapOrigin) -> LocalFrame:
+    return LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+
+
+def counts(dropped: Mapping[str, int]) -> tuple[Count, ...]:
+    """Most first."""
+    found = sorted(((count, what) for what, count in dropped.items() if count > 0), key=lambda c: (-c[0], c[1]))
+    return tuple(Count(what, count) for count, what in found)
+
+
+def region_of(region: SearchedRegion) -> Region:
+    return Region(region.enu_m, region.heading_rad, region.depth_m, region.fov_rad, region.height_m, region.occupied)
+
+
+def obstacle_of(found: Found, frame: LocalFrame) -> Obstacle:
+    lat_deg, lon_deg, alt_amsl_m = (float(v) for v in frame.to_geodetic([found.enu_m])[0])
+    return Obstacle(
+        region=found.region,
+        distance_m=found.distance_m,
+        bearing_deg=math.degrees(found.bearing_rad) % 360.0,
+        off_nose_deg=math.degrees(found.off_nose_rad),
+        height_difference_m=found.height_difference_m,
+        time_to_contact_s=found.time_to_contact_s,
+        enu_m=found.enu_m,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        alt_amsl_m=alt_amsl_m,
+        voxels=found.voxels,
+        size_m=found.size_m,
+    )
+
+
+def alert_of(
+    event: AlertEvent, sensor: Sensor, frame: LocalFrame | None, *, utc_minus_mono_s: float, done_t_mono_s: float
+) -> ObstacleAlert:
+    """``frame`` None: the map has no place yet; then there are no obstacles in it either."""
+    return ObstacleAlert(
+        id=event.id,
+        sensor=sensor,
+        kind=event.kind,
+        phase=event.phase,
+        t_mono_s=event.t_mono_s,
+        t_utc_s=event.t_mono_s + utc_minus_mono_s,
+        done_t_mono_s=done_t_mono_s,
+        text=event.text,
+        obstacle=None if event.obstacle is None or frame is None else obstacle_of(event.obstacle, frame),
+    )

@@ -1,0 +1,123 @@
+"""A map as files for other programs: point cloud, OctoMap, GeoTIFF of the highest obstacles, GeoJSON of obstacles."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from affine import Affine
+from numpy.typing import NDArray
+
+from mapping.octomap_bt import write_bt
+from mapping.ply import ply
+from mapping.voxels import VoxelMap
+from planning.dsm import Dsm
+from planning.geotiff import write_dsm
+from telemetry.errors import TelemetryError
+from telemetry.obstacles import MapDelta
+from telemetry.perception.convert import frame_of
+from telemetry.perception.deltas import FoldedMap, Voxels
+from telemetry.perception.mission_line import local_crs
+from telemetry.perception.outlines import clusters, outline
+
+Kind = Literal["ply", "bt", "tif", "geojson"]
+KINDS: tuple[Kind, ...] = ("ply", "bt", "tif", "geojson")
+
+MOST_CELLS = 100_000_000
+"""Of a GeoTIFF: 400 MB before it is compressed."""
+
+F64 = NDArray[np.float64]
+
+
+class ExportError(TelemetryError):
+    """A map that cannot be written as it was asked for."""
+
+    code = "map_export"
+
+
+def exported(kind: Kind, folded: FoldedMap) -> bytes:
+    """The whole map as a file of that kind. Raises ExportError when there is nothing in it, or it does not fit.
+
+    ``ply`` and ``bt`` hold every occupied voxel, known ground too, in metres of the map; ``tif`` and ``geojson`` only
+    obstacles, placed on Earth.
+    """
+    head = folded.last
+    if head is None or len(folded.voxels.occupied().keys) == 0:
+        raise ExportError("The map is empty.", advice="Fly first, with the sensor switched on.")
+    if kind == "ply":
+        held = folded.voxels.occupied()
+        return ply(_centres(held, head.resolution_m), probability=held.probability / 255.0)
+    if kind == "bt":
+        return _bt(folded.voxels, head.resolution_m)
+    obstacles = folded.voxels.occupied(include_explained=False)
+    return _tif(obstacles, head) if kind == "tif" else _geojson(obstacles, head)
+
+
+def _centres(voxels: Voxels, resolution_m: float) -> F64:
+    return (voxels.keys.astype(np.float64) + 0.5) * resolution_m
+
+
+def _bt(voxels: Voxels, resolution_m: float) -> bytes:
+    the_map = VoxelMap(resolution_m=resolution_m)
+    the_map.assign(voxels.keys, voxels.probability > 127)
+    return write_bt(the_map)
+
+
+def _tif(obstacles: Voxels, head: MapDelta) -> bytes:
+    """Height above sea level of the highest obstacle in each cell; unknown where there is none."""
+    edge_m, keys = head.resolution_m, obstacles.keys
+    if len(keys) == 0:
+        raise ExportError("There are no obstacles in the map, only known ground.", advice="Choose PLY or .bt.")
+    west, south = keys[:, 0].min(), keys[:, 1].min()
+    cols, rows = int(keys[:, 0].max()) - int(west) + 1, int(keys[:, 1].max()) - int(south) + 1
+    if rows * cols > MOST_CELLS:
+        what = f"A grid of {cols:,} x {rows:,} cells does not fit: {MOST_CELLS:,} are the most."
+        raise ExportError(what, advice="Choose PLY or GeoJSON.")
+    top_m = np.full((rows, cols), -np.inf, np.float32)
+    height_m = (keys[:, 2] + 1.0) * edge_m + head.origin.alt_amsl_m
+    np.maximum.at(top_m, (rows - 1 - (keys[:, 1] - south), keys[:, 0] - west), height_m.astype(np.float32))
+    top_m[np.isneginf(top_m)] = np.nan
+    transform = Affine(edge_m, 0.0, west * edge_m, 0.0, -edge_m, (south + rows) * edge_m)
+    with tempfile.TemporaryDirectory(prefix="hedgehop-") as folder:
+        path = Path(folder) / "map.tif"
+        write_dsm(path, Dsm(top_m, transform, local_crs(head.origin), None, ""))
+        return path.read_bytes()
+
+
+def _geojson(obstacles: Voxels, head: MapDelta) -> bytes:
+    """A polygon around each obstacle as seen from above; longitude and latitude, WGS84 (RFC 7946)."""
+    labels = clusters(obstacles.keys)
+    order = np.argsort(labels, kind="stable")
+    starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
+    features = [_feature(obstacles, rows, head) for rows in np.split(order, starts[1:]) if len(rows)]
+    document = {"type": "FeatureCollection", "features": features}
+    return (json.dumps(document, allow_nan=False) + "\n").encode()
+
+
+def _feature(obstacles: Voxels, rows: NDArray[np.intp], head: MapDelta) -> dict[str, Any]:
+    keys, edge_m, frame = obstacles.keys[rows], head.resolution_m, frame_of(head.origin)
+    ring = outline(keys[:, :2]) * edge_m
+    geodetic = frame.to_geodetic(np.column_stack([ring, np.zeros(len(ring))]))
+    centre = frame.to_geodetic([((keys.min(axis=0) + keys.max(axis=0) + 1) / 2 * edge_m)])[0]
+    bottom_m, top_m = float(keys[:, 2].min()) * edge_m, (float(keys[:, 2].max()) + 1.0) * edge_m
+    return {
+        "type": "Feature",
+        "geometry": {
+            "type": "Polygon",
+            "coordinates": [[[round(float(lon), 9), round(float(lat), 9)] for lat, lon, _ in geodetic]],
+        },
+        "properties": {
+            "sensor": head.sensor,
+            "voxels": len(rows),
+            "voxel_m": edge_m,
+            "lat_deg": round(float(centre[0]), 9),
+            "lon_deg": round(float(centre[1]), 9),
+            "top_alt_rel_home_m": round(top_m, 3),
+            "bottom_alt_rel_home_m": round(bottom_m, 3),
+            "top_alt_amsl_m": round(top_m + head.origin.alt_amsl_m, 3),
+            "largest_probability": round(float(obstacles.probability[rows].max()) / 255.0, 3),
+        },
+    }

@@ -1,0 +1,220 @@
+"""A recording's map, made once more from its frames and poses: exactly the one that was there in flight.
+
+Frames are worked on in the order in which the node worked on them, each with what the node knew by then: its status
+after each frame tells (``telemetry.obstacles.Basis``). Where no node ran, every frame is worked on as it came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mapping.ground import GroundGrid
+from telemetry.errors import RecordingError
+from telemetry.messages import FlightStatus, PlanRecord, Published, Topic
+from telemetry.obstacles import Basis, GroundNotice, PerceptionSettings, PerceptionStatus
+from telemetry.perception.changes import ChangeTeller
+from telemetry.perception.deltas import FoldedMap
+from telemetry.perception.ground import GroundError, ground_around, why_none
+from telemetry.perception.inbox import HOLD_S
+from telemetry.perception.kinds import AnyFrame, SensorKind
+from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.recording.reader import Entry, Recording, open_recording
+from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose
+from telemetry.vehicle import VehicleState
+
+_PATIENCE_S = 5.0
+"""A frame of which no status has told by then was not worked on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rebuilt:
+    folded: FoldedMap
+    """The map at the recording's end."""
+    frames: int
+    """That went into the map, since it last began afresh."""
+    dropped: int
+    """Frames that were recorded since then but did not."""
+    points: int
+    """Of all frames, after the gates."""
+    voxels_occupied: int
+    extent_m: tuple[float, float, float]
+    """East, north, up of all occupied voxels."""
+    notes: tuple[str, ...]
+
+
+def rebuild(path: Path, kind: SensorKind, *, progress: Callable[[float], None] | None = None) -> Rebuilt:
+    """Raises RecordingError for what is no recording, or holds no frame of that sensor."""
+    with open_recording(path) as recording:
+        if kind.frames not in recording.topics():
+            what = f"The recording holds no frames of the {kind.sensor}."
+            raise RecordingError(what, where=path.name, advice="Choose another sensor, or another recording.")
+        run = _Run(kind, has_bases=_has_bases(recording, kind), mono_minus_utc_s=recording.mono_minus_utc_s)
+        span_s = max(recording.end_utc_s - recording.start_utc_s, 1e-9)
+        for entry in recording.entries(run.topics):
+            run.take(entry)
+            if progress is not None:
+                progress((entry.t_utc_s - recording.start_utc_s) / span_s)
+        return run.finished()
+
+
+class _Run:
+    """Frames, states and camera poses wait until the status of a frame says which of them it was made with."""
+
+    def __init__(self, kind: SensorKind, *, has_bases: bool, mono_minus_utc_s: float) -> None:
+        self._kind, self._has_bases, self._mono_minus_utc_s = kind, has_bases, mono_minus_utc_s
+        self.topics = {kind.frames, kind.status, Topic.VEHICLE, Topic.SLAM_POSE, Topic.PLAN, Topic.FLIGHT}
+        self.topics |= {Topic.PERCEPTION_SETTINGS, Topic.GROUND}
+        self._frames: deque[tuple[float, AnyFrame]] = deque()
+        self._states: deque[VehicleState] = deque()
+        self._cameras: deque[SlamPose] = deque()
+        self._bases: deque[tuple[float, Basis]] = deque()
+        self._newest_state_s = self._newest_camera_s = 0.0
+        self._settled: dict[type[Published], Published] = {}
+        self._run = ""
+        self._perceiver = Perceiver(kind, run="", utc_minus_mono_s=-mono_minus_utc_s)
+        self._asked = GroundWanted(None, None)
+        self._ground: GroundGrid | None = None
+        self._begun = self._frames_seen = self._points = 0
+        self._notes: dict[str, None] = {}
+
+    def take(self, entry: Entry) -> None:
+        message, t_mono_s = entry.message, entry.t_utc_s + self._mono_minus_utc_s
+        if isinstance(message, VehicleState):
+            self._states.append(message)
+            self._newest_state_s = max(self._newest_state_s, message.t_utc_s)
+        elif isinstance(message, SlamPose):
+            self._cameras.append(message)
+            self._newest_camera_s = max(self._newest_camera_s, message.t_mono_s)
+        elif isinstance(message, RadarFrame | CloudFrame | RangeFrame):
+            self._frames.append((t_mono_s, message))
+        elif isinstance(message, PerceptionStatus):
+            if message.basis is not None:
+                self._bases.append((message.t_mono_s, message.basis))
+        else:
+            self._settled[type(message)] = message
+            self._settle(message)
+        self._go_on(t_mono_s)
+
+    def _go_on(self, now_s: float) -> None:
+        if not self._has_bases:
+            self._work_as_they_came(now_s)
+        while self._bases and self._is_complete(*self._bases[0], now_s):
+            self._on_basis(*self._bases.popleft())
+
+    def _is_complete(self, t_mono_s: float, basis: Basis, now_s: float) -> bool:
+        """Whether all that the frame was worked on with has been read: its status comes from another process."""
+        if now_s > basis.taken_t_mono_s + _PATIENCE_S:
+            return True
+        known = self._newest_state_s >= basis.vehicle_t_utc_s and self._newest_camera_s >= basis.camera_t_mono_s
+        return known and any(frame.t_mono_s == t_mono_s for _, frame in self._frames)
+
+    def finished(self) -> Rebuilt:
+        self._go_on(math.inf)
+        self._frames_seen += len(self._frames)
+        perception, where = self._perceiver.perception, self._perceiver.where
+        teller = ChangeTeller(self._kind, -self._mono_minus_utc_s)
+        folded = FoldedMap().folded(teller.changes(perception.map, where.origin, 0.0))
+        return Rebuilt(
+            folded=folded,
+            frames=perception.frames,
+            dropped=max(0, self._frames_seen - perception.frames),
+            points=self._points,
+            voxels_occupied=perception.map.occupied_count,
+            extent_m=_extent_m(folded),
+            notes=tuple(self._notes),
+        )
+
+    def _settle(self, message: Published) -> None:
+        if isinstance(message, PerceptionSettings):
+            self._perceiver.on_settings(message)
+        elif isinstance(message, GroundNotice):
+            self._perceiver.on_ground(message)
+        elif isinstance(message, PlanRecord):
+            self._perceiver.on_plan(message)
+        elif isinstance(message, FlightStatus):
+            self._perceiver.flown.flight = message
+
+    def _on_basis(self, t_mono_s: float, basis: Basis) -> None:
+        """The frame of that time, with what was known when it was worked on."""
+        if basis.run != self._run:
+            self._start_again(basis.run)
+        while self._states and self._states[0].t_utc_s <= basis.vehicle_t_utc_s:
+            self._perceiver.on_state(self._states.popleft())
+        while self._cameras and self._cameras[0].t_mono_s <= basis.camera_t_mono_s:
+            self._perceiver.on_camera(self._cameras.popleft())
+        found = next((number for number, (_, f) in enumerate(self._frames) if f.t_mono_s == t_mono_s), None)
+        if found is not None:
+            _, frame = self._frames[found]
+            del self._frames[found]
+            self._work(frame, basis.taken_t_mono_s, ground=basis.ground)
+        while self._frames and self._frames[0][0] < basis.taken_t_mono_s - 2.0 * _PATIENCE_S:
+            self._frames.popleft()
+            self._frames_seen += 1
+
+    def _work_as_they_came(self, now_s: float) -> None:
+        """What the node would have done: each frame as soon as poses are known up to its time."""
+        while self._states:
+            self._perceiver.on_state(self._states.popleft())
+        while self._cameras:
+            self._perceiver.on_camera(self._cameras.popleft())
+        while self._frames:
+            came_s, frame = self._frames[0]
+            if not frame.t_mono_s <= self._perceiver.pose_t_mono_s and now_s < came_s + HOLD_S:
+                return
+            self._frames.popleft()
+            self._work(frame, came_s, ground=True)
+
+    def _work(self, frame: AnyFrame, now_s: float, *, ground: bool) -> None:
+        self._perceiver.feed()
+        if self._perceiver.begun != self._begun:
+            self._begun, self._frames_seen, self._points = self._perceiver.begun, 0, 0
+        self._lay_ground(wanted=ground)
+        outcome = self._perceiver.work(frame, lambda: now_s)
+        self._frames_seen += 1
+        self._points += outcome.status.points if outcome.accepted else 0
+
+    def _lay_ground(self, *, wanted: bool) -> None:
+        asked = self._perceiver.ground_wanted
+        if asked != self._asked:
+            self._asked, self._ground = asked, self._loaded(asked)
+        self._perceiver.set_ground(self._ground if wanted else None)
+        if wanted and self._has_bases and self._ground is None:
+            self._notes["In flight known ground was told from obstacles; its surface model is not there any more."] = (
+                None
+            )
+
+    def _loaded(self, asked: GroundWanted) -> GroundGrid | None:
+        if asked.notice is None or asked.origin is None:
+            return None
+        try:
+            return ground_around(asked.notice, asked.origin)
+        except GroundError as error:
+            self._notes[why_none(error)] = None
+            return None
+
+    def _start_again(self, run: str) -> None:
+        """The node was started: its first frame, or one after it had died."""
+        self._run = run
+        self._perceiver = Perceiver(self._kind, run=run, utc_minus_mono_s=-self._mono_minus_utc_s)
+        self._begun = self._frames_seen = self._points = 0
+        for message in self._settled.values():
+            self._settle(message)
+
+
+def _has_bases(recording: Recording, kind: SensorKind) -> bool:
+    for entries in recording.backwards(kind.status, recording.end_utc_s):
+        if any(isinstance(e.message, PerceptionStatus) and e.message.basis is not None for e in entries):
+            return True
+    return False
+
+
+def _extent_m(folded: FoldedMap) -> tuple[float, float, float]:
+    keys = folded.voxels.occupied().keys
+    if folded.last is None or len(keys) == 0:
+        return 0.0, 0.0, 0.0
+    size = (keys.max(axis=0).astype(int) - keys.min(axis=0) + 1) * folded.last.resolution_m
+    return float(size[0]), float(size[1]), float(size[2])

@@ -1,0 +1,55 @@
+"""Everything that a frame needs, used once before the first one comes: kernels are loaded, or compiled if they must."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping.ground import ground_grid
+from telemetry.perception.changes import ChangeTeller
+from telemetry.perception.kinds import SensorKind
+from telemetry.perception.perceiver import Perceiver
+from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose, packed
+from telemetry.vehicle import VehicleState
+
+
+def warm_up(kind: SensorKind) -> None:
+    """Three frames of a made-up flight over made-up ground."""
+    perceiver = Perceiver(kind, run="warm-up", utc_minus_mono_s=0.0)
+    for number in range(3):
+        t_s = 100.0 + 0.1 * number
+        perceiver.on_state(_state(t_s))
+        if kind.uses_camera:
+            perceiver.on_camera(SlamPose(t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
+        perceiver.work(_frame(kind, t_s, number), lambda t_s=t_s: t_s)
+        perceiver.set_ground(ground_grid(np.zeros((40, 40), np.float32), [[-1.0, 0.0, 20.0], [0.0, 1.0, 20.0]]))
+    perceiver.tick(lambda: 101.0, feed=True)
+    ChangeTeller(kind, 0.0).changes(perceiver.perception.map, perceiver.where.origin, 101.0)
+
+
+def _state(t_s: float) -> VehicleState:
+    return VehicleState(
+        1,
+        1,
+        t_utc_s=t_s,
+        armed=True,
+        position_t_mono_s=t_s,
+        lat_deg=45.0,
+        lon_deg=10.0,
+        alt_rel_home_m=5.0,
+        attitude_t_mono_s=t_s,
+        roll_rad=0.0,
+        pitch_rad=0.0,
+        heading_rad=0.0,
+        home_lat_deg=45.0,
+        home_lon_deg=10.0,
+        home_alt_amsl_m=100.0,
+    )
+
+
+def _frame(kind: SensorKind, t_s: float, number: int) -> RadarFrame | CloudFrame | RangeFrame:
+    if kind.sensor == "ranges":
+        return RangeFrame(t_s, t_s, number, "warm-up", (0.0, 0.1), (0.0, 0.0), (6.0, 6.0))
+    xyz = packed(np.repeat([[0.0, 6.0, 1.0], [0.5, 5.0, 0.2]], 50, axis=0))
+    if kind.sensor == "vision":
+        return CloudFrame(t_s, t_s, number, "warm-up", xyz)
+    return RadarFrame(t_s, t_s, number, "warm-up", xyz, packed(np.zeros(100)), packed(np.full(100, 20.0)))

@@ -1,0 +1,161 @@
+"""The thread that works on one sensor's frames: maps, regions and alerts, and what is told of them."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+from telemetry.messages import Published, Topic
+from telemetry.obstacles import MapDelta
+from telemetry.perception.ahead import Flight
+from telemetry.perception.changes import ChangeTeller
+from telemetry.perception.inbox import Inbox
+from telemetry.perception.kinds import SensorKind
+from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.status import Outcome
+
+_log = logging.getLogger(__name__)
+
+TICK_S = 1.0
+DELTA_S = 0.1
+LOOK_S = 1.0
+_REFUSED_S = 0.1
+"""Frames that are refused may come in floods: they are told of at most so often."""
+_FRAMES_IN_A_ROW = 8
+
+Give = Callable[[str, Published], None]
+
+STATE, CAMERA, SETTINGS, PLAN, FLIGHT, AVOIDANCE, NOTICE = (
+    "state",
+    "camera",
+    "settings",
+    "plan",
+    "flight",
+    "avoidance",
+    "notice",
+)
+GROUND, WHOLE, CONFLICT = "ground", "whole", "conflict"
+
+
+class Worker:
+    """``run`` is the thread. ``give`` gets what is to be published, ``ask_ground`` what ground is wanted: from here."""
+
+    def __init__(
+        self,
+        kind: SensorKind,
+        inbox: Inbox,
+        *,
+        give: Give,
+        tell_map: Callable[[list[MapDelta]], None],
+        ask_ground: Callable[[GroundWanted], None],
+        look_ahead: Callable[[Flight | None], None],
+        run: str,
+        clock: Callable[[], float] = time.monotonic,
+        utc: Callable[[], float] = time.time,
+    ) -> None:
+        self._kind, self._inbox, self._clock = kind, inbox, clock
+        self._give, self._tell_map, self._ask_ground, self._look_ahead = give, tell_map, ask_ground, look_ahead
+        utc_minus_mono_s = utc() - clock()
+        self.perceiver = Perceiver(kind, run=run, utc_minus_mono_s=utc_minus_mono_s)
+        self._changes = ChangeTeller(kind, utc_minus_mono_s)
+        self._told_s = self._delta_s = self._looked_s = clock()
+        self._frame_t_s = 0.0
+        self._asked = GroundWanted(None, None)
+        self._handlers: dict[str, Callable[[Any], None]] = {
+            STATE: self.perceiver.on_state,
+            CAMERA: self.perceiver.on_camera,
+            SETTINGS: self.perceiver.on_settings,
+            PLAN: self.perceiver.on_plan,
+            FLIGHT: self._on_flight,
+            AVOIDANCE: self._on_avoidance,
+            NOTICE: self.perceiver.on_ground,
+            GROUND: self._on_ground,
+            WHOLE: self._on_whole,
+            CONFLICT: self._on_conflict,
+        }
+
+    def run(self) -> None:
+        """Until the inbox is closed. An error of ours costs one frame, not the node."""
+        while not self._inbox.closed:
+            self._inbox.wait(min(self._told_s + TICK_S, self._delta_s + DELTA_S))
+            try:
+                self.step()
+            except Exception:
+                _log.exception("A frame of the %s could not be worked on", self._kind.sensor)
+
+    def step(self) -> None:
+        """All that is due now."""
+        self._take_messages()
+        for _ in range(_FRAMES_IN_A_ROW):
+            frame = self._inbox.frame(self.perceiver.pose_t_mono_s)
+            if frame is None:
+                break
+            self._take_messages()
+            self._frame_t_s = frame.t_mono_s
+            self._tell(self.perceiver.work(frame, self._clock))
+            self._tell_changes()
+        now_s = self._clock()
+        if now_s >= self._told_s + TICK_S:
+            self._tell(self.perceiver.tick(self._clock, feed=True))
+        self._tell_changes()
+        if now_s >= self._looked_s + LOOK_S:
+            self._looked_s = now_s
+            self._look_ahead(self._flight())
+        if (wanted := self.perceiver.ground_wanted) != self._asked:
+            self._asked = wanted
+            self._ask_ground(wanted)
+
+    def _flight(self) -> Flight | None:
+        """None while no mission is flown."""
+        where, line, settings = self.perceiver.where, self.perceiver.flown.line, self.perceiver.settings
+        if where.origin is None or where.position is None or line is None or settings.paper_bare:
+            return None
+        radius_m = settings.vehicle_radius_m + settings.position_error_m
+        return Flight(line, where.origin, where.position, where.speed_m_s, radius_m)
+
+    def _take_messages(self) -> None:
+        if skipped := self._inbox.skipped():
+            self.perceiver.skip(skipped)
+        for kind, message in self._inbox.messages():
+            self._handlers[kind](message)
+
+    def _tell(self, outcome: Outcome) -> None:
+        now_s = self._clock()
+        if not outcome.accepted and not outcome.alerts and now_s < self._told_s + _REFUSED_S:
+            return
+        for alert in outcome.alerts:
+            self._give(Topic.ALERT, alert)
+        self._told_s = now_s
+        self._give(self._kind.status, outcome.status)
+
+    def _tell_changes(self) -> None:
+        now_s = self._clock()
+        if now_s < self._delta_s + DELTA_S:
+            return
+        perceiver = self.perceiver
+        deltas = self._changes.changes(perceiver.perception.map, perceiver.where.origin, self._frame_t_s or now_s)
+        self._delta_s = now_s
+        if deltas:
+            self._tell_map(deltas)
+
+    def _on_flight(self, message: Any) -> None:
+        self.perceiver.flown.flight = message
+
+    def _on_avoidance(self, message: Any) -> None:
+        self.perceiver.flown.avoidance = message
+
+    def _on_ground(self, message: Any) -> None:
+        wanted, grid, why_none = message
+        if wanted == self.perceiver.ground_wanted:
+            self.perceiver.set_ground(grid, why_none)
+
+    def _on_whole(self, done: Callable[[], None]) -> None:
+        self._changes.forget()
+        self._delta_s = self._clock() - DELTA_S
+        self._tell_changes()
+        done()
+
+    def _on_conflict(self, message: Any) -> None:
+        self.perceiver.conflict = message

@@ -1,0 +1,155 @@
+"""Scenario: a corner reflector 68 m ahead and 3 m higher, seen in lateral flight (Miccinesi 2022, figs 10-15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.alerts import AlertParams
+from mapping.radar_targets import Gate, Variant, in_gate, polar, to_enu
+from telemetry.obstacles import PerceptionSettings
+from telemetry.scenarios import scenes
+from telemetry.scenarios.figures import clusters_of, spread, within
+from telemetry.scenarios.flown import Flown, RadarLook
+from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.scenarios.running import flown_of, setup_of
+from telemetry.scenarios.wanted import Wanted
+from telemetry.sensing import rows
+from telemetry.simulator.sensors.body import of_truth
+from telemetry.simulator.sensors.radar_model import RadarModel
+
+F64 = NDArray[np.float64]
+
+NAME = "corner-reflector"
+RANGE_GATE_M, WEAKEST = 1.5, 0.01
+"""A return at the reflector's true range and within 20 dB of its strength is its own, side lobes included: the grass
+and the hill at that range are weaker than that."""
+FAR_M, NEAR_M = (60.0, 76.0), 40.0
+LEVEL_WITHIN_M = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """The reflector's own, one row each."""
+
+    range_m: F64
+    """True distance of the reflector when it was measured."""
+    up_m: F64
+    """True height of the vehicle then."""
+    mapped: dict[Variant, F64]
+    """(N, 3) In the world's frame, as each variant of fig. 15 puts it."""
+
+
+def run(wanted: Wanted) -> ScenarioResult:
+    scene = scenes.corner_reflector()
+    setup = setup_of(scene, wanted, NAME, sensors=("radar",))
+    flown = flown_of(setup, wanted)
+    world = setup.world
+    places = world.reflectors
+    if len(places) == 0:
+        return ScenarioResult(NAME, wanted.seed, (_result(flown, MapFigures(), (), ("There is no reflector.",)),))
+    returns = returns_of(flown, places[0], float(world.placed.corner_m2.max()))
+    errors_m = np.hypot(*(returns.mapped["heading_only"] - places[0])[:, :2].T)
+    voxels = flown.voxels("radar")
+    mine = _holding(voxels, returns.mapped["heading_only"], flown.map_to_world)
+    figures = (*_place_figures(returns, errors_m), _cluster_figure(mine), *_spread_figures(returns))
+    level = _level(returns)
+    radar = MapFigures(
+        voxels=len(voxels),
+        within_m=within(errors_m),
+        vertical_spread_m=spread(returns.mapped["heading_only"][level, 2]),
+    )
+    note = f"{len(errors_m)} returns of the reflector in {len(flown.radar)} frames, in {len(mine)} voxels"
+    return ScenarioResult(NAME, wanted.seed, (_result(flown, radar, figures, (note,)),))
+
+
+def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> Returns:
+    """Those in the paper's gate whose range and strength fit the reflector."""
+    range_m: list[float] = []
+    up_m: list[float] = []
+    mapped: dict[Variant, list[F64]] = {"heading_only": [], "full_attitude": [], "full_attitude_flat": []}
+    for look in flown.radar:
+        xyz = _own(look, reflector, cross_section_m2)
+        for variant, places in mapped.items():
+            found = to_enu(xyz, look.pose.position_enu_m, look.pose.rotation_enu_body, look.pose.heading_rad, variant)
+            places.append(found + flown.map_to_world)
+        range_m += [float(np.linalg.norm(reflector - look.truth.position_enu_m))] * len(xyz)
+        up_m += [look.truth.position_enu_m[2]] * len(xyz)
+    stacked: dict[Variant, F64] = {
+        name: np.concatenate(places or [np.empty((0, 3))]) for name, places in mapped.items()
+    }
+    return Returns(np.array(range_m), np.array(up_m), stacked)
+
+
+def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
+    """(N, 3) body"""
+    xyz = np.array(rows(look.frame.xyz_m, 3), np.float64)
+    power = 10 ** (rows(look.frame.snr_db, 1)[:, 0] / 10)
+    measured = polar(xyz)
+    true = polar((of_truth(look.truth).T @ (reflector - look.truth.position_enu_m))[None])
+    full = RadarModel().snr(np.array([cross_section_m2]), true.range_m, true.azimuth_rad, true.elevation_rad)
+    own = in_gate(measured, Gate()) & (power >= WEAKEST * full)
+    return xyz[own & (np.abs(measured.range_m - true.range_m) <= RANGE_GATE_M)]
+
+
+def _place_figures(returns: Returns, errors_m: F64) -> tuple[Figure, ...]:
+    far = (returns.range_m >= FAR_M[0]) & (returns.range_m <= FAR_M[1])
+    near = returns.range_m <= NEAR_M
+    return (
+        Figure("returns within 3 m at 68 m", _share(errors_m[far] <= 3.0), least=0.9),
+        Figure("returns within 1.5 m inside 40 m", _share(errors_m[near] <= 1.5), least=0.9),
+    )
+
+
+def _holding(voxels: F64, places: F64, map_to_world: F64) -> F64:
+    """Those believed voxels in which the places lie."""
+    edge = PerceptionSettings().radar_resolution_m
+    keys = {tuple(key) for key in np.floor((places - map_to_world) / edge).astype(int).tolist()}
+    own = [tuple(key) in keys for key in np.floor((voxels - map_to_world) / edge).astype(int).tolist()]
+    return voxels[np.array(own, np.bool_)]
+
+
+def _cluster_figure(voxels: F64) -> Figure:
+    """Voxels that one alert would hold together are one cluster."""
+    count = len(np.unique(clusters_of(voxels, link_m=AlertParams().same_within_m)))
+    return Figure("clusters that the reflector makes", float(count), least=1.0, most=1.0)
+
+
+def _spread_figures(returns: Returns) -> tuple[Figure, ...]:
+    level = _level(returns)
+    chosen = spread(returns.mapped["heading_only"][level, 2])
+    measured = spread(returns.mapped["full_attitude"][level, 2])
+    flat = spread(returns.mapped["full_attitude_flat"][level, 2])
+    # A map is no finer than its voxels: a spread below one is one.
+    ratio = measured / max(chosen, PerceptionSettings().radar_resolution_m)
+    return (
+        Figure("vertical spread, measured elevation over heading only", ratio, least=3.0),
+        Figure("vertical spread, heading only", chosen, unit=" m"),
+        Figure("vertical spread, measured elevation", measured, unit=" m"),
+        Figure("vertical spread, full attitude but level", flat, unit=" m"),
+    )
+
+
+def _level(returns: Returns) -> NDArray[np.bool_]:
+    """Those of the part flown at constant altitude."""
+    return np.abs(returns.up_m - scenes.LEVEL_FLIGHT_M) <= LEVEL_WITHIN_M
+
+
+def _share(hits: NDArray[np.bool_]) -> float:
+    return float(hits.mean()) if len(hits) else 0.0
+
+
+def _result(flown: Flown, radar: MapFigures, figures: tuple[Figure, ...], notes: tuple[str, ...]) -> FlightResult:
+    return FlightResult(
+        title="lateral flight",
+        duration_s=flown.duration_s,
+        contact=flown.contact,
+        min_true_distance_m=flown.nearest_m,
+        alerts=flown.alerts_seen(),
+        radar=radar,
+        vision=MapFigures(),
+        figures=figures,
+        notes=notes,
+    )

@@ -1,0 +1,83 @@
+"""A terrain-hugging mission over a surface model, planned as any other, and its line in the scenario's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.dsm import Dsm
+from planning.model import Mission, PathParams, Poi, SurfaceParams
+from planning.plan import plan_mission
+from planning.request import PlanRequest
+from planning.vehicle_profile import load_profile
+from telemetry.simulator.frame import Frame
+
+F64 = NDArray[np.float64]
+
+HEIGHT_M, RADIUS_M = 5.0, 20.0
+"""H and R = 4 H, the defaults of Melita 2020."""
+SPEED_M_S, FASTEST_M_S = 3.0, 5.0
+RIM_M = 12.0
+"""Points keep this far from the model's rim and from unknown cells."""
+TRIES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Hugging:
+    dsm: Dsm
+    mission: Mission
+    frame: Frame
+    line_enu_m: F64
+    """(K, 3) From the top of the take-off to the last waypoint; up counts from home."""
+
+    @property
+    def length_m(self) -> float:
+        return float(np.hypot(*np.diff(self.line_enu_m[:, :2], axis=0).T).sum())
+
+
+def hugging(dsm: Dsm, pois: tuple[Poi, ...]) -> Hugging:
+    """Raises what planning raises."""
+    request = PlanRequest(
+        pois=pois,
+        profile=load_profile("mapper-rtk"),
+        surface=SurfaceParams(RADIUS_M, HEIGHT_M),
+        path=PathParams(mean_speed_m_s=SPEED_M_S, max_speed_m_s=FASTEST_M_S),
+    )
+    plan = plan_mission(dsm, request)
+    home = plan.mission.home
+    frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
+    lat_lon = plan.dsm.lat_lon_from_xy(plan.line.points_m[:, :2])
+    north_per_deg, east_per_deg = frame.metres_per_degree
+    line = np.column_stack(
+        [
+            (lat_lon[:, 1] - home.lon_deg) * east_per_deg,
+            (lat_lon[:, 0] - home.lat_deg) * north_per_deg,
+            plan.line.points_m[:, 2] - home.alt_dsm_m,
+        ]
+    )
+    return Hugging(plan.dsm, plan.mission, frame, line)
+
+
+def random_route(dsm: Dsm, random: np.random.Generator, *, points: int, apart_m: float) -> tuple[Poi, ...]:
+    """Points on known ground, each ``apart_m`` or more from the one before."""
+    west, south, east, north = dsm.bounds_m
+    low, high = np.array([west, south]) + RIM_M, np.array([east, north]) - RIM_M
+    route: list[F64] = []
+    for _ in range(TRIES):
+        place = random.uniform(low, high)
+        far = not route or np.hypot(*(place - route[-1])) >= apart_m
+        if far and _all_known(dsm, place):
+            route.append(place)
+        if len(route) == points:
+            break
+    lat_lon = dsm.lat_lon_from_xy(np.array(route))
+    return tuple(Poi(float(lat), float(lon), f"P{number}") for number, (lat, lon) in enumerate(lat_lon, start=1))
+
+
+def _all_known(dsm: Dsm, place: F64) -> bool:
+    """Around the place, as far as the rim."""
+    steps = np.arange(-RIM_M, RIM_M + 0.1, 2.0)
+    around = place + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    return bool(np.isfinite(dsm.elevation_at(around)).all())

@@ -1,0 +1,41 @@
+"""Scenarios: a wood and a ruined building, mapped by the radar (Miccinesi 2022, figs 16-21)."""
+
+from __future__ import annotations
+
+from telemetry.scenarios import scenes
+from telemetry.scenarios.map_figures import radar_figures, vision_figures
+from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult
+from telemetry.scenarios.running import flown_of, setup_of
+from telemetry.scenarios.wanted import Wanted
+
+WOOD, RUIN = "wood", "ruined-building"
+
+
+def run_wood(wanted: Wanted) -> ScenarioResult:
+    return _run(WOOD, scenes.wood(wanted.seed), wanted)
+
+
+def run_ruin(wanted: Wanted) -> ScenarioResult:
+    return _run(RUIN, scenes.ruined_building(wanted.seed), wanted)
+
+
+def _run(name: str, scene: scenes.Scene, wanted: Wanted) -> ScenarioResult:
+    setup = setup_of(scene, wanted, name)
+    flown = flown_of(setup, wanted)
+    radar, vision = radar_figures(flown, setup), vision_figures(flown, setup)
+    figures = (
+        Figure("contacts", float(flown.contact), most=0.0),
+        Figure("precision of the radar map", radar.precision or 0.0),
+        Figure("recall of the radar map", radar.recall or 0.0),
+    )
+    flight = FlightResult(
+        title="mapping flight",
+        duration_s=flown.duration_s,
+        contact=flown.contact,
+        min_true_distance_m=flown.nearest_m,
+        alerts=flown.alerts_seen(),
+        radar=radar,
+        vision=vision,
+        figures=figures,
+    )
+    return ScenarioResult(name, wanted.seed, (flight,))

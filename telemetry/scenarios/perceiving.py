@@ -1,0 +1,68 @@
+"""The sensors' frames on their way through perception, as they would go through its nodes."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from telemetry.messages import FlightStatus, PlanRecord, Published
+from telemetry.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
+from telemetry.perception.changes import ChangeTeller
+from telemetry.perception.ground import ground_around
+from telemetry.perception.kinds import KINDS
+from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.status import Outcome
+from telemetry.scenarios.setup import PERCEPTION_S, Setup
+from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose
+from telemetry.vehicle import VehicleState
+
+TICK_S = 1.0
+
+
+class Perceiving:
+    """One sensor: frames come out ``PERCEPTION_S`` after they were measured."""
+
+    def __init__(self, sensor: Sensor, setup: Setup, plan: PlanRecord, ground: GroundNotice) -> None:
+        self.perceiver = Perceiver(KINDS[sensor], run=str(setup.seed), utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
+        self.perceiver.on_settings(setup.settings)
+        self.perceiver.on_plan(plan)
+        self.perceiver.on_ground(ground)
+        self._laid: GroundWanted | None = None
+        self._changes = ChangeTeller(KINDS[sensor], T0_UTC_S - T0_MONO_S)
+        self._waiting: deque[RadarFrame | CloudFrame] = deque()
+        self._worked_s = 0.0
+
+    def on_message(self, message: Published) -> None:
+        if isinstance(message, VehicleState):
+            self.perceiver.on_state(message)
+        elif isinstance(message, SlamPose):
+            self.perceiver.on_camera(message)
+        elif isinstance(message, FlightStatus):
+            self.perceiver.flown.flight = message
+        elif isinstance(message, AvoidanceStatus):
+            self.perceiver.flown.avoidance = message
+        elif isinstance(message, RadarFrame | CloudFrame):
+            self._waiting.append(message)
+
+    def work(self, now_s: float) -> list[tuple[RadarFrame | CloudFrame | None, Outcome]]:
+        """What is done by now; a second without a frame is told as well."""
+        out: list[tuple[RadarFrame | CloudFrame | None, Outcome]] = []
+        self._lay_ground()
+        while self._waiting and self._waiting[0].t_mono_s + PERCEPTION_S <= now_s + 1e-9:
+            frame = self._waiting.popleft()
+            out.append((frame, self.perceiver.work(frame, lambda: now_s)))
+            self._worked_s = now_s
+        if now_s - self._worked_s >= TICK_S:
+            out.append((None, self.perceiver.tick(lambda: now_s, feed=True)))
+            self._worked_s = now_s
+        return out
+
+    def changes(self, now_s: float) -> list[MapDelta]:
+        """What of the map has not been told yet, for a recording."""
+        return self._changes.changes(self.perceiver.perception.map, self.perceiver.where.origin, now_s)
+
+    def _lay_ground(self) -> None:
+        wanted = self.perceiver.ground_wanted
+        if wanted != self._laid and wanted.notice is not None and wanted.origin is not None:
+            self.perceiver.set_ground(ground_around(wanted.notice, wanted.origin))
+            self._laid = wanted

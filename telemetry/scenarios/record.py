@@ -1,0 +1,30 @@
+"""Writes a scenario's flight as a recording that Review opens: states, frames, maps, alerts, all on virtual time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from telemetry.messages import Published
+from telemetry.recording.topics import RECORDED
+from telemetry.recording.writer import RecordingWriter
+from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
+
+
+class FlightRecording:
+    """One file. Nothing reads a clock: the same flight gives the same file."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        """Raises RecordingError when it cannot be created."""
+        self._virtual_s = 0.0
+        self._writer = RecordingWriter(path, t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name=name, now=self._now)
+
+    def tell(self, topic: str, message: Published, t_utc_s: float) -> None:
+        if topic in RECORDED:
+            self._virtual_s = t_utc_s - T0_UTC_S
+            self._writer.write(topic, message, t_utc_s)
+
+    def close(self) -> None:
+        self._writer.close()
+
+    def _now(self) -> float:
+        return self._virtual_s

@@ -1,0 +1,84 @@
+"""What all scenarios share: what is wanted of one, and the ground and objects that it is flown among."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planning.dsm import Dsm
+from planning.errors import FormatError
+from telemetry.scenarios.course import course_mission
+from telemetry.scenarios.flight import fly
+from telemetry.scenarios.flown import Flown
+from telemetry.scenarios.record import FlightRecording
+from telemetry.scenarios.scenes import VALLEY, Scene
+from telemetry.scenarios.setup import Setup
+from telemetry.scenarios.terrain import field, known
+from telemetry.scenarios.wanted import Wanted
+from telemetry.simulator.frame import Frame
+from telemetry.simulator.scene import World
+from telemetry.simulator.scene.world_file import read_world
+
+
+def setup_of(scene: Scene, wanted: Wanted, title: str, *, by_script: bool = True, **more: Any) -> Setup:
+    """The scene's flight. ``more``: further fields of ``Setup``. Raises FormatError for a broken world file."""
+    frame, dsm = VALLEY, field(VALLEY, scene.hills)
+    if wanted.world is not None:
+        frame, dsm = _own_ground(wanted.world, frame, dsm)
+        world = World.load(wanted.world, frame=frame, dsm=dsm)
+    else:
+        world = World.parse(scene.document, frame=frame, dsm=dsm)
+    return Setup(
+        title=title,
+        world=world,
+        seed=wanted.seed,
+        mission=course_mission(scene.course, frame),
+        course=scene.course if by_script else None,
+        ground=surveyed(dsm, wanted.seed),
+        **more,
+    )
+
+
+def surveyed(dsm: Dsm, seed: int) -> Dsm:
+    """What is known of the ground, the same for every flight of a seed."""
+    return known(dsm, np.random.default_rng([seed, 11]))
+
+
+def flown_of(setup: Setup, wanted: Wanted, *, part: str = "") -> Flown:
+    """The flight, recorded if that is wanted; ``part`` tells the files of several flights apart."""
+    if wanted.record is None:
+        return fly(setup)
+    path = wanted.record if not part else wanted.record.with_stem(f"{wanted.record.stem}-{part.replace(' ', '-')}")
+    recording = FlightRecording(path, setup.title)
+    try:
+        return fly(setup, recording.tell)
+    finally:
+        recording.close()
+
+
+def own_ground(path: Path) -> Dsm | None:
+    """The surface model that a world file names."""
+    file = read_world(path)
+    if file.dsm is None:
+        return None
+    # What reads rasters takes a second to load.
+    from planning.geotiff import read_dsm
+
+    return read_dsm(file.dsm)
+
+
+def _own_ground(path: Path, frame: Frame, dsm: Dsm) -> tuple[Frame, Dsm]:
+    own, origin = own_ground(path), read_world(path).origin
+    if own is None:
+        return frame, dsm
+    if origin is None:
+        raise FormatError(
+            "The world names a surface model but no origin on it.",
+            where=path.name,
+            advice='Add "origin": {"lat_deg": ..., "lon_deg": ...}: there the vehicle takes off.',
+        )
+    height_m = float(own.elevation_at(own.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
+    return Frame(origin.lat_deg, origin.lon_deg, height_m if math.isfinite(height_m) else 0.0), own

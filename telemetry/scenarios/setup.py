@@ -1,0 +1,44 @@
+"""What a flight of a scenario begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from planning.dsm import Dsm
+from planning.model import Mission
+from telemetry.messages import Published
+from telemetry.obstacles import PerceptionSettings, Sensor
+from telemetry.scenarios.course import Course
+from telemetry.simulator.gnss_script import GnssEvent
+from telemetry.simulator.scene import World
+
+Tell = Callable[[str, Published, float], None]
+"""Topic, message, UTC: as on the bus."""
+
+PERCEPTION_S, ORDER_S = 0.1, 0.2
+"""From measuring a frame to what it shows, and from an order to the vehicle's obeying: 0.3 s together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    title: str
+    world: World
+    seed: int
+    mission: Mission
+    """What is flown: in AUTO, or as targets of the navigation script where there is a course."""
+    ground: Dsm
+    """What is known of the ground."""
+    course: Course | None = None
+    sensors: tuple[Sensor, ...] = ("radar", "vision")
+    settings: PerceptionSettings = field(default_factory=PerceptionSettings)
+    avoids: bool = False
+    """Only in AUTO."""
+    solid: bool = True
+    """Whether the vehicle crashes into what stands there, or flies through it to look at the next."""
+    dark: bool = False
+    gnss_script: tuple[GnssEvent, ...] = ()
+    climb_m_s: float | None = None
+    most_m: float | None = None
+    """Stop looking after so much way; None: until it has landed."""
+    longest_s: float = 900.0

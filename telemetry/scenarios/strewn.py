@@ -1,0 +1,65 @@
+"""Things in the way of a mission that its surface model knows nothing of: masts, walls and trees."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from telemetry.scenarios.objects import Object, cylinder, tree, wall
+from telemetry.simulator.scene import SceneTerrain
+
+F64 = NDArray[np.float64]
+
+FIRST_M, APART_M, LAST_M = 30.0, 35.0, 15.0
+"""The first stands so far along the line, the next ones so far apart, and none this near to its end."""
+KINDS = ("mast", "wall", "tree")
+
+
+def strewn(line_enu_m: F64, terrain: SceneTerrain, random: np.random.Generator) -> list[Object]:
+    """One kind after the other on the (K, 3) line, each reaching some metres above it."""
+    objects: list[Object] = []
+    s_m = FIRST_M + float(random.uniform(0.0, 10.0))
+    while s_m < _length_m(line_enu_m) - LAST_M:
+        (east, north, up), heading_rad = _at(line_enu_m, s_m)
+        ground_m = terrain.up_m(north, east)
+        height_m = up - ground_m + float(random.uniform(3.0, 8.0))
+        kind = KINDS[len(objects) % len(KINDS)]
+        objects.append(_object(kind, f"{kind} {len(objects)}", (east, north), height_m, heading_rad, random))
+        s_m += APART_M + float(random.uniform(0.0, 10.0))
+    return objects
+
+
+def _object(
+    kind: str,
+    name: str,
+    at_m: tuple[float, float],
+    height_m: float,
+    heading_rad: float,
+    random: np.random.Generator,
+) -> Object:
+    if kind == "mast":
+        return cylinder(name, at_m, float(random.uniform(0.1, 0.25)), height_m, material="metal")
+    if kind == "tree":
+        return tree(name, at_m, height_m, float(random.uniform(1.5, 2.8)), 0.3 * height_m)
+    across = heading_rad + math.pi / 2 + float(random.uniform(-0.5, 0.5))
+    half_m = float(random.uniform(2.5, 5.0))
+    east, north = half_m * math.sin(across), half_m * math.cos(across)
+    ends = (at_m[0] - east, at_m[1] - north), (at_m[0] + east, at_m[1] + north)
+    return wall(name, *ends, height_m, thickness_m=0.3, material="concrete")
+
+
+def _length_m(line: F64) -> float:
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
+def _at(line: F64, s_m: float) -> tuple[tuple[float, float, float], float]:
+    """Place and heading so far along the line, as seen from above."""
+    steps = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    ends = np.cumsum(steps)
+    leg = int(np.searchsorted(ends, s_m))
+    share = 1.0 - (ends[leg] - s_m) / steps[leg]
+    place = line[leg] + share * (line[leg + 1] - line[leg])
+    east, north = line[leg + 1, :2] - line[leg, :2]
+    return (float(place[0]), float(place[1]), float(place[2])), math.atan2(east, north)

@@ -1,0 +1,104 @@
+"""What sensors put on the bus: radar frames, point clouds, the camera's own pose, ranges. Frozen dataclasses.
+
+Body frame, as in the papers: x to the right, y forward, z up, metres, at the vehicle. Arrays travel as the bytes of
+little-endian float32 in row order; ``rows`` reads and ``packed`` writes them. ``t_mono_s`` is when a frame was
+MEASURED, on this machine's monotonic clock; who brings frames in from elsewhere converts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+
+
+def packed(values: NDArray[np.floating]) -> bytes:
+    """Any float array as little-endian float32, in row order."""
+    return np.ascontiguousarray(values, dtype="<f4").tobytes()
+
+
+def rows(data: bytes, columns: int) -> F32:
+    """(N, columns) float32, read-only. Raises ValueError when the bytes are no whole rows."""
+    return np.frombuffer(data, dtype="<f4").reshape(-1, columns)
+
+
+@dataclass(frozen=True, slots=True)
+class RadarFrame:
+    """Targets of one radar frame; a radar that sees nothing publishes nothing."""
+
+    t_mono_s: float
+    t_utc_s: float
+    number: int
+    """Counts up by one per frame of this source; gaps are lost frames."""
+    source: str
+    """"simulated", or the agent's name."""
+    xyz_m: bytes
+    """(N, 3) body frame"""
+    radial_speed_m_s: bytes
+    """(N,) positive: moving away"""
+    snr_db: bytes
+    """(N,)"""
+
+
+@dataclass(frozen=True, slots=True)
+class CloudFrame:
+    """A point cloud of the stereo camera (or any range camera that looks forward)."""
+
+    t_mono_s: float
+    t_utc_s: float
+    number: int
+    source: str
+    xyz_m: bytes
+    """(N, 3) body frame"""
+    voxel_m: float = 0.0
+    """Edge of the voxels that it was thinned to on board; 0: not thinned."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlamPose:
+    """Where the camera's own SLAM believes to be, in a frame of its own: z up, its origin and heading arbitrary."""
+
+    t_mono_s: float
+    position_m: tuple[float, float, float]
+    q_wxyz: tuple[float, float, float, float]
+    """Unit quaternion, body frame -> SLAM frame."""
+    tracking: Literal["good", "poor", "lost"] = "good"
+
+
+@dataclass(frozen=True, slots=True)
+class RangeFrame:
+    """MAVLink OBSTACLE_DISTANCE or DISTANCE_SENSOR: ranges in single directions from the vehicle."""
+
+    t_mono_s: float
+    t_utc_s: float
+    number: int
+    source: str
+    bearing_rad: tuple[float, ...]
+    """Clockwise from the nose."""
+    elevation_rad: tuple[float, ...]
+    """Above the horizontal plane; -pi/2 is straight down."""
+    range_m: tuple[float, ...]
+    """Only those that hit something."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimTruth:
+    """Where the simulated vehicle really is: for simulated sensors and for tests, for nobody else."""
+
+    t_mono_s: float
+    t_utc_s: float
+    t_sim_s: float
+    home_lat_deg: float
+    home_lon_deg: float
+    home_alt_amsl_m: float
+    position_enu_m: tuple[float, float, float]
+    """From the simulation's origin, z = 0 on the ground there."""
+    velocity_enu_m_s: tuple[float, float, float]
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
+    armed: bool

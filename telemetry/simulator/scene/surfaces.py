@@ -1,0 +1,79 @@
+"""Places on the surfaces of a world, and how far points are from its ground: what maps are judged by."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from telemetry.simulator.scene.primitives import BOX, CYLINDER
+from telemetry.simulator.scene.terrain import SceneTerrain
+
+F64 = NDArray[np.float64]
+
+_STEP_M = 0.5
+
+
+def sample(rows: F64, spacing_m: float, random: np.random.Generator) -> F64:
+    """(N, 3) spread evenly over the surfaces of primitives, one per ``spacing_m`` squared; no undersides."""
+    parts = [_on(row, spacing_m, random) for row in rows]
+    return np.concatenate(parts) if parts else np.empty((0, 3))
+
+
+def _on(row: F64, spacing_m: float, random: np.random.Generator) -> F64:
+    if row[0] == BOX:
+        local = _on_box(row, spacing_m, random)
+        cos, sin = row[7], row[8]
+        turned = np.column_stack(
+            [local[:, 0] * cos + local[:, 1] * sin, local[:, 1] * cos - local[:, 0] * sin, local[:, 2]]
+        )
+        return turned + np.array([row[1], row[2], row[3]])
+    local = _on_cylinder(row, spacing_m, random) if row[0] == CYLINDER else _on_ellipsoid(row, spacing_m, random)
+    return local + np.array([row[1], row[2], row[3]])
+
+
+def _count(area_m2: float, spacing_m: float) -> int:
+    return max(1, round(area_m2 / spacing_m**2))
+
+
+def _on_box(row: F64, spacing_m: float, random: np.random.Generator) -> F64:
+    a, b, height = row[5], row[6], row[4] - row[3]
+    out = []
+    for side, half, across in ((0, a, b), (1, b, a)):
+        for sign in (-1.0, 1.0):
+            n = _count(2 * across * height, spacing_m)
+            face = np.empty((n, 3))
+            face[:, side], face[:, 1 - side] = sign * half, random.uniform(-across, across, n)
+            face[:, 2] = random.uniform(0.0, height, n)
+            out.append(face)
+    n = _count(4 * a * b, spacing_m)
+    out.append(np.column_stack([random.uniform(-a, a, n), random.uniform(-b, b, n), np.full(n, height)]))
+    return np.concatenate(out)
+
+
+def _on_cylinder(row: F64, spacing_m: float, random: np.random.Generator) -> F64:
+    radius, height = row[5], row[4] - row[3]
+    n, m = _count(2 * math.pi * radius * height, spacing_m), _count(math.pi * radius**2, spacing_m)
+    around, on_top = random.uniform(0, 2 * math.pi, n), random.uniform(0, 2 * math.pi, m)
+    out = radius * np.sqrt(random.uniform(0, 1, m))
+    side = np.column_stack([radius * np.sin(around), radius * np.cos(around), random.uniform(0.0, height, n)])
+    return np.concatenate([side, np.column_stack([out * np.sin(on_top), out * np.cos(on_top), np.full(m, height)])])
+
+
+def _on_ellipsoid(row: F64, spacing_m: float, random: np.random.Generator) -> F64:
+    radius, half = row[5], (row[4] - row[3]) / 2
+    p = 1.6075  # Thomsen's approximation of an ellipsoid's area
+    area = 4 * math.pi * ((radius ** (2 * p) + 2 * (radius * half) ** p) / 3) ** (1 / p)
+    direction = random.standard_normal((_count(area, spacing_m), 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return direction * [radius, radius, half] + [0.0, 0.0, half]
+
+
+def ground_distance(terrain: SceneTerrain, points_enu: F64) -> F64:
+    """(N,) to the nearest of the columns under and one step around each point; heights between columns count too."""
+    steps = [(x * _STEP_M, y * _STEP_M) for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    ups = np.stack([terrain.ups_m(points_enu[:, :2] + step) for step in steps])
+    up = points_enu[:, 2]
+    beside = np.maximum(0.0, np.maximum(ups.min(axis=0) - up, up - ups.max(axis=0)))
+    return np.minimum(np.abs(up - ups[4]), np.hypot(beside, _STEP_M))

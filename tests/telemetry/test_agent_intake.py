@@ -1,0 +1,131 @@
+"""The ground station's end of the sensor link."""
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.agent.intake import Intake
+from telemetry.agent.wire import (
+    STEP_M,
+    Cloud,
+    Hello,
+    Ping,
+    Pong,
+    Radar,
+    Slam,
+    Welcome,
+    cloud,
+    decode_from_agent,
+    encode,
+    points_of,
+)
+from telemetry.errors import SensorLinkError
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
+
+TARGETS = np.array([[1, 50, 0.5, -3, 20], [2, 60, 1, 0.31, 15]], np.float32)
+
+
+def greeted() -> Intake:
+    intake = Intake()
+    taken = intake.on_data(encode(Hello(1, "drone")), now_mono_s=100.0, now_utc_s=1000.0)
+    assert taken.answer == Welcome(100.0)
+    return intake
+
+
+def give(intake: Intake, message: Radar | Cloud | Slam | Ping, now_mono_s: float = 100.0):
+    return intake.on_data(encode(message), now_mono_s=now_mono_s, now_utc_s=1000.0 + now_mono_s - 100.0)
+
+
+def radar(number: int, t_s: float = 99.9) -> Radar:
+    return Radar(number, t_s, TARGETS.tobytes())
+
+
+def test_a_radar_frame_becomes_one_for_the_bus() -> None:
+    frame = give(greeted(), radar(7)).frame
+    assert isinstance(frame, RadarFrame)
+    assert (frame.number, frame.source, frame.t_mono_s) == (7, "drone", 99.9)
+    assert frame.t_utc_s == pytest.approx(999.9)
+    assert np.array_equal(rows(frame.xyz_m, 3), TARGETS[:, :3])
+    assert np.array_equal(rows(frame.radial_speed_m_s, 1)[:, 0], TARGETS[:, 3])
+    assert np.array_equal(rows(frame.snr_db, 1)[:, 0], TARGETS[:, 4])
+
+
+@given(st.lists(st.tuples(*[st.floats(-160, 160, width=32)] * 3), max_size=50))
+def test_a_cloud_arrives_to_half_a_step(points: list[tuple[float, float, float]]) -> None:
+    xyz_m = np.array(points, np.float32).reshape(-1, 3)
+    frame = give(greeted(), cloud(xyz_m, number=0, t_s=99.0, voxel_m=0.25)).frame
+    assert isinstance(frame, CloudFrame)
+    assert frame.voxel_m == 0.25
+    assert np.allclose(rows(frame.xyz_m, 3), xyz_m, atol=STEP_M / 2 + 1e-4)
+
+
+def test_points_that_cannot_be_written_are_left_out() -> None:
+    xyz_m = np.array([[1, 2, 3], [np.nan, 0, 0], [400, 0, 0], [np.inf, 1, 1]], np.float32)
+    assert points_of(cloud(xyz_m, number=0, t_s=0.0, voxel_m=0.0)) == pytest.approx(np.array([[1, 2, 3]]))
+
+
+def test_a_pose_passes_and_one_without_numbers_does_not() -> None:
+    intake = greeted()
+    pose = Slam(99.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), "poor")
+    assert give(intake, pose).frame == SlamPose(99.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), "poor")
+    assert give(intake, Slam(99.0, (float("nan"), 0, 0), (1.0, 0, 0, 0), "good")).frame is None
+    assert intake.refused == 1
+
+
+def test_gaps_and_late_frames_are_counted() -> None:
+    intake = greeted()
+    for number, now_s in ((0, 100.0), (1, 100.0), (4, 100.0), (5, 101.0)):
+        assert give(intake, radar(number), now_s).frame is not None
+    report = intake.report(101.0)
+    assert (report.received, report.lost, report.late, report.refused) == (4, 2, 1, 0)
+    assert report.bytes_per_s > 0
+
+
+@pytest.mark.parametrize("t_s", [100.2, float("nan"), float("inf"), -5000.0])
+def test_impossible_times_are_refused_and_told(t_s: float) -> None:
+    intake = greeted()
+    assert give(intake, radar(0, t_s)).frame is None
+    report = intake.report(100.0)
+    assert (report.refused, report.received) == (1, 0)
+    assert "measured" in report.text
+    assert intake.report(100.0).text == ""
+
+
+@pytest.mark.parametrize("message", [Radar(0, 99.0, b"123"), Cloud(0, 99.0, 0.2, 0.005, b"1"),
+                                     Cloud(0, 99.0, 0.2, 0.0, b""), Cloud(0, 99.0, 0.2, 0.005, bytes(600_006)),
+                                     Radar(0, 99.0, bytes(20 * 1001))], ids=str)  # fmt: skip
+def test_bytes_that_are_no_rows_are_refused(message: Radar | Cloud) -> None:
+    intake = greeted()
+    assert give(intake, message).frame is None
+    assert intake.refused == 1
+
+
+def test_a_ping_is_answered_with_both_clocks() -> None:
+    assert give(greeted(), Ping(5.5), 123.0).answer == Pong(5.5, 123.0)
+
+
+@pytest.mark.parametrize("hello", [Hello(2, "drone"), Hello(1, ""), Hello(1, "x" * 41), Hello(1, "a\nb")])
+def test_agents_that_cannot_be_understood_are_sent_away(hello: Hello) -> None:
+    with pytest.raises(SensorLinkError):
+        Intake().on_data(encode(hello), now_mono_s=0.0, now_utc_s=0.0)
+
+
+def test_frames_before_hello_end_the_connection() -> None:
+    with pytest.raises(SensorLinkError, match="hello"):
+        give(Intake(), radar(0))
+
+
+@given(st.binary(max_size=200))
+def test_noise_never_does_more_than_end_the_connection(data: bytes) -> None:
+    try:
+        decode_from_agent(data)
+    except SensorLinkError as error:
+        assert error.advice  # noqa: PT017 - noise may be a message by chance
+
+
+def test_unknown_fields_and_types_are_told() -> None:
+    for wrong in ({"type": "bomb"}, {"type": "ping", "t_s": 1.0, "more": 1}, {"t_s": 1.0}, [1]):
+        with pytest.raises(SensorLinkError):
+            decode_from_agent(msgspec.msgpack.encode(wrong))

@@ -1,0 +1,283 @@
+"""Avoidance with the simulated vehicle in virtual time: it climbs over walls, holds when blind, yields to the pilot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from telemetry.errors import NotAllowedError
+from telemetry.flight.rest import Rest, rest_from
+from telemetry.messages import GuidedTarget
+from telemetry.requests import FlyManoeuvre, Operator
+from tests.telemetry.avoiding_bench import NORTH_PER_DEG, Craft, Sense, Wall, mission, place
+from tests.telemetry.frames import heard
+from tests.telemetry.simulator_bench import HOME
+
+AUTO, GUIDED, RTL, LOITER, BRAKE = 3, 4, 6, 5, 17
+ME = Operator("Ann", 1)
+FLIGHT = mission(place(45, 8), place(60, 8))
+
+
+def craft(*walls: Wall, senses: list[Sense] | None = None, items: Any = FLIGHT) -> Craft:
+    made = Craft(items, list(walls), senses)
+    made.start()
+    return made
+
+
+def state(it: Craft) -> str:
+    return it.avoiding.status.state
+
+
+@lru_cache
+def climbed_over() -> Craft:
+    """A building on the way, as in the field test of Bigazzi 2022: vision alone."""
+    it = craft(Wall(25, 15))
+    it.until(lambda: it.state.mode == "RTL")
+    return it
+
+
+def test_it_stops_climbs_straight_up_until_clear_and_goes_on_higher() -> None:
+    it = climbed_over()
+    assert it.states == ["off", "watching", "climbing", "offset", "watching"]
+    assert it.modes() == [BRAKE, GUIDED, RTL]
+    below = [north_m for _, north_m, up_m in it.trail if up_m < 15.5]
+    assert max(below) < 24.0
+    climbing = [(n, u) for _, n, u in it.trail if 8.7 < u < 15.0 and n > 10]
+    assert max(n for n, _ in climbing) - min(n for n, _ in climbing) < 0.5
+    assert max(north_m for _, north_m, _ in it.trail) > 59.0
+
+
+def test_it_is_never_lower_than_it_was_and_climbs_at_its_own_speed() -> None:
+    it = climbed_over()
+    first_s = it.orders[0][0]
+    heights = [up_m for t, _, up_m in it.trail if t > first_s]
+    assert all(later >= earlier - 0.25 for earlier, later in pairwise(heights))
+    rises = [(t, u) for t, _, u in it.trail if 9.5 < u < 14.0 and t > first_s]
+    (t0, u0), (t1, u1) = rises[0], rises[-1]
+    assert (u1 - u0) / (t1 - t0) == pytest.approx(1.5, abs=0.1)
+
+
+def test_targets_after_the_climb_are_the_missions_raised_by_the_offset() -> None:
+    it = climbed_over()
+    last = it.sent("SET_POSITION_TARGET_GLOBAL_INT")[-2:]
+    offset_m = last[0].alt - 8.0
+    assert [round((m.lat_int / 1e7 - HOME.lat_deg) * NORTH_PER_DEG) for m in last] == [45, 60]
+    assert all(m.alt == pytest.approx(8.0 + offset_m, abs=0.01) for m in last)
+    assert 8.0 < offset_m < 12.0
+    speeds = [(m.param1, m.param2) for m in it.sent("COMMAND_LONG") if m.command == 178]
+    assert speeds == [(2.0, 1.5), (1.0, 3.0)]
+    assert any("Climbing" in text for text in it.texts)
+    assert any("higher than planned" in text for text in it.texts)
+
+
+def test_a_second_building_is_climbed_over_from_the_new_height() -> None:
+    it = craft(Wall(22, 11, thick_m=2), Wall(42, 16, thick_m=2))
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.states == ["off", "watching", "climbing", "offset", "climbing", "offset", "watching"]
+    assert AUTO not in it.modes()
+    assert max(n for _, n, u in it.trail if u < 16.5 and n > 30) < 41.5
+
+
+def test_frames_that_stop_while_it_climbs_make_it_hold_until_they_come_again() -> None:
+    it = craft(Wall(25, 18))
+    it.until(lambda: it.avoiding.detour.phase == "climbing" and it.truth[2] > 10.0)
+    it.senses[0].silent = True
+    it.until(lambda: state(it) == "holding")
+    it.advance(3.0)
+    assert it.state.mode == "BRAKE"
+    held_m = it.truth[2]
+    assert held_m < 13.5
+    assert "vision" in it.avoiding.status.text
+    assert it.avoiding.flight_status().phase == "paused"
+    it.advance(4.0)
+    assert it.truth[2] == pytest.approx(held_m, abs=0.1)
+    it.senses[0].silent = False
+    it.until(lambda: state(it) == "offset")
+    assert it.truth[2] > 18.5
+
+
+def test_a_position_that_stands_still_makes_it_hold() -> None:
+    it = craft(Wall(25, 18))
+    it.until(lambda: it.avoiding.detour.phase == "climbing" and it.truth[2] > 10.0)
+    old = replace(it.state, position_t_mono_s=it.now_s - 0.6)
+    it.perform(it.avoiding.on_state(old, it.now_s))
+    assert state(it) == "holding"
+    assert it.modes()[-1] == BRAKE
+
+
+def test_above_the_ceiling_it_does_not_climb() -> None:
+    it = craft(Wall(25, 90))
+    it.until(lambda: state(it) == "ceiling")
+    it.advance(4.0)
+    assert max(up_m for _, _, up_m in it.trail) == pytest.approx(38.0, abs=0.5)
+    assert "holds" in it.avoiding.status.text
+    assert it.truth[1] == pytest.approx(0.0, abs=0.5)
+    assert max(n for _, n, _ in it.trail) < 24.0
+
+
+def test_too_fast_for_the_region_it_does_not_engage_and_says_how_fast_it_may_be() -> None:
+    it = craft(Wall(30, 15), senses=[Sense("vision", 2.0, 0.2)])
+    it.until(lambda: it.truth[0] > 20.0)
+    status = it.avoiding.status
+    assert status.largest_speed_m_s is not None
+    assert status.largest_speed_m_s < 2.2
+    assert status.text == f"Too fast to stop within 2 m: 3.0 m/s, at most {status.largest_speed_m_s:.1f} m/s."
+    it.until(lambda: it.truth[0] > 29.0)
+    assert it.orders == []
+    assert state(it) == "watching"
+
+
+@pytest.mark.parametrize(("depth_m", "sensor"), [(7.0, "vision"), (10.0, "radar")])
+def test_each_sensor_alone_clears_the_building(depth_m: float, sensor: Any) -> None:
+    other = Sense("radar" if sensor == "vision" else "vision", 12.0, 0.1, state="blind")
+    it = craft(Wall(25, 12), senses=[Sense(sensor, depth_m, 0.1), other])
+    it.until(lambda: state(it) == "offset")
+    assert it.avoiding.status.sensors == (sensor,)
+    assert max(n for _, n, u in it.trail if u < 12.5) < 24.5
+
+
+def test_a_mode_that_the_pilot_chooses_releases_it_for_the_flight() -> None:
+    it = craft(Wall(25, 20))
+    it.until(lambda: it.avoiding.detour.phase == "climbing")
+    sent = len(it.orders)
+    assert it.bench.command(176, 1, LOITER) == 0
+    it.until(lambda: state(it) == "released")
+    it.advance(5.0)
+    assert len(it.orders) == sent
+    assert "the pilot took over" in it.avoiding.status.text
+    assert not it.avoiding.status.enabled
+    with pytest.raises(NotAllowedError, match="for this flight"):
+        it.avoiding.enable(it.now_s)
+    it.bench.command(176, 1, AUTO)
+    it.advance(5.0)
+    assert len(it.orders) == sent
+    it.bench.command(400, 0, 21196)
+    it.until(lambda: not it.state.armed)
+    assert state(it) == "watching"
+
+
+def test_a_mode_that_this_station_asked_for_is_no_pilots() -> None:
+    it = craft()
+    it.avoiding.commanded("LOITER", it.now_s)
+    it.bench.command(176, 1, LOITER)
+    it.advance(1.0)
+    assert state(it) == "watching"
+
+
+def channels(*sticks_us: int) -> Any:
+    values: list[int] = [0, 8, *sticks_us, *[1500] * (18 - len(sticks_us)), 255]
+    return heard(wire.MAVLink_rc_channels_message(*values))
+
+
+def test_a_stick_that_is_moved_stops_the_vehicle_and_releases_it() -> None:
+    it = craft(Wall(25, 20))
+    it.hear(channels(1500, 1500, 1100, 1500))
+    it.until(lambda: it.avoiding.detour.phase == "climbing")
+    it.hear(channels(1500, 1540, 1100, 1500))
+    assert state(it) == "climbing"
+    it.hear(channels(1500, 1700, 1100, 1500))
+    assert state(it) == "released"
+    assert it.modes()[-1] == BRAKE
+    assert "stick" in it.avoiding.status.text
+    sent = len(it.orders)
+    it.advance(5.0)
+    assert len(it.orders) == sent
+    assert it.state.mode == "BRAKE"
+
+
+def test_on_the_mission_a_stick_releases_it_without_a_word_to_the_vehicle() -> None:
+    it = craft(Wall(25, 12))
+    it.hear(channels(1500, 1500, 1500, 1500))
+    it.hear(heard(wire.MAVLink_manual_control_message(1, 300, 0, 500, 0, 0)))
+    it.until(lambda: it.truth[0] > 22)
+    assert state(it) == "released"
+    assert it.orders == []
+
+
+def test_it_is_paused_and_goes_on() -> None:
+    it = craft(Wall(25, 14))
+    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
+    it.perform(it.avoiding.pause(it.now_s))
+    it.advance(4.0)
+    assert (it.state.mode, state(it)) == ("BRAKE", "holding")
+    held_m = it.truth[0]
+    it.advance(1.0)
+    assert it.truth[0] == pytest.approx(held_m, abs=0.2)
+    it.perform(it.avoiding.resume(it.now_s))
+    it.until(lambda: it.state.mode == "RTL")
+    assert max(n for _, n, _ in it.trail) > 59
+
+
+def test_switched_off_nothing_is_sent() -> None:
+    it = craft(Wall(25, 7.5))
+    it.perform(it.avoiding.disable(it.now_s))
+    it.until(lambda: it.truth[0] > 30)
+    assert it.orders == []
+    assert state(it) == "off"
+
+
+def targets(*places: tuple[float, float, float]) -> tuple[GuidedTarget, ...]:
+    """North, east and height above home of each."""
+    return tuple(
+        GuidedTarget(k, HOME.lat_deg + n / NORTH_PER_DEG, HOME.lon_deg + e / NORTH_PER_DEG * 1.2543, up_m, 3.0)
+        for k, (n, e, up_m) in enumerate(places, start=1)
+    )
+
+
+def rest_at(it: Craft, item: int) -> Rest:
+    rest = rest_from(it.onboard, item)
+    assert rest is not None
+    return rest
+
+
+def test_a_prepared_way_around_is_flown_and_the_mission_goes_on_at_its_height() -> None:
+    it = craft()
+    it.until(lambda: it.truth[0] > 8)
+    way = targets((14, 10, 8), (26, 10, 8), (30, 0, 8))
+    request = FlyManoeuvre(ME, "around", way, 2)
+    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    assert state(it) == "manoeuvre"
+    it.until(lambda: it.bench.vehicle.truth.p_neu[1] > 9, 60)
+    it.until(lambda: it.avoiding.detour.phase == "going" and not it.avoiding.detour.is_manoeuvre)
+    it.until(lambda: it.state.mode == "RTL")
+    assert max(up_m for _, _, up_m in it.trail) < 8.6
+    assert max(n for _, n, _ in it.trail) > 59
+
+
+def test_a_prepared_way_over_climbs_on_while_it_is_not_clear() -> None:
+    it = craft(Wall(25, 14))
+    it.avoiding.disable(it.now_s)
+    it.until(lambda: it.truth[0] > 12)
+    request = FlyManoeuvre(ME, "over", targets((16, 0, 10), (30, 0, 10)), None, 2.0)
+    it.perform(it.avoiding.fly(request, Rest((), "hold"), it.now_s))
+    it.until(lambda: it.truth[0] > 28)
+    assert max(n for _, n, u in it.trail if u < 14.5) < 24.5
+    it.until(lambda: state(it) == "holding")
+    assert it.truth[2] > 14.5
+
+
+def test_a_way_without_places_and_a_vehicle_on_the_ground_are_refused() -> None:
+    it = Craft(FLIGHT, [])
+    with pytest.raises(NotAllowedError, match="no places"):
+        it.avoiding.fly(FlyManoeuvre(ME, "over", (), None), Rest((), "hold"), 0.0)
+    with pytest.raises(NotAllowedError, match="not in the air"):
+        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None), Rest((), "hold"), 0.0)
+
+
+def test_on_the_far_way_home_it_climbs_over_what_stands_there_and_returns() -> None:
+    it = craft()
+    it.until(lambda: it.truth[0] > 40)
+    it.walls.append(Wall(0, 0))
+    it.avoiding.commanded("RTL", it.now_s)
+    it.bench.command(176, 1, RTL)
+    it.until(lambda: it.state.mode == "RTL")
+    it.walls[0] = Wall(it.truth[0] + 3, 60.0)
+    it.until(lambda: it.avoiding.detour.phase == "climbing")
+    it.walls.clear()
+    it.until(lambda: it.state.mode == "RTL" and state(it) == "watching")
+    assert it.modes() == [BRAKE, GUIDED, RTL]

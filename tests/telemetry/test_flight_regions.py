@@ -1,0 +1,72 @@
+"""What sensors say about the region ahead, put together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from telemetry.flight.regions import CLEAR_FRAMES, Regions
+from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
+from tests.telemetry.avoiding_bench import seen_at
+
+ROI = Region((0.0, 0.0, 0.0), 0.0, 7.0, 0.4, 2.0, occupied=False)
+
+
+def status(t_s: float, **changes: Any) -> PerceptionStatus:
+    plain = PerceptionStatus("vision", "running", "", t_s, 0.0, t_s, region=ROI)
+    return replace(plain, **changes)
+
+
+def of(*said: PerceptionStatus) -> Regions:
+    regions = Regions(PerceptionSettings())
+    for each in said:
+        regions.take(each)
+    return regions
+
+
+def test_a_frame_counts_for_half_a_second_and_only_of_a_sensor_that_works() -> None:
+    regions = of(status(10.0), status(10.0, sensor="radar", state="frozen"))
+    assert regions.counted(10.4) == ("vision",)
+    assert regions.counted(10.6) == ()
+    assert regions.oldest(frozenset({"vision"}), 10.4) is None
+    old = regions.oldest(frozenset({"vision", "radar"}), 10.4)
+    assert old is not None
+    assert old.sensor == "radar"
+
+
+def test_what_is_in_the_region_is_in_the_way_until_several_fresh_frames_are_clear() -> None:
+    regions = of(status(1.0, obstacles=(seen_at(5.0),)))
+    vision: frozenset[Sensor] = frozenset({"vision"})
+    assert [sight.distance_m for sight in regions.occupied(1.1)] == [5.0]
+    for k in range(1, CLEAR_FRAMES + 1):
+        assert not regions.is_clear(vision, 1.0 + 0.1 * k)
+        regions.take(status(1.0 + 0.1 * k))
+        regions.take(status(1.0 + 0.1 * k))  # the same frame, told again
+    assert regions.is_clear(vision, 1.4)
+    assert not regions.is_clear(vision, 2.4)
+
+
+def test_a_region_that_is_occupied_without_a_cluster_counts_too() -> None:
+    regions = of(status(1.0, region=replace(ROI, occupied=True)))
+    assert [sight.distance_m for sight in regions.occupied(1.1)] == [7.0]
+
+
+def test_in_the_corridor_only_what_is_near_and_not_below_is_in_the_way() -> None:
+    far, low, near = (
+        seen_at(9.0, region="corridor"),
+        seen_at(3.0, region="corridor", height_difference_m=-1.5),
+        seen_at(6.0, region="corridor", height_difference_m=0.2),
+    )
+    assert of(status(1.0, obstacles=(low, far))).occupied(1.0) == ()
+    assert [s.distance_m for s in of(status(1.0, obstacles=(low, near, far))).occupied(1.0)] == [6.0]
+
+
+def test_late_frames_change_nothing_and_nearest_sights_come_first() -> None:
+    regions = of(
+        status(2.0, obstacles=(seen_at(5.0),)),
+        status(1.0),
+        status(2.0, sensor="radar", region=None, obstacles=(seen_at(4.0),)),
+    )
+    assert [(sight.sensor, sight.distance_m) for sight in regions.occupied(2.1)] == [("radar", 4.0), ("vision", 5.0)]
+    assert regions.sights["radar"].depth_m == PerceptionSettings().radar_depth_m
+    assert regions.seen_by(2.1) == {"radar", "vision"}

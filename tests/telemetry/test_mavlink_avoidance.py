@@ -1,0 +1,211 @@
+"""Avoidance over real sockets: consent, a wall on the way in AUTO and on the script's way, prepared ways, orders."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from telemetry.errors import NotAllowedError
+from telemetry.messages import FlightStatus, GuidedTarget
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Region
+from telemetry.requests import FlyManoeuvre, Pause, Resume, ReturnHome, SetAvoidance, StartAuto, StartGuided
+from telemetry.simulator.run import Simulator
+from tests.telemetry.avoiding_bench import Wall, seen_at
+from tests.telemetry.bus_runs import run
+from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.test_mavlink_flights import (
+    LAT_DEG,
+    LON_DEG,
+    STEP_DEG,
+    TARGETS,
+    phase,
+    simulated,
+    start,
+    upload,
+)
+
+SPEEDUP = 3.0
+WALL = Wall(14.0, 17.0, thick_m=3.0)
+FRAME_S = 0.05
+
+
+def avoidance(bench: Console) -> AvoidanceStatus:
+    return bench.last(AvoidanceStatus) or AvoidanceStatus()
+
+
+def states(bench: Console) -> list[str]:
+    found = [status.state for status in bench.of(AvoidanceStatus)]
+    return [state for k, state in enumerate(found) if k == 0 or found[k - 1] != state]
+
+
+def seen(simulator: Simulator, wall: Wall | None) -> PerceptionStatus:
+    north_m, _, up_m = simulator.vehicle.truth.p_neu
+    ahead_m = None if wall is None else wall.ahead_m(north_m, up_m, 9.0)
+    now_s = time.monotonic()
+    return PerceptionStatus(
+        sensor="vision",
+        state="running",
+        text="",
+        t_mono_s=now_s,
+        t_utc_s=0.0,
+        done_t_mono_s=now_s,
+        region=Region((0.0, 0.0, 0.0), 0.0, 9.0, math.radians(24), 2.0, ahead_m is not None),
+        obstacles=() if ahead_m is None else (seen_at(ahead_m),),
+    )
+
+
+@contextlib.asynccontextmanager
+async def before_a_wall(wall: Wall | None = WALL) -> AsyncIterator[tuple[Console, Simulator]]:
+    """A simulated vehicle whose camera sees this wall, and avoidance switched on."""
+    async with simulated(speedup=SPEEDUP) as (bench, simulator):
+
+        async def look() -> None:
+            while True:
+                bench.link.on_perception(seen(simulator, wall))
+                await asyncio.sleep(FRAME_S)
+
+        eye = asyncio.create_task(look())
+        try:
+            yield bench, simulator
+        finally:
+            eye.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await eye
+
+
+async def switch_on(bench: Console) -> None:
+    await bench.link.handle(SetAvoidance(ME, enabled=True))
+    await until(lambda: avoidance(bench).state == "watching")
+
+
+def test_a_real_vehicle_needs_consent_and_a_simulated_one_does_not() -> None:
+    async def whole() -> None:
+        async with simulated(speedup=1.0) as (bench, _):
+            vehicle = bench.link.vehicle
+            assert vehicle is not None
+            await until(lambda: vehicle.capabilities is not None)
+            vehicle.is_simulation = False
+            with pytest.raises(NotAllowedError, match="consent"):
+                await bench.link.handle(SetAvoidance(ME, enabled=True))
+            await until(lambda: avoidance(bench).state == "off")
+            await bench.link.handle(SetAvoidance(ME, enabled=True, consent=True))
+            await until(lambda: avoidance(bench).state == "watching")
+            assert "avoidance on, with consent" in bench.commands
+            await bench.link.handle(SetAvoidance(ME, enabled=False))
+            await until(lambda: avoidance(bench).state == "off")
+            vehicle.is_simulation = True
+            await switch_on(bench)
+            with pytest.raises(NotAllowedError, match="not in the air"):
+                await bench.link.handle(FlyManoeuvre(ME, "over", TARGETS, None))
+            assert bench.status.state == "live"
+
+    run(whole)
+
+
+def test_other_autopilots_are_refused() -> None:
+    async def whole() -> None:
+        async with simulated(speedup=1.0) as (bench, _):
+            assert bench.link.pilot is not None
+            vehicle: Any = bench.link.vehicle
+            vehicle.state = type(vehicle.state)(1, 1, autopilot="px4")
+            with pytest.raises(NotAllowedError, match="ArduPilot only"):
+                bench.link.pilot.avoidance.check_autopilot()
+
+    run(whole)
+
+
+def test_in_auto_it_climbs_over_a_wall_and_the_flight_ends_as_planned() -> None:
+    async def whole() -> None:
+        async with before_a_wall() as (bench, simulator):
+            report = await upload(bench)
+            await switch_on(bench)
+            await start(bench, StartAuto(ME, report.onboard.digest))
+            await until(lambda: avoidance(bench).state == "offset")
+            assert simulator.vehicle.truth.p_neu[2] > 17.5
+            assert avoidance(bench).height_offset_m > 3.0
+            await until(lambda: bench.flight.phase == "returning")
+            await phase(bench, "landed")
+            assert bench.flight.broke_off_at is None
+            assert bench.flight.way == "auto"
+            assert [s for s in dict.fromkeys(states(bench)) if s != "holding"] == [
+                "off",
+                "watching",
+                "climbing",
+                "offset",
+            ]
+            assert "avoidance: climbing" in bench.commands
+            assert not simulator.vehicle.autopilot.crashed
+            modes = [s.mode for s in bench.of(type(bench.state)) if s.armed]
+            assert "AUTO" not in modes[modes.index("BRAKE") :]
+
+    run(whole)
+
+
+def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_order() -> None:
+    async def whole() -> None:
+        async with before_a_wall() as (bench, simulator):
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await switch_on(bench)
+            await start(bench, StartGuided(ME, TARGETS, 10.0))
+            await until(lambda: avoidance(bench).state in ("climbing", "holding"))
+            assert bench.flight.way == "guided"
+            await until(lambda: avoidance(bench).state == "offset")
+            await bench.link.handle(Pause(ME))
+            await until(lambda: bench.state.mode == "BRAKE")
+            await phase(bench, "paused")
+            await bench.link.handle(Resume(ME))
+            await phase(bench, "flying")
+            assert simulator.vehicle.truth.p_neu[2] > 17.0
+            await bench.link.handle(ReturnHome(ME))
+            await phase(bench, "returning")
+            await until(lambda: avoidance(bench).state == "watching")
+            assert bench.flight.broke_off_at is not None
+
+    run(whole)
+
+
+def test_a_prepared_way_is_flown_and_the_mission_goes_on() -> None:
+    async def whole() -> None:
+        async with before_a_wall(None) as (bench, simulator):
+            report = await upload(bench)
+            await start(bench, StartAuto(ME, report.onboard.digest))
+            await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 2)
+            aside = tuple(
+                GuidedTarget(k, LAT_DEG + north * STEP_DEG, LON_DEG + 1.3e-4, 14.0, 3.0)
+                for k, north in enumerate((1.0, 2.0), start=1)
+            )
+            await bench.link.handle(FlyManoeuvre(ME, "around", aside, 4))
+            await until(lambda: avoidance(bench).state == "manoeuvre")
+            await until(lambda: simulator.vehicle.truth.p_neu[1] > 9)
+            await phase(bench, "landed")
+            assert bench.flight.broke_off_at is None
+            assert "fly around an obstacle, 2 places" in bench.commands
+            assert states(bench)[-1] == "off"
+            assert {status.way for status in bench.of(FlightStatus)} >= {"auto"}
+
+    run(whole)
+
+
+def test_how_deep_regions_are_is_told_and_outlives_another_adoption() -> None:
+    async def whole() -> None:
+        async with simulated(speedup=1.0) as (bench, simulator):
+            bench.link.on_settings(PerceptionSettings(vehicle_radius_m=2.0))
+            bench.link.on_perception(seen(simulator, None))
+            await until(lambda: avoidance(bench).sensors == ("vision",))
+            slow_m_s = avoidance(bench).largest_speed_m_s
+            bench.link.on_settings(PerceptionSettings(vehicle_radius_m=0.2))
+            await until(lambda: avoidance(bench).sensors == ())
+            bench.link.on_perception(seen(simulator, None))
+            await until(lambda: avoidance(bench).sensors == ("vision",))
+            fast_m_s = avoidance(bench).largest_speed_m_s
+            assert slow_m_s is not None
+            assert fast_m_s is not None
+            assert fast_m_s > slow_m_s
+
+    run(whole)

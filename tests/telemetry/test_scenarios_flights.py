@@ -1,0 +1,65 @@
+"""Short versions of the papers' field tests: what each must show, on seeds that nothing was tuned to."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from planning.geotiff import read_dsm
+from telemetry.scenarios import terrain_hugging
+from telemetry.scenarios.castle import CASES, fly_case
+from telemetry.scenarios.catalogue import run_scenario
+from telemetry.scenarios.result import Figure, ScenarioResult
+from telemetry.scenarios.wanted import Wanted
+
+pytestmark = pytest.mark.slow
+
+
+def unreached(figures: tuple[Figure, ...]) -> list[str]:
+    return [figure.line() for figure in figures if not figure.reached]
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_a_corner_reflector_is_one_compact_cluster_where_it_stands(seed: int) -> None:
+    result = run_scenario("corner-reflector", Wanted(seed))
+    assert unreached(result.figures) == []
+    assert not result.flights[0].contact
+
+
+@pytest.mark.parametrize("number", range(len(CASES)), ids=[case.title.replace(" ", "-") for case in CASES])
+@pytest.mark.parametrize("seed", [31, 32])
+def test_each_sensor_alone_clears_a_building(number: int, seed: int) -> None:
+    result = fly_case(CASES[number], Wanted(seed), ahead_m=26.0)
+    assert unreached(result.figures) == [], result.notes
+    assert result.min_true_distance_m > 0.5
+
+
+@pytest.mark.parametrize("name", ["wood", "ruined-building"])
+def test_maps_of_what_stands_there_are_mostly_right_and_mostly_whole(name: str) -> None:
+    (flight,) = run_scenario(name, Wanted(41)).flights
+    assert not flight.contact
+    for figures in (flight.radar, flight.vision):
+        assert figures.precision is not None
+        assert figures.recall is not None
+        assert figures.precision > 0.7
+        assert figures.recall > 0.6
+
+
+def hugging_is_safe(result: ScenarioResult) -> None:
+    """Rates need kilometres: a short flight may hold one false alarm, and no object that is met unannounced."""
+    (flight,) = result.flights
+    assert math.isclose(flight.min_true_distance_m, 0.0, abs_tol=0.5)
+    assert flight.missed == 0, flight.notes
+    assert sum(note.startswith("FALSE") for note in flight.notes) <= 1, flight.notes
+
+
+def test_things_strewn_over_a_volcano_are_told_before_it_is_too_late() -> None:
+    result = terrain_hugging.run_over(terrain_hugging.etna(), Wanted(51), "etna-like", most_m=150.0)
+    hugging_is_safe(result)
+
+
+def test_things_strewn_over_real_bush_are_told_before_it_is_too_late(shared_data: Path) -> None:
+    dsm = read_dsm(shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
+    hugging_is_safe(terrain_hugging.run_over(dsm, Wanted(52), "coromandel", apart_m=60.0, most_m=150.0))
