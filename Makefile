@@ -13,7 +13,7 @@ PIP := PIP_DISABLE_PIP_VERSION_CHECK=1 $(VENV_PYTHON) -m pip install --quiet --o
 WITH_NODE := PATH="$(CURDIR)/.venv/bin:$$PATH"
 NODE_IS_NEW_ENOUGH := node -e 'const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)' && npm --version
-KERNELS := $(shell grep -rl --include='*.py' njit planning)
+KERNELS := $(shell grep -rl --include='*.py' njit mapping planning telemetry)
 WEB_SOURCES := $(shell find web -mindepth 1 \( -name node_modules -o -name dist -o -name coverage \) -prune \
   -o -print 2>/dev/null)
 

@@ -1,9 +1,9 @@
 """The ``/ws`` streams to the browsers: one bounded queue per page, so that a stalled page holds up no other.
 
-State (plan, library, view, selection, cursor, each job, each vehicle) is latest-wins: a newer message takes the place
-of the one still waiting. Notices and the vehicle's own words must arrive: each waits on its own, and a page that lets
-the queue fill up is cut off, as is one that does not take a message within five seconds. It reconnects and starts from
-a fresh snapshot.
+State (plan, library, view, selection, cursor, each job, each vehicle, each sensor) is latest-wins: a newer message
+takes the place of the one still waiting. Notices, alerts and the vehicle's own words must arrive: each waits on its
+own, and a page that lets the queue fill up is cut off, as is one that does not take a message within five seconds. It
+reconnects and starts from a fresh snapshot.
 """
 
 from __future__ import annotations
@@ -55,12 +55,14 @@ class _Outgoing:
 def key_of(message: schemas.ServerMessage) -> object | None:
     """Messages of the same key replace each other; None: each one must arrive."""
     match message:
-        case schemas.NoticeMessage() | schemas.TextMessage():
+        case schemas.NoticeMessage() | schemas.TextMessage() | schemas.AlertMessage():
             return None
         case schemas.JobMessage():
             return message.type, message.job.id
-        case schemas.VehicleMessage() | schemas.FlightMessage():
+        case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage():
             return message.type, message.source
+        case schemas.PerceptionMessage():
+            return message.type, message.source, message.sensor
         case schemas.TrackMessage():
             return message.type, message.track.source
     return message.type

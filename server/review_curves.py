@@ -14,10 +14,13 @@ from planning.following.reference import Reference
 from planning.model import F64
 from server.review_flight import Flight
 from server.schemas.review import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
+from telemetry.obstacles import ObstacleAlert
 from telemetry.recording.flight_log import FlightLog
 
 STRETCHES = 400
 """Parts of a long recording of which each keeps its first position and its peaks."""
+_WARNING, _INFO = 4, 6
+"""MAV_SEVERITY"""
 
 
 def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
@@ -125,7 +128,14 @@ def events(log: FlightLog) -> list[ReviewEvent]:
     found += [_event(log, t, "item", f"Item {seq} reached") for t, seq in log.reached]
     found += [_event(log, text.t_utc_s, "text", text.text, text.severity) for text in log.texts]
     found += [_event(log, c.t_utc_s, "command", f"{c.operator}: {c.words}") for c in log.commands]
+    found += [_alert(log, alert) for alert in log.alerts]
     return sorted(found, key=lambda event: event.t_s)
+
+
+def _alert(log: FlightLog, alert: ObstacleAlert) -> ReviewEvent:
+    over = alert.phase == "ends"
+    severity = _INFO if over else _WARNING
+    return _event(log, alert.t_utc_s, "alert", f"Over: {alert.text}" if over else alert.text, severity)
 
 
 def _event(log: FlightLog, t_utc_s: float, kind: str, text: str, severity: int = 6) -> ReviewEvent:

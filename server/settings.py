@@ -92,6 +92,9 @@ class Settings(BaseSettings):
     link: Names = ()
     """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
     first vehicle heard on one of them is the one that is flown."""
+    demo_world: bool = True
+    """Whether the demo's simulated vehicle has radar and camera, in a world with things that its surface model does not
+    know."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)

@@ -6,6 +6,7 @@ edit asks about the same one.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from server.charts import chart
 from server.documents import request_from_doc
 from server.jobs import Progress
 from server.library.orthophotos import load_orthophoto
+from server.library.seen import load_planned_terrain, load_seen
 from server.library.terrains import load_terrain
 from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
@@ -77,10 +79,16 @@ def _terrain(directory: Path) -> Dsm:
     return load_terrain(directory)
 
 
+@lru_cache(maxsize=1)
+def _terrain_with_seen(directory: Path, seen_id: str) -> tuple[Dsm, int]:
+    return load_planned_terrain(directory, seen_id), load_seen(directory, seen_id).count
+
+
 def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
     """The answer to an edit, without the trade table."""
     plan, source, seconds = last_plan.of(directory, document, report)
-    return result_doc(plan, source, seconds), plan_scene(plan)
+    seen = 0 if document.seen_id is None else _terrain_with_seen(directory, document.seen_id)[1]
+    return result_doc(plan, source, seconds, seen), plan_scene(plan)
 
 
 def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:
@@ -121,12 +129,21 @@ def draw_terrain(
 def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, dict[str, float]]:
     timer = StepTimer(report)
     timer(READ_STEP, 0.0)
-    source = _terrain(directory)
+    if document.seen_id is None:
+        source, columns = _terrain(directory), 0
+    else:
+        source, columns = _terrain_with_seen(directory, document.seen_id)
     plan = plan_mission(source, request_from_doc(document, source), report=timer)
-    return plan, source, timer.seconds()
+    return (plan if not columns else with_seen(plan, columns)), source, timer.seconds()
 
 
-def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float]) -> ResultDoc:
+def with_seen(plan: Plan, columns: int) -> Plan:
+    """Says so wherever the plan's warnings go: console, report and exported files."""
+    text = f"The surface model was raised at {columns} places by what radar and camera saw in flight."
+    return replace(plan, warnings=(text, *plan.warnings))
+
+
+def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns: int = 0) -> ResultDoc:
     """A plan's figures as the console shows them."""
     certificate, summary = plan.certificate, plan_summary(plan, source)
     worst = summary["worst"]
@@ -140,6 +157,7 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float]) -> ResultDoc:
         gsd_max_cm=gsd_max,
         home_alt_dsm_m=plan.line.home_alt_dsm_m,
         vertical_datum=source.vertical_datum,
+        seen_columns=seen_columns,
         trade=[],
         chart=chart(plan),
         seconds=seconds,

@@ -18,7 +18,7 @@ from starlette.requests import ClientDisconnect
 
 from planning import __version__
 from planning.errors import DescribedError
-from server.api import console, flight, link, plan, recordings, session, terrain, view
+from server.api import console, flight, link, obstacles, plan, recordings, sensors, session, terrain, view
 from server.api.access import Parts, answer
 from server.auth import Auth
 from server.errors import error_doc, status_of
@@ -28,6 +28,7 @@ from server.library import Library
 from server.scene import proxy
 from server.scene.host import SceneHost
 from server.schemas import NoticeMessage
+from server.sensor_token import sensor_token
 from server.settings import Settings
 from server.together import Background
 
@@ -41,7 +42,7 @@ MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
 OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
 """Joins the bus and all that hangs on it."""
-ROUTERS = (session, plan, terrain, view, console, link, flight, recordings, proxy)
+ROUTERS = (session, plan, terrain, view, console, link, flight, obstacles, sensors, recordings, proxy)
 
 
 def create_app(
@@ -114,6 +115,7 @@ async def _open(
 ) -> Parts:
     """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
     auth = Auth(library.root / "sessions.json", password=settings.password, lifetime_s=settings.session_days * 86400.0)
+    await asyncio.to_thread(sensor_token, library.root)
     hub = Hub()
     host = await asyncio.to_thread(SceneHost)
     stack.callback(host.close)

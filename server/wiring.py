@@ -14,7 +14,7 @@ from server.workspace import Workspace
 
 async def open_flying(settings: Settings, library: Library, hub: Hub, workspace: Workspace) -> Flying:
     """The server's place on the bus. Raises BusError."""
-    return await Flying.open(library, hub, workspace, settings.link)
+    return await Flying.open(library, hub, workspace, settings)
 
 
 def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Background) -> Workspace:
@@ -39,5 +39,5 @@ def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Back
         on_poi_moved=on_poi_moved,
         page_of_client=host.page_of_client,
     )
-    workspace = Workspace(library, hub, view, spawn=background.spawn, stage=view.vehicles)
+    workspace = Workspace(library, hub, view, spawn=background.spawn, stage=view.vehicles, sights=view.sights)
     return workspace

@@ -15,16 +15,19 @@ from planning.poi_files import looks_swapped, read_pois
 from server import demo, file_tasks, ordering, tasks
 from server.computing import Computing
 from server.documents import with_points
-from server.errors import InUseError, NotFoundError, reported
+from server.errors import InUseError, NotFoundError, NotReadyError, reported
 from server.exporting import exported
 from server.file_jobs import FileJobs
 from server.job_board import JobBoard, Spawn
 from server.jobs import Lane
 from server.library import Library
+from server.obstacles.mirror import Voxels
+from server.obstacles.seen_task import keep_seen
 from server.picture import Picture, View
 from server.plan_desk import PlanDesk
 from server.pointing import Pointing
 from server.scene.payload import PlanScene, ReviewScene
+from server.scene.sights import Sights
 from server.scene.vehicles import Vehicles
 from server.schemas import (
     ClientMessage,
@@ -68,9 +71,16 @@ class Workspace:
     """One open plan at a time: a ground station has one task in hand."""
 
     def __init__(
-        self, library: Library, streams: Streams, view: View, *, spawn: Spawn, stage: Vehicles | None = None
+        self,
+        library: Library,
+        streams: Streams,
+        view: View,
+        *,
+        spawn: Spawn,
+        stage: Vehicles | None = None,
+        sights: Sights | None = None,
     ) -> None:
-        """``stage``: where the 3D view shows vehicles; None without a 3D view."""
+        """``stage``, ``sights``: where the 3D view shows vehicles and what they see; None without a 3D view."""
         self._library, self._streams, self._spawn = library, streams, spawn
         self._plan_lane, self._file_lane = Lane("plan"), Lane("files", niceness=_FILES_NICENESS)
         self._board = JobBoard(self._file_lane, publish=streams.publish, spawn=spawn)
@@ -84,7 +94,7 @@ class Workspace:
             library_changed=self._publish_library,
             show_orthophoto=lambda: self._set_view(self.view.model_copy(update={"shading": "orthophoto"})),
         )
-        self.stage = stage
+        self.stage, self.sights = stage, sights
         self._listed: tuple[str, str | None] | None = None
         self.changed: Callable[[], None] = lambda: None
         """Called after every change of the plan or its answer."""
@@ -148,6 +158,30 @@ class Workspace:
             return None
         lat_deg, lon_deg = dsm.lat_lon_from_xy(scene.home_m[None, :2])[0].tolist()
         return lat_deg, lon_deg
+
+    @property
+    def seen_columns(self) -> int:
+        """Of the open plan's surface model that were raised by what was seen."""
+        result = self._computing.state.result
+        return 0 if self.document.seen_id is None or result is None else result.seen_columns
+
+    async def plan_with_seen(self, maps: list[Voxels]) -> PlanState:
+        """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other."""
+        terrain_id = self.document.terrain_id
+        if terrain_id is None:
+            raise NotReadyError("There is no surface model to add to.", advice="Open the plan that is flown.")
+        directory = self._library.terrain_dir(terrain_id)
+        seen_id = await self._plan_lane.call(keep_seen, directory, maps)
+        await self._desk.propose(
+            lambda document: ("Plan against what was seen", document.model_copy(update={"seen_id": seen_id}))
+        )
+        return self.state
+
+    async def plan_without_seen(self) -> PlanState:
+        await self._desk.propose(
+            lambda document: ("Plan without what was seen", document.model_copy(update={"seen_id": None}))
+        )
+        return self.state
 
     def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
         """A recording in the 3D view instead of the plan; None: the plan again."""

@@ -11,11 +11,14 @@ import typer
 
 from planning import __version__
 from server.cli import examples
+from server.cli.agent import agent
 from server.cli.bench import bench
 from server.cli.certify import certify
 from server.cli.fly import fly
+from server.cli.map import build_map
 from server.cli.plan import plan
 from server.cli.review import review
+from server.cli.scenario import scenario
 from server.cli.serve import serve
 from server.cli.sim import sim
 from server.cli.survey import survey
@@ -48,6 +51,9 @@ app.command(epilog=examples.UPLOAD)(upload)
 app.command(epilog=examples.FLY)(fly)
 app.command(epilog=examples.SIM)(sim)
 app.command(epilog=examples.REVIEW)(review)
+app.command(epilog=examples.SCENARIO)(scenario)
+app.command("map", epilog=examples.MAP)(build_map)
+app.command(epilog=examples.AGENT)(agent)
 app.command(epilog=examples.BENCH)(bench)
 
 

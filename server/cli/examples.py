@@ -50,4 +50,19 @@ REVIEW = _examples(
     ("A recording, over its surface model", "hedgehop review flight.mcap --dsm dsm.tif"),
     ("Another ground station's log", "hedgehop review flight.tlog --dsm dsm.tif --mission mission.waypoints --json"),
 )
+MAP = _examples(
+    ("What the radar saw, for a point cloud viewer", "hedgehop map flight.mcap --sensor radar --out radar.ply"),
+    ("The highest obstacles as a raster", "hedgehop map flight.mcap --sensor radar --out radar.tif --json"),
+)
+AGENT = _examples(
+    ("From a driver that writes lines of JSON", "radar_driver | hedgehop agent https://gcs.example "
+     "--token-file sensor-token.txt"),
+    ("A recorded flight's frames once more", "hedgehop agent http://10.0.0.5:8000 --token-file sensor-token.txt "
+     "--recording flight.mcap --json"),
+)  # fmt: skip
 BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))
+SCENARIO = _examples(
+    ("A building in the way, by each sensor alone, at night and without GNSS", "hedgehop scenario castle-building"),
+    ("Fifty seeds, for a script", "hedgehop scenario castle-building --seeds 50 --json > castle.json"),
+    ("Objects of your own, the flight kept on file", "hedgehop scenario wood --world park.json --record park.mcap"),
+)

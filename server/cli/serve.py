@@ -16,6 +16,12 @@ def serve(
     demo: Annotated[bool, typer.Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on; default 127.0.0.1.")] = None,
     port: Annotated[int | None, typer.Option("--port", help="Port; default 8000.")] = None,
+    demo_world: Annotated[
+        bool | None,
+        typer.Option(
+            "--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."
+        ),
+    ] = None,
     link: Annotated[
         list[str] | None,
         typer.Option(
@@ -30,4 +36,5 @@ def serve(
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
     with refusing(as_json=False):
-        run(load_settings(host=host, port=port, data_dir=data_dir, link=link or None), demo=demo)
+        settings = load_settings(host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world)
+        run(settings, demo=demo)

@@ -10,6 +10,7 @@ import typer
 from server.cli import options as o
 from server.cli.output import refusing, say
 from telemetry.nodes.simulator import read_home, read_parameter
+from telemetry.simulator.gnss_script import read_event
 from telemetry.simulator.run import SimOptions, run
 
 
@@ -36,6 +37,18 @@ def sim(
     dsm: Annotated[
         Path | None, typer.Option("--dsm", metavar="FILE", help="Surface model that it can hit; default: level ground.")
     ] = None,
+    world: Annotated[
+        Path | None,
+        typer.Option("--world", metavar="FILE", help="World file: what else it can hit (docs/worlds.md)."),
+    ] = None,
+    gnss_event: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--gnss-event",
+            metavar="EVENT",
+            help="loss:START:SECONDS or glitch:START:SECONDS:METRES[:BEARING]; may be given several times.",
+        ),
+    ] = None,
     parameter: Annotated[
         list[str] | None,
         typer.Option("--parameter", metavar="NAME=VALUE", help="Of the autopilot; may be given several times."),
@@ -54,6 +67,8 @@ def sim(
             gnss=gnss,
             wind_m_s=wind_m_s,
             dsm=o.existing(dsm),
+            world=o.existing(world),
+            gnss_script=tuple(read_event(text) for text in gnss_event or ()),
             parameters=tuple(read_parameter(text) for text in parameter or ()),
         )
         run(options, announce=say)

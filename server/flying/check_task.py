@@ -24,7 +24,7 @@ from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
 from server.documents import profile_from_doc
 from server.jobs import Progress
-from server.library.terrains import load_terrain
+from server.library.seen import load_planned_terrain
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
 from telemetry.messages import Item, OnboardMission, PlanRecord
 from telemetry.vehicle import VehicleState
@@ -72,7 +72,7 @@ def check_start(
     from telemetry.flight.preflight import check
 
     report("Checking the start", None)
-    dsm, planned = load_terrain(directory), read_wpl(record.mission_wpl)
+    dsm, planned = load_planned_terrain(directory, seen_in(record)), read_wpl(record.mission_wpl)
     found = check(
         onboard,
         state,
@@ -87,6 +87,11 @@ def check_start(
     certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
     return Checked(_doc(found, rereferenced_m), certificate, moved, found.mission, found.clearance)
+
+
+def seen_in(record: PlanRecord) -> str | None:
+    """What was seen before and taken into the plan: what is flown is checked against it as well."""
+    return PlanDoc.model_validate_json(record.plan_json).seen_id
 
 
 def clearance_of(record: PlanRecord) -> ClearanceParams:
@@ -112,14 +117,20 @@ def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
 
 
 def climb_for_resuming(
-    directory: Path, mission: Mission, clearance: ClearanceParams, from_item: int, *, report: Progress
+    directory: Path,
+    mission: Mission,
+    clearance: ClearanceParams,
+    from_item: int,
+    seen_id: str | None,
+    *,
+    report: Progress,
 ) -> tuple[int, float]:
     """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
     from telemetry.flight.preflight import SMALL_HOLE_M2
     from telemetry.flight.resume import plan_resumption
 
     report("Finding the way back into the mission", None)
-    surface, _ = fill_holes(load_terrain(directory), max_area_m2=SMALL_HOLE_M2)
+    surface, _ = fill_holes(load_planned_terrain(directory, seen_id), max_area_m2=SMALL_HOLE_M2)
     way = plan_resumption(mission, from_item, surface, clearance)
     return way.from_item, way.climb_to_m
 

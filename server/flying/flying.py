@@ -11,6 +11,7 @@ from collections.abc import Coroutine
 from typing import Any
 
 from server.errors import reported
+from server.flying.agents import Agents
 from server.flying.channel import Channel
 from server.flying.connections import Connections
 from server.flying.desk import FlightDesk
@@ -29,6 +30,7 @@ from server.jobs import Lane
 from server.lease import Lease
 from server.library import Library
 from server.library.recordings import RecordingShelf
+from server.obstacles.obstacles import Obstacles
 from server.schemas import (
     ErrorDoc,
     LeaseDoc,
@@ -38,6 +40,7 @@ from server.schemas import (
     ServerMessage,
     TransferMessage,
 )
+from server.settings import Settings
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.link_client import LinkClient
@@ -57,7 +60,7 @@ class Flying:
     """Everything about vehicles that the server does; all methods belong to the event loop."""
 
     def __init__(
-        self, bus: Bus, lease: Lease, library: Library, hub: Hub, workspace: Workspace, links: tuple[str, ...]
+        self, bus: Bus, lease: Lease, library: Library, hub: Hub, workspace: Workspace, settings: Settings
     ) -> None:
         self._bus, self._hub, self._workspace = bus, hub, workspace
         self.lease = lease
@@ -67,10 +70,11 @@ class Flying:
         self.shelf = RecordingShelf(library.root, terrains=library.terrains)
         self.nodes = Nodes(runtime_dir, self.shelf.folder, tell)
         self._lane = Lane("flight")
+        self.agents = Agents(bus)
         self.live, self.replay = Channel("live", tell), Channel("replay", tell)
         link = LinkClient(bus)
         self.connections = Connections(
-            link, need_link=self.nodes.link, server_operator=lease.server_operator, configured=links
+            link, need_link=self.nodes.link, server_operator=lease.server_operator, configured=settings.link
         )
         work = FlightWork(
             library,
@@ -95,6 +99,19 @@ class Flying:
             tell=tell,
             in_review=lambda: self.reviewing.file_name,
         )
+        self._obstacles = Obstacles(
+            bus,
+            library,
+            workspace,
+            self.nodes,
+            link,
+            self.live,
+            lane=self._lane,
+            server_operator=lease.server_operator,
+            onboard=lambda: self.desk.record,
+            tell=tell,
+        )
+        self.obstacles = self._obstacles.desk
         self.reviewing = Reviewing(
             library,
             self.shelf,
@@ -103,19 +120,29 @@ class Flying:
             ask=self._ask_replay,
             run=workspace.board.run,
             tell=tell,
-            forget=self._present.forget_replay,
+            forget=self._forget_replay,
+            jumped=self._obstacles.watches["replay"].forget_alerts,
         )
-        self.simulation = Simulation(library, workspace, self.nodes, self.connections, self._lane, runtime_dir)
+        self.simulation = Simulation(
+            library,
+            workspace,
+            self.nodes,
+            self.connections,
+            self._lane,
+            runtime_dir,
+            demo_world=settings.demo_world,
+            sees=self._obstacles.simulated,
+        )
         self._scenery = Scenery(workspace.stage, {"live": self.live, "replay": self.replay})
         self._followed = PlanFollowed(library, self.live, open_dsm=lambda: workspace.dsm)
         self._track_so_far = TrackSoFar(self.shelf.folder, self.live, self._lane)
 
     @classmethod
-    async def open(cls, library: Library, hub: Hub, workspace: Workspace, links: tuple[str, ...]) -> Flying:
+    async def open(cls, library: Library, hub: Hub, workspace: Workspace, settings: Settings) -> Flying:
         """Joins the bus; nodes that a server before this one has left running are taken over. Raises BusError."""
         lease = await asyncio.to_thread(Lease, library.root / "lease.json")
         bus = await Bus.open(library.root / RUNTIME_FOLDER, "server")
-        return cls(bus, lease, library, hub, workspace, links)
+        return cls(bus, lease, library, hub, workspace, settings)
 
     # Life
 
@@ -130,6 +157,7 @@ class Flying:
             self._beat(),
             self._scenery.run(),
             self._followed.run(),
+            *self._obstacles.loops(),
             *starts,
         ]
 
@@ -150,6 +178,7 @@ class Flying:
         return self.live.state is not None and self.live.state.armed
 
     async def _start(self, *, demo: bool) -> None:
+        await self._obstacles.start()
         await self.recording.refresh()
         if self.connections.wanted or demo:
             await self.nodes.link()
@@ -170,6 +199,7 @@ class Flying:
         while True:
             self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
             self.live.tick()
+            self._obstacles.tick()
             await asyncio.sleep(ALIVE_EVERY_S)
 
     # What is heard
@@ -186,6 +216,7 @@ class Flying:
         relay.on(Topic.VEHICLE, self.replay.on_state, replayed=True)
         relay.on(Topic.TEXT, self.replay.on_text, replayed=True, each=True)
         relay.on(Topic.FLIGHT, self.replay.on_flight, replayed=True)
+        self._obstacles.hear(relay)
         return relay
 
     def _on_state(self, state: VehicleState) -> None:
@@ -203,6 +234,7 @@ class Flying:
         self.desk.on_link(status)
         self._followed.want(self.desk.record)
         await self.connections.on_status(status)
+        await self._obstacles.on_link(status)
 
     def _on_flight(self, flight: FlightStatus) -> None:
         self.live.on_flight(flight)
@@ -215,6 +247,11 @@ class Flying:
     def _on_plan_changed(self) -> None:
         self.desk.refresh()
         self._followed.want(self.desk.record)
+        self._obstacles.on_plan()
+
+    def _forget_replay(self) -> None:
+        self._obstacles.watches["replay"].forget()
+        self._present.forget_replay()
 
     def _publish_plan(self, record: PlanRecord) -> None:
         self._followed.want(record)

@@ -37,3 +37,11 @@ def export_ground(directory: Path, target: Path, home_lat_lon_deg: tuple[float, 
     target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     write_dsm(target, around)
     return Ground(target, home.lat_deg, home.lon_deg, home.alt_dsm_m)
+
+
+def write_demo_world(target: Path, *, report: Progress) -> None:
+    """What stands on the demo's hillside since its surface model was made."""
+    from telemetry.simulator import demo_world
+
+    report("Preparing the simulated vehicle's world", None)
+    demo_world.write_demo_world(target)

@@ -10,8 +10,12 @@ from server.flying.ground_task import Ground
 from server.schemas import NodeDoc, NodesMessage, ServerMessage
 from server.supervisor import NodeState, Supervisor
 from telemetry.node_lock import running_node
+from telemetry.obstacles import SENSORS, Sensor
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
+SIMULATED_SENSORS = "sensors"
+
+_SENSOR_SEED = 1
 
 
 class Nodes:
@@ -39,16 +43,27 @@ class Nodes:
     async def replay(self) -> None:
         await self.supervisor.start(REPLAY, [])
 
-    async def simulator(self, ground: Ground, link: str, *, rtl_height_m: float) -> None:
-        """Set up as the plan's profile says of its vehicle."""
+    async def sensor(self, sensor: Sensor) -> None:
+        """A map, regions and alerts of what one sensor sends."""
+        await self.supervisor.start(sensor, [])
+
+    async def simulated_sensors(self, ground: Ground, world: Path) -> None:
+        """Radar, camera and its pose, of the simulated vehicle in its world."""
+        arguments = ["--world", str(world), "--dsm", str(ground.path), "--seed", str(_SENSOR_SEED)]
+        await self.supervisor.start(SIMULATED_SENSORS, arguments)
+
+    async def simulator(self, ground: Ground, link: str, *, rtl_height_m: float, world: Path | None = None) -> None:
+        """Set up as the plan's profile says of its vehicle; ``world``: what it may crash into."""
         home = f"{ground.home_lat_deg:.9f},{ground.home_lon_deg:.9f},{ground.home_alt_m:.3f}"
         rtl = f"RTL_ALT={100 * rtl_height_m:.0f}"
         arguments = ["--home", home, "--dsm", str(ground.path), "--link", link, "--parameter", rtl]
+        if world is not None:
+            arguments += ["--world", str(world)]
         await self.supervisor.start(SIMULATOR, arguments)
 
     async def stop_all(self) -> None:
         """The simulated vehicle last: until then its link may say farewell."""
-        for names in ((REPLAY, LINK, RECORDER), (SIMULATOR,)):
+        for names in ((REPLAY, LINK, RECORDER, SIMULATED_SENSORS, *SENSORS), (SIMULATOR,)):
             await asyncio.gather(*(self.supervisor.stop(name) for name in names))
 
     def _changed(self, nodes: Sequence[NodeState]) -> None:

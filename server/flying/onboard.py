@@ -41,7 +41,9 @@ def is_plan(record: PlanRecord, document: PlanDoc) -> bool:
 
 
 def _flown_part(document: dict[str, object]) -> dict[str, object]:
-    return {key: value for key, value in document.items() if key not in ("name", "orthophoto_id")}
+    # Plans from before obstacles could be taken into them do not say that none were.
+    flown = {"seen_id": None} | document
+    return {key: value for key, value in flown.items() if key not in ("name", "orthophoto_id")}
 
 
 def read_onboard(file: Path) -> Onboard | None:

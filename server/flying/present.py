@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from server.hub import key_of
-from server.schemas import ReplayMessage, ServerMessage, TextMessage, VehicleMessage
+from server.schemas import AlertMessage, PerceptionMessage, ReplayMessage, ServerMessage, TextMessage, VehicleMessage
 
 TEXTS_KEPT = 50
 
@@ -23,7 +23,8 @@ class Present:
     def tell(self, message: ServerMessage) -> None:
         if isinstance(message, TextMessage):
             self._texts.append(message)
-        else:
+        elif not isinstance(message, AlertMessage):
+            # Alerts are latched in the obstacles message, which a page that opens later gets.
             self._latest[key_of(message)] = message
         self._publish(message)
 
@@ -40,7 +41,8 @@ class Present:
 
 
 def _at_present(message: ServerMessage) -> ServerMessage:
-    if isinstance(message, ReplayMessage) or (isinstance(message, VehicleMessage) and message.source == "live"):
+    live = isinstance(message, (VehicleMessage, PerceptionMessage)) and message.source == "live"
+    if live or isinstance(message, ReplayMessage):
         return message.model_copy(update={"now_mono_s": time.monotonic()})
     return message
 

@@ -55,7 +55,10 @@ class _Open:
 
 
 class Reviewing:
-    """``ask`` reaches the replay node, which is started for it; ``channel`` is the replayed vehicle's."""
+    """``ask`` reaches the replay node, which is started for it; ``channel`` is the replayed vehicle's.
+
+    ``forget`` is called with every other recording, ``jumped`` when the clock has moved by more than playing explains.
+    """
 
     def __init__(
         self,
@@ -68,9 +71,10 @@ class Reviewing:
         run: Run,
         tell: Callable[[ServerMessage], None],
         forget: Callable[[], None],
+        jumped: Callable[[], None] = lambda: None,
     ) -> None:
         self._library, self._shelf, self._screen, self._channel = library, shelf, screen, channel
-        self._ask, self._run, self._tell, self._forget = ask, run, tell, forget
+        self._ask, self._run, self._tell, self._forget, self._jumped = ask, run, tell, forget, jumped
         self._open: _Open | None = None
         self._opening = asyncio.Lock()
         self._last: ReplayStatus | None = None
@@ -130,6 +134,7 @@ class Reviewing:
         if status.recording is None and status.error is None:
             await self._ask(OpenRecording(str(self._open.path)))
         elif before is None or _jumped(before, status, now_mono_s - before_mono_s):
+            self._jumped()
             self._cut_track(self._open.reviewed, status.at_utc_s)
 
     async def _reviewed(

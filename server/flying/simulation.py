@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Protocol
 
+from server import demo
 from server.errors import NotReadyError
 from server.flying.connections import Connections
-from server.flying.ground_task import Ground, export_ground
+from server.flying.ground_task import Ground, export_ground, write_demo_world
 from server.flying.nodes import Nodes
 from server.jobs import Lane
 from server.library import Library
@@ -33,11 +35,22 @@ class Simulation:
     """Starts it once, on a free loopback port, with the surface model as its ground."""
 
     def __init__(
-        self, library: Library, plans: Plans, nodes: Nodes, connections: Connections, lane: Lane, runtime_dir: Path
+        self,
+        library: Library,
+        plans: Plans,
+        nodes: Nodes,
+        connections: Connections,
+        lane: Lane,
+        runtime_dir: Path,
+        *,
+        demo_world: bool = True,
+        sees: Callable[[Ground, Path], Awaitable[None]] | None = None,
     ) -> None:
+        """``sees`` is called where the vehicle gets a world of its own, with that world's file."""
         self._library, self._plans, self._nodes, self._connections = library, plans, nodes, connections
         self._lane, self._ground_file = lane, runtime_dir / "ground.tif"
         self._port_file = runtime_dir / "simulator-port.txt"
+        self._world_file, self._demo_world, self._sees = runtime_dir / "world.json", demo_world, sees
         self._starting = asyncio.Lock()
 
     async def start(self, operator: Operator) -> None:
@@ -46,8 +59,19 @@ class Simulation:
             link = await self._nodes.simulator_link()
             if link is None:
                 ground, link = await self._make_ground(), f"{_OUT}127.0.0.1:{self._port()}"
-                await self._nodes.simulator(ground, link, rtl_height_m=self._plans.document.profile.rtl_height_m)
+                await self._start_node(ground, link)
             await self._connections.connect(operator, link.replace(_OUT, _IN), adopt=True)
+
+    async def _start_node(self, ground: Ground, link: str) -> None:
+        document = self._plans.document
+        known = demo.terrain(self._library)
+        world = None
+        if self._demo_world and known is not None and document.terrain_id == known.id:
+            world = self._world_file
+            await self._lane.call(write_demo_world, world)
+        await self._nodes.simulator(ground, link, rtl_height_m=document.profile.rtl_height_m, world=world)
+        if world is not None and self._sees is not None:
+            await self._sees(ground, world)
 
     def _port(self) -> int:
         """The same as last time if it can be had: the link node remembers its connections."""

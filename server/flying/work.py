@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from server.errors import NotCertifiedError, NotReadyError, StaleRevisionError
 from server.flying.asking import Asks
-from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets
+from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets, seen_in
 from server.flying.upload_task import MadeUpload, make_upload
 from server.jobs import Lane
 from server.library import Library
@@ -62,7 +62,12 @@ class FlightWork:
     async def way_back(self, record: PlanRecord, checked: Checked, from_item: int) -> tuple[int, float]:
         """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
         return await self._flight_lane.call(
-            climb_for_resuming, self._directory(record), checked.mission, checked.clearance, from_item
+            climb_for_resuming,
+            self._directory(record),
+            checked.mission,
+            checked.clearance,
+            from_item,
+            seen_in(record),
         )
 
     def _directory(self, record: PlanRecord) -> Path:

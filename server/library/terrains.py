@@ -16,6 +16,7 @@ from server.library.arrays import read_array, write_array
 from server.library.files import new_directory, new_id
 from server.library.shelf import read_manifest, utc_now, write_manifest
 from server.schemas import PlaceDoc, SpikeDoc, TerrainDoc
+from telemetry.obstacles import GroundNotice
 
 FOLDER = "terrains"
 _ELEVATION = "elevation.npy"
@@ -57,6 +58,22 @@ def load_terrain(directory: Path) -> Dsm:
         transform=Affine(*manifest.transform),
         crs=CRS.from_wkt(manifest.crs_wkt),
         vertical_datum=manifest.doc.vertical_datum,
+        sha256=manifest.doc.sha256,
+    )
+
+
+def ground_notice(directory: Path) -> GroundNotice:
+    """Tells other processes where the heights lie; raises ``StorageError`` when the manifest is damaged."""
+    manifest = read_manifest(directory, TerrainManifest)
+    transform = Affine(*manifest.transform)
+    return GroundNotice(
+        terrain_id=manifest.doc.id,
+        name=manifest.doc.name,
+        elevation_npy=str((directory / _ELEVATION).absolute()),
+        crs_wkt=manifest.crs_wkt,
+        west_m=transform.c,
+        north_m=transform.f,
+        resolution_m=transform.a,
         sha256=manifest.doc.sha256,
     )
 

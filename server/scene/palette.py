@@ -26,6 +26,16 @@ REPLAY_NOSE = (150, 110, 190)
 RECORDED_PLAN = (250, 250, 250)
 UNKNOWN = ((104, 92, 120), (130, 115, 148))
 """Two stripes"""
+RADAR = (240, 90, 205)
+VISION = (255, 225, 80)
+"""Of the sensors that see obstacles: magenta and yellow stay apart for every kind of colour blindness."""
+KNOWN_GROUND = (150, 154, 162)
+"""Voxels that the surface model explains."""
+_FAINT_SHARE = 0.6
+"""What is left of a colour where a voxel is as likely free as occupied."""
+_SURE = 0.97
+_STEPS = 8
+"""Shades of probability: finer ones are not told apart, and each change of a shade travels."""
 _DIM = (128, 132, 140)
 _DIM_SHARE = 0.65
 
@@ -35,6 +45,13 @@ def clearance_rgb(clearance_m: F64, required_m: float) -> U8:
     clearance = np.where(np.isnan(clearance_m), -np.inf, clearance_m)
     bands = np.array([INSIDE, CLOSE, SAFE], dtype=np.uint8)
     return bands[(clearance > 0).astype(np.intp) + ((clearance > 0) & (clearance >= required_m))]
+
+
+def probability_rgb(hue: tuple[int, int, int], probability: F64) -> U8:
+    """(N,) probabilities of 0.5 and more -> (N, 3): the surer, the lighter."""
+    share = np.clip((np.asarray(probability) - 0.5) / (_SURE - 0.5), 0.0, 1.0)
+    share = np.round(share * _STEPS) / _STEPS
+    return np.round((_FAINT_SHARE + (1 - _FAINT_SHARE) * share)[:, None] * np.array(hue)).astype(np.uint8)
 
 
 def dimmed(rgb: NDArray[np.uint8] | tuple[int, int, int], *, stale: bool) -> U8:

@@ -28,7 +28,7 @@ CONE = _shape(trimesh.creation.cone(radius=1.0, height=2.4, sections=24))
 def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> Node:
     """A polyline through (N, 3) scene points; ``color`` is one, or (N - 1, 3): one per segment."""
     segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-    colors = _linear(np.asarray(color, dtype=np.uint8))
+    colors = linear_light(np.asarray(color, dtype=np.uint8))
     # One colour for each end of each segment: viser takes a single colour for sRGB.
     ends = np.broadcast_to(colors[..., None, :] if colors.ndim == 2 else colors, (len(segments), 2, 3)).copy()
     props = {"points": segments, "colors": ends, "thickness": width_px, "thickness_units": "screen"}
@@ -62,8 +62,8 @@ def label_node(name: str, text: str, at: F64, *, size: float = 1.0, anchor: str 
     return Node(name, "label", props)
 
 
-def _linear(srgb: U8) -> U8:
-    """viser takes the colours of lines for linear light, those of meshes for sRGB."""
+def linear_light(srgb: U8) -> U8:
+    """viser takes the colours of lines, and of meshes in batches, for linear light; those of single meshes for sRGB."""
     share = srgb / 255.0
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.round(255 * linear).astype(np.uint8)

@@ -21,6 +21,7 @@ from server.scene.nodes import Canvas, Node
 from server.scene.payload import F64, SceneState
 from server.scene.picking import PlaceHit, PoiHit, pick
 from server.scene.shots import Target, shot
+from server.scene.sights import Sights
 from server.scene.vehicles import Vehicles
 
 _POINTER_REACH_PX = 24.0
@@ -47,6 +48,7 @@ class SceneView:
         self._page_of_client = page_of_client
         self._canvas = Canvas(server.scene)
         self.vehicles = Vehicles(self._put)
+        self.sights = Sights(server, self._put)
         self._layers = layers(self._watch_gizmo)
         self._keys: dict[str, Key] = {}
         self._wanted: tuple[Dsm | None, SceneState] | None = None
@@ -101,6 +103,7 @@ class SceneView:
             self._put({layer.name: [] for layer in self._layers} | {"cursor": []})
             self._drawn = None
             self.vehicles.redraw(None)
+            self.sights.redraw(None)
             return
         keys = {layer.name: layer.key(drawing) for layer in self._layers}
         if self._dragged is not None:
@@ -115,6 +118,7 @@ class SceneView:
         before, self._drawn = self._drawn, drawing
         self._put(built)
         self._keys |= keys
+        self.sights.redraw(drawing)
         if before is None or before.terrain.terrain_id != drawing.terrain.terrain_id:
             self._aim_all(drawing)
         if before is None or before.frame != drawing.frame or before.dsm is not drawing.dsm:

@@ -91,6 +91,8 @@ class PlanDoc(Strict):
     name: Name = "Untitled plan"
     terrain_id: str | None = None
     orthophoto_id: str | None = None
+    seen_id: str | None = None
+    """What was seen and raises the surface model as columns; None: the model is as it was read."""
     source: Literal["pois", "survey"] = "pois"
     pois: list[PoiDoc] = Field(default=[], max_length=5000)
     survey: SurveyDoc = SurveyDoc()

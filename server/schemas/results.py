@@ -82,6 +82,8 @@ class ResultDoc(Strict):
     gsd_max_cm: float | None
     home_alt_dsm_m: float
     vertical_datum: str | None
+    seen_columns: int = 0
+    """Columns of the surface model that were raised by what was seen."""
     trade: list[TradeRow]
     chart: Chart
     seconds: dict[str, float]

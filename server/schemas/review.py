@@ -58,7 +58,7 @@ class Histogram(Strict):
 class ReviewEvent(Strict):
     t_s: float
     kind: str
-    """mode, text, arm, item, command"""
+    """mode, text, arm, item, command, alert"""
     text: str
     severity: int = 6
 

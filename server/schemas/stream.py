@@ -9,10 +9,12 @@ from pydantic import Field
 from server.schemas.base import Strict
 from server.schemas.flight import FlyState, FollowDoc, LeaseDoc, NodeDoc, RecordingDoc, Source, TrackDoc
 from server.schemas.library import JobDoc, LibraryState
+from server.schemas.obstacles import ObstaclesState, SensorName
 from server.schemas.results import ErrorDoc, PlanState
 from server.schemas.review import ReviewDoc
 from server.schemas.view import SelectionDoc, ViewDoc
 from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
+from telemetry.obstacles import ObstacleAlert, PerceptionStatus
 from telemetry.vehicle import VehicleState
 
 
@@ -164,6 +166,34 @@ class ReplayMessage(Strict):
     replay: ReplayStatus
 
 
+class PerceptionMessage(Strict):
+    """One sensor's status: with every frame of it, at most 10 times a second; null: forget this sensor."""
+
+    v: Literal[1] = 1
+    type: Literal["perception"] = "perception"
+    source: Source
+    now_mono_s: float
+    """The clock of the status's ``..._t_mono_s``."""
+    sensor: SensorName
+    status: PerceptionStatus | None
+
+
+class AlertMessage(Strict):
+    """An alert begins, goes on or ends: at once, before the obstacles message that lists it."""
+
+    v: Literal[1] = 1
+    type: Literal["alert"] = "alert"
+    source: Source
+    alert: ObstacleAlert
+
+
+class ObstaclesMessage(Strict):
+    v: Literal[1] = 1
+    type: Literal["obstacles"] = "obstacles"
+    source: Source
+    obstacles: ObstaclesState
+
+
 class NoticeMessage(Strict):
     """Something the operator must read: a failed click, a warning."""
 
@@ -194,6 +224,9 @@ ServerMessage = Annotated[
     | RecordingsMessage
     | ReviewMessage
     | ReplayMessage
+    | PerceptionMessage
+    | AlertMessage
+    | ObstaclesMessage
     | NoticeMessage,
     Field(discriminator="type"),
 ]

@@ -16,6 +16,12 @@ class ViewDoc(Strict):
     show_surface: bool = True
     show_path: bool = True
     show_unknown: bool = True
+    show_radar_map: bool = True
+    show_vision_map: bool = True
+    """The camera's voxels, and those of range finders."""
+    show_explained: bool = True
+    """Voxels that are known ground, in grey."""
+    show_regions: bool = True
     vertical_exaggeration: Annotated[float, Field(ge=1, le=5)] = 1.0
     legend_min_m: float | None = None
     legend_max_m: float | None = None

@@ -52,6 +52,8 @@ class Station:
     def start(self) -> None:
         port = _free_port()
         command = [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
+        # Flights of other tests meet no obstacles: a later option wins.
+        command.append("--no-demo-world")
         self._process = subprocess.Popen(
             [*command, *self._arguments],
             stdout=subprocess.PIPE,

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from server.errors import NotReadyError, StaleRevisionError
+from server.flying.agents import Agents
 from server.hub import Hub
 from server.lease import Lease
 from server.library import Library
@@ -22,6 +23,7 @@ from server.schemas import (
     LeaseDoc,
     LibraryState,
     NoticeMessage,
+    ObstaclesState,
     OnboardDoc,
     PlanDoc,
     PlanEdit,
@@ -150,7 +152,14 @@ class FakeFlying:
         self.lease = Lease(library.root / "lease.json")
         self.hub = hub
         self.asked: list[tuple[Any, ...]] = []
+        self.obstacles = _Asked(self.asked)
+        self.published: list[tuple[str, Any]] = []
+        self.agents = Agents(self)
         self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
+
+    def publish(self, topic: str, message: Any) -> None:
+        """As the bus does."""
+        self.published.append((topic, message))
 
     def loops(self, *, demo: bool = False) -> list:
         return []
@@ -173,6 +182,17 @@ class FakeFlying:
         return self.lease.doc_for(session_key)
 
 
+_FLY_STATE, _OBSTACLES = FlyState(onboard=OnboardDoc(state="none")), ObstaclesState()
+_ANSWERS: dict[str, Any] = {
+    "upload": _FLY_STATE,
+    "check": _FLY_STATE,
+    "acknowledge": _OBSTACLES,
+    "change_settings": _OBSTACLES,
+    "plan_with_seen": plan_state(),
+    "exported": b"a map",
+}
+
+
 class _Asked:
     """Takes every call and keeps its name and arguments."""
 
@@ -182,6 +202,6 @@ class _Asked:
     def __getattr__(self, name: str) -> Callable[..., Awaitable[Any]]:
         async def call(*args: object, **more: object) -> Any:
             self._asked.append((name, *args, *more.values()))
-            return FlyState(onboard=OnboardDoc(state="none")) if name in ("upload", "check") else None
+            return _ANSWERS.get(name)
 
         return call

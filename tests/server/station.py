@@ -111,7 +111,11 @@ def ok(response: httpx.Response) -> httpx.Response:
 
 @contextlib.contextmanager
 def station(data_dir: Path, *, demo: bool = False, flies: bool = False, **overrides: Any) -> Iterator[Station]:
-    """``flies``: with a bus and nodes, which planning alone does not need."""
+    """``flies``: with a bus and nodes, which planning alone does not need.
+
+    The demo's vehicle meets no obstacles unless ``demo_world=True`` is given.
+    """
+    overrides.setdefault("demo_world", False)
     flying = open_flying if flies else fake_flying
     with running(data_dir, make=make_workspace, flying=flying, demo=demo, **overrides) as server:
         server.http.timeout = httpx.Timeout(PATIENCE_S)

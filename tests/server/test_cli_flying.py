@@ -174,6 +174,8 @@ def test_wrong_simulators(tmp_path: Path) -> None:
         (*link, "--home", HOME, "--speedup", 0),
         (*link, "--home", HOME, "--parameter", "NOSUCH=1"),
         (*link, "--home", HOME, "--dsm", tmp_path / "none.tif"),
+        (*link, "--home", HOME, "--world", tmp_path / "none.json"),
+        (*link, "--home", HOME, "--gnss-event", "jam:1:2"),
         ("--link", "/etc/passwd", "--home", HOME),
     ):
         run = hedgehop("sim", *options)

@@ -15,6 +15,7 @@ from server.review import recording_of, review
 from server.review_curves import STRETCHES, thinned
 from server.schemas.flight import RecordingDoc
 from telemetry.messages import CommandRecord, PlanRecord
+from telemetry.obstacles import ObstacleAlert
 from telemetry.recording.flight import FlightLog
 from telemetry.recording.frame_facts import SentTarget
 from tests.server.flight_logs import PLAIN, ROUTE, START_UTC_S, degrees, log_of, mission, plain, positions
@@ -135,6 +136,14 @@ def test_events_in_the_order_of_time() -> None:
     assert {event.kind for event in found} == {"mode", "arm", "item", "text", "command"}
     warning = next(event for event in found if event.kind == "text")
     assert (warning.text, warning.severity) == ("Wind is strong", 4)
+
+
+def test_alerts_are_among_the_events_where_they_begin_and_where_they_end() -> None:
+    begins = ObstacleAlert("a", "radar", "obstacle", "begins", 1.0, START_UTC_S + 0.3, 1.1, "A crane, 8 m ahead")
+    ends = replace(begins, phase="ends", t_utc_s=START_UTC_S + 0.6)
+    found = reviewed(replace(log_of(positions(), flown=FLOWN), alerts=(begins, ends)), dsm=PLAIN).events
+    alerts = [(event.text, event.severity) for event in found if event.kind == "alert"]
+    assert alerts == [("A crane, 8 m ahead", 4), ("Over: A crane, 8 m ahead", 6)]
 
 
 def test_a_recorded_plan_brings_its_mission_profile_and_certificate() -> None:

@@ -22,11 +22,16 @@ import "./styles/hold.css";
 import "./styles/fly.css";
 import "./styles/instruments.css";
 import "./styles/review.css";
+import "./styles/obstacles.css";
+import "./styles/polar.css";
+import "./styles/alerts.css";
 import { App } from "./shell/App";
+import { startSound } from "./obstacles/sound";
 import { startClock } from "./store/clock";
 import { connect } from "./store/stream";
 
 const root = document.getElementById("app");
 if (root) render(<App />, root);
 startClock();
+startSound();
 connect();

@@ -2,6 +2,25 @@
 
 export const PROTOCOL_VERSION = 1;
 
+/** The link node's: what is done about obstacles by itself. */
+export interface AvoidanceStatus {
+  enabled: boolean;
+  state: "off" | "watching" | "holding" | "climbing" | "offset" | "manoeuvre" | "released" | "ceiling";
+  text: string;
+  height_offset_m: number;
+  largest_speed_m_s: number | null;
+  sensors: ("radar" | "vision" | "ranges")[];
+}
+
+/** What was known when a frame was worked on: with it a recording's map comes out exactly as live. */
+export interface Basis {
+  taken_t_mono_s: number;
+  vehicle_t_utc_s: number;
+  camera_t_mono_s: number;
+  ground: boolean;
+  run: string;
+}
+
 /** An autopilot that was heard and to which nothing is sent until the operator adopts it. */
 export interface Candidate {
   id: string;
@@ -20,6 +39,12 @@ export interface ConnectionStatus {
   error: ErrorInfo | null;
   received_messages: number;
   bad_bytes: number;
+}
+
+/** So many frames, points or events, and of what. */
+export interface Count {
+  what: string;
+  count: number;
 }
 
 /** A ``DescribedError`` on its way through the bus. */
@@ -56,6 +81,100 @@ export interface LinkStatus {
   warnings: string[];
 }
 
+/** Of the map frame. */
+export interface MapOrigin {
+  lat_deg: number;
+  lon_deg: number;
+  alt_amsl_m: number;
+}
+
+/** The first place of the mission ahead that the live map comes too near to. */
+export interface MissionConflict {
+  ahead_m: number;
+  time_s: number | null;
+  item: number;
+  distance_m: number;
+  enu_m: [number, number, number];
+  lat_deg: number;
+  lon_deg: number;
+  voxels: number;
+}
+
+/** A cluster of occupied, unexplained voxels; ``distance_m`` and so on are those of its nearest voxel. */
+export interface Obstacle {
+  region: "roi" | "corridor";
+  distance_m: number;
+  bearing_deg: number;
+  off_nose_deg: number;
+  height_difference_m: number;
+  time_to_contact_s: number | null;
+  enu_m: [number, number, number];
+  lat_deg: number;
+  lon_deg: number;
+  alt_amsl_m: number;
+  voxels: number;
+  size_m: [number, number, number];
+}
+
+/** Something has entered a region, is still there (told again at most once a second), or has left it. */
+export interface ObstacleAlert {
+  id: string;
+  sensor: "radar" | "vision" | "ranges";
+  kind: "obstacle" | "conflict" | "divergence" | "sensor";
+  phase: "begins" | "goes_on" | "ends";
+  t_mono_s: number;
+  t_utc_s: number;
+  done_t_mono_s: number;
+  text: string;
+  obstacle: Obstacle | null;
+}
+
+/** How the maps are made and what is searched. Defaults: Bigazzi 2022 and Miccinesi 2022. */
+export interface PerceptionSettings {
+  radar_depth_m: number;
+  vision_depth_m: number;
+  ranges_depth_m: number;
+  fov_deg: number;
+  height_m: number;
+  paper_bare: boolean;
+  radar_variant: "heading_only" | "full_attitude" | "full_attitude_flat";
+  vehicle_radius_m: number;
+  position_error_m: number;
+  brake_m_s2: number;
+  clear_count: number;
+  radar_resolution_m: number;
+  vision_resolution_m: number;
+  memory_limit_bytes: number;
+}
+
+/** One sensor's node after each frame, and once a second when none comes. */
+export interface PerceptionStatus {
+  sensor: "radar" | "vision" | "ranges";
+  state: "waiting" | "running" | "blind" | "frozen" | "stale";
+  text: string;
+  t_mono_s: number;
+  t_utc_s: number;
+  done_t_mono_s: number;
+  frames: number;
+  dropped: Count[];
+  lost_frames: number;
+  points: number;
+  voxels_occupied: number;
+  voxels_explained: number;
+  map_bytes: number;
+  map_revision: number;
+  origin: MapOrigin | null;
+  region: Region | null;
+  corridor_m: number;
+  corridor_occupied: boolean;
+  obstacles: Obstacle[];
+  sweep_m: (number | null)[];
+  conflict: MissionConflict | null;
+  divergence_m: number | null;
+  latency_s: number | null;
+  basis: Basis | null;
+}
+
 export interface RecorderStatus {
   t_mono_s: number;
   recording: boolean;
@@ -65,6 +184,16 @@ export interface RecorderStatus {
   messages: number;
   free_bytes: number | null;
   error: ErrorInfo | null;
+}
+
+/** The sector ahead that is searched (Bigazzi 2022, eq. A1), as it was for this frame. */
+export interface Region {
+  enu_m: [number, number, number];
+  heading_rad: number;
+  depth_m: number;
+  fov_rad: number;
+  height_m: number;
+  occupied: boolean;
 }
 
 export interface ReplayStatus {
@@ -235,6 +364,8 @@ export interface PlanDoc {
   name: string;
   terrain_id: string | null;
   orthophoto_id: string | null;
+  /** What was seen and raises the surface model as columns; None: the model is as it was read. */
+  seen_id: string | null;
   source: "pois" | "survey";
   pois: PoiDoc[];
   survey: SurveyDoc;
@@ -319,6 +450,8 @@ export interface ResultDoc {
   gsd_max_cm: number | null;
   home_alt_dsm_m: number;
   vertical_datum: string | null;
+  /** Columns of the surface model that were raised by what was seen. */
+  seen_columns: number;
   trade: TradeRow[];
   chart: Chart;
   seconds: Record<string, number>;
@@ -417,6 +550,12 @@ export interface ViewDoc {
   show_surface: boolean;
   show_path: boolean;
   show_unknown: boolean;
+  show_radar_map: boolean;
+  /** The camera's voxels, and those of range finders. */
+  show_vision_map: boolean;
+  /** Voxels that are known ground, in grey. */
+  show_explained: boolean;
+  show_regions: boolean;
   vertical_exaggeration: number;
   legend_min_m: number | null;
   legend_max_m: number | null;
@@ -655,7 +794,7 @@ export interface Histogram {
 
 export interface ReviewEvent {
   t_s: number;
-  /** mode, text, arm, item, command */
+  /** mode, text, arm, item, command, alert */
   kind: string;
   text: string;
   severity: number;
@@ -676,6 +815,86 @@ export interface ReviewDoc {
   terrain_name: string;
   /** What had to be assumed or could not be told. */
   notes: string[];
+}
+
+/** An alert, latched: it stays until it is over AND acknowledged. */
+export interface AlertDoc {
+  /** As last told. */
+  alert: ObstacleAlert;
+  began_utc_s: number;
+  over: boolean;
+  acknowledged: boolean;
+}
+
+/** A prepared way past an obstacle; never below it. */
+export interface ManoeuvreDoc {
+  id: string;
+  kind: "over" | "around";
+  /** ``ObstacleAlert.id`` */
+  for_alert: string;
+  possible: boolean;
+  /** What it does, or why there is none. */
+  text: string;
+  /** Smallest distance of its line to anything seen and to the surface model. */
+  clearance_m: number | null;
+  length_m: number | null;
+  seconds: number | null;
+  climb_m: number | null;
+}
+
+/** What of one sensor's map the 3D view draws. */
+export interface MapDrawn {
+  sensor: "radar" | "vision" | "ranges";
+  /** Occupied, of the whole map. */
+  voxels: number;
+  drawn: number;
+  /** Every drawn box stands for a cube of so many voxels along each edge; 1 is full detail. */
+  detail: number;
+  /** To the pages, since the map began. */
+  sent_bytes: number;
+  /** Such as "drawn coarser: 1 box for 2 x 2 x 2 voxels". */
+  text: string;
+}
+
+/** Everything about obstacles but the sensors' own status, which comes with every frame. */
+export interface ObstaclesState {
+  /** Newest first, at most 20. */
+  alerts: AlertDoc[];
+  manoeuvres: ManoeuvreDoc[];
+  avoidance: AvoidanceStatus;
+  settings: PerceptionSettings;
+  maps: MapDrawn[];
+  /** Columns of the open plan's surface model that were raised by what was seen; 0: it is as it was read. */
+  seen_in_plan: number;
+  /** What is being done right now: "Looking for a way around" ... */
+  busy: string;
+}
+
+export interface SetAvoidanceBody {
+  enabled: boolean;
+  consent?: boolean;
+}
+
+/** Null: all of them. */
+export interface AcknowledgeBody {
+  alert_id?: string | null;
+}
+
+/** What an operator may change; the rest stays. */
+export interface PerceptionSettingsBody {
+  radar_depth_m?: number | null;
+  vision_depth_m?: number | null;
+  ranges_depth_m?: number | null;
+  fov_deg?: number | null;
+  height_m?: number | null;
+  paper_bare?: boolean | null;
+  radar_variant?: "heading_only" | "full_attitude" | "full_attitude_flat" | null;
+}
+
+/** Takes the maps into planning, or out of it again. */
+export interface PlanWithSeen {
+  seen: boolean;
+  sensors?: ("radar" | "vision" | "ranges")[];
 }
 
 export interface Snapshot {
@@ -821,6 +1040,32 @@ export interface ReplayMessage {
   replay: ReplayStatus;
 }
 
+/** One sensor's status: with every frame of it, at most 10 times a second; null: forget this sensor. */
+export interface PerceptionMessage {
+  v: 1;
+  type: "perception";
+  source: "live" | "replay";
+  /** The clock of the status's ``..._t_mono_s``. */
+  now_mono_s: number;
+  sensor: "radar" | "vision" | "ranges";
+  status: PerceptionStatus | null;
+}
+
+/** An alert begins, goes on or ends: at once, before the obstacles message that lists it. */
+export interface AlertMessage {
+  v: 1;
+  type: "alert";
+  source: "live" | "replay";
+  alert: ObstacleAlert;
+}
+
+export interface ObstaclesMessage {
+  v: 1;
+  type: "obstacles";
+  source: "live" | "replay";
+  obstacles: ObstaclesState;
+}
+
 /** Something the operator must read: a failed click, a warning. */
 export interface NoticeMessage {
   v: 1;
@@ -879,6 +1124,9 @@ export type ServerMessage =
   | RecordingsMessage
   | ReviewMessage
   | ReplayMessage
+  | PerceptionMessage
+  | AlertMessage
+  | ObstaclesMessage
   | NoticeMessage;
 
 export type ClientMessage =

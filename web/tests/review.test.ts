@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import type { ReplayStatus, ReviewDoc, ReviewEvent, ReviewSeries } from "../src/messages";
 import { playhead, replay, review, seeking, takeReviewing } from "../src/store/review";
 import { flownLevel } from "../src/review/level";
-import { axisTime, columns, eventAt, momentAt, reachOf, roundStep } from "../src/review/time";
+import { alertTimes, axisTime, columns, eventAt, momentAt, reachOf, roundStep } from "../src/review/time";
 
 const status = (fields: Partial<ReplayStatus> = {}): ReplayStatus => ({
   t_mono_s: 0,
@@ -75,6 +75,14 @@ describe("events", () => {
     expect([0, 1, 4.9, 5, 8, 100].map((at_s) => eventAt(events, at_s))).toEqual([-1, 0, 0, 2, 2, 3]);
     expect(eventAt(events, null)).toBe(-1);
     expect(eventAt([], 5)).toBe(-1);
+  });
+});
+
+describe("the alerts of a recording", () => {
+  it("are marked where they begin, not where they end", () => {
+    const event = (t_s: number, kind: string, severity: number) => ({ t_s, kind, severity, text: "" });
+    const events = [event(1, "text", 2), event(2, "alert", 4), event(5, "alert", 6), event(9, "alert", 4)];
+    expect(alertTimes(events)).toEqual([2, 9]);
   });
 });
 

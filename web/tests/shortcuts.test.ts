@@ -15,6 +15,8 @@ describe("keys", () => {
     [press("Delete"), "delete"],
     [press("f"), "fit"],
     [press("t"), "top"],
+    [press("k"), "acknowledge"],
+    [press("M"), "sound"],
     [press("?", false, true), "help"],
   ])("%j means %s", (key, id) => {
     expect(shortcutOf(key, false)?.id).toBe(id);
@@ -58,6 +60,14 @@ describe("keys of the views", () => {
         [press("a"), press("Delete"), press("z", true)].map((key) => shortcutOf(key, false, at(view))),
       ).toEqual([null, null, null]);
     }
+  });
+
+  it("answer an alert in every view, but never while something is typed", () => {
+    for (const view of ["plan", "fly", "review"] as const) {
+      expect(shortcutOf(press("k"), false, at(view))?.id).toBe("acknowledge");
+      expect(shortcutOf(press("m"), false, at(view))?.id).toBe("sound");
+    }
+    expect(shortcutOf(press("k"), true, at("fly"))).toBeNull();
   });
 
   it("steer the replay in Review only", () => {

@@ -5,6 +5,7 @@ import { isStale } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, trackVersion, tracks } from "../store/flying";
 import { theme } from "../store/prefs";
+import { ConflictMark } from "./ConflictMark";
 
 const REDRAW_MS = 200;
 
@@ -85,6 +86,7 @@ export function FlownLayer({ plot }: { plot: uPlot }) {
   return (
     <>
       <canvas class="flown-layer" ref={canvas} style={style} data-testid="flown-layer" aria-hidden="true" />
+      <ConflictMark plot={plot} />
       <Marker plot={plot} />
     </>
   );

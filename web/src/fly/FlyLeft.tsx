@@ -1,6 +1,7 @@
 import { adopted, isInAir, linkStatus } from "../store/flying";
 import { closeReview } from "../review/commands";
-import { isReplaying } from "../store/review";
+import { isReplaying, review } from "../store/review";
+import { ObstaclesSection } from "../obstacles/ObstaclesSection";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { ConnectionSection } from "./Connection";
@@ -12,10 +13,15 @@ import { PreflightSection } from "./Preflight";
 /** All pages share the 3D view: it shows the recording that any of them reviews. */
 function ReviewOpen() {
   if (!isReplaying.value) return null;
+  const isInView = Boolean(review.value?.terrain_name);
   return (
     <div class="callout wrap-row review-open" data-testid="review-open">
       <Icon name="info" />
-      <p>A recording is open for review: the 3D view shows it, not the vehicle.</p>
+      <p>
+        {isInView
+          ? "A recording is open for review: the 3D view shows it, not the vehicle."
+          : "A recording is open for review. It lies over no surface model that is known here, so the 3D view does not show it."}
+      </p>
       <Button testid="close-review" onClick={() => void closeReview()}>
         Close the recording
       </Button>
@@ -51,6 +57,7 @@ export function FlyLeft() {
         <OnboardSection />
         <PreflightSection />
         {!isInAir.value && <FlightSection />}
+        <ObstaclesSection />
       </div>
       <NextAction />
     </>

@@ -3,6 +3,7 @@ import { age_s, isStale, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, linkStatus, silence_s, type Source } from "../store/flying";
 import { link } from "../store/state";
+import { Polar } from "../obstacles/Polar";
 import { Icon } from "../ui/Icon";
 import { Attitude } from "./Attitude";
 import { Following } from "./Following";
@@ -42,10 +43,13 @@ export function Instruments({ source }: { source: Source }) {
   const [attitude, position] = [ageOf(source, "attitude"), ageOf(source, "position")];
   return (
     <div class="instruments" data-testid={`instruments-${source}`}>
-      <div class="attitude-holder">
-        <Attitude state={state} isOld={attitude.isOld} />
-        {lost && <Lost />}
-        {position.age && !lost && <span class="age position-age">{position.age}</span>}
+      <div class="around">
+        <div class="attitude-holder">
+          <Attitude state={state} isOld={attitude.isOld} />
+          {lost && <Lost />}
+          {position.age && !lost && <span class="age position-age">{position.age}</span>}
+        </div>
+        <Polar source={source} state={state} />
       </div>
       <Tiles state={state} follow={follow} isOld={position.isOld} />
       <Following state={state} follow={follow} isOld={position.isOld} />

@@ -83,6 +83,10 @@ const NODE_WORDS: Readonly<Record<string, string>> = {
   recorder: "Recorder",
   replay: "Replay",
   simulator: "Simulator",
+  sensors: "Simulated sensors",
+  radar: "Radar map",
+  vision: "Camera map",
+  ranges: "Range finder map",
 };
 
 export const nodeWord = (name: string) => NODE_WORDS[name] ?? name;

@@ -1,4 +1,5 @@
 import { ErrorBox } from "../ui/ErrorBox";
+import { SeenInPlan } from "../obstacles/SeenInPlan";
 import { document_ } from "../store/state";
 import { PlanActions } from "./PlanActions";
 import { MissionSection } from "./sections/Mission";
@@ -15,6 +16,7 @@ export function PlanLeft() {
     <>
       <div class="panel-scroll">
         <ErrorBox place="plan" />
+        <SeenInPlan />
         {plan ? (
           <>
             <TerrainSection plan={plan} />

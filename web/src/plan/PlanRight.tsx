@@ -36,6 +36,16 @@ function Headline() {
   );
 }
 
+/** A certificate against more than the surface model says so. */
+function AgainstSeen({ result: { seen_columns: columns } }: { result: ResultDoc }) {
+  if (columns === 0) return null;
+  return (
+    <p class="against-seen" data-testid="against-seen">
+      <Icon name="radar" size={16} /> Against the surface model and {count(columns, "seen column")}
+    </p>
+  );
+}
+
 function Reasons({ result: { reasons } }: { result: ResultDoc }) {
   if (reasons.length === 0) return null;
   return (
@@ -126,6 +136,7 @@ export function PlanRight() {
       {now?.state === "error" && now.error && <ErrorPanel error={now.error} />}
       {shown ? (
         <div class={`figures ${isFresh.value ? "" : "stale"}`} aria-busy={!isFresh.value}>
+          <AgainstSeen result={shown} />
           <Reasons result={shown} />
           <Clearance result={shown} />
           <Flight result={shown} />

@@ -13,11 +13,12 @@ const KINDS: Readonly<Record<string, IconName>> = {
   item: "flag",
   command: "user",
   text: "info",
+  alert: "radar",
 };
 
 function Row({ event, isNow }: { event: ReviewEvent; isNow: boolean }) {
   const row = useRef<HTMLLIElement>(null);
-  const level = event.kind === "text" ? severityLevel(event.severity) : "neutral";
+  const level = event.kind === "text" || event.kind === "alert" ? severityLevel(event.severity) : "neutral";
   useEffect(() => {
     const list = row.current?.parentElement;
     // Only the list scrolls, and not under a pointer that is choosing from it.

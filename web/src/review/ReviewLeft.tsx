@@ -3,10 +3,13 @@ import { bytes, count, day, duration } from "../format";
 import type { RecordingDoc } from "../messages";
 import { chooseFiles } from "../shell/keyboard";
 import { goTo } from "../shell/views";
+import { MapExports } from "../obstacles/MapExports";
 import { sendRecording } from "../store/files";
+import { hasSensors } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { isPlaying, recordings, review } from "../store/review";
 import { library } from "../store/state";
+import { frame } from "../store/stream";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { Done, Outcome } from "../ui/Outcome";
@@ -197,6 +200,19 @@ function Judge() {
   );
 }
 
+/** The maps as they are at the time that is shown: at the end, all that was seen. */
+function Maps() {
+  if (!review.value || !hasSensors.replay.value) return null;
+  return (
+    <Section id="maps" title="Maps" icon="radar" summary="up to the time shown" startsOpen>
+      <MapExports source="replay" />
+      <Button kind="quiet" icon="top" testid="maps-from-above" onClick={() => frame("top")}>
+        Look at it from above
+      </Button>
+    </Section>
+  );
+}
+
 function Play() {
   const isOpen = review.value !== null;
   const playing = isPlaying.value;
@@ -225,6 +241,7 @@ export function ReviewLeft() {
       <div class="panel-scroll">
         <Recordings />
         <Judge />
+        <Maps />
       </div>
       <Play />
     </>

@@ -2,6 +2,8 @@ import { signal } from "@preact/signals";
 import { day, duration } from "../format";
 import type { ReviewDoc } from "../messages";
 import { Instruments } from "../fly/Instruments";
+import { MissionAhead } from "../obstacles/MissionAhead";
+import { Sensors } from "../obstacles/Sensors";
 import { review } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -77,6 +79,8 @@ export function ReviewRight() {
       <div class="panel-scroll truth" tabIndex={0}>
         <div class="part part-instruments">
           <Instruments source="replay" />
+          <MissionAhead source="replay" />
+          <Sensors source="replay" />
         </div>
         <div class="part part-figures">
           <Figures review={open} />

@@ -13,7 +13,7 @@ import { HistogramChart } from "./HistogramChart";
 import { Transport } from "./Transport";
 import { altitudeOverTime, crossTrackOverTime, type Pointing } from "./charts";
 import { seek } from "./commands";
-import { momentAt } from "./time";
+import { alertTimes, momentAt } from "./time";
 
 type Tab = "altitude" | "cross_track" | "histogram" | "both";
 
@@ -51,6 +51,9 @@ function TimeChart({ kind, open }: { kind: keyof typeof CHARTS; open: ReviewDoc 
       kind={kind}
       over={(plot) => (
         <>
+          {alertTimes(open.events).map((at_s) => (
+            <VerticalLine key={at_s} plot={plot} at={at_s} kind="alert-line" testid="alert-mark" />
+          ))}
           <VerticalLine plot={plot} at={hovered_s.value} kind="hovered" testid="hover-line" />
           <Playhead plot={plot} />
         </>
@@ -91,12 +94,13 @@ function Values({ open, shown }: { open: ReviewDoc; shown: Tab }) {
   );
 }
 
-function Keys() {
+function Keys({ alerts }: { alerts: boolean }) {
   return (
     <span class="chart-keys" aria-hidden="true">
       <span class="key ground">Ground</span>
       <span class="key reference">Plan</span>
       <span class="key track">Flown</span>
+      {alerts && <span class="key alert-key">Alert</span>}
     </span>
   );
 }
@@ -148,7 +152,9 @@ export function TimePane() {
           ]}
           onChange={(next) => (tab.value = next)}
         />
-        {open && (shown === "altitude" || shown === "both") && <Keys />}
+        {open && (shown === "altitude" || shown === "both") && (
+          <Keys alerts={alertTimes(open.events).length > 0} />
+        )}
         <span class="spring" />
         {open && <Values open={open} shown={shown} />}
       </header>

@@ -15,6 +15,13 @@ export function eventAt(events: readonly ReviewEvent[], at_s: number | null): nu
   return low;
 }
 
+/** When alerts began, as far as the recording tells of them. */
+export const alertTimes = (events: readonly ReviewEvent[]): number[] =>
+  events.filter((event) => event.kind === "alert" && event.severity <= WARNING).map((event) => event.t_s);
+
+/** MAV_SEVERITY of what begins; an end is only information. */
+const WARNING = 4;
+
 export interface Moment {
   flown_m: number | null;
   reference_m: number | null;

@@ -2,7 +2,9 @@ import { listenInside } from "./frame_events";
 import { EmptyState } from "./EmptyState";
 import { Legend } from "./Legend";
 import { Loading } from "./Loading";
+import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
+import { AlertBanner } from "../obstacles/AlertBanner";
 import { Toasts } from "../shell/Notices";
 import { document_, pageId, selection, terrain } from "../store/state";
 
@@ -55,14 +57,18 @@ export function Scene() {
       )}
       <Loading />
       {document_.value && !hasTerrain && <EmptyState />}
-      {hasTerrain && (
-        <>
-          <Legend />
-          <ViewTools />
-        </>
-      )}
-      <ToolHint />
+      {hasTerrain && <ViewTools />}
+      <div class="scene-foot">
+        <ToolHint />
+        {hasTerrain && (
+          <>
+            <MapLegend />
+            <Legend />
+          </>
+        )}
+      </div>
       <div class="scene-messages">
+        <AlertBanner />
         <Toasts />
       </div>
     </section>

@@ -13,6 +13,7 @@ const STEPS = [
   "Add points: press A and click the surface, or drop a file of points.",
   "Choose the vehicle, then tune R and H until the verdict on the right says CERTIFIED.",
   "Fly: connect a vehicle or the simulator, upload, check, then hold Start for a second.",
+  "Obstacles: an alert stays until it is over and acknowledged; the ways past it stand on the right of Fly.",
   "Hold and Return stay in the second line of the page, in every view.",
   "Review: open the recording that every flight leaves, or a .tlog, and play it.",
 ];
@@ -22,6 +23,8 @@ const TERMS = [
   ["Clearance", "Smallest distance in space between the line that will be flown and the surface model."],
   ["Above home, above DSM", "Height over the take-off place, and over the surface model straight below."],
   ["Cross-track", "How far beside the planned line; height error: how far above or below it."],
+  ["Region, corridor", "What is searched: a sector ahead of the nose, and the mission's own next seconds."],
+  ["Known ground", "Seen, and already in the surface model: drawn grey, never an alert."],
   ["m above home", "Heights count from the surface model at the home point."],
 ];
 
@@ -70,7 +73,7 @@ export function HelpSheet() {
           <ErrorBox place="session" />
         </section>
         <section>
-          <h3>Keys</h3>
+          <h3>Keys, of the view that is shown</h3>
           <table>
             <tbody>
               {SHORTCUTS.map((shortcut) => (

@@ -17,6 +17,7 @@ import {
 } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { isReplaying, review } from "../store/review";
+import { link } from "../store/state";
 import { severityWord } from "../store/texts";
 import { Chip } from "../ui/Chip";
 import { HoldButton } from "../ui/HoldButton";
@@ -29,15 +30,19 @@ function isParked(): boolean {
   return vehicle.value?.armed === false && !isStale(heard.live.value, "heartbeat", now_ms.value);
 }
 
+const NO_SERVER = "No connection: use the pilot's transmitter";
+
+/** Why the vehicle cannot be stopped or called home from this page; null: it can. */
+function whyNot(): string | null {
+  if (link.value !== "open") return NO_SERVER;
+  if (!lease.value.mine) return "You observe: take control first";
+  return isParked() ? "The vehicle is disarmed" : null;
+}
+
 /** Always at the same place while a vehicle is connected: stop where you are, and come back. */
 function Safety() {
-  const mine = lease.value.mine;
-  const mayCommand = mine && !isParked();
-  const title = mine
-    ? mayCommand
-      ? undefined
-      : "The vehicle is disarmed"
-    : "You observe: take control first";
+  const why = whyNot();
+  const mayCommand = why === null;
   return (
     <div class="safety" role="group" aria-label="Safety">
       {isReplaying.value && <strong class="live-tag">LIVE</strong>}
@@ -46,7 +51,7 @@ function Safety() {
         class="button hold-position"
         disabled={!mayCommand}
         aria-disabled={pending.value.has(SAFETY)}
-        title={title ?? "Stop and hold the position, at once"}
+        title={why ?? "Stop and hold the position, at once"}
         data-testid="hold-position"
         onClick={() => !pending.value.has(SAFETY) && void holdPosition()}
       >
@@ -59,10 +64,15 @@ function Safety() {
         kind="return"
         place={SAFETY}
         disabled={!mayCommand}
-        title={title ?? "Return home and land"}
+        title={why ?? "Return home and land"}
         testid="return-home"
         onHold={() => void returnHome()}
       />
+      {why === NO_SERVER && (
+        <span class="safety-why" role="alert" data-testid="safety-why">
+          {why}
+        </span>
+      )}
       <div class="safety-says">
         <Outcome place={SAFETY} />
       </div>

@@ -1,8 +1,11 @@
 import { useEffect } from "preact/hooks";
 import { setSection } from "../ui/Section";
 import { redo, removeSelectedPoi, undo } from "../plan/commands";
+import { acknowledgeFirst } from "../obstacles/commands";
+import { switchSound } from "../obstacles/sound";
 import { seekBy, togglePlaying } from "../review/commands";
 import { takeFiles } from "../store/files";
+import { sound } from "../store/prefs";
 import { document_, selection } from "../store/state";
 import { frame, setSelection } from "../store/stream";
 import { drawer, openDialog } from "./ui_state";
@@ -67,6 +70,10 @@ function act(hit: Hit): void {
       return toggleSection(hit.section ?? 0);
     case "view":
       return goTo(hit.view ?? "plan");
+    case "acknowledge":
+      return acknowledgeFirst();
+    case "sound":
+      return void switchSound(!sound.value);
     case "play":
       return togglePlaying();
     case "seek":

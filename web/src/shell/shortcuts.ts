@@ -9,8 +9,14 @@ export const SHORTCUTS = [
   { id: "delete", keys: "Delete", text: "Delete the selected point" },
   { id: "fit", keys: "F", text: "Fit the plan into the view" },
   { id: "top", keys: "T", text: "Look from above, north up" },
-  { id: "section", keys: "1 to 6", text: "Open or close a section on the left" },
-  { id: "view", keys: "G then P or F or R", text: "Go to Plan, Fly or Review" },
+  {
+    id: "section",
+    keys: "1 to 6",
+    text: "Open or close that section on the left",
+  },
+  { id: "view", keys: "G then P or F or R", text: "Go to Plan, Fly or Review, from any view" },
+  { id: "acknowledge", keys: "K", text: "Acknowledge the obstacle alert on top" },
+  { id: "sound", keys: "M", text: "Sound of alerts on or off" },
   { id: "play", keys: "Space", text: "Review: play and pause" },
   { id: "seek", keys: "← or →", text: "Review: 10 s back, 10 s forward" },
   { id: "help", keys: "?", text: "This sheet" },
@@ -82,6 +88,8 @@ function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
     delete: "delete",
     f: "fit",
     t: "top",
+    k: "acknowledge",
+    m: "sound",
     "?": "help",
   };
   if (/^[1-6]$/.test(key)) return { id: "section", section: Number(key) };

@@ -40,7 +40,7 @@ export const views: readonly [View, ...View[]] = [
     Left: FlyLeft,
     Right: FlyRight,
     Below: ProfilePane,
-    sections: ["connection", "onboard", "preflight", "flight"],
+    sections: ["connection", "onboard", "preflight", "flight", "obstacles"],
   },
   {
     id: "review",
@@ -48,7 +48,7 @@ export const views: readonly [View, ...View[]] = [
     Left: ReviewLeft,
     Right: ReviewRight,
     Below: TimePane,
-    sections: ["recordings", "judge"],
+    sections: ["recordings", "judge", "maps"],
   },
 ];
 

@@ -8,7 +8,12 @@ import { document_, library } from "./state";
 export const offered = signal<string | null>(null);
 
 export function useTerrain(entry: TerrainDoc): void {
-  edit(`Use ${entry.name}`, "terrain", (doc) => ({ ...doc, terrain_id: entry.id, orthophoto_id: null }));
+  edit(`Use ${entry.name}`, "terrain", (doc) => ({
+    ...doc,
+    terrain_id: entry.id,
+    orthophoto_id: null,
+    seen_id: null,
+  }));
   offered.value = null;
 }
 

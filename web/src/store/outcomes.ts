@@ -33,7 +33,7 @@ interface Order {
   place: string;
   path: string;
   body?: object;
-  method?: "POST" | "DELETE";
+  method?: "POST" | "PUT" | "DELETE";
   /** What to say once it is done. */
   done?: string;
 }

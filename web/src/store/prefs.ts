@@ -32,6 +32,8 @@ const isHeight = (value: unknown): value is number =>
 const isOpenMap = (value: unknown): value is Record<string, boolean> =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 
+const isYesNo = (value: unknown): value is boolean => typeof value === "boolean";
+const isRange = (value: unknown): value is number => typeof value === "number" && value >= 10 && value <= 120;
 const isText = (value: unknown): value is string => typeof value === "string" && value.length < 40;
 
 export const theme = remembered<Theme>("theme", "dark", isTheme);
@@ -39,6 +41,10 @@ export const chartHeight_px = remembered<number>("chartHeight", 244, isHeight);
 export const openSections = remembered<Record<string, boolean>>("sections", {}, isOpenMap);
 /** The view that was open last. */
 export const lastView = remembered<string>("view", "plan", isText);
+/** Alerts sound on this computer. */
+export const sound = remembered<boolean>("sound", true, isYesNo);
+/** What the rim of the polar display stands for. */
+export const polarRange_m = remembered<number>("polarRange", 20, isRange);
 
 effect(() => {
   document.documentElement.dataset["theme"] = theme.value;

@@ -1,6 +1,7 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage } from "../messages";
 import { fly, flight, heard, linkStatus, nodes, recorder, transfer } from "./flying";
+import { forgetObstacles, forgetSensing } from "./obstacles";
 import { replay, review } from "./review";
 
 /**
@@ -21,6 +22,10 @@ const FORGET: Partial<Record<string, () => void>> = {
   "flight replay": () => (flight.replay.value = null),
   "vehicle live": () => (heard.live.value = null),
   "vehicle replay": () => (heard.replay.value = null),
+  "perception live": () => forgetSensing("live"),
+  "perception replay": () => forgetSensing("replay"),
+  "obstacles live": () => forgetObstacles("live"),
+  "obstacles replay": () => forgetObstacles("replay"),
 };
 
 const confirmed = new Set<string>();

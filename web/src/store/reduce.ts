@@ -1,6 +1,7 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage, Snapshot, ViewDoc } from "../messages";
 import { takeFlying } from "./flying";
+import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
@@ -53,6 +54,11 @@ export function receive(message: ServerMessage): void {
     case "review":
     case "replay":
       takeReviewing(message, performance.now());
+      return;
+    case "perception":
+    case "alert":
+    case "obstacles":
+      takeSensing(message, performance.now());
       return;
     default:
       message satisfies never;

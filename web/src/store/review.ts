@@ -8,6 +8,7 @@ import type {
   ReviewMessage,
 } from "../messages";
 import { now_ms } from "./clock";
+import { forgetObstacles, forgetSensing } from "./obstacles";
 
 /** Recordings, and the one that is open for review. */
 export type ReviewingMessage = RecordingsMessage | ReviewMessage | ReplayMessage;
@@ -25,6 +26,10 @@ export function takeReviewing(message: ReviewingMessage, received_ms: number): v
       return;
     case "review":
       if (message.review?.recording.id !== review.value?.recording.id) seeking.value = null;
+      if (message.review === null) {
+        forgetSensing("replay");
+        forgetObstacles("replay");
+      }
       review.value = message.review;
       return;
     case "replay":

@@ -1,0 +1,85 @@
+"""Obstacles: alerts acknowledged, avoidance, what is searched, manoeuvres, and maps as files or in the plan."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query
+from fastapi.responses import Response
+
+from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
+from server.schemas import (
+    AcknowledgeBody,
+    MapFormat,
+    ObstaclesState,
+    PerceptionSettingsBody,
+    PlanState,
+    PlanWithSeen,
+    SensorName,
+    SetAvoidanceBody,
+    Source,
+)
+
+router = APIRouter(prefix="/api/obstacles", dependencies=[SignedIn], tags=["obstacles"], responses=ERROR_RESPONSES)
+
+MEDIA_TYPES: dict[MapFormat, str] = {
+    "ply": "application/octet-stream",
+    "bt": "application/octet-stream",
+    "tif": "image/tiff",
+    "geojson": "application/geo+json",
+}
+
+
+@router.post("/acknowledge", response_model=ObstaclesState)
+async def acknowledge(body: AcknowledgeBody, operator: InCharge, flying: Fly) -> Response:
+    """One alert, or all: it stays latched until it is over as well."""
+    del operator
+    return answer(await flying.obstacles.acknowledge(body))
+
+
+@router.put("/avoidance", status_code=204)
+async def set_avoidance(body: SetAvoidanceBody, operator: InCharge, flying: Fly) -> Response:
+    """409 without consent, unless the vehicle is a simulation; what came of it is told by the stream."""
+    await flying.obstacles.set_avoidance(operator, body)
+    return Response(status_code=204)
+
+
+@router.put("/settings", response_model=ObstaclesState)
+async def change_settings(body: PerceptionSettingsBody, operator: InCharge, flying: Fly) -> Response:
+    """Depth, width and height of the regions, and the papers' bare behaviour. What is left out stays."""
+    del operator
+    return answer(await flying.obstacles.change_settings(body))
+
+
+@router.post("/clear", status_code=204)
+async def clear(operator: InCharge, flying: Fly) -> Response:
+    """Empties all maps."""
+    del operator
+    await flying.obstacles.clear()
+    return Response(status_code=204)
+
+
+@router.post("/manoeuvre/{manoeuvre_id}/fly", status_code=204)
+async def fly_manoeuvre(
+    manoeuvre_id: Annotated[str, Path(max_length=100)], operator: InCharge, flying: Fly
+) -> Response:
+    """404 for one that is out of date."""
+    await flying.obstacles.fly(operator, manoeuvre_id)
+    return Response(status_code=204)
+
+
+@router.put("/seen", response_model=PlanState)
+async def plan_with_seen(body: PlanWithSeen, operator: InCharge, flying: Fly) -> Response:
+    """Takes what was seen into the open plan's surface model, or out of it again; an edit that can be undone."""
+    del operator
+    return answer(await flying.obstacles.plan_with_seen(body))
+
+
+@router.get("/map/{sensor}.{kind}", response_class=Response)
+async def export_map(
+    sensor: SensorName, kind: MapFormat, flying: Fly, source: Annotated[Source, Query()] = "live"
+) -> Response:
+    """The map as it is now: points, OctoMap, highest obstacle per cell, or clusters; 409 while it is empty."""
+    data = await flying.obstacles.exported(source, sensor, kind)
+    headers = {"content-disposition": f'attachment; filename="{sensor}-map.{kind}"'}
+    return Response(data, media_type=MEDIA_TYPES[kind], headers=headers)

@@ -1,0 +1,175 @@
+"""``hedgehop agent``: a companion computer's radar frames and point clouds to the ground station."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planning.errors import DescribedError
+from server.cli.output import print_json, refusing, say
+from server.errors import BadRequestError
+from telemetry.agent.client import Agent, Reading, sensor_url
+from telemetry.agent.sources import at, readings_of_lines, recorded_readings
+from telemetry.agent.wire import Report
+
+TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
+TELL_EVERY_S = 5.0
+LAST_FRAMES_S = 1.5
+"""For what is under way when the source ends, and the ground station's last word on it."""
+CONNECT_WITHIN_S = 10.0
+
+
+def agent(
+    address: Annotated[
+        str, typer.Argument(metavar="URL", help="The ground station: http://HOST:PORT or https://HOST.")
+    ],
+    recording: Annotated[
+        Path | None, typer.Option("--recording", metavar="FILE", help="Send the frames of a recorded flight.")
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--token-file", metavar="FILE", help=f"Holds the ground station's token; default: {TOKEN_VARIABLE}."
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option("--name", help="Of this agent; default: the computer's.")] = "",
+    voxel_m: Annotated[
+        float, typer.Option("--voxel-m", help="One point per voxel of this edge; 0: all points.")
+    ] = 0.25,
+    limit_kb_s: Annotated[
+        float, typer.Option("--limit-kb-s", help="Bandwidth; clouds beyond it are left out.")
+    ] = 1000.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was sent as JSON at the end.")] = False,
+) -> None:
+    """Send radar frames and point clouds to a ground station: lines of JSON on stdin, or those of a recording."""
+    with refusing(as_json=as_json):
+        sensor_url(address)
+        _check(voxel_m, limit_kb_s)
+        made = Agent(
+            address,
+            token=_token(token_file),
+            name=(name or socket.gethostname())[:40],
+            voxel_m=voxel_m,
+            limit_bytes_per_s=1000.0 * limit_kb_s,
+        )
+        asyncio.run(_run(made, _paced(recording) if recording else readings_of_lines(sys.stdin)))
+        _answer(made, as_json=as_json)
+
+
+def _check(voxel_m: float, limit_kb_s: float) -> None:
+    for what, value, low, high in (("voxel", voxel_m, 0.0, 10.0), ("limit", limit_kb_s, 1.0, 1e6)):
+        if not low <= value <= high:
+            raise BadRequestError(f"The {what} is {value:g}.", advice=f"Give a value from {low:g} to {high:g}.")
+
+
+def _token(file: Path | None) -> str:
+    token = file.read_text(encoding="utf-8").strip() if file else os.environ.get(TOKEN_VARIABLE, "").strip()
+    if not token:
+        raise BadRequestError(
+            "The agent has no token.",
+            where="--token-file",
+            advice="Copy sensor-token.txt from the ground station's data directory, and name it here.",
+        )
+    return token
+
+
+async def _run(made: Agent, readings: Iterator[Reading]) -> None:
+    """Until the source ends or Ctrl+C; the connection is made again as often as it is lost."""
+    loop = asyncio.get_running_loop()
+    connection = asyncio.ensure_future(made.run())
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, connection.cancel)
+    source = loop.create_future()
+    try:
+        async with asyncio.timeout(CONNECT_WITHIN_S):
+            while not made.is_ready and not connection.done():
+                await asyncio.sleep(0.02)
+    except TimeoutError:
+        say(f"The ground station does not answer ({made.counts.trouble or 'no answer'}): it is tried again.")
+    threading.Thread(target=_read, args=(readings, made.put, loop, source), daemon=True).start()
+    teller = asyncio.ensure_future(_tell(made))
+    try:
+        await asyncio.wait((source, connection), return_when=asyncio.FIRST_COMPLETED)
+        if source.done() and not connection.done():
+            source.result()
+            await asyncio.sleep(LAST_FRAMES_S)
+    finally:
+        for task in (connection, teller):
+            task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await connection
+
+
+def _read(
+    readings: Iterator[Reading],
+    put: Callable[[Reading], None],
+    loop: asyncio.AbstractEventLoop,
+    source: asyncio.Future[None],
+) -> None:
+    """In a thread of its own: a pipe may be silent for ever."""
+
+    def end(error: Exception | None) -> None:
+        if not source.done():
+            source.set_exception(error) if error else source.set_result(None)
+
+    try:
+        for reading in readings:
+            loop.call_soon_threadsafe(put, reading)
+        loop.call_soon_threadsafe(end, None)
+    except RuntimeError:
+        return  # the loop has ended: Ctrl+C
+    except (DescribedError, OSError) as error:
+        loop.call_soon_threadsafe(end, error)
+
+
+def _paced(recording: Path) -> Iterator[Reading]:
+    """At the recorded pace, as if measured now."""
+    began_s = time.monotonic()
+    for after_s, reading in recorded_readings(recording):
+        wait_s = began_s + after_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(wait_s)
+        yield at(reading, began_s + after_s)
+
+
+async def _tell(made: Agent) -> None:
+    while True:
+        await asyncio.sleep(TELL_EVERY_S)
+        counts = made.counts
+        rate = f"{(counts.report.bytes_per_s if counts.report else 0.0) / 1000:.0f} kB/s"
+        state = f"no connection: {counts.trouble}" if counts.trouble else rate
+        say(f"{counts.sent} frames sent, {counts.skipped} left out, {state}")
+
+
+def _answer(made: Agent, *, as_json: bool) -> None:
+    counts = made.counts
+    report = counts.report or Report(0, 0, 0, 0, 0.0, "")
+    if as_json:
+        print_json(
+            {
+                "sent": counts.sent,
+                "skipped": counts.skipped,
+                "sent_bytes": counts.sent_bytes,
+                "connections": counts.connections,
+                "received": report.received,
+                "lost": report.lost,
+                "late": report.late,
+                "refused": report.refused,
+            }
+        )
+    else:
+        say(
+            f"{counts.sent} frames sent ({counts.sent_bytes / 1e6:.1f} MB), {counts.skipped} left out; the ground "
+            f"station took {report.received}, {report.late} of them late, and refused {report.refused}."
+        )

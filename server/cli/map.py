@@ -1,0 +1,71 @@
+"""``hedgehop map``: a recording's map of obstacles, made once more from what its sensors saw."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from planning.errors import DescribedError
+from server.cli import options as o
+from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
+from telemetry.perception.export import KINDS as FORMATS
+from telemetry.perception.export import Kind, exported
+from telemetry.perception.kinds import KINDS
+from telemetry.perception.rebuild import Rebuilt, rebuild
+
+
+class MapFileError(DescribedError):
+    """A file name that says no format."""
+
+    code = "map_file"
+
+
+def build_map(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap).")],
+    sensor: Annotated[
+        Literal["radar", "vision", "ranges"], typer.Option("--sensor", help="Whose map.", show_default=False)
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.", show_default=False),
+    ],
+    as_json: o.AsJson = False,
+) -> None:
+    """Build a recording's map of obstacles again, exactly as it was in flight."""
+    with refusing(as_json=as_json):
+        kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
+        if kind is None:
+            what = f"{out.suffix or 'No ending'} is no format of maps."
+            raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
+        began_s = time.monotonic()
+        built = rebuild(recording, KINDS[sensor], progress=lambda share: progress("Building the map", share))
+        end_progress()
+        for note in built.notes:
+            say(f"Note: {note}")
+        out.write_bytes(exported(kind, built.folded))
+        answer(built, out, time.monotonic() - began_s, as_json=as_json)
+        raise typer.Exit(DONE)
+
+
+def answer(built: Rebuilt, out: Path, seconds: float, *, as_json: bool) -> None:
+    """One JSON object, or a few lines."""
+    if as_json:
+        print_json(summary(built, seconds))
+        return
+    east_m, north_m, up_m = built.extent_m
+    typer.echo(f"{out.name}: {built.voxels_occupied:,} occupied voxels in {east_m:.0f} x {north_m:.0f} x {up_m:.0f} m")
+    typer.echo(f"  of {built.frames:,} frames with {built.points:,} points; {built.dropped:,} frames were not taken")
+
+
+def summary(built: Rebuilt, seconds: float) -> dict[str, Any]:
+    return {
+        "frames": built.frames,
+        "dropped": built.dropped,
+        "points": built.points,
+        "voxels_occupied": built.voxels_occupied,
+        "extent_m": list(built.extent_m),
+        "seconds": round(seconds, 3),
+    }

@@ -1,0 +1,67 @@
+"""``hedgehop scenario``: the papers' field tests of obstacle detection, flown in simulation, and their figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planning.errors import ParameterError
+from server.cli import options as o
+from server.cli.files import check_directory
+from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing
+from server.errors import StorageError
+from telemetry.scenarios.catalogue import NAMES, run_scenario
+from telemetry.scenarios.result import ScenarioResult, tally, tally_json
+from telemetry.scenarios.wanted import Wanted
+
+
+def scenario(
+    name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of {', '.join(NAMES)}.", show_default=False)],
+    world: Annotated[
+        Path | None,
+        typer.Option("--world", metavar="FILE", help="Objects of your own (JSON) instead of the scenario's."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the scene, the sensors' noise and the wind.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="FILE", help="Keep the flight (.mcap) with frames, maps and alerts here."),
+    ] = None,
+    as_json: o.AsJson = False,
+) -> None:
+    """Fly one of the papers' field tests in simulation and measure what the sensors' maps and alerts are worth.
+
+    Virtual time: the same seed gives the same flight. The exit code is 1 when a figure is not reached.
+    """
+    with refusing(as_json=as_json):
+        _check(name, record, seeds)
+        results: list[ScenarioResult] = []
+        for number in range(seed, seed + seeds):
+            progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
+            results.append(run_scenario(name, Wanted(number, o.existing(world), record)))
+            end_progress()
+            if not as_json:
+                typer.echo("\n".join(results[-1].lines()))
+        if as_json:
+            print_json(results[0].as_json() if seeds == 1 else tally_json(results))
+        elif seeds > 1:
+            typer.echo("\n".join(tally(results)))
+        raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
+
+
+def _check(name: str, record: Path | None, seeds: int) -> None:
+    if name not in NAMES:
+        raise ParameterError(
+            f'There is no scenario "{name}".', where="NAME", advice=f"Choose one of {', '.join(NAMES)}."
+        )
+    if record is None:
+        return
+    if seeds > 1:
+        raise ParameterError(
+            f"A recording holds one seed, not {seeds}.", where="--record", advice="Leave --seeds away, or --record."
+        )
+    check_directory(record.parent)
+    if record.exists():
+        raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")

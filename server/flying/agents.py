@@ -1,0 +1,48 @@
+"""The companion computers that are connected, and their way onto the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from server.errors import BusyError
+from telemetry.agent.intake import Frame, Intake
+from telemetry.messages import Published, Topic
+from telemetry.sensing import CloudFrame, RadarFrame
+
+AGENTS_MAX = 4
+
+
+class Publisher(Protocol):
+    """The part of the bus that is used here."""
+
+    def publish(self, topic: str, message: Published) -> None: ...
+
+
+class Agents:
+    """Frames of all agents go the same way; the perception nodes tell their sources apart."""
+
+    def __init__(self, bus: Publisher) -> None:
+        self._bus = bus
+        self._connected: list[Intake] = []
+
+    @contextmanager
+    def connected(self, intake: Intake) -> Iterator[None]:
+        """Raises BusyError when there are as many agents as may be."""
+        if len(self._connected) >= AGENTS_MAX:
+            raise BusyError(f"{AGENTS_MAX} agents are connected already.", advice="End one of them first.")
+        self._connected.append(intake)
+        try:
+            yield
+        finally:
+            self._connected.remove(intake)
+
+    def publish(self, frame: Frame) -> None:
+        match frame:
+            case RadarFrame():
+                self._bus.publish(Topic.RADAR_FRAME, frame)
+            case CloudFrame():
+                self._bus.publish(Topic.CLOUD_FRAME, frame)
+            case _:
+                self._bus.publish(Topic.SLAM_POSE, frame)

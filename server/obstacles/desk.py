@@ -1,0 +1,130 @@
+"""What operators do about obstacles: acknowledge, set, clear, avoid, fly past, plan against what was seen, take out."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from server.errors import NotReadyError, reported
+from server.flying.asking import Asks
+from server.jobs import Lane
+from server.obstacles.export_task import map_file
+from server.obstacles.keeping import changed, read_settings, write_settings
+from server.obstacles.manoeuvres import Manoeuvres
+from server.obstacles.mirror import Voxels
+from server.obstacles.watch import Watch
+from server.schemas import (
+    AcknowledgeBody,
+    MapFormat,
+    ObstaclesState,
+    PerceptionSettingsBody,
+    PlanState,
+    PlanWithSeen,
+    SensorName,
+    SetAvoidanceBody,
+    Source,
+)
+from telemetry.messages import LinkStatus
+from telemetry.obstacles import PerceptionSettings
+from telemetry.requests import Operator, SetAvoidance
+
+log = logging.getLogger("hedgehop.obstacles")
+
+
+class SeesPlans(Protocol):
+    """The part of the workspace that takes what was seen into the plan."""
+
+    async def plan_with_seen(self, maps: list[Voxels]) -> PlanState: ...
+
+    async def plan_without_seen(self) -> PlanState: ...
+
+
+class ObstacleDesk:
+    """Commands come from live data only; of a replay only maps may be taken out as files."""
+
+    def __init__(
+        self,
+        root: Path,
+        watches: Mapping[Source, Watch],
+        manoeuvres: Manoeuvres,
+        link: Asks,
+        plans: SeesPlans,
+        *,
+        lane: Lane,
+        publish_settings: Callable[[PerceptionSettings], None],
+        server_operator: Callable[[], Operator],
+    ) -> None:
+        self._root, self._watches, self._manoeuvres = root, watches, manoeuvres
+        self._link, self._plans, self._lane = link, plans, lane
+        self._publish_settings, self._server_operator = publish_settings, server_operator
+        self._live = watches["live"]
+        self._avoid_when_adopted = False
+        """Of the demo's simulated vehicle: it climbs over what stands in its way."""
+
+    async def start(self) -> None:
+        """Nodes get the settings from the bus whenever they start."""
+        self._set(await asyncio.to_thread(read_settings, self._root))
+
+    async def acknowledge(self, body: AcknowledgeBody) -> ObstaclesState:
+        self._live.acknowledge(body.alert_id)
+        return self._live.state
+
+    async def set_avoidance(self, operator: Operator, body: SetAvoidanceBody) -> None:
+        """Raises NotAllowedError and what else the link says."""
+        self._avoid_when_adopted = False
+        await self._link.call(SetAvoidance(operator, body.enabled, body.consent))
+
+    def avoid_in_demo(self) -> None:
+        """As soon as the simulated vehicle is connected; whoever switches avoidance before that decides."""
+        self._avoid_when_adopted = True
+
+    async def on_link(self, status: LinkStatus) -> None:
+        if not self._avoid_when_adopted or status.adopted is None or status.state != "live":
+            return
+        self._avoid_when_adopted = False
+        try:
+            await self._link.call(SetAvoidance(self._server_operator(), enabled=True))
+        except Exception as error:
+            doc = reported(error, log, "Switching avoidance on")
+            log.warning("Avoidance stays off in the demo: %s", doc.what)
+
+    async def change_settings(self, body: PerceptionSettingsBody) -> ObstaclesState:
+        self._set(changed(self._live.settings, body))
+        await asyncio.to_thread(write_settings, self._root, self._live.settings)
+        return self._live.state
+
+    async def clear(self) -> None:
+        settings = self._live.settings
+        self._set(replace(settings, clear_count=settings.clear_count + 1))
+        await asyncio.to_thread(write_settings, self._root, self._live.settings)
+
+    async def fly(self, operator: Operator, manoeuvre_id: str) -> None:
+        """Raises NotFoundError for one that is out of date, and what the link says."""
+        await self._link.call(self._manoeuvres.request(operator, manoeuvre_id))
+
+    async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
+        """Raises NotReadyError when nothing was seen."""
+        if not body.seen:
+            return await self._plans.plan_without_seen()
+        maps = [await asyncio.to_thread(self._live.mirrors[sensor].voxels) for sensor in body.sensors]
+        maps = [seen for seen in maps if len(seen.keys) and not seen.explained.all()]
+        if not maps:
+            raise NotReadyError(
+                "Nothing was seen that the surface model does not know.", advice="Fly on, or plan as is."
+            )
+        return await self._plans.plan_with_seen(maps)
+
+    async def exported(self, source: Source, sensor: SensorName, kind: MapFormat) -> bytes:
+        """Raises NotReadyError while the map is empty."""
+        voxels = await asyncio.to_thread(self._watches[source].mirrors[sensor].voxels)
+        if voxels.origin is None or not len(voxels.keys):
+            raise NotReadyError(f"The map of the {sensor} is empty.", advice="Nothing has been seen yet.")
+        return await self._lane.call(map_file, voxels, sensor, kind)
+
+    def _set(self, settings: PerceptionSettings) -> None:
+        self._live.on_settings(settings)
+        self._publish_settings(settings)

@@ -1,0 +1,20 @@
+"""What the flight lane's worker makes of a map: a file of one of four formats, like those of ``hedgehop map``."""
+
+from __future__ import annotations
+
+from server.jobs import Progress
+from server.obstacles.mirror import Voxels
+from server.schemas import MapFormat, SensorName
+from telemetry.obstacles import MapDelta
+
+
+def map_file(voxels: Voxels, sensor: SensorName, kind: MapFormat, *, report: Progress) -> bytes:
+    """Raises ExportError for a map that the format cannot hold."""
+    from telemetry.perception import deltas
+    from telemetry.perception.export import exported
+
+    report("Writing the map", None)
+    assert voxels.origin is not None
+    last = MapDelta(sensor, 0.0, 0.0, 0, True, 0, 1, voxels.origin, voxels.resolution_m, b"", b"", b"")
+    kept = deltas.Voxels(voxels.keys, voxels.probability, voxels.explained.astype("u1"))
+    return exported(kind, deltas.FoldedMap(last, kept))

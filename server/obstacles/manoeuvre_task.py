@@ -1,0 +1,139 @@
+"""What the flight lane's worker does when an obstacle is alerted: the ways over and around it, with their clearance."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mapping.frames import LocalFrame
+from planning.model import F64
+from planning.vehicle_profile import parse_profile
+from server.jobs import Progress
+from server.library.terrains import ground_notice
+from server.obstacles.mirror import Voxels
+from server.schemas import ManoeuvreDoc
+from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
+from telemetry.obstacles import GroundNotice, MapOrigin, ObstacleAlert
+from telemetry.vehicle import VehicleState
+
+if TYPE_CHECKING:
+    from mapping.ground import GroundGrid
+    from planning.avoiding.model import Manoeuvre, NoWay
+    from telemetry.perception.mission_line import Line
+
+_HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """Where everything is at one moment."""
+
+    alert: ObstacleAlert
+    state: VehicleState
+    flight: FlightStatus
+    height_offset_m: float
+    """So much higher than planned the mission is flown already."""
+    record: PlanRecord
+    terrain: Path
+    origin: MapOrigin
+    maps: tuple[Voxels, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A manoeuvre that is on show, and what flying it takes."""
+
+    doc: ManoeuvreDoc
+    targets: tuple[GuidedTarget, ...] = ()
+    rejoin_item: int | None = None
+    height_offset_m: float = 0.0
+    points_enu_m: tuple[tuple[float, float, float], ...] = ()
+    """From the vehicle on, in the maps' frame; empty when there is no way."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Ahead:
+    line: Line
+    points_enu_m: F64
+    """From beside the vehicle on."""
+    leg: int
+    """Of the mission's line, on which they begin."""
+
+
+def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
+    """Over and around, each possible or with the reason why not; nothing without a mission that is flown."""
+    from planning.avoidance import around, over
+    from planning.avoiding.room import Seen
+    from telemetry.perception.mission_line import mission_line
+
+    report("Looking for a way past the obstacle", None)
+    line, state = mission_line(situation.record, situation.origin), situation.state
+    if line is None or state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
+        return ()
+    frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
+    position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
+    ahead = _ahead(line, position, situation)
+    seen = [Seen(v.centres_enu_m[~v.explained], v.resolution_m) for v in situation.maps if len(v.keys)]
+    surface = _surface(ground_notice(situation.terrain), situation.origin)
+    ways = [find(position, ahead.points_enu_m, seen, surface) for find in (over, around)]
+    return tuple(_prepared(way, situation, ahead, frame) for way in ways)
+
+
+@lru_cache(maxsize=1)
+def _surface(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
+    from telemetry.perception.ground import ground_around
+
+    return ground_around(notice, origin)
+
+
+def _ahead(line: Line, position: F64, situation: Situation) -> _Ahead:
+    """The rest of the mission from the place of the leg that is flown which is nearest to the vehicle."""
+    points = line.points_enu + np.array([0.0, 0.0, situation.height_offset_m])
+    target = situation.flight.target or 0
+    leg = next((n for n, item in enumerate(line.leg_item) if item >= target), len(line.leg_item) - 1)
+    a, d = points[leg], points[leg + 1] - points[leg]
+    share = float(np.clip((position - a) @ d / max(float(d @ d), 1e-9), 0.0, 1.0))
+    return _Ahead(line, np.vstack([a + share * d, points[leg + 1 :]]), leg)
+
+
+def _prepared(way: Manoeuvre | NoWay, situation: Situation, ahead: _Ahead, frame: LocalFrame) -> Prepared:
+    from planning.avoiding.model import NoWay
+
+    handle = f"{way.kind}-{_HANDLE.sub('-', situation.alert.id)}"[:80]
+    if isinstance(way, NoWay):
+        doc = ManoeuvreDoc(id=handle, kind=way.kind, for_alert=situation.alert.id, possible=False, text=way.reason)
+        return Prepared(doc)
+    speed_m_s = parse_profile(situation.record.profile_toml.encode(), where="the plan's profile").mean_speed_m_s
+    item = ahead.line.leg_item[min(ahead.leg + way.leg, len(ahead.line.leg_item) - 1)]
+    clearance_m, climb_m = min(way.seen_m, way.surface_m), float(np.ptp(way.points_enu_m[:, 2]))
+    doc = ManoeuvreDoc(
+        id=handle,
+        kind=way.kind,
+        for_alert=situation.alert.id,
+        possible=True,
+        text=_words(way, climb_m),
+        clearance_m=clearance_m if math.isfinite(clearance_m) else None,
+        length_m=way.length_m,
+        seconds=way.length_m / speed_m_s,
+        climb_m=climb_m,
+    )
+    geodetic = frame.to_geodetic(way.points_enu_m[1:])
+    targets = tuple(
+        GuidedTarget(item, lat, lon, float(up), speed_m_s)
+        for (lat, lon, _), up in zip(geodetic.tolist(), way.points_enu_m[1:, 2], strict=True)
+    )
+    points = tuple((e, n, u) for e, n, u in way.points_enu_m.tolist())
+    return Prepared(doc, targets, item, situation.height_offset_m + way.height_offset_m, points)
+
+
+def _words(way: Manoeuvre, climb_m: float) -> str:
+    if way.kind == "over":
+        return f"Climb {climb_m:.0f} m straight up, then on along the mission, {way.height_offset_m:.0f} m higher."
+    rest = "" if way.height_offset_m < 0.5 else f", {way.height_offset_m:.0f} m higher"
+    return f"Sideways past it and back onto the mission{rest}."

@@ -1,0 +1,206 @@
+"""A copy of one sensor's map, folded from the deltas on the bus, in chunks of 32 m, for drawing and planning."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from telemetry.obstacles import MapDelta, MapOrigin, Sensor, unpack_keys
+
+I32 = NDArray[np.int32]
+I64 = NDArray[np.int64]
+U8 = NDArray[np.uint8]
+F64 = NDArray[np.float64]
+ChunkKey = tuple[int, int, int]
+
+CHUNK_M = 32.0
+OCCUPIED_ABOVE = 127
+DETAILS = (1, 2, 4, 8, 16)
+"""Edges in voxels of what a drawn box may stand for."""
+_BITS = 20
+_OFFSET = 1 << (_BITS - 1)
+"""Keys beyond +-500,000 voxels are nobody's: 250 km of the finest map."""
+
+
+@dataclass(slots=True)
+class Chunk:
+    """Occupied voxels, sorted by ``ids``."""
+
+    ids: I64
+    probability: U8
+    explained: NDArray[np.bool_]
+    boxes: tuple[int, ...] = ()
+    """How many boxes it is at each of ``DETAILS``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Voxels:
+    """A map, or a part of it, as plain arrays."""
+
+    keys: I32
+    """(N, 3) floor(enu / resolution)"""
+    probability: U8
+    explained: NDArray[np.bool_]
+    resolution_m: float
+    origin: MapOrigin | None
+
+    @property
+    def centres_enu_m(self) -> F64:
+        return (self.keys.astype(np.float64) + 0.5) * self.resolution_m
+
+
+@dataclass(slots=True)
+class MapMirror:
+    """From any thread: one fold or look at a time."""
+
+    sensor: Sensor
+    origin: MapOrigin | None = None
+    resolution_m: float = 0.0
+    generation: int = 0
+    """Another one: everything that was drawn is void."""
+    revision: int = 0
+    """Of the newest delta in it."""
+    t_mono_s: float = 0.0
+    """Of the newest frame in it."""
+    _chunks: dict[ChunkKey, Chunk] = field(default_factory=dict)
+    _dirty: set[ChunkKey] = field(default_factory=set)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def voxel_count(self) -> int:
+        with self._lock:
+            return sum(len(chunk.ids) for chunk in self._chunks.values())
+
+    def clear(self) -> None:
+        """As if nothing had ever been heard."""
+        with self._lock:
+            self._forget()
+            self.origin, self.resolution_m, self.revision = None, 0.0, 0
+            self.generation += 1
+
+    def fold(self, delta: MapDelta) -> bool:
+        """Whether nothing is missing before it. Raises ValueError when the delta's arrays do not belong together."""
+        keys = unpack_keys(delta.keys)
+        probability = np.frombuffer(delta.probability, dtype=np.uint8)
+        explained = np.frombuffer(delta.explained, dtype=np.uint8) != 0
+        if not len(keys) == len(probability) == len(explained):
+            raise ValueError(f"{len(keys)} keys, {len(probability)} probabilities, {len(explained)} verdicts")
+        sound = (np.abs(keys) < _OFFSET).all(axis=1)
+        with self._lock:
+            complete = delta.whole or self.revision in (delta.since, delta.revision)
+            self._begin(delta)
+            self._take(keys[sound], probability[sound], explained[sound])
+            return complete
+
+    def taken_dirty(self) -> set[ChunkKey]:
+        """Chunks that have changed since they were last asked for; those that are empty now among them."""
+        with self._lock:
+            dirty, self._dirty = self._dirty, set()
+            return dirty
+
+    def chunk(self, key: ChunkKey) -> Voxels | None:
+        with self._lock:
+            chunk = self._chunks.get(key)
+            return None if chunk is None else self._voxels([chunk])
+
+    def voxels(self) -> Voxels:
+        """All that is occupied."""
+        with self._lock:
+            return self._voxels(list(self._chunks.values()))
+
+    def boxes(self) -> tuple[int, ...]:
+        """How many there would be in all, at each of ``DETAILS``."""
+        with self._lock:
+            counts = np.array([chunk.boxes for chunk in self._chunks.values()], dtype=np.int64)
+        return tuple(counts.reshape(-1, len(DETAILS)).sum(axis=0).tolist())
+
+    @property
+    def chunk_keys(self) -> list[ChunkKey]:
+        with self._lock:
+            return list(self._chunks)
+
+    # With the lock held
+
+    def _forget(self) -> None:
+        self._dirty |= self._chunks.keys()
+        self._chunks = {}
+
+    def _begin(self, delta: MapDelta) -> None:
+        moved = self.origin != delta.origin or self.resolution_m != delta.resolution_m
+        if moved or (delta.whole and delta.part == 0):
+            self._forget()
+        if moved:
+            self.generation += 1
+            self.origin, self.resolution_m = delta.origin, delta.resolution_m
+        self.t_mono_s, self.revision = delta.t_mono_s, delta.revision
+
+    def _take(self, keys: I32, probability: U8, explained: NDArray[np.bool_]) -> None:
+        if not len(keys):
+            return
+        per_chunk = max(1, round(CHUNK_M / self.resolution_m))
+        place = keys // per_chunk
+        chunk_ids, ids = _ids(place), _ids(keys)
+        order = np.lexsort((ids, chunk_ids))
+        starts = np.flatnonzero(np.diff(chunk_ids[order], prepend=chunk_ids[order[0]] - 1))
+        for part in np.split(order, starts[1:]):
+            x, y, z = place[part[0]].tolist()
+            self._merge((x, y, z), ids[part], probability[part], explained[part])
+
+    def _merge(self, key: ChunkKey, ids: I64, probability: U8, explained: NDArray[np.bool_]) -> None:
+        """The delta's word on a voxel is the last."""
+        old = self._chunks.get(key)
+        if old is not None:
+            kept = ~np.isin(old.ids, ids)
+            ids = np.concatenate([ids, old.ids[kept]])
+            probability = np.concatenate([probability, old.probability[kept]])
+            explained = np.concatenate([explained, old.explained[kept]])
+        occupied = np.flatnonzero(probability > OCCUPIED_ABOVE)
+        ids, first = np.unique(ids[occupied], return_index=True)
+        chosen = occupied[first]
+        self._dirty.add(key)
+        if len(ids):
+            self._chunks[key] = Chunk(ids, probability[chosen], explained[chosen], _box_counts(ids))
+        else:
+            self._chunks.pop(key, None)
+
+    def _voxels(self, chunks: list[Chunk]) -> Voxels:
+        nothing = Chunk(np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.bool_))
+        chunks = chunks or [nothing]
+        return Voxels(
+            _keys(np.concatenate([chunk.ids for chunk in chunks])),
+            np.concatenate([chunk.probability for chunk in chunks]),
+            np.concatenate([chunk.explained for chunk in chunks]),
+            self.resolution_m,
+            self.origin,
+        )
+
+
+def coarser(voxels: Voxels, detail: int) -> Voxels:
+    """Boxes of ``detail`` voxels along each edge: as probable as their most probable voxel, explained if all are."""
+    if detail == 1 or not len(voxels.keys):
+        return voxels
+    ids, where = np.unique(_ids(voxels.keys // detail), return_inverse=True)
+    probability = np.zeros(len(ids), dtype=np.uint8)
+    np.maximum.at(probability, where, voxels.probability)
+    unexplained = np.zeros(len(ids), dtype=np.bool_)
+    unexplained[where[~voxels.explained]] = True
+    return Voxels(_keys(ids), probability, ~unexplained, voxels.resolution_m * detail, voxels.origin)
+
+
+def _box_counts(ids: I64) -> tuple[int, ...]:
+    keys = _keys(ids)
+    return (len(ids), *(len(np.unique(_ids(keys // detail))) for detail in DETAILS[1:]))
+
+
+def _ids(keys: NDArray[np.integer]) -> I64:
+    """(N, 3) -> (N,) one number each."""
+    k = keys.astype(np.int64) + _OFFSET
+    return (k[:, 0] << (2 * _BITS)) | (k[:, 1] << _BITS) | k[:, 2]
+
+
+def _keys(ids: I64) -> I32:
+    mask = (1 << _BITS) - 1
+    return (np.stack([ids >> (2 * _BITS), (ids >> _BITS) & mask, ids & mask], axis=1) - _OFFSET).astype(np.int32)

@@ -1,0 +1,146 @@
+"""Obstacles as a whole: what hangs on the bus for them, and what the rest of flying tells them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+from server.errors import reported
+from server.flying.asking import Asks
+from server.flying.channel import Channel
+from server.flying.ground_task import Ground
+from server.flying.nodes import Nodes
+from server.flying.relay import Relay
+from server.jobs import Lane
+from server.library import Library
+from server.library.terrain_of import FlownOver, terrain_of
+from server.obstacles.desk import ObstacleDesk
+from server.obstacles.drawing import MapDrawing
+from server.obstacles.ground import KnownGround
+from server.obstacles.manoeuvre_task import Situation, prepare
+from server.obstacles.manoeuvres import Manoeuvres
+from server.obstacles.sensor_nodes import SensorNodes
+from server.obstacles.watch import Watch
+from server.schemas import ServerMessage, Source
+from server.workspace import Workspace
+from telemetry.bus import Bus
+from telemetry.messages import LinkStatus, PlanRecord, Topic
+from telemetry.obstacles import SENSORS, ObstacleAlert, Sensor
+from telemetry.requests import Operator, WholeMap
+
+log = logging.getLogger("hedgehop.obstacles")
+
+_MAPS = (Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_RANGES)
+_STATUSES = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
+_ASK_EVERY_S = 2.0
+
+
+class Obstacles:
+    """All methods belong to the event loop; each topic has a loop of its own, so that alerts wait for no map."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        library: Library,
+        workspace: Workspace,
+        nodes: Nodes,
+        link: Asks,
+        live: Channel,
+        *,
+        lane: Lane,
+        server_operator: Callable[[], Operator],
+        onboard: Callable[[], PlanRecord | None],
+        tell: Callable[[ServerMessage], None],
+    ) -> None:
+        self._bus, self._library, self._workspace, self._nodes = bus, library, workspace, nodes
+        self._live, self._onboard, self._lane = live, onboard, lane
+        self.watches: dict[Source, Watch] = {"live": Watch("live", tell), "replay": Watch("replay", tell)}
+        watch = self.watches["live"]
+        self._manoeuvres = Manoeuvres(watch, situation=self._situation, prepare=self._prepare)
+        self._ground = KnownGround(library, lambda notice: bus.publish(Topic.GROUND, notice))
+        self.sensor_nodes = SensorNodes(bus, nodes)
+        self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres)
+        self.desk = ObstacleDesk(
+            library.root,
+            self.watches,
+            self._manoeuvres,
+            link,
+            workspace,
+            lane=lane,
+            publish_settings=lambda settings: bus.publish(Topic.PERCEPTION_SETTINGS, settings),
+            server_operator=server_operator,
+        )
+
+    def hear(self, relay: Relay) -> None:
+        live, replay = self.watches["live"], self.watches["replay"]
+        for topic in _MAPS:
+            relay.on(topic, live.on_map, each=True)
+            relay.on(topic, replay.on_map, replayed=True, each=True)
+        for topic in _STATUSES:
+            relay.on(topic, live.on_status)
+            relay.on(topic, replay.on_status, replayed=True)
+        for watch, replayed in ((live, False), (replay, True)):
+            relay.on(Topic.ALERT, watch.on_alert, replayed=replayed, each=True)
+            relay.on(Topic.AVOIDANCE, watch.on_avoidance, replayed=replayed)
+
+    def loops(self) -> list[Coroutine[Any, Any, None]]:
+        whole = [self._ask_for_whole(sensor) for sensor in SENSORS]
+        return [self._drawing.run(), self._manoeuvres.run(), *self.sensor_nodes.loops(), *whole]
+
+    async def start(self) -> None:
+        await self.desk.start()
+        self.on_plan()
+
+    async def simulated(self, ground: Ground, world: Path) -> None:
+        """The demo's vehicle has radar and camera, and climbs over what they see."""
+        await self.sensor_nodes.start("radar", "vision")
+        await self._nodes.simulated_sensors(ground, world)
+        self.desk.avoid_in_demo()
+
+    def tick(self) -> None:
+        self.watches["live"].tick()
+
+    async def on_link(self, status: LinkStatus) -> None:
+        self.on_plan()
+        await self.desk.on_link(status)
+
+    def on_plan(self) -> None:
+        """Another plan on board or open, or another answer to it."""
+        self._ground.want(self._onboard(), self._workspace.document.terrain_id)
+        self.watches["live"].seen_in_plan = self._workspace.seen_columns
+        self.watches["live"].refresh()
+
+    def _situation(self, alert: ObstacleAlert) -> Situation | None:
+        """None without a vehicle, its plan, or the surface model of that."""
+        record, state = self._onboard(), self._live.state
+        if record is None or state is None:
+            return None
+        terrain = terrain_of(FlownOver(record.terrain_id, record.terrain_sha256), self._library.terrains())
+        if terrain is None:
+            return None
+        watch = self.watches["live"]
+        origin = next((status.origin for status in watch.statuses.values() if status.origin is not None), None)
+        if origin is None:
+            return None
+        maps = tuple(mirror.voxels() for mirror in watch.mirrors.values() if mirror.origin == origin)
+        directory = self._library.terrain_dir(terrain.id)
+        offset_m = watch.avoidance.height_offset_m
+        return Situation(alert, state, self._live.flight, offset_m, record, directory, origin, maps)
+
+    async def _ask_for_whole(self, sensor: Sensor) -> None:
+        """A part was missed, or came before this server was there: the node tells its map once more."""
+        needed = self.watches["live"].needs_whole[sensor]
+        while True:
+            await needed.wait()
+            needed.clear()
+            try:
+                await self._bus.call(sensor, WholeMap(), result=type(None))
+            except Exception as error:
+                log.warning("Asking the %s for its map: %s", sensor, reported(error, log, "Asking for a map").what)
+            await asyncio.sleep(_ASK_EVERY_S)
+
+    async def _prepare(self, situation: Situation) -> Any:
+        return await self._lane.call(prepare, situation)

@@ -1,0 +1,194 @@
+"""Obstacles of one source, live or replayed, as the pages see them: sensors, alerts, avoidance, and what is drawn."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from server.errors import reported
+from server.obstacles.alerts import LatchedAlerts
+from server.obstacles.mirror import MapMirror
+from server.schemas import (
+    AlertMessage,
+    ManoeuvreDoc,
+    MapDrawn,
+    ObstaclesMessage,
+    ObstaclesState,
+    PerceptionMessage,
+    ServerMessage,
+    Source,
+)
+from telemetry.obstacles import (
+    SENSORS,
+    AvoidanceStatus,
+    MapDelta,
+    ObstacleAlert,
+    PerceptionSettings,
+    PerceptionStatus,
+    Sensor,
+)
+
+log = logging.getLogger("hedgehop.obstacles")
+
+RATE_HZ = 10.0
+"""Of a sensor's status to the pages."""
+DEAD_S = 3.0
+"""Nodes say at least once a second how they are."""
+
+
+class Watch:
+    """Tells what is heard at once: alerts above all. Maps are folded in threads; nothing waits for them."""
+
+    def __init__(
+        self,
+        source: Source,
+        tell: Callable[[ServerMessage], None],
+        *,
+        now_mono_s: Callable[[], float] = time.monotonic,
+        now_utc_s: Callable[[], float] = time.time,
+    ) -> None:
+        self._source: Source = source
+        self._tell, self._now_mono_s, self._now_utc_s = tell, now_mono_s, now_utc_s
+        self._alerts = LatchedAlerts()
+        self._maps_drawn: tuple[MapDrawn, ...] = ()
+        self._told_mono_s = dict.fromkeys(SENSORS, float("-inf"))
+        self._heard_mono_s: dict[Sensor, float] = {}
+        self._lost: dict[Sensor, ObstacleAlert] = {}
+        self._told: ObstaclesState | None = None
+        self.statuses: dict[Sensor, PerceptionStatus] = {}
+        self.mirrors: dict[Sensor, MapMirror] = {sensor: MapMirror(sensor) for sensor in SENSORS}
+        self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
+        """Set when parts of a map are missing here."""
+        self.settings = PerceptionSettings()
+        self.avoidance = AvoidanceStatus()
+        self.manoeuvres: Sequence[ManoeuvreDoc] = ()
+        self.seen_in_plan = 0
+        self.busy = ""
+        self.begins: Callable[[ObstacleAlert], None] = lambda alert: None
+        """Called with every alert that was not there before."""
+        self.ends: Callable[[str], None] = lambda alert_id: None
+
+    @property
+    def state(self) -> ObstaclesState:
+        return ObstaclesState(
+            alerts=self._alerts.docs,
+            manoeuvres=list(self.manoeuvres),
+            avoidance=self.avoidance,
+            settings=self.settings,
+            maps=list(self._maps_drawn),
+            seen_in_plan=self.seen_in_plan,
+            busy=self.busy,
+        )
+
+    # What is heard
+
+    def on_status(self, status: PerceptionStatus) -> None:
+        sensor, now_s = status.sensor, self._now_mono_s()
+        before = self.statuses.get(sensor)
+        self.statuses[sensor] = status
+        self._heard_mono_s[sensor] = now_s
+        if status.voxels_occupied and self.mirrors[sensor].origin is None:
+            self.needs_whole[sensor].set()
+        changed = before is None or before.state != status.state
+        if changed or now_s - self._told_mono_s[sensor] >= 0.8 / RATE_HZ:
+            self._tell_status(sensor)
+        if (lost := self._lost.pop(sensor, None)) is not None:
+            self._tell_own(replace(lost, phase="ends", text=f"The {sensor} node is back."))
+
+    def on_alert(self, alert: ObstacleAlert) -> None:
+        """Latched before it is told: whoever reads the message finds it in the list that follows."""
+        is_new = self._alerts.on_alert(alert, self._now_mono_s())
+        self._tell(AlertMessage(source=self._source, alert=alert))
+        if is_new:
+            self.begins(alert)
+        if alert.phase == "ends":
+            self.ends(alert.id)
+        self.refresh()
+
+    def on_avoidance(self, status: AvoidanceStatus) -> None:
+        self.avoidance = status
+        self.refresh()
+
+    def on_settings(self, settings: PerceptionSettings) -> None:
+        self.settings = settings
+        self.refresh()
+
+    async def on_map(self, delta: MapDelta) -> None:
+        """In a thread: what is large takes milliseconds, and the next part waits for this one."""
+        try:
+            if not await asyncio.to_thread(self.mirrors[delta.sensor].fold, delta):
+                self.needs_whole[delta.sensor].set()
+        except Exception as error:
+            # Whatever a node sends: the others' maps and all alerts go on.
+            log.warning("A part of the %s map: %s", delta.sensor, reported(error, log, "Taking in a map").what)
+
+    def on_drawn(self, maps: Sequence[MapDrawn]) -> None:
+        self._maps_drawn = tuple(maps)
+        self.refresh()
+
+    # What is asked
+
+    def acknowledge(self, alert_id: str | None) -> None:
+        self._alerts.acknowledge(alert_id)
+        self.refresh()
+
+    def is_on(self, alert_id: str) -> bool:
+        """Whether the alert goes on."""
+        doc = self._alerts.get(alert_id)
+        return doc is not None and not doc.over
+
+    def refresh(self) -> None:
+        """Tells the pages, if there is anything new."""
+        if (state := self.state) != self._told:
+            self._told = state
+            self._tell(ObstaclesMessage(source=self._source, obstacles=state))
+
+    def tick(self) -> None:
+        """Once a second: a node that has died tells nothing, so its silence is noted here."""
+        now_s = self._now_mono_s()
+        for sensor, heard_s in self._heard_mono_s.items():
+            silent = now_s - heard_s > DEAD_S
+            if silent and sensor not in self._lost and self.statuses[sensor].state != "waiting":
+                self._lose(sensor, now_s)
+            if silent and self._alerts.give_up(sensor, now_s):
+                self.refresh()
+
+    def forget(self) -> None:
+        """Another recording, or none."""
+        for sensor in self.statuses:
+            self._tell(
+                PerceptionMessage(source=self._source, now_mono_s=self._now_mono_s(), sensor=sensor, status=None)
+            )
+        self.statuses.clear()
+        self._heard_mono_s.clear()
+        self._lost.clear()
+        for mirror in self.mirrors.values():
+            mirror.clear()
+        self.avoidance = AvoidanceStatus()
+        self.forget_alerts()
+
+    def forget_alerts(self) -> None:
+        """The clock has jumped: what was heard before belongs to another time."""
+        self._alerts.clear()
+        self.refresh()
+
+    # How
+
+    def _tell_status(self, sensor: Sensor) -> None:
+        now_s = self._now_mono_s()
+        self._told_mono_s[sensor] = now_s
+        status = self.statuses[sensor]
+        self._tell(PerceptionMessage(source=self._source, now_mono_s=now_s, sensor=sensor, status=status))
+
+    def _lose(self, sensor: Sensor, now_s: float) -> None:
+        text = f"Nothing is heard of the {sensor} any more: its node may have died. It is started again."
+        lost = ObstacleAlert(f"lost-{sensor}-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
+        self._lost[sensor] = lost
+        self._tell_own(lost)
+
+    def _tell_own(self, alert: ObstacleAlert) -> None:
+        now_s = self._now_mono_s()
+        self.on_alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))

@@ -1,0 +1,136 @@
+"""What was seen, on the stage: maps by their chunks, and above them what happens now.
+
+Maps have a canvas of their own, which is drawn from a thread: vehicles and regions wait for none of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import viser
+
+from planning.dsm import Dsm
+from server.obstacles.mirror import ChunkKey, Voxels
+from server.scene.drawing import Drawing
+from server.scene.enu import EnuPlacing
+from server.scene.nodes import Canvas, Node
+from server.scene.regions import Route, conflict_nodes, region_nodes, route_nodes
+from server.scene.voxels import chunk_nodes, chunk_place, sent_bytes
+from server.schemas import Source
+from telemetry.obstacles import MapOrigin, PerceptionStatus, Sensor
+
+
+@dataclass(frozen=True, slots=True)
+class MapLook:
+    """All on which the picture of a map depends, but for its voxels."""
+
+    drawing: Drawing
+    origin: MapOrigin
+    with_ground: bool
+    visible: bool
+
+    def same(self, other: MapLook | None) -> bool:
+        return (
+            other is not None
+            and self.drawing.dsm is other.drawing.dsm
+            and self.drawing.frame == other.drawing.frame
+            and (self.origin, self.with_ground, self.visible) == (other.origin, other.with_ground, other.visible)
+        )
+
+
+class Sights:
+    """``draw_chunks`` is for one thread at a time; all else belongs to the event loop."""
+
+    def __init__(self, server: viser.ViserServer, put: Callable[[dict[str, list[Node]]], None]) -> None:
+        self._server, self._put = server, put
+        self._canvas = Canvas(server.scene)
+        self._nodes: dict[str, list[Node]] = {}
+        self._drawing: Drawing | None = None
+        self._placing: EnuPlacing | None = None
+        self._shown: set[str] = set()
+        self._now: tuple[object, ...] = ()
+
+    @property
+    def dsm(self) -> Dsm | None:
+        return None if self._drawing is None else self._drawing.dsm
+
+    def redraw(self, drawing: Drawing | None) -> None:
+        """Another model, frame or choice of layers; what moves is drawn again at the next turn."""
+        self._drawing = drawing
+
+    def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
+        """None while there is nothing to draw a map on."""
+        if self._drawing is None or origin is None:
+            return None
+        view = self._drawing.state.view
+        visible = view.show_radar_map if sensor == "radar" else view.show_vision_map
+        return MapLook(self._drawing, origin, view.show_explained, visible)
+
+    def draw_now(
+        self,
+        source: Source,
+        origin: MapOrigin | None,
+        statuses: Mapping[Sensor, PerceptionStatus],
+        routes: Sequence[Route],
+    ) -> None:
+        """Regions, conflicts and manoeuvres: few and small, ten times a second."""
+        drawing, placing = self._drawing, self._place(origin)
+        key = (drawing, placing, *statuses.values(), *routes)
+        if len(key) == len(self._now) and all(a is b for a, b in zip(key, self._now, strict=True)):
+            return
+        self._now = key
+        drawn: dict[str, list[Node]] = {}
+        if drawing is not None and placing is not None:
+            prefix = f"/now_{source}"
+            drawn = {
+                f"regions_{source}": region_nodes(drawing, placing, statuses, prefix=prefix),
+                f"conflicts_{source}": conflict_nodes(drawing, placing, statuses, prefix=prefix),
+                f"routes_{source}": route_nodes(drawing, placing, routes, prefix=prefix),
+            }
+        gone = self._shown - {layer for layer, nodes in drawn.items() if nodes}
+        self._shown = {layer for layer, nodes in drawn.items() if nodes}
+        changed = {layer: drawn.get(layer, []) for layer in self._shown | gone}
+        if changed:
+            self._put(changed)
+
+    def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
+        """None: the chunk is empty. Returns how many bytes it comes to for one page. Heavy: for a thread."""
+        placing = EnuPlacing.of(look.drawing.dsm, look.origin)
+        if placing is None:
+            return 0
+        sent = 0
+        for key, voxels in chunks.items():
+            name = chunk_name(sensor, key)
+            nodes: list[Node] = []
+            if voxels is not None and look.visible:
+                place = chunk_place(look.drawing, placing, key)
+                nodes = chunk_nodes(name, sensor, key, voxels, place, with_ground=look.with_ground)
+            sent += sent_bytes(self._nodes.get(name, []), nodes)
+            self._draw(name, nodes)
+        return sent
+
+    def drop_chunks(self, sensor: Sensor) -> None:
+        """All of the sensor's: another map takes its place. For the thread that draws."""
+        for name in [name for name in self._nodes if name.startswith(f"/map_{sensor}/")]:
+            self._draw(name, [])
+
+    def _draw(self, name: str, nodes: list[Node]) -> None:
+        with self._server.atomic():
+            self._canvas.put(name, nodes)
+        if nodes:
+            self._nodes[name] = nodes
+        else:
+            self._nodes.pop(name, None)
+
+    def _place(self, origin: MapOrigin | None) -> EnuPlacing | None:
+        dsm = self.dsm
+        if dsm is None or origin is None:
+            return None
+        if self._placing is None or self._placing.dsm is not dsm or self._placing.origin != origin:
+            self._placing = EnuPlacing.of(dsm, origin)
+        return self._placing
+
+
+def chunk_name(sensor: Sensor, key: ChunkKey) -> str:
+    return f"/map_{sensor}/{key[0]}_{key[1]}_{key[2]}"

@@ -1,0 +1,106 @@
+"""Obstacles: what perception sees, what is alerted, what can be done about it.
+
+What the bus carries (``telemetry.obstacles``) goes to the pages as it is; it is not written down a second time here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Strict
+from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+
+SensorName = Literal["radar", "vision", "ranges"]
+MapFormat = Literal["ply", "bt", "tif", "geojson"]
+
+
+class AlertDoc(Strict):
+    """An alert, latched: it stays until it is over AND acknowledged."""
+
+    alert: ObstacleAlert
+    """As last told."""
+    began_utc_s: float
+    over: bool = False
+    acknowledged: bool = False
+
+
+class ManoeuvreDoc(Strict):
+    """A prepared way past an obstacle; never below it."""
+
+    id: str
+    kind: Literal["over", "around"]
+    for_alert: str
+    """``ObstacleAlert.id``"""
+    possible: bool
+    text: str
+    """What it does, or why there is none."""
+    clearance_m: float | None = None
+    """Smallest distance of its line to anything seen and to the surface model."""
+    length_m: float | None = None
+    seconds: float | None = None
+    climb_m: float | None = None
+
+
+class MapDrawn(Strict):
+    """What of one sensor's map the 3D view draws."""
+
+    sensor: SensorName
+    voxels: int
+    """Occupied, of the whole map."""
+    drawn: int
+    detail: int
+    """Every drawn box stands for a cube of so many voxels along each edge; 1 is full detail."""
+    sent_bytes: int
+    """To the pages, since the map began."""
+    text: str = ""
+    """Such as "drawn coarser: 1 box for 2 x 2 x 2 voxels"."""
+
+
+class ObstaclesState(Strict):
+    """Everything about obstacles but the sensors' own status, which comes with every frame."""
+
+    alerts: list[AlertDoc] = Field(default_factory=list)
+    """Newest first, at most 20."""
+    manoeuvres: list[ManoeuvreDoc] = Field(default_factory=list)
+    avoidance: AvoidanceStatus = Field(default_factory=AvoidanceStatus)
+    settings: PerceptionSettings = Field(default_factory=PerceptionSettings)
+    maps: list[MapDrawn] = Field(default_factory=list)
+    seen_in_plan: int = 0
+    """Columns of the open plan's surface model that were raised by what was seen; 0: it is as it was read."""
+    busy: str = ""
+    """What is being done right now: "Looking for a way around" ..."""
+
+
+# Bodies of requests
+
+
+class SetAvoidanceBody(Strict):
+    enabled: bool
+    consent: bool = False
+
+
+class AcknowledgeBody(Strict):
+    """Null: all of them."""
+
+    alert_id: str | None = None
+
+
+class PerceptionSettingsBody(Strict):
+    """What an operator may change; the rest stays."""
+
+    radar_depth_m: Annotated[float, Field(ge=2, le=120)] | None = None
+    vision_depth_m: Annotated[float, Field(ge=2, le=40)] | None = None
+    ranges_depth_m: Annotated[float, Field(ge=2, le=40)] | None = None
+    fov_deg: Annotated[float, Field(ge=4, le=120)] | None = None
+    height_m: Annotated[float, Field(ge=0.5, le=20)] | None = None
+    paper_bare: bool | None = None
+    radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] | None = None
+
+
+class PlanWithSeen(Strict):
+    """Takes the maps into planning, or out of it again."""
+
+    seen: bool
+    sensors: list[SensorName] = Field(default_factory=lambda: ["radar", "vision"])

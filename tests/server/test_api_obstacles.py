@@ -1,0 +1,90 @@
+"""The doors to obstacles: closed to strangers and observers, open to the one in charge, exact about what they take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from server.schemas import AcknowledgeBody, PerceptionSettingsBody, PlanWithSeen, SetAvoidanceBody
+from tests.server.running import PASSWORD, Running
+
+CHANGES: list[tuple[str, str, dict[str, Any]]] = [
+    ("post", "/api/obstacles/acknowledge", {}),
+    ("put", "/api/obstacles/avoidance", {"enabled": True}),
+    ("put", "/api/obstacles/settings", {"radar_depth_m": 20.0}),
+    ("post", "/api/obstacles/clear", {}),
+    ("post", "/api/obstacles/manoeuvre/over-radar-1/fly", {}),
+    ("put", "/api/obstacles/seen", {"seen": True}),
+]
+
+
+@pytest.fixture
+def pilot(served: Running) -> Iterator[httpx.Client]:
+    served.http.post("/api/lease/take", json={"name": "Anna"})
+    served.flying.asked.clear()
+    yield served.http
+    served.http.post("/api/lease/release")
+
+
+def ask(client: httpx.Client, change: tuple[str, str, dict[str, Any]]) -> httpx.Response:
+    method, path, body = change
+    return client.request(method, path, json=body)
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=[path for _, path, _ in CHANGES])
+def test_strangers_and_observers_change_nothing(
+    served: Running, pilot: httpx.Client, change: tuple[str, str, dict[str, Any]]
+) -> None:
+    del pilot
+    with served.stranger(headers={"Origin": served.origin}) as other:
+        assert ask(other, change).status_code == 401
+        assert other.post("/api/session", json={"password": PASSWORD}).status_code == 204
+        refused = ask(other, change)
+        assert (refused.status_code, refused.json()["code"]) == (403, "not_in_charge")
+    assert served.flying.asked == []
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=[path for _, path, _ in CHANGES])
+def test_the_one_in_charge_is_heard(
+    served: Running, pilot: httpx.Client, change: tuple[str, str, dict[str, Any]]
+) -> None:
+    assert ask(pilot, change).is_success
+    name, *arguments = served.flying.asked[0]
+    bodies = {
+        "acknowledge": AcknowledgeBody(),
+        "set_avoidance": SetAvoidanceBody(enabled=True),
+        "change_settings": PerceptionSettingsBody(radar_depth_m=20.0),
+        "plan_with_seen": PlanWithSeen(seen=True),
+        "fly": "over-radar-1",
+    }
+    assert name == "clear" or arguments[-1] == bodies[name]
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("settings", {"radar_depth_m": 1.0}),
+        ("settings", {"fov_deg": 500}),
+        ("settings", {"memory_limit_bytes": 1}),
+        ("settings", {"radar_variant": "upside_down"}),
+        ("avoidance", {}),
+        ("seen", {"seen": True, "sensors": ["sonar"]}),
+    ],
+)
+def test_what_makes_no_sense_is_refused(served: Running, pilot: httpx.Client, path: str, body: dict[str, Any]) -> None:
+    assert pilot.put(f"/api/obstacles/{path}", json=body).status_code == 422
+    assert served.flying.asked == []
+
+
+def test_a_map_is_a_file_by_its_sensor_and_kind(served: Running) -> None:
+    answer = served.http.get("/api/obstacles/map/radar.geojson", params={"source": "replay"})
+    assert answer.headers["content-type"] == "application/geo+json"
+    assert 'filename="radar-map.geojson"' in answer.headers["content-disposition"]
+    assert served.flying.asked[-1] == ("exported", "replay", "radar", "geojson")
+    for path in ("sonar.ply", "radar.exe", "radar"):
+        assert served.http.get(f"/api/obstacles/map/{path}").status_code in (404, 422)
+    with served.stranger() as other:
+        assert other.get("/api/obstacles/map/radar.ply").status_code == 401

@@ -1,0 +1,206 @@
+"""Prepared manoeuvres: on show while the obstacle is, with their clearance; flown as they are shown, or not at all."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planning.dsm import Dsm
+from planning.formats.wpl import write_wpl
+from planning.model import Poi, VehicleProfile
+from planning.plan import plan_mission
+from planning.request import PlanRequest
+from planning.vehicle_profile import dump_profile
+from server.errors import NotFoundError
+from server.library.terrains import store_terrain
+from server.obstacles.manoeuvre_task import Prepared, Situation, prepare
+from server.obstacles.manoeuvres import Manoeuvres
+from server.obstacles.mirror import MapMirror
+from server.obstacles.watch import Watch
+from server.schemas import ManoeuvreDoc
+from telemetry.errors import NotAllowedError
+from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
+from telemetry.obstacles import AvoidanceStatus, MapOrigin
+from telemetry.perception.mission_line import mission_line
+from telemetry.requests import Operator
+from telemetry.vehicle import VehicleState
+from tests.server.obstacle_messages import alert, delta
+from tests.server.scene_fixtures import hill
+
+ANNA = Operator("Anna", 3)
+
+
+def prepared(kind: Any = "over", *, possible: bool = True) -> Prepared:
+    doc = ManoeuvreDoc(id=f"{kind}-radar-1", kind=kind, for_alert="radar-1", possible=possible, text="Climb.")
+    targets = (GuidedTarget(4, 37.7, 15.0, 30.0, 3.0),)
+    return Prepared(doc, targets, 4, 6.0, ((0.0, 0.0, 5.0), (0.0, 0.0, 30.0)))
+
+
+class Desk:
+    """A watch with manoeuvres whose worker answers at once."""
+
+    def __init__(self, *answers: Any) -> None:
+        self.told: list[Any] = []
+        self.watch = Watch("live", self.told.append)
+        self.answers = list(answers)
+        self.asked: list[Any] = []
+        self.manoeuvres = Manoeuvres(self.watch, situation=self._situation, prepare=self._prepare)
+
+    def _situation(self, each: Any) -> Any:
+        return each
+
+    async def _prepare(self, situation: Any) -> tuple[Prepared, ...]:
+        self.asked.append(situation.id)
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def until(self, done: Any) -> None:
+        task = asyncio.ensure_future(self.manoeuvres.run())
+        try:
+            async with asyncio.timeout(60):
+                while not done():
+                    await asyncio.sleep(0.01)
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
+def test_they_come_with_the_alert_and_go_with_it() -> None:
+    desk = Desk((prepared("over"), prepared("around", possible=False)))
+    desk.watch.on_alert(alert())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert [doc.kind for doc in desk.watch.state.manoeuvres] == ["over", "around"]
+    assert [route.words for route in desk.manoeuvres.routes()] == ["Over", "Around"]
+    assert desk.watch.state.busy == ""
+    assert any(m.type == "obstacles" and m.obstacles.busy for m in desk.told)
+    request = desk.manoeuvres.request(ANNA, "over-radar-1")
+    assert (request.operator, request.kind, request.rejoin_item, request.height_offset_m) == (ANNA, "over", 4, 6.0)
+    with pytest.raises(NotAllowedError, match="cannot be flown"):
+        desk.manoeuvres.request(ANNA, "around-radar-1")
+    desk.watch.on_alert(alert(phase="ends"))
+    assert desk.watch.state.manoeuvres == []
+    with pytest.raises(NotFoundError, match="out of date"):
+        desk.manoeuvres.request(ANNA, "over-radar-1")
+
+
+def test_a_worker_that_fails_costs_this_manoeuvre_only() -> None:
+    desk = Desk(RuntimeError("broken"), (prepared(),))
+    desk.watch.on_alert(alert("a"))
+    asyncio.run(desk.until(lambda: desk.asked == ["a"] and desk.watch.state.busy == ""))
+    assert desk.watch.state.manoeuvres == []
+    desk.watch.on_alert(alert("b"))
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert desk.asked == ["a", "b"]
+
+
+def test_when_the_newest_is_over_the_one_before_counts() -> None:
+    desk = Desk((prepared(),), (prepared(),))
+    desk.watch.on_alert(alert("a"))
+    desk.watch.on_alert(alert("b"))
+    desk.watch.on_alert(alert("b", "ends"))
+    asyncio.run(desk.until(lambda: desk.asked))
+    assert desk.asked == ["a"]
+
+
+@pytest.mark.parametrize("kind", ["sensor", "divergence"])
+def test_what_stands_nowhere_is_not_avoided(kind: str) -> None:
+    desk = Desk()
+    desk.watch.on_alert(alert(kind=kind))
+    assert desk.manoeuvres.routes() == []
+    assert desk.asked == []
+
+
+def test_while_the_vehicle_climbs_by_itself_nothing_is_prepared() -> None:
+    desk = Desk()
+    desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
+    asked: list[str] = []
+    desk.manoeuvres._situation = lambda each: asked.append(each.id) or each  # pyright: ignore[reportPrivateUsage]
+    desk.watch.on_alert(alert())
+    asyncio.run(desk.until(lambda: asked))
+    assert desk.asked == []
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Dsm, PlanRecord, Path]:
+    """A flight along the foot of the hill."""
+    root, dsm = tmp_path_factory.mktemp("data"), hill(hole=False)
+    xy = np.array([[500_008.0, 3_999_945.0], [500_072.0, 3_999_945.0]])
+    pois = tuple(Poi(lat, lon) for lat, lon in dsm.lat_lon_from_xy(xy).tolist())
+    plan = plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("quad")))
+    (root / "terrains").mkdir()
+    doc = store_terrain(root, dsm, name="Hill")
+    record = PlanRecord(
+        t_utc_s=time.time(),
+        name="Foot",
+        mission_wpl=write_wpl(plan.mission),
+        digest="d",
+        firmware="ardupilot",
+        terrain_id=doc.id,
+        terrain_name="Hill",
+        terrain_sha256=dsm.sha256,
+        home_alt_dsm_m=plan.line.home_alt_dsm_m,
+        vertical_datum=None,
+        profile_toml=dump_profile(VehicleProfile("quad")),
+        certificate_json="",
+    )
+    return dsm, record, root / "terrains" / doc.id
+
+
+def situation(planned: tuple[Dsm, PlanRecord, Path], above_line_m: int) -> Situation:
+    """A wall from the ground to so much above the line."""
+    dsm, record, directory = planned
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(np.array([[500_008.0, 3_999_945.0]]))[0].tolist()
+    origin = MapOrigin(lat_deg, lon_deg, 900.0)
+    mirror = MapMirror("radar")
+    line = mission_line(record, origin)
+    assert line is not None
+    up_m, top_m = np.interp([12.0, 30.0], line.points_enu[:, 0], line.points_enu[:, 2]).tolist()
+    wall = [(30, n, up) for n in range(-4, 5) for up in range(round(top_m) + above_line_m)]
+    mirror.fold(delta(wall, origin=origin, whole=True))
+    at = dsm.lat_lon_from_xy(np.array([[500_020.0, 3_999_945.0]]))[0].tolist()
+    state = replace(
+        VehicleState(system_id=1, component_id=1),
+        lat_deg=at[0],
+        lon_deg=at[1],
+        alt_rel_home_m=up_m,
+        armed=True,
+    )
+    flight = FlightStatus(way="auto", phase="flying", target=2)
+    return Situation(alert(), state, flight, 0.0, record, directory, origin, (mirror.voxels(),))
+
+
+def test_over_and_around_a_wall_on_the_mission(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    there = situation(planned, 4)
+    assert there.state.alt_rel_home_m is not None
+    ways = prepare(there, report=lambda step, share: None)
+    assert [way.doc.kind for way in ways] == ["over", "around"]
+    for way in ways:
+        assert way.doc.possible, way.doc.text
+        assert way.doc.clearance_m is not None
+        assert way.doc.clearance_m >= 1.9
+        assert way.rejoin_item is not None
+        ups = [up for _, _, up in way.points_enu_m]
+        assert min(ups) >= there.state.alt_rel_home_m - 1e-6
+        assert [t.alt_rel_home_m for t in way.targets] == pytest.approx(ups[1:])
+        assert all(t.speed_m_s > 0 for t in way.targets)
+    assert ways[0].height_offset_m > 4.0
+
+
+def test_a_mission_that_nothing_blocks_needs_no_manoeuvre(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    ways = prepare(situation(planned, -6), report=lambda step, share: None)
+    assert [way.doc.possible for way in ways] == [False, False]
+    assert all("keeps" in way.doc.text for way in ways)
+
+
+def test_without_a_position_there_is_none(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    here = situation(planned, 4)
+    lost = replace(here, state=replace(here.state, lat_deg=None))
+    assert prepare(lost, report=lambda step, share: None) == ()

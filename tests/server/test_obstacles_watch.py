@@ -1,0 +1,121 @@
+"""What pages are told of obstacles: alerts at once, statuses at their pace, silence, nothing of another recording."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+from server.obstacles.watch import DEAD_S, Watch
+from tests.server.obstacle_messages import alert, delta, status
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def watching(source: Any = "live") -> tuple[Watch, list[Any], Clock]:
+    told: list[Any] = []
+    clock = Clock()
+    return Watch(source, told.append, now_mono_s=clock, now_utc_s=lambda: 5000.0), told, clock
+
+
+def test_an_alert_is_told_at_once_before_the_list_that_holds_it() -> None:
+    watch, told, _ = watching()
+    watch.on_alert(alert())
+    assert [message.type for message in told] == ["alert", "obstacles"]
+    assert told[1].obstacles.alerts[0].alert.id == "radar-1"
+    watch.acknowledge("radar-1")
+    watch.on_alert(alert(phase="ends"))
+    assert told[-1].obstacles.alerts == []
+
+
+def test_begin_and_end_are_passed_on_once() -> None:
+    watch, _, _ = watching()
+    begun: list[str] = []
+    ended: list[str] = []
+    watch.begins, watch.ends = lambda each: begun.append(each.id), ended.append
+    for phase in ("begins", "goes_on", "goes_on", "ends"):
+        watch.on_alert(alert(phase=phase))
+    assert (begun, ended) == (["radar-1"], ["radar-1"])
+
+
+def test_statuses_go_out_at_ten_hertz_and_a_change_of_state_at_once() -> None:
+    watch, told, clock = watching()
+    for _ in range(100):
+        watch.on_status(status())
+        clock.now_s += 0.02
+    assert 15 <= len(told) <= 26
+    del told[:]
+    watch.on_status(replace(status(), state="blind"))
+    assert [message.status.state for message in told] == ["blind"]
+
+
+def test_a_node_that_died_is_alerted_and_its_return_ends_that() -> None:
+    watch, told, clock = watching()
+    watch.on_status(status())
+    watch.on_status(status("vision"))
+    watch.on_alert(alert())
+    clock.now_s += DEAD_S + 0.1
+    watch.on_status(status("vision"))
+    del told[:]
+    watch.tick()
+    lost = [m.alert for m in told if m.type == "alert"]
+    assert [(a.sensor, a.kind, a.phase) for a in lost] == [("radar", "sensor", "begins")]
+    watch.tick()
+    clock.now_s += 3.0
+    watch.tick()
+    docs = {doc.alert.id: doc for doc in watch.state.alerts}
+    assert docs["radar-1"].over
+    assert len([m for m in told if m.type == "alert" and m.alert.sensor == "radar"]) == 1
+    watch.on_status(status())
+    ended = [m.alert for m in told if m.type == "alert"][-1]
+    assert (ended.id, ended.phase, ended.t_utc_s) == (lost[0].id, "ends", 5000.0)
+
+
+def test_a_sensor_that_never_sent_anything_is_not_missed() -> None:
+    watch, told, clock = watching()
+    watch.on_status(status(state="waiting"))
+    clock.now_s += 100.0
+    watch.tick()
+    assert [m for m in told if m.type == "alert"] == []
+
+
+def test_broken_parts_of_a_map_hurt_nobody_and_missing_ones_are_asked_for() -> None:
+    watch, _, _ = watching()
+
+    async def hear() -> None:
+        await watch.on_map(delta([(0, 0, 0)], whole=True, revision=3))
+        await watch.on_map(replace(delta([(1, 0, 0)], revision=4, since=3), keys=b"123"))
+        assert not watch.needs_whole["radar"].is_set()
+        await watch.on_map(delta([(1, 0, 0)], revision=9, since=8))
+
+    asyncio.run(hear())
+    assert watch.needs_whole["radar"].is_set()
+    assert watch.mirrors["radar"].voxel_count == 2
+
+
+def test_a_map_that_was_there_before_is_asked_for() -> None:
+    watch, _, _ = watching()
+    watch.on_status(status(voxels_occupied=0))
+    assert not watch.needs_whole["radar"].is_set()
+    watch.on_status(status(voxels_occupied=12))
+    assert watch.needs_whole["radar"].is_set()
+
+
+def test_of_another_recording_nothing_stays() -> None:
+    watch, told, _ = watching("replay")
+    asyncio.run(watch.on_map(delta([(0, 0, 0)])))
+    watch.on_status(status())
+    watch.on_alert(alert())
+    del told[:]
+    watch.forget()
+    assert [(m.sensor, m.status) for m in told if m.type == "perception"] == [("radar", None)]
+    assert watch.state.alerts == []
+    assert watch.statuses == {}
+    assert watch.mirrors["radar"].voxel_count == 0
+    assert watch.mirrors["radar"].origin is None

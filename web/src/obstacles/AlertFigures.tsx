@@ -1,0 +1,64 @@
+import { useState } from "preact/hooks";
+import { clock, latLon, metres } from "../format";
+import type { AlertDoc, Obstacle } from "../messages";
+import { notifyText } from "../store/state";
+import { Icon } from "../ui/Icon";
+import { bearingWord, distance, heightDifference, timeTo } from "./words";
+
+/** The place as text that a click copies, all 7 decimals of it. */
+export function Place({ obstacle }: { obstacle: Obstacle }) {
+  const [copied, setCopied] = useState(false);
+  const text = latLon(obstacle);
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(text);
+      setCopied(true);
+      setTimeout(() => setCopied(false), 1500);
+    } catch {
+      notifyText("warning", "The browser does not let this page copy.", `Copy by hand: ${text}`);
+    }
+  };
+  return (
+    <button
+      type="button"
+      class="alert-place"
+      title="Copy latitude and longitude"
+      data-testid="alert-place"
+      onClick={copy}
+    >
+      <Icon name={copied ? "check" : "copy"} size={16} />
+      <span class="number">{text}</span>
+      <span class="muted number">{metres(obstacle.alt_amsl_m)} AMSL</span>
+      {copied && <span class="visually-hidden">Copied</span>}
+    </button>
+  );
+}
+
+/** What is over is told as it was last seen: nobody has to brake for it. */
+export function Figures({ obstacle, isOver }: { obstacle: Obstacle; isOver: boolean }) {
+  return (
+    <p class={`alert-figures ${isOver ? "over" : ""}`}>
+      <strong class="alert-distance" data-testid="alert-distance">
+        {distance(obstacle.distance_m)}
+      </strong>
+      <span>{bearingWord(obstacle)}</span>
+      <span>{heightDifference(obstacle.height_difference_m)}</span>
+      <span class={isOver || obstacle.time_to_contact_s === null ? "muted" : ""}>
+        {isOver ? "when last seen" : timeTo(obstacle.time_to_contact_s)}
+      </span>
+    </p>
+  );
+}
+
+const began = (entry: AlertDoc) => clock(new Date(entry.began_utc_s * 1000).toISOString());
+
+export function State({ entry }: { entry: AlertDoc }) {
+  const ended = clock(new Date(entry.alert.t_utc_s * 1000).toISOString());
+  if (entry.over)
+    return (
+      <span class="alert-state" data-testid="alert-over">
+        <b>OVER</b> since {ended}
+      </span>
+    );
+  return <span class="alert-state">since {began(entry)}</span>;
+}

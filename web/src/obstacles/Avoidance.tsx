@@ -1,0 +1,143 @@
+import { useState } from "preact/hooks";
+import { withUnit } from "../format";
+import { lease, nodes, vehicle } from "../store/flying";
+import { obstacles } from "../store/obstacles";
+import { link, setError } from "../store/state";
+import { Button } from "../ui/Button";
+import { Check } from "../ui/fields";
+import { HoldButton } from "../ui/HoldButton";
+import { Icon } from "../ui/Icon";
+import { Outcome } from "../ui/Outcome";
+import { AVOIDANCE, switchAvoidance, wantsConsent } from "./commands";
+import { avoidanceWords, isTooFast } from "./words";
+
+const isSimulated = () => nodes.value.some((node) => node.name === "simulator" && node.state === "running");
+
+function whyNot(): string | null {
+  if (link.value === "lost") return "The server cannot be reached";
+  return lease.value.mine ? null : "You observe: take control first";
+}
+
+/** A real vehicle leaves its mission by itself only if somebody has said in words that it may. */
+function Consent({ onDone }: { onDone: () => void }) {
+  const [agrees, setAgrees] = useState(false);
+  const why = whyNot();
+  const grant = async () => {
+    if (await switchAvoidance(true, true)) onDone();
+  };
+  return (
+    <div class="consent" data-testid="avoidance-consent">
+      <p>
+        <strong>This is a real vehicle.</strong> When a sensor sees something ahead, Hedgehop will take it out
+        of its mission, brake, climb up to 30 m above the plan, and fly the rest that much higher.
+      </p>
+      <p>Any stick or mode change hands it back for the rest of the flight.</p>
+      <Check
+        label="It may do this. I can take over at any time."
+        checked={agrees}
+        testid="avoidance-agree"
+        onChange={setAgrees}
+      />
+      <div class="row wrap">
+        <HoldButton
+          label="Switch on"
+          icon="shield"
+          place={AVOIDANCE}
+          disabled={!agrees || why !== null}
+          title={why ?? (agrees ? undefined : "Agree first")}
+          testid="avoidance-on"
+          onHold={() => void grant()}
+        />
+        <Button kind="quiet" onClick={onDone}>
+          Not now
+        </Button>
+      </div>
+    </div>
+  );
+}
+
+function Switch({ isOn, ask }: { isOn: boolean; ask: () => void }) {
+  const why = whyNot();
+  if (isOn) {
+    return (
+      <Button
+        title={why ?? "From now on you steer clear yourself"}
+        disabled={why !== null}
+        testid="avoidance-off"
+        onClick={() => void switchAvoidance(false)}
+      >
+        Switch off
+      </Button>
+    );
+  }
+  if (!isSimulated()) {
+    return (
+      <Button title={why ?? undefined} disabled={why !== null} testid="avoidance-ask" onClick={ask}>
+        Switch on…
+      </Button>
+    );
+  }
+  return (
+    <HoldButton
+      label="Switch on"
+      icon="shield"
+      place={AVOIDANCE}
+      disabled={why !== null}
+      title={why ?? "Climbs by itself over what it sees"}
+      testid="avoidance-on"
+      onHold={() => void switchAvoidance(true)}
+    />
+  );
+}
+
+function Speed() {
+  const status = obstacles.live.value.avoidance;
+  if (status.largest_speed_m_s === null) return null;
+  const tooFast = isTooFast(status, vehicle.value?.ground_speed_m_s ?? null);
+  return (
+    <span
+      class={`largest-speed ${tooFast ? "near" : ""}`}
+      data-testid="largest-speed"
+      data-too-fast={tooFast}
+    >
+      {tooFast && <Icon name="warning" size={16} />}
+      {tooFast ? "Too fast to stop: at most " : "Sees far enough up to "}
+      <strong>{withUnit(status.largest_speed_m_s, "m/s", 1)}</strong>.
+    </span>
+  );
+}
+
+/** What is done about obstacles without asking, and the switch for it. */
+export function Avoidance() {
+  const [asks, setAsks] = useState(false);
+  const status = obstacles.live.value.avoidance;
+  const { word, level, note } = avoidanceWords(status);
+  const close = () => {
+    setAsks(false);
+    setError(AVOIDANCE, null);
+  };
+  const consents = asks || (wantsConsent() && !status.enabled);
+  return (
+    <section
+      class={`avoidance ${level}`}
+      aria-label="Avoidance"
+      data-testid="avoidance"
+      data-state={status.state}
+      data-enabled={status.enabled}
+    >
+      <div class="row">
+        <Icon name={level === "neutral" ? "shield" : "warning"} />
+        <span class="avoidance-state">
+          <span class="muted">Avoidance</span>
+          <strong role="status">{word}</strong>
+        </span>
+        {!consents && <Switch isOn={status.enabled} ask={() => setAsks(true)} />}
+      </div>
+      <p class="avoidance-note">
+        {note} <Speed />
+      </p>
+      {consents && <Consent onDone={close} />}
+      <Outcome place={AVOIDANCE} />
+    </section>
+  );
+}

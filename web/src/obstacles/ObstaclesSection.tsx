@@ -1,0 +1,103 @@
+import { metres } from "../format";
+import type { PerceptionSettings, PerceptionSettingsBody } from "../messages";
+import { lease } from "../store/flying";
+import { hasSensors, obstacles } from "../store/obstacles";
+import { pending } from "../store/outcomes";
+import { Done } from "../ui/Outcome";
+import { HoldButton } from "../ui/HoldButton";
+import { NumberField } from "../ui/NumberField";
+import { Section } from "../ui/Section";
+import { Check, SelectField } from "../ui/fields";
+import { MapExports } from "./MapExports";
+import { MAPS, clearMaps, setPerception } from "./commands";
+
+const FIELDS = [
+  { key: "radar_depth_m", label: "Radar looks ahead", unit: "m", min: 2, max: 120, step: 1 },
+  { key: "vision_depth_m", label: "Camera looks ahead", unit: "m", min: 2, max: 40, step: 1 },
+  { key: "ranges_depth_m", label: "Range finder looks ahead", unit: "m", min: 2, max: 40, step: 1 },
+  { key: "fov_deg", label: "Width of the region", unit: "°", min: 4, max: 120, step: 2 },
+  { key: "height_m", label: "Height of the region", unit: "m", min: 0.5, max: 20, step: 0.5 },
+] as const;
+
+const VARIANTS: readonly { value: PerceptionSettings["radar_variant"]; label: string }[] = [
+  { value: "heading_only", label: "Heading only, at own height" },
+  { value: "full_attitude", label: "Attitude and measured elevation" },
+  { value: "full_attitude_flat", label: "Attitude, at own height" },
+];
+
+const change = (body: PerceptionSettingsBody) => void setPerception(body);
+
+/** What is searched ahead, and how radar targets are placed. */
+function Searched({ settings }: { settings: PerceptionSettings }) {
+  const disabled = !lease.value.mine;
+  return (
+    <>
+      <div class="field-grid">
+        {FIELDS.map(({ key, ...field }) => (
+          <NumberField
+            key={key}
+            {...field}
+            value={settings[key]}
+            disabled={disabled}
+            testid={`perception-${key}`}
+            onChange={(value) => change({ [key]: value })}
+          />
+        ))}
+      </div>
+      <SelectField
+        label="Radar targets"
+        value={settings.radar_variant}
+        options={VARIANTS}
+        testid="radar-variant"
+        onChange={(radar_variant) => change({ radar_variant })}
+      />
+      <Check
+        label="As in the papers: no known ground, no corridor along the mission"
+        checked={settings.paper_bare}
+        disabled={disabled}
+        testid="paper-bare"
+        onChange={(paper_bare) => change({ paper_bare })}
+      />
+      {settings.paper_bare && (
+        <p class="hint">
+          Flying near the ground, the ground itself will alarm: it is not told from obstacles.
+        </p>
+      )}
+    </>
+  );
+}
+
+function Clear() {
+  return (
+    <HoldButton
+      label="Empty the maps"
+      icon="trash"
+      place={MAPS}
+      disabled={!lease.value.mine}
+      title="Everything seen so far is forgotten; recordings keep it"
+      testid="clear-maps"
+      onHold={() => void clearMaps()}
+    />
+  );
+}
+
+/** What the sensors search, and their maps: as files, or begun anew. */
+export function ObstaclesSection() {
+  const { settings } = obstacles.live.value;
+  const there = hasSensors.live.value;
+  const summary = there
+    ? `${metres(settings.radar_depth_m, 0)} radar, ${metres(settings.vision_depth_m, 0)} camera`
+    : "no sensor yet";
+  return (
+    <Section id={MAPS} title="Obstacles" icon="radar" summary={summary}>
+      <Searched settings={settings} />
+      <h3>Maps as files</h3>
+      <MapExports source="live" />
+      <div class="row wrap minor-actions">
+        <Clear />
+        {pending.value.has(MAPS) && <span class="muted">Under way…</span>}
+      </div>
+      <Done place={MAPS} />
+    </Section>
+  );
+}

@@ -1,0 +1,36 @@
+import { count } from "../format";
+import { lease } from "../store/flying";
+import { pending } from "../store/outcomes";
+import { document_, result } from "../store/state";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+import { Outcome } from "../ui/Outcome";
+import { SEEN, planWithSeen } from "./commands";
+
+/** In Plan: the surface model is not as it was read, and the way out of it. */
+export function SeenInPlan() {
+  if (document_.value?.seen_id == null) return null;
+  const columns = result.value?.seen_columns ?? 0;
+  return (
+    <div class="callout wrap-row seen-in-plan" data-testid="seen-in-plan">
+      <Icon name="radar" />
+      <p>
+        {columns > 0
+          ? `${count(columns, "seen column")} on the surface model`
+          : "What was seen is on the surface model"}
+        : path and certificate keep clear of it.
+      </p>
+      <Button
+        disabled={pending.value.has(SEEN) || !lease.value.mine}
+        title={
+          lease.value.mine ? "Back to the surface model as it was read" : "You observe: take control first"
+        }
+        testid="take-seen-out"
+        onClick={() => void planWithSeen(false)}
+      >
+        Take them out
+      </Button>
+      <Outcome place={SEEN} />
+    </div>
+  );
+}

@@ -1,0 +1,77 @@
+import type {
+  AcknowledgeBody,
+  PerceptionSettingsBody,
+  PlanState,
+  PlanWithSeen,
+  SetAvoidanceBody,
+} from "../messages";
+import { order } from "../store/outcomes";
+import { alerts } from "../store/obstacles";
+import { allSent, queue, showPlan } from "../store/plan";
+import { errors } from "../store/state";
+
+/** Everything that is asked of the server about obstacles, each with the place where its outcome appears. */
+
+export const ALERTS = "alerts";
+export const AVOIDANCE = "avoidance";
+export const MANOEUVRE = "manoeuvre";
+export const MAPS = "obstacles";
+export const SEEN = "seen";
+
+/** One alert, or all of them. */
+export function acknowledge(alert_id: string | null): Promise<Response | null> {
+  const body: AcknowledgeBody = { alert_id };
+  return order({ place: ALERTS, path: "/api/obstacles/acknowledge", body });
+}
+
+/** The one that stands on top, by its key. */
+export function acknowledgeFirst(): void {
+  const first = alerts.live.value.find((entry) => !entry.acknowledged);
+  if (first) void acknowledge(first.alert.id);
+}
+
+export async function switchAvoidance(enabled: boolean, consent = false): Promise<boolean> {
+  const body: SetAvoidanceBody = { enabled, consent };
+  const done = enabled ? "Avoidance is on." : "Avoidance is off.";
+  const answer = await order({
+    place: AVOIDANCE,
+    method: "PUT",
+    path: "/api/obstacles/avoidance",
+    body,
+    done,
+  });
+  return answer !== null;
+}
+
+/** The server wants it in words: this is a real vehicle. */
+export function wantsConsent(): boolean {
+  const error = errors.value[AVOIDANCE];
+  return error !== undefined && /consent/i.test(`${error.code} ${error.what} ${error.advice}`);
+}
+
+export const flyManoeuvre = (id: string, kind: string) =>
+  order({
+    place: MANOEUVRE,
+    path: `/api/obstacles/manoeuvre/${encodeURIComponent(id)}/fly`,
+    done: `The vehicle flies ${kind} it.`,
+  });
+
+export function setPerception(body: PerceptionSettingsBody): Promise<Response | null> {
+  return order({ place: MAPS, method: "PUT", path: "/api/obstacles/settings", body });
+}
+
+export const clearMaps = () =>
+  order({ place: MAPS, path: "/api/obstacles/clear", done: "The maps begin anew." });
+
+/** Takes what was seen into the open plan's surface model, or out of it again: an edit that can be undone. */
+export async function planWithSeen(seen: boolean): Promise<void> {
+  await allSent();
+  const body: PlanWithSeen = { seen };
+  const done = seen
+    ? "What was seen is in the plan's surface model."
+    : "The plan is on the surface model alone.";
+  const answer = await order({ place: SEEN, method: "PUT", path: "/api/obstacles/seen", body, done });
+  if (!answer) return;
+  queue.takeAnswer((await answer.json()) as PlanState);
+  showPlan();
+}

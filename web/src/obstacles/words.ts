@@ -1,0 +1,133 @@
+import { DASH, bearing, metres, number, withUnit } from "../format";
+import type { AlertDoc, AvoidanceStatus, MissionConflict, Obstacle, ObstacleAlert } from "../messages";
+import type { SensorName } from "../store/obstacles";
+import type { Sensed, Watch } from "../store/sensing";
+
+/** Obstacles, sensors and avoidance in a few words. */
+
+export const SENSOR_WORDS: Record<SensorName, string> = {
+  radar: "Radar",
+  vision: "Camera",
+  ranges: "Range finder",
+};
+
+const KIND_WORDS: Record<ObstacleAlert["kind"], string> = {
+  obstacle: "obstacle",
+  conflict: "conflict on the mission ahead",
+  divergence: "positions disagree",
+  sensor: "sensor trouble",
+};
+
+/** A small distance in decimetres, a larger one in metres: nobody reads decimetres in a hurry. */
+export const distance = (value_m: number) => metres(value_m, value_m < 20 ? 1 : 0);
+
+/** "12° right" of the nose. */
+export function offNose(value_deg: number): string {
+  const size = Math.round(Math.abs(value_deg));
+  if (size === 0) return "dead ahead";
+  if (size === 180) return "straight behind";
+  return `${size}° ${value_deg > 0 ? "right" : "left"}`;
+}
+
+/** "3.2 m higher" than the vehicle. */
+export function heightDifference(value_m: number): string {
+  if (Math.abs(value_m) < 0.05) return "at your height";
+  return `${metres(Math.abs(value_m))} ${value_m > 0 ? "higher" : "lower"}`;
+}
+
+/** With its sign always, for where there is no room for words: "+3". */
+export function signedHeight(value_m: number): string {
+  const whole = Math.round(value_m);
+  return `${whole < 0 ? "" : "+"}${number(whole)}`;
+}
+
+export const timeTo = (value_s: number | null) =>
+  value_s === null ? "not getting nearer" : `contact in ${withUnit(value_s, "s", value_s < 10 ? 1 : 0)}`;
+
+export const alertTitle = ({ sensor, kind }: ObstacleAlert) => `${SENSOR_WORDS[sensor]}: ${KIND_WORDS[kind]}`;
+
+/** What is said aloud once, when it begins; its figures go on changing, in silence. */
+export function spoken(entry: AlertDoc): string {
+  const { alert, over } = entry;
+  const title = alertTitle(alert);
+  if (over) return `Over. ${title}.`;
+  const { obstacle } = alert;
+  if (!obstacle) return `${title}. ${alert.text}`;
+  const where = `${number(obstacle.distance_m, 1)} metres, ${offNose(obstacle.off_nose_deg)}`;
+  return `${title}. ${where}, ${heightDifference(obstacle.height_difference_m)}, ${timeTo(obstacle.time_to_contact_s)}.`;
+}
+
+export const bearingWord = (obstacle: Obstacle) =>
+  `${offNose(obstacle.off_nose_deg)} · ${bearing(obstacle.bearing_deg)}`;
+
+export type Level = "neutral" | "good" | "near" | "bad";
+
+export const WATCH_WORDS: Record<Watch, { word: string; level: Level }> = {
+  waiting: { word: "no frame yet", level: "neutral" },
+  running: { word: "watching", level: "neutral" },
+  blind: { word: "sees nothing", level: "bad" },
+  frozen: { word: "map stands still", level: "bad" },
+  stale: { word: "frames have stopped", level: "bad" },
+  silent: { word: "silent", level: "bad" },
+};
+
+export interface SensorRow {
+  rate: string;
+  latency: string;
+  voxels: string;
+  /** Frames that never came and what was refused: empty when there is nothing of it to say. */
+  lost: string;
+  reasons: readonly string[];
+}
+
+export function sensorRow({ status, rate_hz }: Sensed): SensorRow {
+  const dropped = status.dropped.reduce((sum, entry) => sum + entry.count, 0);
+  const parts = [
+    ...(dropped > 0 ? [`${number(dropped)} dropped`] : []),
+    ...(status.lost_frames > 0 ? [`${number(status.lost_frames)} lost`] : []),
+  ];
+  return {
+    rate: withUnit(rate_hz, "Hz", rate_hz !== null && rate_hz < 10 ? 1 : 0),
+    latency: status.latency_s === null ? DASH : withUnit(status.latency_s * 1000, "ms"),
+    voxels: number(status.voxels_occupied),
+    lost: parts.join(", "),
+    reasons: status.dropped.filter((entry) => entry.count > 0).map((e) => `${number(e.count)} × ${e.what}`),
+  };
+}
+
+export interface AvoidanceWords {
+  word: string;
+  level: Level;
+  /** What it means, where the server says nothing better. */
+  note: string;
+}
+
+const AVOIDANCE: Record<AvoidanceStatus["state"], AvoidanceWords> = {
+  off: { word: "Off", level: "neutral", note: "You steer clear yourself." },
+  watching: { word: "Watching", level: "neutral", note: "Climbs by itself over what it sees ahead." },
+  holding: { word: "Holding", level: "bad", note: "Braked: what sensors or position say is too old." },
+  climbing: { word: "Climbing", level: "near", note: "Until the way ahead is clear." },
+  offset: { word: "Higher", level: "near", note: "The rest is flown above the plan." },
+  manoeuvre: { word: "On the way past", level: "near", note: "Flies the chosen manoeuvre." },
+  released: { word: "Released", level: "near", note: "The pilot has taken over: off for this flight." },
+  ceiling: { word: "At its ceiling", level: "bad", note: "It may not climb any further, and holds. Decide." },
+};
+
+export function avoidanceWords(status: AvoidanceStatus): AvoidanceWords {
+  const words = AVOIDANCE[status.state];
+  const higher = status.height_offset_m >= 0.05 ? ` +${metres(status.height_offset_m)}` : "";
+  return { ...words, word: words.word + higher, note: status.text || words.note };
+}
+
+/** Faster than the region lets it stop. */
+export const isTooFast = (status: AvoidanceStatus, speed_m_s: number | null) =>
+  status.enabled &&
+  status.largest_speed_m_s !== null &&
+  speed_m_s !== null &&
+  speed_m_s > status.largest_speed_m_s + 0.05;
+
+/** "in 84 m, 28 s, before item 14". */
+export function conflictWhere(conflict: MissionConflict): string {
+  const time = conflict.time_s === null ? "" : `, ${withUnit(conflict.time_s, "s")}`;
+  return `in ${metres(conflict.ahead_m, 0)}${time}, before item ${conflict.item}`;
+}

@@ -1,0 +1,50 @@
+import type { AlertDoc, ObstacleAlert, ObstaclesState } from "../messages";
+
+/** Alerts as they are latched: each stays until it is over and acknowledged. Nothing here reads a clock. */
+
+const MOST_ALERTS = 20;
+
+/** An alert's word comes before the list that holds it: it is shown at once. */
+export function withAlert(state: ObstaclesState, alert: ObstacleAlert): ObstaclesState {
+  const known = state.alerts.find((entry) => entry.alert.id === alert.id);
+  const over = alert.phase === "ends";
+  if (!known && over) return state;
+  // Its last word says that it is over, not where it was.
+  const told = { ...alert, obstacle: alert.obstacle ?? known?.alert.obstacle ?? null };
+  const entry: AlertDoc = known
+    ? { ...known, alert: told, over }
+    : { alert, began_utc_s: alert.t_utc_s, over, acknowledged: false };
+  const alerts = known
+    ? state.alerts.map((other) => (other === known ? entry : other))
+    : [entry, ...state.alerts].slice(0, MOST_ALERTS);
+  return { ...state, alerts };
+}
+
+export const isShown = (entry: AlertDoc) => !entry.over || !entry.acknowledged;
+
+/** Sounds and shouts: it is there, and nobody has said that they saw it. */
+export const isCalling = (entry: AlertDoc) => !entry.over && !entry.acknowledged;
+
+const KINDS: Record<ObstacleAlert["kind"], number> = { obstacle: 0, conflict: 1, divergence: 2, sensor: 3 };
+
+/** Coarsely, so that two obstacles do not change places with every frame, under the hand that acknowledges one. */
+function haste(time_to_contact_s: number | null): number {
+  if (time_to_contact_s === null) return 3;
+  return time_to_contact_s < 3 ? 0 : time_to_contact_s < 10 ? 1 : 2;
+}
+
+/** Calling before seen before over; then obstacles first, what will be reached soon, and what was there first. */
+function rank(entry: AlertDoc): number[] {
+  const { obstacle, kind } = entry.alert;
+  const stage = isCalling(entry) ? 0 : entry.over ? 2 : 1;
+  return [stage, KINDS[kind], haste(obstacle?.time_to_contact_s ?? null), entry.began_utc_s];
+}
+
+function compare(a: readonly number[], b: readonly number[]): number {
+  const at = a.findIndex((value, index) => value !== b[index]);
+  return at < 0 ? 0 : (a[at] ?? 0) < (b[at] ?? 0) ? -1 : 1;
+}
+
+/** What must be seen, the most urgent first. */
+export const inOrder = (alerts: readonly AlertDoc[]): AlertDoc[] =>
+  alerts.filter(isShown).sort((a, b) => compare(rank(a), rank(b)));
