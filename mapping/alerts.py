@@ -80,8 +80,8 @@ class AlertBook:
         return events + self._over(t_mono_s)
 
     def pass_time(self, t_mono_s: float) -> list[AlertEvent]:
-        """Nothing has been looked at: what has been out for long enough is over."""
-        return self._over(t_mono_s)
+        """Nothing has been looked at: what has been out for long enough is over, though nobody knows it to be gone."""
+        return self._over(t_mono_s, "not seen any more, for nothing is seen")
 
     def say(self, kind: Kind, on: bool, text: str, t_mono_s: float) -> list[AlertEvent]:
         """Something about the sensor itself is (still) so, or not any more."""
@@ -114,10 +114,10 @@ class AlertBook:
         entry.told_s = t_s
         return [AlertEvent(entry.id, entry.kind, "goes_on", t_s, entry.text, entry.obstacle)]
 
-    def _over(self, t_s: float) -> list[AlertEvent]:
+    def _over(self, t_s: float, why: str = "clear again") -> list[AlertEvent]:
         over = [e for e in self._open if e.kind == "obstacle" and t_s - e.seen_s >= self._params.out_for_s]
         self._open = [e for e in self._open if e not in over]
-        return [AlertEvent(e.id, e.kind, "ends", t_s, f"{self._name}: clear again", e.obstacle) for e in over]
+        return [AlertEvent(e.id, e.kind, "ends", t_s, f"{self._name}: {why}", e.obstacle) for e in over]
 
     def _same(self, obstacle: Found) -> _Open | None:
         near = [(_box_gap_m(e, obstacle), e) for e in self._open if e.kind == "obstacle"]

@@ -65,3 +65,4 @@ def _check(name: str, record: Path | None, seeds: int) -> None:
     check_directory(record.parent)
     if record.exists():
         raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")
+    record.parent.mkdir(parents=True, exist_ok=True)

@@ -51,17 +51,23 @@ class LatchedAlerts:
                 self._docs[each] = self._docs[each].model_copy(update={"acknowledged": True})
         self._drop_done()
 
-    def give_up(self, sensor: Sensor, now_mono_s: float) -> bool:
-        """Of a sensor whose node says nothing more: what was not told again counts as over. Whether any was."""
-        silent = [
+    def give_up(self, sensor: Sensor, now_mono_s: float) -> tuple[str, ...]:
+        """What a sensor's node has not told again counts as over: it has died, or been started anew. Their ids.
+
+        Not what this server says of the node itself.
+        """
+        silent = tuple(
             key
             for key, doc in self._docs.items()
-            if doc.alert.sensor == sensor and not doc.over and now_mono_s - self._heard_mono_s[key] > UNHEARD_S
-        ]
+            if doc.alert.sensor == sensor
+            and doc.alert.kind != "sensor"
+            and not doc.over
+            and now_mono_s - self._heard_mono_s[key] > UNHEARD_S
+        )
         for key in silent:
             self._docs[key] = self._docs[key].model_copy(update={"over": True})
         self._drop_done()
-        return bool(silent)
+        return silent
 
     def clear(self) -> None:
         self._docs.clear()

@@ -43,6 +43,10 @@ class SeesPlans(Protocol):
     async def plan_without_seen(self) -> PlanState: ...
 
 
+DEMO_SETTINGS = PerceptionSettings(radar_depth_m=15.0, vision_depth_m=10.0)
+"""The demo flies at 5 m/s: the papers' regions, for 3 m/s, would end where it can only just stop."""
+
+
 class ObstacleDesk:
     """Commands come from live data only; of a replay only maps may be taken out as files."""
 
@@ -81,6 +85,8 @@ class ObstacleDesk:
     def avoid_in_demo(self) -> None:
         """As soon as the simulated vehicle is connected; whoever switches avoidance before that decides."""
         self._avoid_when_adopted = True
+        if self._live.settings == PerceptionSettings():
+            self._set(DEMO_SETTINGS)
 
     async def on_link(self, status: LinkStatus) -> None:
         if not self._avoid_when_adopted or status.adopted is None or status.state != "live":

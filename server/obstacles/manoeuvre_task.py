@@ -43,6 +43,9 @@ class Situation:
     terrain: Path
     origin: MapOrigin
     maps: tuple[Voxels, ...]
+    """Each with an origin of its own: home may move a little between the starts of two sensors' nodes."""
+    radius_m: float = 0.5
+    """Of the vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +71,7 @@ class _Ahead:
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Over and around, each possible or with the reason why not; nothing without a mission that is flown."""
-    from planning.avoidance import around, over
+    from planning.avoidance import AvoidanceParams, around, over
     from planning.avoiding.room import Seen
     from telemetry.perception.mission_line import mission_line
 
@@ -79,10 +82,22 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
     ahead = _ahead(line, position, situation)
-    seen = [Seen(v.centres_enu_m[~v.explained], v.resolution_m) for v in situation.maps if len(v.keys)]
+    seen = [Seen(_centres_enu_m(v, situation.origin, frame), v.resolution_m) for v in situation.maps if len(v.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
-    ways = [find(position, ahead.points_enu_m, seen, surface) for find in (over, around)]
+    usual = AvoidanceParams()
+    params = AvoidanceParams(
+        radius_m=situation.radius_m, ceiling_m=max(0.0, usual.ceiling_m - situation.height_offset_m)
+    )
+    ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
     return tuple(_prepared(way, situation, ahead, frame) for way in ways)
+
+
+def _centres_enu_m(voxels: Voxels, origin: MapOrigin, frame: LocalFrame) -> F64:
+    """(N, 3) of what known ground does not explain, in the frame of ``origin``."""
+    centres, own = voxels.centres_enu_m[~voxels.explained], voxels.origin
+    if own is None or own == origin or not len(centres):
+        return centres
+    return frame.to_enu(*LocalFrame(own.lat_deg, own.lon_deg, own.alt_amsl_m).to_geodetic(centres).T)
 
 
 @lru_cache(maxsize=1)

@@ -90,6 +90,7 @@ class Manoeuvres:
     async def _renew(self, alert: ObstacleAlert) -> None:
         situation = self._situation(alert)
         if situation is None or self._watch.avoidance.state in ("climbing", "holding", "ceiling"):
+            self._show(())  # those on show begin where the vehicle is no more
             return
         self._busy("" if self.prepared else "Looking for a way past the obstacle")
         try:

@@ -125,10 +125,11 @@ class Obstacles:
         origin = next((status.origin for status in watch.statuses.values() if status.origin is not None), None)
         if origin is None:
             return None
-        maps = tuple(mirror.voxels() for mirror in watch.mirrors.values() if mirror.origin == origin)
+        maps = tuple(mirror.voxels() for mirror in watch.mirrors.values() if mirror.origin is not None)
         directory = self._library.terrain_dir(terrain.id)
         offset_m = watch.avoidance.height_offset_m
-        return Situation(alert, state, self._live.flight, offset_m, record, directory, origin, maps)
+        radius_m = watch.settings.vehicle_radius_m
+        return Situation(alert, state, self._live.flight, offset_m, record, directory, origin, maps, radius_m)
 
     async def _ask_for_whole(self, sensor: Sensor) -> None:
         """A part was missed, or came before this server was there: the node tells its map once more."""

@@ -147,14 +147,18 @@ class Watch:
             self._tell(ObstaclesMessage(source=self._source, obstacles=state))
 
     def tick(self) -> None:
-        """Once a second: a node that has died tells nothing, so its silence is noted here."""
+        """Once a second: a node that has died tells nothing, so its silence is noted here.
+
+        One that was started anew at once knows nothing of the alerts before: they end here, too.
+        """
         now_s = self._now_mono_s()
         for sensor, heard_s in self._heard_mono_s.items():
             silent = now_s - heard_s > DEAD_S
             if silent and sensor not in self._lost and self.statuses[sensor].state != "waiting":
                 self._lose(sensor, now_s)
-            if silent and self._alerts.give_up(sensor, now_s):
-                self.refresh()
+            for alert_id in self._alerts.give_up(sensor, now_s):
+                self.ends(alert_id)
+        self.refresh()
 
     def forget(self) -> None:
         """Another recording, or none."""

@@ -25,6 +25,7 @@ from server.scene.sights import Sights
 from server.scene.vehicles import Vehicles
 
 _POINTER_REACH_PX = 24.0
+_SHOTS_DUE_MAX = 100
 
 TerrainClick = Callable[[str | None, float, float, bool], Awaitable[None]]
 PoiClick = Callable[[str], Awaitable[None]]
@@ -57,6 +58,9 @@ class SceneView:
         self._cursor_m: F64 | None = None
         self._one_at_a_time = asyncio.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._shots_due: dict[str, Target] = {}
+        """Asked for by pages whose view had not connected yet."""
+        server.on_client_connect(self._joined)
         server.scene.world_axes.visible = False
         server.initial_camera.fov = FOV_RAD
         # Awaited by viser although its signature does not say so.
@@ -79,7 +83,12 @@ class SceneView:
     async def frame(self, page_id: str, target: Target) -> None:
         """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, vehicle."""
         client = self._client(page_id)
-        if client is not None and self._drawn is not None:
+        if client is None:
+            self._shots_due.pop(page_id, None)
+            self._shots_due[page_id] = target
+            while len(self._shots_due) > _SHOTS_DUE_MAX:
+                del self._shots_due[next(iter(self._shots_due))]
+        elif self._drawn is not None:
             vehicle_m = self.vehicles.place_m()
             pose = shot(self._drawn, target, aspect=client.camera.aspect, vehicle_m=vehicle_m)
             _move(client, pose, self._drawn)
@@ -176,6 +185,17 @@ class SceneView:
                 await self._on_poi_click(poi_id)
             case PlaceHit(lat_deg, lon_deg, known):
                 await self._on_terrain_click(page_id, lat_deg, lon_deg, known)
+
+    async def _joined(self, client: viser.ClientHandle) -> None:
+        """A page's view has connected: its camera goes where the page has asked for meanwhile."""
+        page_id = self._page_of_client(client.client_id)
+        if page_id is not None:
+            await self._hand_over(self._catch_up(page_id))
+
+    async def _catch_up(self, page_id: str) -> None:
+        target = self._shots_due.pop(page_id, None)
+        if target is not None:
+            await self.frame(page_id, target)
 
     def _watch_gizmo(self, gizmo: viser.TransformControlsHandle) -> None:
         async def on_update(event: viser.TransformControlsEvent) -> None:

@@ -12,10 +12,10 @@ from planning.avoidance import largest_speed_m_s, may_engage
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoiding_words import status_of
 from telemetry.flight.detour import Detour, DetourParams
-from telemetry.flight.helm import GUIDED, Helm
+from telemetry.flight.helm import GUIDED, STOP_MODES, Helm
 from telemetry.flight.pilot_watch import PilotWatch
 from telemetry.flight.regions import Regions, Sight
-from telemetry.flight.rest import Rest
+from telemetry.flight.rest import RETURNS, Rest
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.ends import GROUND_STATION
 from telemetry.messages import FlightStatus
@@ -26,6 +26,8 @@ from telemetry.vehicle import VehicleState
 REACTION_S = 0.2
 """From the region's word to the vehicle's first braking."""
 LOW_M = 1.0
+FLOWN_FROM = frozenset({"AUTO", *STOP_MODES, *RETURNS})
+"""Modes in which no pilot flies by hand."""
 
 
 class Avoiding:
@@ -123,6 +125,10 @@ class Avoiding:
             raise NotAllowedError("The vehicle is not in the air.", advice="A way around is flown in flight.")
         if self.released:
             raise NotAllowedError(self.released, advice="The pilot flies the vehicle.")
+        if state.mode not in FLOWN_FROM:
+            raise NotAllowedError(f"The vehicle is flown in {state.mode}, by hand.", advice="Pause it first.")
+        if not self.enabled and not self.is_engaged:
+            self._watch.begin()  # what anybody did before this order releases nothing
         self._on_engage()
         return self.detour.fly(
             request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s

@@ -24,6 +24,8 @@ AHEAD_M, AHEAD_AGAIN_M = 6.0, 4.0
 """The climb's target is never farther above the vehicle: without a link it climbs no farther than that."""
 THERE_M = 0.3
 LEVEL_M, LEVEL_M_S = 0.5, 0.3
+HEARD_S = 2.0
+"""A heartbeat as young as this shows the vehicle's mode."""
 CLIMB_DECEL_M_S2 = 1.0
 """ArduCopter's WPNAV_ACCEL_Z."""
 
@@ -109,9 +111,8 @@ class Detour:
     def pause(self, now_s: float) -> list[Action]:
         """The operator wants it to stay where it is."""
         then = "go" if self.phase == "going" else self._then
-        self._paused, self.why = True, "Paused."
         actions = self._stop(now_s, then=then)
-        self.phase = "holding"
+        self.phase, self._paused, self.why = "holding", True, "Paused."
         return actions
 
     def resume(self, state: VehicleState, now_s: float) -> list[Action]:
@@ -139,14 +140,20 @@ class Detour:
         return [] if step is None else step(state, now_s)
 
     def _stop(self, now_s: float, *, then: Literal["climb", "go"]) -> list[Action]:
-        self.phase, self._then = "stopping", then
+        self.phase, self._then, self._paused = "stopping", then, False
         return self._helm.stop(now_s)
 
     def _on_stopping(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._helm.has_stopped(state, now_s):
-            return []
+            return self._stop_again_if_unheard(state, now_s)
         self.phase = "taking"
         return self._on_taking(state, now_s)
+
+    def _stop_again_if_unheard(self, state: VehicleState, now_s: float) -> list[Action]:
+        """An order to stop that was never answered is given again once the link is back and nobody has taken over."""
+        heard_s = state.heartbeat_t_mono_s
+        is_back = heard_s is not None and now_s - heard_s <= HEARD_S
+        return self._helm.stop(now_s) if self._helm.failed and is_back else []
 
     def _on_taking(self, state: VehicleState, now_s: float) -> list[Action]:
         if state.mode != GUIDED:
@@ -275,7 +282,9 @@ class Detour:
         return self._helm.stop(now_s)
 
     def _on_holding(self, state: VehicleState, now_s: float) -> list[Action]:
-        if self._paused or self._old(state, now_s) or not self._helm.has_stopped(state, now_s):
+        if not self._helm.has_stopped(state, now_s):
+            return self._stop_again_if_unheard(state, now_s)
+        if self._paused or self._old(state, now_s):
             return []
         self.phase = "taking"
         return self._on_taking(state, now_s)

@@ -40,7 +40,12 @@ class Regions:
         self.sights: dict[Sensor, Sight] = {}
 
     def take(self, status: PerceptionStatus) -> None:
-        """Frames that come late or twice change nothing."""
+        """Frames that come late or twice change nothing, nor does what is told of a frame that was refused.
+
+        Of a cloud of very few points, which counts as blind, only what it shows counts, not what it does not.
+        """
+        if status.state == "running" and status.region is None and not status.obstacles:
+            return
         before = self.sights.get(status.sensor)
         if before is not None and before.counts and status.t_mono_s < before.t_mono_s:
             return
@@ -51,7 +56,7 @@ class Regions:
         self.sights[status.sensor] = Sight(
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
-            counts=status.state == "running",
+            counts=status.state == "running" or (status.state == "blind" and occupied),
             occupied=occupied,
             distance_m=found_m,
             depth_m=self._depth_m(status),

@@ -128,7 +128,12 @@ class PerceptionNode:
             self._look.clear()
             deltas, self._unseen = self._unseen, []
             t_mono_s, t_utc_s = time.monotonic(), time.time()
-            conflict: MissionConflict | None = await asyncio.to_thread(self._ahead.look, deltas, self._flight)
+            try:
+                conflict: MissionConflict | None = await asyncio.to_thread(self._ahead.look, deltas, self._flight)
+            except Exception:
+                # Frames, regions and their alerts go on without the look ahead.
+                _log.exception("The mission ahead of the %s could not be looked at", self._kind.sensor)
+                continue
             self._inbox.put(CONFLICT, conflict)
             for alert in self._ahead.alerts(conflict, t_mono_s, t_utc_s, time.monotonic()):
                 self._publish(Topic.ALERT, alert)

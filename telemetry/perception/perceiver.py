@@ -145,13 +145,14 @@ class Perceiver:
 
     def feed(self) -> None:
         """Everything that waits, in the order of its own times. Every frame does so first."""
-        for _, item in sorted(self._waiting, key=itemgetter(0)):
+        waiting = sorted(self._waiting, key=itemgetter(0))
+        self._waiting.clear()  # before anything in it can fail: the next frame must not meet it again
+        for _, item in waiting:
             if isinstance(item, SlamPose):
                 self.perception.feed_camera(camera_pose(item))
                 self._basis = replace(self._basis, camera_t_mono_s=item.t_mono_s)
             else:
                 self._feed_state(item)
-        self._waiting.clear()
         if self.flown.update(self.where.origin, self.where.position):
             self.perception.set_line(self.flown.points_enu)
 

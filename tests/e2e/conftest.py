@@ -18,7 +18,7 @@ from server.settings import default_console_dir
 from telemetry.node_lock import running_nodes
 
 # The browser renders in software while other tests keep the processors busy.
-PATIENCE_MS = 120_000
+PATIENCE_MS = 90_000
 expect.set_options(timeout=PATIENCE_MS)
 
 # viser's page tries to evaluate a string, which the content security policy forbids, and goes on without.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from io import BytesIO
 from pathlib import Path
 
@@ -269,7 +270,8 @@ def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
 
 
 def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    for _ in range(timeout_ms // 200):
+    end_s = time.monotonic() + timeout_ms / 1000
+    while time.monotonic() < end_s:
         if condition():
             return
         page.wait_for_timeout(200)

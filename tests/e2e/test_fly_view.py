@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -174,7 +175,8 @@ def _percent(page: Page) -> int:
 
 
 def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    for _ in range(timeout_ms // 200):
+    end_s = time.monotonic() + timeout_ms / 1000
+    while time.monotonic() < end_s:
         if condition():
             return
         page.wait_for_timeout(200)

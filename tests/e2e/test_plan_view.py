@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 import zipfile
 from io import BytesIO
 from pathlib import Path
@@ -130,7 +131,8 @@ def _distance_m(page: Page) -> float:
 
 
 def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    for _ in range(timeout_ms // 200):
+    end_s = time.monotonic() + timeout_ms / 1000
+    while time.monotonic() < end_s:
         if condition():
             return
         page.wait_for_timeout(200)

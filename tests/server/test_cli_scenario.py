@@ -78,7 +78,7 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
         ("wood", "--world", tmp_path / "none.json"): "There is no such file",
         ("wood", "--record", there): "There is such a file already",
         ("wood", "--record", tmp_path / "new.mcap", "--seeds", 2): "A recording holds one seed",
-        ("wood", "--seed", -1): "-1",
+        ("wood", "--seeds", 0): "--seeds",
     }
     for arguments, words in wrong.items():
         run = hedgehop("scenario", *arguments)

@@ -71,3 +71,9 @@ def test_what_a_silent_node_said_counts_as_over() -> None:
     assert not kept.give_up("radar", UNHEARD_S)
     assert kept.give_up("radar", UNHEARD_S + 0.1)
     assert {doc.alert.id: doc.over for doc in kept.docs} == {"r": True, "v": False}
+
+
+def test_what_this_server_says_of_a_node_is_not_over_before_it_is_back() -> None:
+    kept = LatchedAlerts()
+    kept.on_alert(alert("lost-radar", kind="sensor"), 0.0)
+    assert not kept.give_up("radar", 100.0)

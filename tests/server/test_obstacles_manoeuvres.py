@@ -204,3 +204,29 @@ def test_without_a_position_there_is_none(planned: tuple[Dsm, PlanRecord, Path])
     here = situation(planned, 4)
     lost = replace(here, state=replace(here.state, lat_deg=None))
     assert prepare(lost, report=lambda step, share: None) == ()
+
+
+def test_the_ceiling_counts_from_the_plan_and_the_vehicle_is_as_large_as_it_is(
+    planned: tuple[Dsm, PlanRecord, Path],
+) -> None:
+    here = situation(planned, 4)
+    assert here.state.alt_rel_home_m is not None
+    higher = replace(here, state=replace(here.state, alt_rel_home_m=here.state.alt_rel_home_m + 28.0))
+    low_wall = replace(situation(planned, 40), state=higher.state, height_offset_m=28.0)
+    over = prepare(low_wall, report=lambda *_: None)[0]
+    assert not over.doc.possible
+    assert "up to 2 m" in over.doc.text
+    usual, large = (prepare(each, report=lambda *_: None)[0] for each in (here, replace(here, radius_m=1.5)))
+    assert usual.doc.climb_m is not None
+    assert large.doc.climb_m is not None
+    assert large.doc.climb_m > usual.doc.climb_m
+
+
+def test_a_map_with_a_slightly_different_home_counts_where_its_things_stand(
+    planned: tuple[Dsm, PlanRecord, Path],
+) -> None:
+    here = situation(planned, 4)
+    moved = replace(here, origin=replace(here.origin, lat_deg=here.origin.lat_deg + 0.5 / 111_195))
+    ways = [prepare(each, report=lambda *_: None) for each in (here, moved)]
+    assert all(way.doc.possible for way in (*ways[0], *ways[1]))
+    assert ways[0][0].targets[-1].lon_deg == pytest.approx(ways[1][0].targets[-1].lon_deg, abs=1e-6)

@@ -119,3 +119,17 @@ def test_of_another_recording_nothing_stays() -> None:
     assert watch.statuses == {}
     assert watch.mirrors["radar"].voxel_count == 0
     assert watch.mirrors["radar"].origin is None
+
+
+def test_alerts_of_a_node_that_was_started_anew_at_once_end() -> None:
+    watch, _, clock = watching()
+    ended: list[str] = []
+    watch.ends = ended.append
+    watch.on_status(status())
+    watch.on_alert(alert())
+    for _ in range(7):
+        clock.now_s += 1.0
+        watch.on_status(status())
+        watch.tick()
+    assert ended == ["radar-1"]
+    assert [doc.over for doc in watch.state.alerts] == [True]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -219,3 +220,37 @@ def test_pages_without_a_view_have_nothing_under_their_pointer(stage: Stage) -> 
         assert stage.view.sample_under("nobody", 0.5, 0.5) is None
 
     asyncio.run(play())
+
+
+class Camera:
+    aspect = 1.5
+
+
+class LateClient:
+    """A page's view that connects after its page has asked for a shot."""
+
+    client_id = 7
+    camera = Camera()
+
+    def atomic(self) -> contextlib.AbstractContextManager[None]:
+        return contextlib.nullcontext()
+
+    def flush(self) -> None: ...
+
+
+def test_a_shot_that_was_asked_for_too_early_is_taken_when_the_view_connects(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clients: dict[int, LateClient] = {}
+    monkeypatch.setattr(viser.ViserServer, "get_clients", lambda _: clients)
+
+    async def play() -> None:
+        await stage.show(DSM, state_over(DSM))
+        await stage.view.frame("page7", "terrain")
+        await stage.view.frame("page7", "top")
+        clients[7] = LateClient()
+        await asyncio.to_thread(lambda: asyncio.run(stage.view._joined(clients[7])))  # type: ignore[arg-type]
+
+    asyncio.run(play())
+    east, north, up = np.subtract(clients[7].camera.position, clients[7].camera.look_at)  # type: ignore[attr-defined]
+    assert up > 10 * np.hypot(east, north) > 0 or (up > 0 and np.hypot(east, north) < 1e-3 * up)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.errors import NotAllowedError
+from telemetry.errors import NotAllowedError, SilentError
 from telemetry.flight.rest import Rest, rest_from
 from telemetry.messages import GuidedTarget
 from telemetry.requests import FlyManoeuvre, Operator
@@ -281,3 +281,42 @@ def test_on_the_far_way_home_it_climbs_over_what_stands_there_and_returns() -> N
     it.walls.clear()
     it.until(lambda: it.state.mode == "RTL" and state(it) == "watching")
     assert it.modes() == [BRAKE, GUIDED, RTL]
+
+
+def test_what_somebody_did_before_a_prepared_way_is_ordered_does_not_end_it() -> None:
+    it = craft()
+    it.avoiding.disable(it.now_s)
+    it.bench.command(176, 1, LOITER)
+    it.until(lambda: it.state.mode == "LOITER")
+    request = FlyManoeuvre(ME, "around", targets((14, 10, 8), (30, 0, 8)), 2)
+    with pytest.raises(NotAllowedError, match="by hand"):
+        it.avoiding.fly(request, rest_at(it, 2), it.now_s)
+    it.bench.command(176, 1, AUTO)
+    it.until(lambda: it.state.mode == "AUTO" and it.truth[0] > 8)
+    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.advance(2.0)
+    assert state(it) == "manoeuvre"
+
+
+def test_a_way_that_is_flown_after_a_pause_is_paused_no_more() -> None:
+    it = craft(Wall(25, 14))
+    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
+    it.perform(it.avoiding.pause(it.now_s))
+    it.advance(4.0)
+    request = FlyManoeuvre(ME, "around", targets((32, 10, 16), (40, 0, 16)), 2)
+    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.until(lambda: it.avoiding.detour.phase == "going")
+    assert it.avoiding.resume(it.now_s) == []
+    assert it.avoiding.detour.phase == "going"
+
+
+def test_an_order_to_stop_that_nobody_answered_is_given_again_when_the_vehicle_is_heard() -> None:
+    it = craft()
+    it.until(lambda: it.truth[0] > 8)
+    detour, helm = it.avoiding.detour, it.avoiding._helm  # pyright: ignore[reportPrivateUsage]
+    detour.avoid(rest_at(it, 2), frozenset(), it.now_s)  # lost on its way
+    detour._helm._on_failed(SilentError("Nothing was heard."), it.now_s)  # pyright: ignore[reportPrivateUsage]
+    assert helm.failed
+    silent = replace(it.state, heartbeat_t_mono_s=it.now_s - 5.0)
+    assert detour.look(silent, it.now_s) == []
+    it.until(lambda: it.state.mode in ("BRAKE", "GUIDED"), 5)

@@ -70,3 +70,20 @@ def test_late_frames_change_nothing_and_nearest_sights_come_first() -> None:
     assert [(sight.sensor, sight.distance_m) for sight in regions.occupied(2.1)] == [("radar", 4.0), ("vision", 5.0)]
     assert regions.sights["radar"].depth_m == PerceptionSettings().radar_depth_m
     assert regions.seen_by(2.1) == {"radar", "vision"}
+
+
+def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None:
+    regions = of(status(1.0, obstacles=(seen_at(5.0),)))
+    for t_s in (1.1, 1.2, 1.3, 1.0, 50.0):  # the last one says that it is from the future
+        regions.take(status(t_s, region=None))
+    assert [sight.distance_m for sight in regions.occupied(1.4)] == [5.0]
+    assert not regions.is_clear(frozenset({"vision"}), 1.4)
+    regions.take(status(1.4))
+    assert regions.sights["vision"].t_mono_s == 1.4
+
+
+def test_of_a_sensor_that_is_blind_what_it_shows_counts_but_not_what_it_does_not() -> None:
+    thin = of(status(1.0, state="blind", obstacles=(seen_at(5.0),)))
+    assert thin.seen_by(1.1) == {"vision"}
+    thin.take(status(1.2, state="blind"))
+    assert thin.counted(1.2) == ()
