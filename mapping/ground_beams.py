@@ -150,7 +150,7 @@ def _walk(up_m, to_cell, origin, ray, step, range_cell, down_6db, gap, area):
 @njit(cache=True, nogil=True)
 def _show(low, high, along, ray, range_cell, down_6db, gap, area):
     """Put what lies between two elevations, so far ``along`` the ground, into its range cells."""
-    pieces = math.ceil((high - low) / PIECE_RAD)
+    pieces = max(1, math.ceil((high - low) / PIECE_RAD))  # slopes may differ where their angles do not
     thick = (high - low) / pieces
     for i in range(pieces):
         elevation = low + (i + 0.5) * thick

@@ -26,7 +26,7 @@ from server.charts import chart
 from server.documents import request_from_doc
 from server.jobs import Progress
 from server.library.orthophotos import load_orthophoto
-from server.library.seen import load_planned_terrain, load_seen
+from server.library.seen import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import load_terrain
 from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
@@ -84,6 +84,12 @@ def _terrain_with_seen(directory: Path, seen_id: str) -> tuple[Dsm, int]:
     return load_planned_terrain(directory, seen_id), load_seen(directory, seen_id).count
 
 
+@lru_cache(maxsize=8)
+def _check_home(directory: Path, seen_id: str, home_lat_lon_deg: tuple[float, float]) -> None:
+    """Once for each home: it reads the model as it came."""
+    check_home_stands_on_ground(directory, _terrain_with_seen(directory, seen_id)[0], home_lat_lon_deg)
+
+
 def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tuple[ResultDoc, PlanScene]:
     """The answer to an edit, without the trade table."""
     plan, source, seconds = last_plan.of(directory, document, report)
@@ -133,7 +139,12 @@ def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, D
         source, columns = _terrain(directory), 0
     else:
         source, columns = _terrain_with_seen(directory, document.seen_id)
-    plan = plan_mission(source, request_from_doc(document, source), report=timer)
+    request = request_from_doc(document, source)
+    if document.seen_id is not None:
+        first = [(poi.lat_deg, poi.lon_deg) for poi in request.pois[:1]]
+        for home in [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else first:
+            _check_home(directory, document.seen_id, home)
+    plan = plan_mission(source, request, report=timer)
     return (plan if not columns else with_seen(plan, columns)), source, timer.seconds()
 
 

@@ -24,7 +24,7 @@ from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
 from server.documents import profile_from_doc
 from server.jobs import Progress
-from server.library.seen import load_planned_terrain
+from server.library.seen import check_home_stands_on_ground, load_planned_terrain
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
 from telemetry.messages import Item, OnboardMission, PlanRecord
 from telemetry.vehicle import VehicleState
@@ -73,6 +73,8 @@ def check_start(
 
     report("Checking the start", None)
     dsm, planned = load_planned_terrain(directory, seen_in(record)), read_wpl(record.mission_wpl)
+    if seen_in(record) is not None:
+        check_home_stands_on_ground(directory, dsm, (state.home_lat_deg, state.home_lon_deg))
     found = check(
         onboard,
         state,

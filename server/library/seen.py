@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from planning.dsm import F64, Dsm
+from planning.errors import PoiError
 from planning.holes import fill_holes
 from planning.seen import Columns, burn
 from server.errors import NotReadyError, StorageError
 from server.library.files import check_id, new_id, write_atomically
 from server.library.terrains import load_terrain
+
+_SAME_M = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,26 @@ def load_planned_terrain(terrain_directory: Path, seen_id: str | None) -> Dsm:
     for columns in load_seen(terrain_directory, seen_id).columns:
         dsm = burn(dsm, columns)
     return dsm
+
+
+def check_home_stands_on_ground(
+    terrain_directory: Path, raised: Dsm, home_lat_lon_deg: tuple[float | None, float | None]
+) -> None:
+    """Raises PoiError where the model's height at home is not the ground's: all heights are counted from there.
+
+    On a column of what was seen the whole flight would be lower than planned by as much as the column is high.
+    """
+    lat_deg, lon_deg = home_lat_lon_deg
+    if lat_deg is None or lon_deg is None or not (abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
+        return
+    xy_m = raised.xy_from_lat_lon(np.array([[lat_deg, lon_deg]]))
+    over_m = float(raised.elevation_at(xy_m)[0] - load_terrain(terrain_directory).elevation_at(xy_m)[0])
+    if np.isfinite(raised.elevation_at(xy_m)[0]) and not over_m <= _SAME_M:
+        raise PoiError(
+            "Something that was seen stands where home is: heights would be counted from its top.",
+            where="home",
+            advice="Move home, or plan without what was seen.",
+        )
 
 
 def _columns(arrays: np.lib.npyio.NpzFile, number: int) -> Columns:

@@ -88,12 +88,12 @@ class Manoeuvres:
                     continue
 
     async def _renew(self, alert: ObstacleAlert) -> None:
-        situation = self._situation(alert)
-        if situation is None or self._watch.avoidance.state in ("climbing", "holding", "ceiling"):
-            self._show(())  # those on show begin where the vehicle is no more
-            return
-        self._busy("" if self.prepared else "Looking for a way past the obstacle")
         try:
+            situation = await asyncio.to_thread(self._situation, alert)  # maps may be large
+            if situation is None or self._watch.avoidance.state in ("climbing", "holding", "ceiling"):
+                self._show(())  # those on show begin where the vehicle is no more
+                return
+            self._busy("" if self.prepared else "Looking for a way past the obstacle")
             prepared = await self._prepare(situation)
         except Exception as error:
             log.warning("No manoeuvre: %s", reported(error, log, "Preparing a manoeuvre").what)

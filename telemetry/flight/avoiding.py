@@ -6,6 +6,7 @@ It engages only where the region is deep enough to stop in. The link node and si
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from planning.avoidance import largest_speed_m_s, may_engage
@@ -60,6 +61,8 @@ class Avoiding:
         self.released = ""
         """Who has taken over; it stays off for this flight."""
         self._too_fast: Sight | None = None
+        self.cannot = False
+        """Something is in the way of a flight that it could not go on with."""
         self._now_s = 0.0
 
     @property
@@ -119,8 +122,7 @@ class Avoiding:
     def fly(self, request: FlyManoeuvre, rest: Rest, now_s: float) -> list[Action]:
         """A prepared way, then ``rest`` higher by what the request says. Raises NotAllowedError."""
         state = self._state
-        if not request.targets:
-            raise NotAllowedError("The way has no places.", advice="Prepare it again.")
+        self._check_way(request)
         if state is None or not _is_flying(state):
             raise NotAllowedError("The vehicle is not in the air.", advice="A way around is flown in flight.")
         if self.released:
@@ -133,6 +135,18 @@ class Avoiding:
         return self.detour.fly(
             request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
         )
+
+    def _check_way(self, request: FlyManoeuvre) -> None:
+        if not request.targets:
+            raise NotAllowedError("The way has no places.", advice="Prepare it again.")
+        numbers = [
+            n for t in request.targets for n in (t.lat_deg, t.lon_deg, t.alt_rel_home_m, t.speed_m_s, t.loiter_s)
+        ]
+        if not all(map(math.isfinite, (*numbers, request.height_offset_m))):
+            raise NotAllowedError("The way has a place that is no number.", advice="Prepare it again.")
+        if request.height_offset_m > self._params.ceiling_m + LOW_M:
+            what = f"It is {request.height_offset_m:.0f} m above the plan; {self._params.ceiling_m:g} m are the most."
+            raise NotAllowedError(what, advice="Fly around it.")
 
     def pause(self, now_s: float) -> list[Action]:
         return self.detour.pause(now_s)
@@ -202,7 +216,7 @@ class Avoiding:
         return actions
 
     def _look_ahead(self, state: VehicleState, now_s: float) -> list[Action]:
-        going = self.detour.phase == "going" and not self.detour.is_manoeuvre
+        going, self.cannot = self.detour.phase == "going" and not self.detour.is_manoeuvre, False
         if self.is_engaged and not going:
             self._too_fast = None
             return []
@@ -215,6 +229,7 @@ class Avoiding:
             return self.detour.avoid_again(seen_by, now_s)
         rest = self._rest(state) if _is_flying(state) else None
         if rest is None:
+            self.cannot = _is_flying(state)
             return []
         self._on_engage()
         return self.detour.avoid(rest, seen_by, now_s)

@@ -52,6 +52,8 @@ def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
             f"Too fast to stop within {avoiding.too_fast.depth_m:g} m: {speed_m_s or 0.0:.1f} m/s,"
             f" at most {largest_m_s:.1f} m/s."
         )
+    if avoiding.cannot:
+        return "Something is in the way, but what is flown now is nothing that avoidance can go on with."
     counted = avoiding.regions.counted(now_s)
     return "" if counted else "No sensor sees ahead at the moment."
 

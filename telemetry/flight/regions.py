@@ -40,10 +40,7 @@ class Regions:
         self.sights: dict[Sensor, Sight] = {}
 
     def take(self, status: PerceptionStatus) -> None:
-        """Frames that come late or twice change nothing, nor does what is told of a frame that was refused.
-
-        Of a cloud of very few points, which counts as blind, only what it shows counts, not what it does not.
-        """
+        """Frames that come late or twice change nothing, nor does what is told of a frame that was refused."""
         if status.state == "running" and status.region is None and not status.obstacles:
             return
         before = self.sights.get(status.sensor)
@@ -56,7 +53,7 @@ class Regions:
         self.sights[status.sensor] = Sight(
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
-            counts=status.state == "running" or (status.state == "blind" and occupied),
+            counts=status.state == "running",
             occupied=occupied,
             distance_m=found_m,
             depth_m=self._depth_m(status),

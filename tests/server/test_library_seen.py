@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from planning.dsm import Dsm
+from planning.errors import PoiError
 from server.errors import NotFoundError, NotReadyError, StorageError
-from server.library.seen import load_planned_terrain, load_seen
+from server.library.seen import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import store_terrain
 from server.obstacles.mirror import MapMirror, Voxels
 from server.obstacles.seen_task import keep_seen
@@ -53,6 +54,16 @@ def test_a_mast_raises_its_cells_and_known_ground_raises_none(terrain: tuple[Dsm
     assert (raised.elevation_m[known] >= dsm.elevation_m[known]).all()
     assert load_seen(directory, seen_id).count == 9
     assert load_planned_terrain(directory, None).elevation_m.tobytes() == dsm.elevation_m.tobytes()
+
+
+def test_a_home_on_what_was_seen_is_refused(terrain: tuple[Dsm, Path]) -> None:
+    dsm, directory = terrain
+    raised = load_planned_terrain(directory, keep_seen(directory, [seen_map(dsm)], report=quiet))
+    at_home, at_mast = (tuple(dsm.lat_lon_from_xy(xy)[0].tolist()) for xy in (HOME_XY, MAST_XY))
+    check_home_stands_on_ground(directory, raised, at_home)
+    check_home_stands_on_ground(directory, raised, (None, None))
+    with pytest.raises(PoiError, match="counted from its top"):
+        check_home_stands_on_ground(directory, raised, at_mast)
 
 
 def test_a_home_on_unknown_ground_is_refused(terrain: tuple[Dsm, Path]) -> None:

@@ -230,3 +230,13 @@ def test_a_map_with_a_slightly_different_home_counts_where_its_things_stand(
     ways = [prepare(each, report=lambda *_: None) for each in (here, moved)]
     assert all(way.doc.possible for way in (*ways[0], *ways[1]))
     assert ways[0][0].targets[-1].lon_deg == pytest.approx(ways[1][0].targets[-1].lon_deg, abs=1e-6)
+
+
+def test_those_on_show_go_when_the_vehicle_begins_to_climb_by_itself() -> None:
+    desk = Desk((prepared(),), (prepared(),))
+    desk.watch.on_alert(alert("a"))
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
+    desk.watch.on_alert(alert("b"))
+    asyncio.run(desk.until(lambda: not desk.manoeuvres.prepared))
+    assert desk.watch.state.manoeuvres == []

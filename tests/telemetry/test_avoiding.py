@@ -265,6 +265,11 @@ def test_a_way_without_places_and_a_vehicle_on_the_ground_are_refused() -> None:
     it = Craft(FLIGHT, [])
     with pytest.raises(NotAllowedError, match="no places"):
         it.avoiding.fly(FlyManoeuvre(ME, "over", (), None), Rest((), "hold"), 0.0)
+    nowhere = (replace(targets((1, 0, 5))[0], alt_rel_home_m=float("nan")),)
+    with pytest.raises(NotAllowedError, match="no number"):
+        it.avoiding.fly(FlyManoeuvre(ME, "over", nowhere, None), Rest((), "hold"), 0.0)
+    with pytest.raises(NotAllowedError, match="are the most"):
+        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None, 40.0), Rest((), "hold"), 0.0)
     with pytest.raises(NotAllowedError, match="not in the air"):
         it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None), Rest((), "hold"), 0.0)
 
@@ -320,3 +325,11 @@ def test_an_order_to_stop_that_nobody_answered_is_given_again_when_the_vehicle_i
     silent = replace(it.state, heartbeat_t_mono_s=it.now_s - 5.0)
     assert detour.look(silent, it.now_s) == []
     it.until(lambda: it.state.mode in ("BRAKE", "GUIDED"), 5)
+
+
+def test_what_cannot_be_gone_on_with_is_not_taken_over_and_that_is_said() -> None:
+    it = craft(Wall(25, 15))
+    it.onboard = replace(it.onboard, items=(*it.onboard.items[:-1], place(60, 8, command=17)))  # waits without end
+    it.until(lambda: it.truth[0] > 20)
+    assert it.orders == []
+    assert "in the way" in it.avoiding.status.text

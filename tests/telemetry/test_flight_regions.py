@@ -80,10 +80,3 @@ def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None
     assert not regions.is_clear(frozenset({"vision"}), 1.4)
     regions.take(status(1.4))
     assert regions.sights["vision"].t_mono_s == 1.4
-
-
-def test_of_a_sensor_that_is_blind_what_it_shows_counts_but_not_what_it_does_not() -> None:
-    thin = of(status(1.0, state="blind", obstacles=(seen_at(5.0),)))
-    assert thin.seen_by(1.1) == {"vision"}
-    thin.take(status(1.2, state="blind"))
-    assert thin.counted(1.2) == ()
