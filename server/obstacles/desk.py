@@ -68,10 +68,13 @@ class ObstacleDesk:
         self._live = watches["live"]
         self._avoid_when_adopted = False
         """Of the demo's simulated vehicle: it climbs over what stands in its way."""
+        self._kept = PerceptionSettings()
+        """What the operator has set; the demo's own settings are never written down."""
 
     async def start(self) -> None:
         """Nodes get the settings from the bus whenever they start."""
-        self._set(await asyncio.to_thread(read_settings, self._root))
+        self._kept = await asyncio.to_thread(read_settings, self._root)
+        self._set(self._kept)
 
     async def acknowledge(self, body: AcknowledgeBody) -> ObstaclesState:
         self._live.acknowledge(body.alert_id)
@@ -85,8 +88,8 @@ class ObstacleDesk:
     def avoid_in_demo(self) -> None:
         """As soon as the simulated vehicle is connected; whoever switches avoidance before that decides."""
         self._avoid_when_adopted = True
-        if self._live.settings == PerceptionSettings():
-            self._set(DEMO_SETTINGS)
+        if replace(self._kept, clear_count=0) == PerceptionSettings():
+            self._set(replace(DEMO_SETTINGS, clear_count=self._kept.clear_count))
 
     async def on_link(self, status: LinkStatus) -> None:
         if not self._avoid_when_adopted or status.adopted is None or status.state != "live":
@@ -100,13 +103,13 @@ class ObstacleDesk:
 
     async def change_settings(self, body: PerceptionSettingsBody) -> ObstaclesState:
         self._set(changed(self._live.settings, body))
-        await asyncio.to_thread(write_settings, self._root, self._live.settings)
+        await self._keep(changed(self._kept, body))
         return self._live.state
 
     async def clear(self) -> None:
         settings = self._live.settings
         self._set(replace(settings, clear_count=settings.clear_count + 1))
-        await asyncio.to_thread(write_settings, self._root, self._live.settings)
+        await self._keep(replace(self._kept, clear_count=settings.clear_count + 1))
 
     async def fly(self, operator: Operator, manoeuvre_id: str) -> None:
         """Raises NotFoundError for one that is out of date, and what the link says."""
@@ -130,6 +133,10 @@ class ObstacleDesk:
         if voxels.origin is None or not len(voxels.keys):
             raise NotReadyError(f"The map of the {sensor} is empty.", advice="Nothing has been seen yet.")
         return await self._lane.call(map_file, voxels, sensor, kind)
+
+    async def _keep(self, settings: PerceptionSettings) -> None:
+        self._kept = settings
+        await asyncio.to_thread(write_settings, self._root, settings)
 
     def _set(self, settings: PerceptionSettings) -> None:
         self._live.on_settings(settings)

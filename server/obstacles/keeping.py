@@ -17,9 +17,26 @@ FILE = "perception.json"
 def read_settings(root: Path) -> PerceptionSettings:
     """The defaults when there are none; damaged ones cost no more than setting them again."""
     try:
-        return msgspec.json.decode((root / FILE).read_bytes(), type=PerceptionSettings)
+        found = msgspec.json.decode((root / FILE).read_bytes(), type=PerceptionSettings)
     except (FileNotFoundError, msgspec.MsgspecError):
         return PerceptionSettings()
+    return found if _makes_sense(found) else PerceptionSettings()
+
+
+def _makes_sense(settings: PerceptionSettings) -> bool:
+    """Every figure is used as a divisor, a length or an angle somewhere."""
+    lengths = (
+        settings.radar_depth_m,
+        settings.vision_depth_m,
+        settings.ranges_depth_m,
+        settings.height_m,
+        settings.brake_m_s2,
+        settings.radar_resolution_m,
+        settings.vision_resolution_m,
+        settings.memory_limit_bytes,
+    )
+    spare = (settings.vehicle_radius_m, settings.position_error_m, settings.clear_count)
+    return all(value > 0 for value in lengths) and all(value >= 0 for value in spare) and 0 < settings.fov_deg <= 180
 
 
 def write_settings(root: Path, settings: PerceptionSettings) -> None:

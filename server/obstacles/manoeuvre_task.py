@@ -58,6 +58,8 @@ class Prepared:
     height_offset_m: float = 0.0
     points_enu_m: tuple[tuple[float, float, float], ...] = ()
     """From the vehicle on, in the maps' frame; empty when there is no way."""
+    begins_lat_lon_deg: tuple[float, float] | None = None
+    """Where the vehicle was when it was prepared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +146,9 @@ def _prepared(way: Manoeuvre | NoWay, situation: Situation, ahead: _Ahead, frame
         for (lat, lon, _), up in zip(geodetic.tolist(), way.points_enu_m[1:, 2], strict=True)
     )
     points = tuple((e, n, u) for e, n, u in way.points_enu_m.tolist())
-    return Prepared(doc, targets, item, situation.height_offset_m + way.height_offset_m, points)
+    begins = frame.to_geodetic(way.points_enu_m[:1])[0].tolist()
+    height_offset_m = situation.height_offset_m + way.height_offset_m
+    return Prepared(doc, targets, item, height_offset_m, points, (begins[0], begins[1]))
 
 
 def _words(way: Manoeuvre, climb_m: float) -> str:

@@ -11,15 +11,19 @@ import numpy as np
 from server.errors import NotFoundError, reported
 from server.obstacles.manoeuvre_task import Prepared, Situation
 from server.obstacles.watch import Watch
+from server.placing import metres_apart
 from server.scene.regions import Route
 from telemetry.errors import NotAllowedError
 from telemetry.obstacles import ObstacleAlert
 from telemetry.requests import FlyManoeuvre, Operator
+from telemetry.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
-AGAIN_AFTER_S = 3.0
+AGAIN_AFTER_S = 1.0
 """While the obstacle stands in the region: the vehicle moves, and more of it is seen."""
+MOVED_ON_M = 8.0
+"""A way that begins farther away than this is not the one that would be flown."""
 
 
 class Manoeuvres:
@@ -31,8 +35,9 @@ class Manoeuvres:
         *,
         situation: Callable[[ObstacleAlert], Situation | None],
         prepare: Callable[[Situation], Awaitable[tuple[Prepared, ...]]],
+        vehicle: Callable[[], VehicleState | None],
     ) -> None:
-        self._watch, self._situation, self._prepare = watch, situation, prepare
+        self._watch, self._situation, self._prepare, self._vehicle = watch, situation, prepare, vehicle
         self._alerts: dict[str, ObstacleAlert] = {}
         self._wake = asyncio.Event()
         self.prepared: tuple[Prepared, ...] = ()
@@ -69,9 +74,21 @@ class Manoeuvres:
             )
         if not found.doc.possible:
             raise NotAllowedError(f"This manoeuvre cannot be flown: {found.doc.text}", advice="Choose the other one.")
+        self._check_begins_here(found)
         return FlyManoeuvre(
             operator, found.doc.kind, found.targets, found.rejoin_item, height_offset_m=found.height_offset_m
         )
+
+    def _check_begins_here(self, prepared: Prepared) -> None:
+        state = self._vehicle()
+        if state is None or state.lat_deg is None or state.lon_deg is None or prepared.begins_lat_lon_deg is None:
+            return
+        away_m = metres_apart(prepared.begins_lat_lon_deg, (state.lat_deg, state.lon_deg))
+        if away_m > MOVED_ON_M:
+            raise NotAllowedError(
+                f"The vehicle is {away_m:.0f} m from where this manoeuvre begins.",
+                advice="Press Hold, then fly the one that is shown from there.",
+            )
 
     async def run(self) -> None:
         """Until cancelled; what cannot be prepared is told, and the next alert is served."""

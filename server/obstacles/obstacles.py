@@ -59,7 +59,9 @@ class Obstacles:
         self._live, self._onboard, self._lane = live, onboard, lane
         self.watches: dict[Source, Watch] = {"live": Watch("live", tell), "replay": Watch("replay", tell)}
         watch = self.watches["live"]
-        self._manoeuvres = Manoeuvres(watch, situation=self._situation, prepare=self._prepare)
+        self._manoeuvres = Manoeuvres(
+            watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: live.state
+        )
         self._ground = KnownGround(library, lambda notice: bus.publish(Topic.GROUND, notice))
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres)

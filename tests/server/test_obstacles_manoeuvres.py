@@ -19,6 +19,7 @@ from planning.request import PlanRequest
 from planning.vehicle_profile import dump_profile
 from server.errors import NotFoundError
 from server.library.terrains import store_terrain
+from server.obstacles import manoeuvres
 from server.obstacles.manoeuvre_task import Prepared, Situation, prepare
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.mirror import MapMirror
@@ -50,7 +51,10 @@ class Desk:
         self.watch = Watch("live", self.told.append)
         self.answers = list(answers)
         self.asked: list[Any] = []
-        self.manoeuvres = Manoeuvres(self.watch, situation=self._situation, prepare=self._prepare)
+        self.vehicle: VehicleState | None = None
+        self.manoeuvres = Manoeuvres(
+            self.watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: self.vehicle
+        )
 
     def _situation(self, each: Any) -> Any:
         return each
@@ -71,6 +75,23 @@ class Desk:
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
+
+
+@pytest.fixture(autouse=True)
+def _prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each worker's answer is used once, however slow the machine."""
+    monkeypatch.setattr(manoeuvres, "AGAIN_AFTER_S", 600.0)
+
+
+def test_a_way_that_begins_elsewhere_is_not_flown() -> None:
+    desk = Desk((replace(prepared(), begins_lat_lon_deg=(37.7, 15.0)),))
+    desk.watch.on_alert(alert())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    desk.vehicle = VehicleState(1, 1, lat_deg=37.70005, lon_deg=15.0)
+    assert desk.manoeuvres.request(ANNA, "over-radar-1").kind == "over"
+    desk.vehicle = VehicleState(1, 1, lat_deg=37.7001, lon_deg=15.0)
+    with pytest.raises(NotAllowedError, match="11 m from where"):
+        desk.manoeuvres.request(ANNA, "over-radar-1")
 
 
 def test_they_come_with_the_alert_and_go_with_it() -> None:

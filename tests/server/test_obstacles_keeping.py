@@ -1,0 +1,27 @@
+"""Settings of perception on disk."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from server.obstacles.keeping import FILE, changed, read_settings, write_settings
+from server.schemas import PerceptionSettingsBody
+from telemetry.obstacles import PerceptionSettings
+
+
+def test_what_was_set_is_there_again(tmp_path: Path) -> None:
+    settings = changed(PerceptionSettings(), PerceptionSettingsBody(radar_depth_m=12.0, paper_bare=True))
+    write_settings(tmp_path, settings)
+    assert read_settings(tmp_path) == replace(PerceptionSettings(), radar_depth_m=12.0, paper_bare=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", '{"brake_m_s2": 0}', '{"vision_depth_m": -1}', '{"fov_deg": 400}', '{"radar_resolution_m": 0}',
+     '{"memory_limit_bytes": 0}', '{"height_m": "high"}'],
+)  # fmt: skip
+def test_damaged_settings_are_the_defaults(text: str, tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text(text)
+    assert read_settings(tmp_path) == PerceptionSettings()
+    assert read_settings(tmp_path / "none") == PerceptionSettings()
