@@ -108,10 +108,11 @@ class FlightKeeper:
         if not self._was_armed or self.status.phase not in GOING_HOME_FROM:
             return
         self._was_armed = False
-        broke_off_at = None if self._completed else self.status.broke_off_at or self.status.target
-        self.status = replace(
-            self.status, phase="landed" if self._completed else "interrupted", broke_off_at=broke_off_at
-        )
+        broke_off_at = self.status.broke_off_at or self.status.target
+        if self._completed:
+            self.status = replace(self.status, phase="landed", broke_off_at=None, hint="")
+        else:
+            self.status = replace(self.status, phase="interrupted", broke_off_at=broke_off_at)
 
     def _phase(self, phase: Phase) -> None:
         if self.status.phase != phase:
