@@ -12,7 +12,10 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = ("mapping", "planning", "telemetry", "server")
 NAMED_BY_CONTRACTS = (
     *(f"planning/{name}" for name in ("clearance", "certificate", "surface", "dilation", "geotiff")),
-    *(f"telemetry/simulator/{name}" for name in ("autopilot", "dynamics", "battery", "gnss", "world")),
+    *(
+        f"telemetry/simulator/{name}"
+        for name in ("autopilot", "dynamics", "battery", "gnss", "scene", "sensors", "world")
+    ),
     *(f"telemetry/{name}" for name in ("bus", "link_client", "recording/replay", "mavlink/link")),
     *(f"telemetry/nodes/{name}" for name in ("link", "replay")),
 )
