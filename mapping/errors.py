@@ -1,4 +1,4 @@
-"""What can go wrong while mapping, as one tree.
+"""What can go wrong while mapping, as one tree; and the base of the errors of all floors.
 
 MappingError
 ├── ParameterError         a resolution, range or probability that contradicts itself
@@ -9,12 +9,12 @@ Every error says what is wrong, where, and what to do.
 """
 
 
-class MappingError(ValueError):
-    """Base of all errors of this floor: ``what`` is one sentence with the offending value, ``where`` names the field or
-    place, ``advice`` says what to do next. ``code`` is stable, for programs.
+class DescribedError(Exception):
+    """An error for people: ``what`` is one sentence with the offending value, ``where`` names the file, row,
+    field or place, ``advice`` says what to do next. ``code`` is stable, for programs.
     """
 
-    code = "mapping"
+    code = "error"
 
     def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
         super().__init__(what, where, advice)
@@ -30,8 +30,14 @@ class MappingError(ValueError):
         return _rebuild, (type(self), self.what, self.where, self.advice)
 
 
-def _rebuild(cls: type[MappingError], what: str, where: str, advice: str) -> MappingError:
+def _rebuild(cls: type[DescribedError], what: str, where: str, advice: str) -> DescribedError:
     return cls(what, where=where, advice=advice)
+
+
+class MappingError(DescribedError, ValueError):
+    """Base of all errors of this floor."""
+
+    code = "mapping"
 
 
 class ParameterError(MappingError):

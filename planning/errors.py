@@ -16,30 +16,7 @@ PlanningError
 Every error says what is wrong, where, and what to do.
 """
 
-
-class DescribedError(Exception):
-    """An error for people: ``what`` is one sentence with the offending value, ``where`` names the file, row,
-    field or place, ``advice`` says what to do next. ``code`` is stable, for programs.
-    """
-
-    code = "error"
-
-    def __init__(self, what: str, *, where: str = "", advice: str = "") -> None:
-        super().__init__(what, where, advice)
-        self.what = what
-        self.where = where
-        self.advice = advice
-
-    def __str__(self) -> str:
-        head = f"{self.where}: {self.what}" if self.where else self.what
-        return f"{head} {self.advice}" if self.advice else head
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return _rebuild, (type(self), self.what, self.where, self.advice)
-
-
-def _rebuild(cls: type[DescribedError], what: str, where: str, advice: str) -> DescribedError:
-    return cls(what, where=where, advice=advice)
+from mapping.errors import DescribedError as DescribedError
 
 
 class PlanningError(DescribedError, ValueError):

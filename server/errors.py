@@ -35,6 +35,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 
+from mapping.errors import MappingError
 from planning.errors import DescribedError, PlanningError
 from server.schemas import ErrorDoc
 from telemetry.errors import (
@@ -143,6 +144,7 @@ class StartError(ServerError):
 
 
 STATUS: dict[type[Exception], int] = {
+    MappingError: 422,
     PlanningError: 422,
     RequestValidationError: 422,
     ValidationError: 422,

@@ -160,6 +160,14 @@ class Perception:
         self._newest = (t, frame.number, frame.source)
         return None
 
+    def _pose_for(self, frame: Frame, now_mono_s: float) -> Pose | FrameResult:
+        """Where the vehicle was when the frame was measured, by GNSS; what comes of a frame that cannot be placed."""
+        refusal = self._refusal(frame, now_mono_s)
+        if refusal is None and not self._has_fix:
+            refusal = "no GNSS position"
+        pose = self.track.at(frame.t_mono_s) if refusal is None else refusal
+        return self._drop(frame, pose, now_mono_s) if isinstance(pose, str) else pose
+
     def _drop(self, frame: Frame, reason: str, now_mono_s: float, state: State | None = None) -> FrameResult:
         self.dropped[reason] += 1
         said, text = self._state(now_mono_s)

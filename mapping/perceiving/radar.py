@@ -36,14 +36,9 @@ class RadarPerception(Perception):
 
     def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
         """Take one frame; never raises for what is in it."""
-        refusal = self._refusal(scan, now_mono_s)
-        if refusal is not None:
-            return self._drop(scan, refusal, now_mono_s)
-        if not self._has_fix:
-            return self._drop(scan, "no GNSS position", now_mono_s)
-        pose = self.track.at(scan.t_mono_s)
-        if isinstance(pose, str):
-            return self._drop(scan, pose, now_mono_s)
+        pose = self._pose_for(scan, now_mono_s)
+        if isinstance(pose, FrameResult):
+            return pose
         columns = self._columns(scan)
         if columns is None:
             return self._drop(scan, "columns of different length", now_mono_s)

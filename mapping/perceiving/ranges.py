@@ -21,14 +21,9 @@ class RangePerception(Perception):
 
     def on_frame(self, scan: RangeScan, now_mono_s: float) -> FrameResult:
         """Take one scan; never raises for what is in it."""
-        refusal = self._refusal(scan, now_mono_s)
-        if refusal is not None:
-            return self._drop(scan, refusal, now_mono_s)
-        if not self._has_fix:
-            return self._drop(scan, "no GNSS position", now_mono_s)
-        pose = self.track.at(scan.t_mono_s)
-        if isinstance(pose, str):
-            return self._drop(scan, pose, now_mono_s)
+        pose = self._pose_for(scan, now_mono_s)
+        if isinstance(pose, FrameResult):
+            return pose
         points = self._points(scan) @ heading_rotation(pose.heading_rad).T + pose.position_enu_m
         ground = self._known_ground
         explained = None if ground is None else ground.explains_points(points, self._within_m)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from abc import abstractmethod
 from collections import OrderedDict
 from typing import Any
 
@@ -35,11 +36,13 @@ class _Udp(Connection):
     _transport: Any = None
     """A DatagramTransport; its type does not know the size of its buffer."""
 
+    @abstractmethod
     def heard(self, data: bytes, addr: Any) -> None:
-        raise NotImplementedError
+        """A datagram, and who sent it."""
 
+    @abstractmethod
     async def _endpoint(self) -> tuple[asyncio.DatagramTransport, _Protocol]:
-        raise NotImplementedError
+        """The open socket. Raises OSError."""
 
     async def _stay_open(self) -> None:
         transport, protocol = await self._endpoint()
