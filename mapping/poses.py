@@ -77,6 +77,10 @@ class _Series:
         while self.samples[0].t_s < sample.t_s - self._params.keep_s:
             self.samples.popleft()
 
+    @property
+    def newest_t_s(self) -> float | None:
+        return self.samples[-1].t_s if self.samples else None
+
     def around(self, t_s: float) -> tuple[_Sample, _Sample, float] | None:
         """(before, after, share between them); share lies beyond 0..1 where the ends are carried on."""
         if not self.samples:
@@ -124,8 +128,12 @@ class PoseTrack:
     @property
     def position_t_mono_s(self) -> float | None:
         """Of the newest position that was believed."""
-        samples = self._positions.samples
-        return samples[-1].t_s if samples else None
+        return self._positions.newest_t_s
+
+    @property
+    def attitude_t_mono_s(self) -> float | None:
+        """Of the newest attitude."""
+        return self._attitudes.newest_t_s
 
     @property
     def is_doubting(self) -> bool:

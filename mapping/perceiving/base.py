@@ -25,7 +25,7 @@ FUTURE_S = 0.05
 """A frame may be measured so much after now: clocks of one machine are read one after the other."""
 TOO_OLD_S = 2.0
 SILENT_S = 1.0
-"""Without a frame for so long the sensor has stopped."""
+"""Without a frame for so long the sensor has stopped; likewise the vehicle's positions and attitudes."""
 LARGEST_GAP = 10_000
 """More missing numbers than this are a source that counts from somewhere else."""
 MOST_OBSTACLES = 16
@@ -193,9 +193,12 @@ class Perception:
             return "frozen", f"No GNSS position: the {self.name} map stands still."
         if self.track.is_doubting:
             return "frozen", f"The vehicle's position jumped: the {self.name} map stands still."
-        newest = self.track.position_t_mono_s
-        if newest is None or now_mono_s - newest > SILENT_S:
-            return "frozen", f"No position from the vehicle: the {self.name} map stands still."
+        for what, newest in (
+            ("position", self.track.position_t_mono_s),
+            ("attitude", self.track.attitude_t_mono_s),
+        ):
+            if newest is None or now_mono_s - newest > SILENT_S:
+                return "frozen", f"No {what} from the vehicle: the {self.name} map stands still."
         return "running", ""
 
     # What is searched and told

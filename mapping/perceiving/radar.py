@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mapping.perceiving.base import Perception
 from mapping.perceiving.model import FrameResult, RadarScan, Settings
 from mapping.perceiving.radar_evidence import RadarEvidence, side_lobes
+from mapping.perceiving.radar_passing import Passing
 from mapping.poses import Pose
 from mapping.radar_targets import Gate, in_gate, polar, to_enu
 
@@ -23,7 +24,8 @@ SNR_LIMITS_DB = (-30.0, 120.0)
 
 
 class RadarPerception(Perception):
-    """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, is "explained"."""
+    """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, or has only passed
+    by, is "explained"."""
 
     name = "radar"
     reach_down = math.tan(Gate().elevation_high_rad)
@@ -33,6 +35,7 @@ class RadarPerception(Perception):
         super().__init__(settings, alert_prefix=alert_prefix)
         self.gate = Gate()
         self._evidence = RadarEvidence()
+        self._passing = Passing()
 
     def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
         """Take one frame; never raises for what is in it."""
@@ -73,12 +76,29 @@ class RadarPerception(Perception):
         if self.settings.paper_bare:
             self.map.insert_hits(points)
             return
-        weight = self._evidence.weights(polar(xyz), snr, speed, pose, self._known_ground)
-        believed, earlier = self._evidence.judge(t_mono_s, points, np.where(ghost, 0.0, weight))
+        targets = polar(xyz)
+        weight = self._evidence.weights(targets, snr, speed, pose, self._known_ground)
+        weight = np.where(ghost, 0.0, weight)
+        believed, earlier = self._evidence.judge(t_mono_s, points, weight)
         self.map.insert_hits(points, explained=~believed)
         if len(earlier):
             self.map.mark_explained(np.floor(earlier / self.map.resolution_m).astype(np.int32), False)
+        moving = self._evidence.moving(targets, snr, speed, pose)
+        surplus = self._evidence.over_ground_m_s(targets, speed, pose)
+        told = moving & (weight > 0)
+        self._passing.look_at_speeds(speed)
+        self._passing.remember(t_mono_s, points[told], speed[told], surplus[told], pose)
+        self._take_back(t_mono_s, np.concatenate([points[believed], earlier]), moving[believed])
+
+    def _take_back(self, t_mono_s: float, points: F64, moving: Bools) -> None:
+        """What was believed earlier than now is of what is seen beside it."""
+        unsure = np.ones(len(points) - len(moving), np.bool_)
+        keys, columns = self._passing.observe(t_mono_s, points, np.concatenate([moving, unsure]), self.map.resolution_m)
+        if len(keys):
+            self.map.mark_explained(keys, True)
+            self._evidence.disbelieve(columns)
 
     def _forget(self) -> None:
         super()._forget()
         self._evidence.clear()
+        self._passing.clear()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,6 +42,10 @@ class EvidenceParams:
     """The same where the ground itself reaches into the gate: rocks, walls and known trees among it."""
     least_m2: float = 0.01
     """Nothing smaller is an obstacle that is seen once or twice; noise at close range is far smaller."""
+    small_m2: float = 0.1
+    far_m: float = 30.0
+    """A smaller one farther away than this is doubtful: the rim of a ridge or a crown that the surface model hides
+    just so shows as much, and there is time to look again from nearer."""
     low_m: float = 2.0
     """Above known ground; lower, while it takes off and lands, every echo grazes it and nothing is believed."""
     elevation_error_rad: float = math.radians(21.0)
@@ -53,6 +58,10 @@ class EvidenceParams:
     speed_error: float = 0.05
     """Share of the vehicle's speed: its direction and the target's are not known any better."""
     folded_m_s: float = 67 * 0.31
+    moves_m_s: float = 1.0
+    """Over ground, along the line of sight: slower ones are not told from what stands still."""
+    below_share: float = 1.0 - math.cos(math.radians(35.0))
+    """By which the lowest that the beam reaches comes nearer more slowly than what is level."""
     azimuth_sigma_rad: float = math.radians(1.0)
     """Straight ahead; beside it grows as 1 / cos."""
     most_aside_m: float = 1.3
@@ -60,13 +69,16 @@ class EvidenceParams:
     the map keeps it for good, in a voxel of 1 m."""
     same_place_m: float = 1.5
     """Targets within so much of each other, seen from above, are the same thing."""
+    grows_m: float = 3.0
+    """By so much at once a believed column grows upwards, as the vehicle climbs beside it."""
     memory_s: float = 1.5
     enough: float = 2.0
     """Frames in which a thing must have been seen; doubtful ones count half."""
 
 
 class RadarEvidence:
-    """Remembers targets for a moment, and for good the places that are believed, as columns one metre wide."""
+    """Remembers targets for a moment, and for good the places that are believed, as columns one metre wide with their
+    tops."""
 
     def __init__(self, params: EvidenceParams | None = None) -> None:
         self._params = params or EvidenceParams()
@@ -74,7 +86,7 @@ class RadarEvidence:
 
     def clear(self) -> None:
         self._recent: deque[tuple[float, F64, F64]] = deque()
-        self._believed: set[tuple[int, int]] = set()
+        self._believed: dict[tuple[int, int], float] = {}
 
     def judge(self, t_mono_s: float, points_enu: F64, weight: F64) -> tuple[Bools, F64]:
         """Targets (N, 3) of a frame and the weight of each -> which are believed, and earlier ones that are now.
@@ -91,14 +103,26 @@ class RadarEvidence:
             score += _heaviest_near(points_enu, earlier, weights, p.same_place_m)
         sure = kept & (score >= p.enough)
         fresh = self._believe(points_enu[sure])
-        believed = sure | np.array([self._column(q) in self._believed for q in points_enu], np.bool_)
+        believed = sure | np.array([self._is_known(q) for q in points_enu], np.bool_)
         return believed, self._earlier_near(fresh)
+
+    def disbelieve(self, columns: Iterable[tuple[int, int]]) -> None:
+        """What was believed there has gone."""
+        for column in columns:
+            self._believed.pop(column, None)
 
     def _believe(self, points: F64) -> F64:
         """Those of which the column is believed only now."""
-        fresh = [q for q in points if self._column(q) not in self._believed]
-        self._believed.update(self._column(q) for q in fresh)
+        fresh = [q for q in points if not self._is_known(q)]
+        for q in points:
+            column = self._column(q)
+            self._believed[column] = max(float(q[2]), self._believed.get(column, -math.inf))
         return np.array(fresh).reshape(-1, 3)
+
+    def _is_known(self, point: F64) -> bool:
+        """In a believed column, or little above it: noise far above would make a mast of a hut."""
+        top_m = self._believed.get(self._column(point))
+        return top_m is not None and float(point[2]) <= top_m + self._params.grows_m
 
     def _earlier_near(self, fresh: F64) -> F64:
         if not len(fresh):
@@ -126,8 +150,9 @@ class RadarEvidence:
         strong = size_m2 > np.maximum(p.least_m2, times * ground_m2)
         fixed = self._is_fixed(targets, radial_speed_m_s, pose)
         free = gaps > p.elevation_error_rad
+        sure = fixed & ((size_m2 > p.small_m2) | (targets.range_m < p.far_m))
         aside_m = targets.range_m * p.azimuth_sigma_rad / np.maximum(np.cos(targets.azimuth_rad), 0.3)
-        weight = np.where(strong, np.where(fixed, 1.0, 0.5), np.where(free & fixed, 0.5, 0.0))
+        weight = np.where(strong, np.where(sure, 1.0, 0.5), np.where(free & fixed, 0.5, 0.0))
         return np.where(aside_m <= p.most_aside_m, weight, 0.0)
 
     def _expected(self, targets: Polar, pose: Pose, ground: GroundGrid) -> tuple[F64, F64]:
@@ -143,15 +168,38 @@ class RadarEvidence:
         db = snr_db - p.rated_snr_db + 40 * np.log10(targets.range_m / p.rated_range_m) + 12 * off**2
         return 10 ** (np.clip(db, -100, 100) / 10)
 
+    def moving(self, targets: Polar, snr_db: F64, radial_speed_m_s: F64, pose: Pose) -> Bools:
+        """(N,) Which move over ground for sure, by their radial speed.
+
+        No ground accounts for them, however weak they are: it would stand in another cell of speed. But what is seen
+        far below, and measured level, comes nearer more slowly than the vehicle flies.
+        """
+        p = self._params
+        off, ahead, known_to = self._off_fixed(targets, radial_speed_m_s, pose)
+        low = max(p.moves_m_s, known_to)
+        high = np.maximum(p.moves_m_s, known_to + p.below_share * np.maximum(ahead, 0.0))
+        return ((off < -low) | (off > high)) & (self._cross_section_m2(targets, snr_db) > p.least_m2)
+
+    def over_ground_m_s(self, targets: Polar, radial_speed_m_s: F64, pose: Pose) -> F64:
+        """(N,) Radial speeds less those of things that stand still."""
+        return self._off_fixed(targets, radial_speed_m_s, pose)[0]
+
     def _is_fixed(self, targets: Polar, radial_speed_m_s: F64, pose: Pose) -> Bools:
         """Whether a target's radial speed is that of a thing that stands still."""
+        off, _, known_to = self._off_fixed(targets, radial_speed_m_s, pose)
+        return np.abs(off) <= known_to
+
+    def _off_fixed(self, targets: Polar, radial_speed_m_s: F64, pose: Pose) -> tuple[F64, F64, float]:
+        """(N,) radial speeds less those of things that stand still, (N,) the vehicle's speed towards these, and how
+        well the first is known."""
         p = self._params
         a = targets.azimuth_rad + pose.heading_rad
         v = pose.velocity_enu_m_s
-        expected = -(v[0] * np.sin(a) + v[1] * np.cos(a)) * np.cos(targets.elevation_rad)
-        off = np.abs(np.remainder(radial_speed_m_s - expected + p.folded_m_s / 2, p.folded_m_s) - p.folded_m_s / 2)
+        ahead = v[0] * np.sin(a) + v[1] * np.cos(a)
+        off = radial_speed_m_s + ahead * np.cos(targets.elevation_rad)
+        off = np.remainder(off + p.folded_m_s / 2, p.folded_m_s) - p.folded_m_s / 2
         climbing = abs(v[2]) * math.sin(p.elevation_error_rad)
-        return off <= 1.5 * p.speed_cell_m_s + p.speed_error * float(np.linalg.norm(v)) + climbing
+        return off, ahead, 1.5 * p.speed_cell_m_s + p.speed_error * float(np.linalg.norm(v)) + climbing
 
 
 def side_lobes(targets: Polar, snr_db: F64, params: EvidenceParams | None = None) -> Bools:
