@@ -99,7 +99,7 @@ def _way(
         return NoWay(kind, f"The mission ahead keeps {params.keep_m:g} m from all that was seen.")
     here = np.vstack([position, position])
     here_m = min(room.seen_m(here), room.surface_m(here))
-    if here_m < params.radius_m:
+    if here_m < params.radius_m + params.least_beside_m:
         return NoWay(kind, f"The vehicle is only {here_m:.1f} m from what was seen.")
     find = way_over if kind == "over" else way_around
     return find(position, line, blocked, room, min(params.keep_m, here_m), params)

@@ -22,7 +22,12 @@ SIDEWAYS_STEPS = 4
 def way_around(
     position: F64, line: LineAhead, blocked: tuple[float, float], room: Room, keep_m: float, params: AvoidanceParams
 ) -> Manoeuvre | NoWay:
-    """``Manoeuvre`` or ``NoWay``: the shortest of those that leave the line least."""
+    """``Manoeuvre`` or ``NoWay``: the shortest of those that leave the line least.
+
+    What nobody has seen behind the obstacle is not flown into: the way goes on beside it first.
+    """
+    seen, room = room, room.with_unseen(position, params.unseen_m)
+    blocked = line.blocked(room, keep_m) or blocked
     joins = _joins(line, blocked[1] + params.keep_m)
     if not joins:
         return NoWay("around", "The mission ahead ends at what was seen: there is no way back onto it.")
@@ -40,11 +45,15 @@ def way_around(
                     points_enu_m=points,
                     leg=line.leg_at(along_m),
                     height_offset_m=0.0,
-                    seen_m=room.seen_m(points),
-                    surface_m=room.surface_m(points),
+                    seen_m=seen.seen_m(points),
+                    surface_m=seen.surface_m(points),
                     length_m=_length_m(points),
                 )
-    return NoWay("around", f"Nothing is clear within {params.sideways_m:g} m to either side.")
+    return NoWay(
+        "around",
+        f"Nothing is clear within {params.sideways_m:g} m to either side; {params.unseen_m:g} m behind what was seen "
+        "count as filled.",
+    )
 
 
 def _joins(line: LineAhead, from_m: float) -> list[float]:

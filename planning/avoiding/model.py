@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
-Kind = Literal["over", "around"]
+Kind = Literal["over", "around", "sidestep"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +18,16 @@ class AvoidanceParams:
     """Of the vehicle."""
     clearance_m: float = 1.5
     """Kept beside the radius: position error, voxel errors, downwash."""
+    least_beside_m: float = 0.5
+    """Beside the hull, where the vehicle stands: nearer to anything it is not moved by a prepared way."""
     ceiling_m: float = 30.0
     """Above the plan."""
     step_m: float = 0.5
     """Of the heights that are tried; sideways it is four times as much."""
     sideways_m: float = 40.0
+    unseen_m: float = 15.0
+    """So far behind what was seen, as seen from the vehicle, nothing is known and all counts as filled: of a building
+    only the face towards the sensors has been seen."""
     ahead_m: float = 120.0
     """So much of the line ahead is looked at."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,6 +54,12 @@ class Room:
         self.seen = [near for each in seen if len((near := _within(each, low, high)).centres_enu_m)]
         self._ground = None if surface is None else _Ground(surface, low[:2], high[:2])
 
+    def with_unseen(self, from_enu_m: F64, depth_m: float) -> Room:
+        """The same with all filled that lies up to ``depth_m`` behind what was seen, looking from a place (3,)."""
+        other = copy.copy(self)
+        other.seen = [*self.seen, *(_behind(each, from_enu_m, depth_m) for each in self.seen)]
+        return other
+
     def seen_m(self, points_enu_m: F64, *, at_most_m: float = np.inf) -> float:
         """Smallest distance to any voxel; inf when none is nearer than ``at_most_m``."""
         found = np.inf
@@ -73,6 +80,18 @@ def _within(seen: Seen, low: F64, high: F64) -> Seen:
     centres = np.asarray(seen.centres_enu_m, np.float64).reshape(-1, 3)
     inside = np.all((centres[:, :2] >= low[:2]) & (centres[:, :2] <= high[:2]), axis=1)
     return Seen(centres[inside], seen.resolution_m)
+
+
+def _behind(seen: Seen, from_enu_m: F64, depth_m: float) -> Seen:
+    """Voxels of its own size, level behind each."""
+    edge_m = seen.resolution_m
+    flat = seen.centres_enu_m[:, :2] - from_enu_m[:2]
+    away = flat / np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-9)[:, None]
+    steps = np.arange(edge_m, depth_m + edge_m, edge_m)
+    filled = np.repeat(seen.centres_enu_m[None, :, :], len(steps), axis=0)
+    filled[:, :, :2] += steps[:, None, None] * away[None, :, :]
+    keys = np.unique(np.floor(filled.reshape(-1, 3) / edge_m).astype(np.int64), axis=0)
+    return Seen(((keys + 0.5) * edge_m).astype(np.float64), edge_m)
 
 
 class _Ground:
