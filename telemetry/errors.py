@@ -12,6 +12,7 @@ TelemetryError
 ├── RecordingError         a recording that cannot be read: foreign, empty, broken from the start
 │   └── RecordingFullError     no space left to record on
 ├── SensorLinkError        an agent or ground station that does not speak the sensor link's protocol
+├── SensorError            a sensor's port that is gone, busy or silent; a configuration that the sensor refuses
 └── BusError               a node that is not there, or messages nobody understands
 """
 
@@ -68,6 +69,10 @@ class RecordingFullError(RecordingError):
 
 class SensorLinkError(TelemetryError):
     code = "sensor_link"
+
+
+class SensorError(TelemetryError):
+    code = "sensor"
 
 
 class BusError(TelemetryError):

@@ -18,6 +18,7 @@ from telemetry.obstacles import (
     PerceptionStatus,
 )
 from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SimTruth, SlamPose
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 
@@ -47,6 +48,7 @@ class Topic(StrEnum):
     ALERT = "obstacle/alert"  # ObstacleAlert, each arrives
     GROUND = "ground/active"  # GroundNotice, latest wins
     PERCEPTION_SETTINGS = "perception/settings"  # PerceptionSettings, latest wins
+    TRACKS = "tracks/status"  # TracksStatus, latest wins
     AVOIDANCE = "avoidance/status"  # AvoidanceStatus, latest wins
     TRUTH = "simulator/truth"  # SimTruth, latest wins, 50 Hz
     SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
@@ -313,6 +315,7 @@ Published = (
     | ObstacleAlert
     | GroundNotice
     | PerceptionSettings
+    | TracksStatus
     | AvoidanceStatus
     | SimTruth
 )
@@ -343,6 +346,7 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.ALERT: ObstacleAlert,
     Topic.GROUND: GroundNotice,
     Topic.PERCEPTION_SETTINGS: PerceptionSettings,
+    Topic.TRACKS: TracksStatus,
     Topic.AVOIDANCE: AvoidanceStatus,
     Topic.TRUTH: SimTruth,
 }

@@ -190,8 +190,9 @@ class ObstacleAlert:
     id: str
     """One per obstacle and sensor, from begin to end."""
     sensor: Sensor
-    kind: Literal["obstacle", "conflict", "divergence", "sensor"]
-    """conflict: on the mission ahead, beyond the regions; divergence, sensor: of the sensor itself."""
+    kind: Literal["obstacle", "conflict", "approach", "divergence", "sensor"]
+    """conflict: on the mission ahead, beyond the regions; approach: a track whose closest approach will be too near;
+    divergence, sensor: of the sensor itself."""
     phase: Literal["begins", "goes_on", "ends"]
     t_mono_s: float
     """When the frame was measured that showed it."""
@@ -240,6 +241,10 @@ class PerceptionSettings:
     vision_resolution_m: float = 0.5
     memory_limit_bytes: int = 1_000_000_000
     """Per map; beyond it the map takes nothing new, and says so."""
+    safety_radius_m: float = 3.0
+    """Kept from moving objects, between middles."""
+    approach_s: float = 8.0
+    """A closest approach later than this is not alerted yet."""
 
 
 @dataclass(frozen=True, slots=True)

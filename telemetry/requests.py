@@ -167,7 +167,7 @@ class FlyManoeuvre:
     """
 
     operator: Operator
-    kind: Literal["over", "around"]
+    kind: Literal["over", "around", "sidestep"]
     targets: tuple[GuidedTarget, ...]
     rejoin_item: int | None
     height_offset_m: float = 0.0

@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 
+RadarKind = Literal["model", "iq"]
+"""Of a simulated radar. model: targets, with errors drawn to the table of the real one's; iq: samples of its
+converters, and the whole chain of processing."""
+
 
 def packed(values: NDArray[np.floating]) -> bytes:
     """Any float array as little-endian float32, in row order."""

@@ -21,10 +21,12 @@ from telemetry.agent.bandwidth import Bandwidth
 from telemetry.agent.clock import RemoteClock
 from telemetry.agent.thinning import thinned
 from telemetry.agent.wire import (
+    NOTICE_LONGEST,
     PATH,
     PROTOCOL_VERSION,
     SUBPROTOCOL,
     Hello,
+    Notice,
     Ping,
     Pong,
     Radar,
@@ -54,6 +56,8 @@ class RadarReading:
     t_s: float
     targets: F32
     """(N, 5) x, y, z in the body frame, radial speed, SNR in dB"""
+    lost: int = 0
+    """Frames that the sensor sent before it and that never came: they count as lost at the ground station, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +74,16 @@ class SlamReading:
     """Its own ``t_s`` is not looked at."""
 
 
-Reading = RadarReading | CloudReading | SlamReading
+@dataclass(frozen=True, slots=True)
+class NoticeReading:
+    """Words for the pilot, about the sensor itself."""
+
+    t_s: float
+    warning: bool
+    text: str
+
+
+Reading = RadarReading | CloudReading | SlamReading | NoticeReading
 
 
 @dataclass(slots=True)
@@ -230,6 +243,8 @@ class Agent:
         if isinstance(reading, SlamReading):
             slam = reading.slam
             return encode(Slam(t_s, slam.position_m, slam.q_wxyz, slam.tracking))
+        if isinstance(reading, NoticeReading):
+            return encode(Notice(reading.warning, reading.text[:NOTICE_LONGEST]))
         number = self._number(reading)
         if isinstance(reading, RadarReading):
             return encode(Radar(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
@@ -239,7 +254,8 @@ class Agent:
     def _number(self, reading: Reading) -> int:
         """Counted also for what is left out, so that the ground station sees the gap."""
         kind = type(reading).__name__
-        self.counts.numbers[kind] = self.counts.numbers.get(kind, -1) + 1
+        lost = reading.lost if isinstance(reading, RadarReading) else 0
+        self.counts.numbers[kind] = self.counts.numbers.get(kind, -1) + 1 + lost
         return self.counts.numbers[kind]
 
     def _skip(self, reading: Reading) -> None:

@@ -7,11 +7,13 @@ from collections import deque
 from dataclasses import dataclass
 
 from telemetry.agent.wire import (
+    NOTICE_LONGEST,
     PROTOCOL_VERSION,
     Cloud,
     FromAgent,
     FromServer,
     Hello,
+    Notice,
     Ping,
     Pong,
     Radar,
@@ -23,6 +25,7 @@ from telemetry.agent.wire import (
     targets_of,
 )
 from telemetry.errors import SensorLinkError
+from telemetry.messages import VehicleText
 from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, packed
 
 LATE_S = 0.5
@@ -30,6 +33,9 @@ FUTURE_S = 0.05
 """Beyond what clocks that were laid over each other can differ."""
 RATE_OVER_S = 5.0
 NAME_MAX = 40
+NOTICE_EVERY_S = 1.0
+WARNING, INFO = 4, 6
+"""MAV_SEVERITY"""
 
 Frame = RadarFrame | CloudFrame | SlamPose
 
@@ -40,6 +46,8 @@ class Taken:
 
     frame: Frame | None = None
     answer: FromServer | None = None
+    notice: VehicleText | None = None
+    """For the pilot, among what the vehicle itself says."""
 
 
 class Intake:
@@ -51,6 +59,7 @@ class Intake:
         self._why = ""
         self._numbers: dict[type[FromAgent], int] = {}
         self._sizes: deque[tuple[float, int]] = deque()
+        self._noticed_s = -math.inf
 
     def on_data(self, data: bytes, *, now_mono_s: float, now_utc_s: float) -> Taken:
         """Raises SensorLinkError where the connection must end: the protocol is another. Bad frames are counted."""
@@ -62,6 +71,8 @@ class Intake:
             raise SensorLinkError("An agent must say hello first.", where="sensor link")
         if isinstance(message, Ping):
             return Taken(answer=Pong(message.t_s, now_mono_s))
+        if isinstance(message, Notice):
+            return Taken(notice=self._notice(message, now_mono_s, now_utc_s))
         try:
             frame = self._frame(message, now_mono_s, now_utc_s)
         except SensorLinkError as error:
@@ -87,6 +98,15 @@ class Intake:
             raise SensorLinkError(f"An agent's name has 1 to {NAME_MAX} printable characters.", where="sensor link")
         self.name = hello.name
         return Welcome(now_mono_s)
+
+    def _notice(self, message: Notice, now_mono_s: float, now_utc_s: float) -> VehicleText | None:
+        """None for one that comes too soon after another: an agent must not drown what the vehicle says."""
+        if now_mono_s - self._noticed_s < NOTICE_EVERY_S:
+            self.refused, self._why = self.refused + 1, "Notices come too often."
+            return None
+        self._noticed_s = now_mono_s
+        text = "".join(c if c.isprintable() else " " for c in message.text[:NOTICE_LONGEST])
+        return VehicleText(now_utc_s, WARNING if message.warning else INFO, f"{self.name}: {text}")
 
     def _frame(self, message: Radar | Cloud | Slam, now_mono_s: float, now_utc_s: float) -> Frame:
         age_s = now_mono_s - message.t_s

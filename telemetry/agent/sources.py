@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from telemetry.agent.client import CloudReading, RadarReading, Reading, SlamReading
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading
 from telemetry.agent.wire import TARGET_COLUMNS, Slam
 from telemetry.errors import SensorLinkError
 from telemetry.messages import Topic
@@ -67,12 +67,14 @@ def recorded_readings(path: Path) -> Iterator[tuple[float, Reading]]:
 def at(reading: Reading, t_s: float) -> Reading:
     """The same, measured at another time."""
     match reading:
-        case RadarReading(_, targets):
-            return RadarReading(t_s, targets)
+        case RadarReading(_, targets, lost):
+            return RadarReading(t_s, targets, lost)
         case CloudReading(_, xyz_m):
             return CloudReading(t_s, xyz_m)
         case SlamReading(_, slam):
             return SlamReading(t_s, slam)
+        case NoticeReading(_, warning, text):
+            return NoticeReading(t_s, warning, text)
 
 
 def _reading(message: RadarFrame | CloudFrame | SlamPose) -> Reading:

@@ -20,6 +20,7 @@ PATH = "/api/sensors"
 TARGET_COLUMNS = 5
 """x, y, z, radial speed (positive: away), SNR in dB"""
 TARGETS_MAX, POINTS_MAX = 1000, 100_000
+NOTICE_LONGEST = 200
 STEP_M = 0.005
 """Of the coordinates of points: 16 bits reach 163 m."""
 
@@ -66,6 +67,13 @@ class Slam(msgspec.Struct, frozen=True, tag="slam", forbid_unknown_fields=True):
     tracking: Literal["good", "poor", "lost"]
 
 
+class Notice(msgspec.Struct, frozen=True, tag="notice", forbid_unknown_fields=True):
+    """What the pilot should know of a sensor: why it says nothing, or that it is back."""
+
+    warning: bool
+    text: str
+
+
 class Welcome(msgspec.Struct, frozen=True, tag="welcome", forbid_unknown_fields=True):
     """The ground station's answer to ``hello``."""
 
@@ -90,7 +98,7 @@ class Report(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=Tr
     text: str
 
 
-FromAgent = Hello | Ping | Radar | Cloud | Slam
+FromAgent = Hello | Ping | Radar | Cloud | Slam | Notice
 FromServer = Welcome | Pong | Report
 _from_agent = msgspec.msgpack.Decoder(FromAgent)
 _from_server = msgspec.msgpack.Decoder(FromServer)

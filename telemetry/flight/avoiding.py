@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from planning.avoidance import largest_speed_m_s, may_engage
+from planning.avoidance import largest_speed_m_s, may_engage, stopping_distance_m
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoiding_words import status_of
 from telemetry.flight.detour import Detour, DetourParams
@@ -27,6 +27,8 @@ from telemetry.vehicle import VehicleState
 REACTION_S = 0.2
 """From the region's word to the vehicle's first braking."""
 LOW_M = 1.0
+SHORT_M = 1.0
+"""Left between the vehicle's hull and what it stops short of."""
 FLOWN_FROM = frozenset({"AUTO", *STOP_MODES, *RETURNS})
 """Modes in which no pilot flies by hand."""
 
@@ -117,6 +119,7 @@ class Avoiding:
     def disable(self, now_s: float) -> list[Action]:
         """A vehicle that has been taken over goes on as it is: higher than planned, and nothing stops it any more."""
         self.enabled, self._now_s = False, now_s
+        self.detour.count_on_nobody()
         return []
 
     def fly(self, request: FlyManoeuvre, rest: Rest, now_s: float) -> list[Action]:
@@ -132,6 +135,8 @@ class Avoiding:
         if not self.enabled and not self.is_engaged:
             self._watch.begin()  # what anybody did before this order releases nothing
         self._on_engage()
+        if request.kind == "sidestep":
+            return self.detour.sidestep(request.targets, rest, now_s=now_s)
         return self.detour.fly(
             request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
         )
@@ -211,9 +216,27 @@ class Avoiding:
         if not actions and self.detour.goes_over:
             seen_by = self.regions.seen_by(now_s)
             return self.detour.climb_on(seen_by, now_s) if seen_by else []
+        if not actions and self.detour.goes_past and self._is_blocked(state, now_s):
+            return self.detour.stop_short(now_s)
         if self.enabled and not actions:
             actions = self._look_ahead(state, now_s)
         return actions
+
+    def _is_blocked(self, state: VehicleState, now_s: float) -> bool:
+        """Whether something ahead is so near that it must brake now; what it flies alongside is not ahead."""
+        heading_rad = state.heading_rad or 0.0
+        north_m_s, east_m_s = state.v_north_m_s or 0.0, state.v_east_m_s or 0.0
+        speed_m_s = max(0.0, north_m_s * math.cos(heading_rad) + east_m_s * math.sin(heading_rad))
+        return any(
+            (sight.distance_m or 0.0) <= self._stopping_m(sight, speed_m_s) for sight in self.regions.occupied(now_s)
+        )
+
+    def _stopping_m(self, sight: Sight, speed_m_s: float) -> float:
+        settings = self.regions.settings
+        radius_m = settings.vehicle_radius_m + settings.position_error_m + SHORT_M
+        return stopping_distance_m(
+            speed_m_s, latency_s=self._latency_s(sight), decel_m_s2=settings.brake_m_s2, radius_m=radius_m
+        )
 
     def _look_ahead(self, state: VehicleState, now_s: float) -> list[Action]:
         going, self.cannot = self.detour.phase == "going" and not self.detour.is_manoeuvre, False
@@ -223,7 +246,7 @@ class Avoiding:
         self._too_fast = next((s for s in self._fresh(now_s) if not self._may_engage(s, state)), None)
         seen = [sight for sight in self.regions.occupied(now_s) if self._may_engage(sight, state)]
         if not seen:
-            return []
+            return self.detour.hold_if_silent(state, now_s) if going else []
         seen_by: frozenset[Sensor] = frozenset(sight.sensor for sight in seen)
         if going:
             return self.detour.avoid_again(seen_by, now_s)

@@ -66,7 +66,7 @@ def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
         return "Still not clear at the highest allowed height: it holds. Return home or take over."
     if detour.phase in ("going", "ending"):
         if detour.is_manoeuvre:
-            return "On the way around."
+            return "On the way past it."
         return f"Goes on {detour.offset_m:.1f} m higher than planned." if detour.offset_m else "Goes on in GUIDED."
     seen = avoiding.regions.occupied(now_s)
     what = f"{SENSOR_WORDS[seen[0].sensor]}, {seen[0].distance_m or 0.0:.0f} m ahead" if seen else ""

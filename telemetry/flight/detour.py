@@ -9,25 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from telemetry.flight.helm import GUIDED, Helm, here_of
+from telemetry.flight.climb import Climb
+from telemetry.flight.helm import GUIDED, Helm
 from telemetry.flight.legs import Legs
-from telemetry.flight.orders import CLIMB_SPEED, Place
-from telemetry.flight.regions import OLD_S, Regions
+from telemetry.flight.regions import Regions
 from telemetry.flight.rest import Rest
+from telemetry.flight.witnesses import Witnesses
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.obstacles import Sensor
 from telemetry.vehicle import VehicleState
 
 Phase = Literal["idle", "stopping", "taking", "climbing", "levelling", "going", "holding", "ceiling", "ending"]
-AHEAD_M, AHEAD_AGAIN_M = 6.0, 4.0
-"""The climb's target is never farther above the vehicle: without a link it climbs no farther than that."""
-THERE_M = 0.3
-LEVEL_M, LEVEL_M_S = 0.5, 0.3
 HEARD_S = 2.0
 """A heartbeat as young as this shows the vehicle's mode."""
-CLIMB_DECEL_M_S2 = 1.0
-"""ArduCopter's WPNAV_ACCEL_Z."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +49,16 @@ class Detour:
         """It holds."""
         self.rest = Rest((), "hold")
         self.offset_m = 0.0
-        self.engaged: frozenset[Sensor] = frozenset()
-        self.is_manoeuvre = False
+        self._witnesses = Witnesses(self._regions)
+        self.is_manoeuvre = self._sidesteps = False
         self._paused = False
         self._then: Literal["climb", "go"] = "climb"
         self._over = True
         self._way: tuple[GuidedTarget, ...] = ()
-        self._least_m = self._ceiling_m = self._wanted_offset_m = self._way_from_m = 0.0
+        self._least_m = self._wanted_offset_m = self._way_from_m = 0.0
         self._plan_m: float | None = None
         """Height of the plan where the vehicle stands."""
-        self._column: Place | None = None
+        self._climb: Climb | None = None
         self._legs: Legs | None = None
 
     @property
@@ -80,7 +75,8 @@ class Detour:
 
     def avoid(self, rest: Rest, seen_by: frozenset[Sensor], now_s: float) -> list[Action]:
         """Something is in the way of a flight of which ``rest`` is left, at its planned heights."""
-        self.rest, self.engaged, self.is_manoeuvre, self._over, self._way = rest, seen_by, False, True, ()
+        self.rest, self.is_manoeuvre, self._over, self._way = rest, False, True, ()
+        self._witnesses.sensors = seen_by
         self._least_m, self._plan_m = 0.0, None
         return self._stop(now_s, then="climb")
 
@@ -92,20 +88,47 @@ class Detour:
         self, way: tuple[GuidedTarget, ...], rest: Rest, *, over: bool, offset_m: float, now_s: float
     ) -> list[Action]:
         """A prepared way, then the rest ``offset_m`` higher than planned. ``over``: climbs on while it is not clear."""
-        self.rest, self.engaged, self.is_manoeuvre, self._over, self._way = rest, frozenset(), True, over, way
+        self.rest, self.is_manoeuvre, self._over, self._way = rest, True, over, way
+        self._witnesses.sensors = frozenset()
+        self._sidesteps = False
         self._least_m = self._way_from_m = way[0].alt_rel_home_m
         self._plan_m = None
         self._wanted_offset_m = max(offset_m, self.offset_m)
         return self._stop(now_s, then="climb")
+
+    def sidestep(self, way: tuple[GuidedTarget, ...], rest: Rest, *, now_s: float) -> list[Action]:
+        """At once: who brakes first stays where the moving object is expected. The rest is as high as it was."""
+        self.rest, self.is_manoeuvre, self._over, self._way = rest, True, False, way
+        self._witnesses.sensors = frozenset()
+        self._least_m = self._way_from_m = way[0].alt_rel_home_m
+        self._plan_m, self._wanted_offset_m = None, self.offset_m
+        self._legs, self._sidesteps = Legs(self._helm, way), True
+        self.phase, self._then, self._paused = "taking", "go", False
+        return self._helm.change_mode(GUIDED, now_s)
 
     @property
     def goes_over(self) -> bool:
         """On a prepared way over something, whose top may not have been seen yet."""
         return self.phase == "going" and self.is_manoeuvre and self._over
 
+    @property
+    def goes_past(self) -> bool:
+        """On a prepared way beside something, of which it has seen only what was in sight.
+
+        Not on a sidestep: who brakes there stays where the moving object is expected, whose own echoes stop it.
+        """
+        return self.phase == "going" and self.is_manoeuvre and not self._over and not self._sidesteps
+
+    def stop_short(self, now_s: float) -> list[Action]:
+        """The prepared way is not clear: it holds, and whoever ordered it decides."""
+        actions = self._stop(now_s, then="go")
+        self.phase, self._paused = "holding", True
+        self.why = "Something stands on the way past: it holds. Fly another way, or return."
+        return actions
+
     def climb_on(self, seen_by: frozenset[Sensor], now_s: float) -> list[Action]:
         """The prepared way was not high enough."""
-        self.engaged, self._least_m = seen_by, 0.0
+        self._witnesses.sensors, self._least_m = seen_by, 0.0
         return self._stop(now_s, then="climb")
 
     def pause(self, now_s: float) -> list[Action]:
@@ -119,6 +142,8 @@ class Detour:
         if self.phase == "ceiling" and not self._regions.occupied(now_s):
             return self._level(state, now_s)
         if not self._paused:
+            if self.phase == "holding":
+                self.count_on_nobody()
             return []
         self._paused, self.why = False, ""
         self.phase = "stopping"
@@ -164,68 +189,58 @@ class Detour:
         return self._begin_climb(state, now_s)
 
     def _begin_climb(self, state: VehicleState, now_s: float) -> list[Action]:
-        self._column = here = here_of(state)
+        height_m, params = state.alt_rel_home_m or 0.0, self._params
         if self._plan_m is None:
-            self._plan_m = here.alt_rel_home_m - self.offset_m
-        highest_m = self._plan_m + self._params.ceiling_m if self._over else 0.0
-        self._ceiling_m = max(highest_m, self._least_m, here.alt_rel_home_m)
+            self._plan_m = height_m - self.offset_m
+        self._climb = climb = Climb(
+            self._helm,
+            state,
+            speed_m_s=params.climb_m_s,
+            latency_s=params.latency_s,
+            least_m=self._least_m,
+            ceiling_m=self._plan_m + params.ceiling_m if self._over else 0.0,
+        )
         self.phase, self.why = "climbing", ""
-        speed = self._helm.set_speed(self._params.climb_m_s, now_s, CLIMB_SPEED)
-        return [*speed, *self._on_climbing(state, now_s)]
+        return [*climb.set_speed(now_s), *self._on_climbing(state, now_s)]
 
     def _on_climbing(self, state: VehicleState, now_s: float) -> list[Action]:
-        assert self._column is not None
-        self.engaged |= self._regions.seen_by(now_s)
-        if why := self._old(state, now_s):
-            return self._hold(why, state, now_s)
-        height_m = state.alt_rel_home_m or 0.0
-        if height_m >= self._least_m - THERE_M and self._is_clear(now_s):
+        assert self._climb is not None
+        self._witnesses.join(now_s)
+        if why := self._witnesses.blind(state, now_s):
+            return self._hold(why, now_s, then="climb")
+        if self._climb.is_high_enough(state) and self._is_clear(now_s):
             return self._level(state, now_s)
-        if height_m >= self._ceiling_m - THERE_M:
+        if self._climb.is_at_ceiling(state):
             self.phase = "ceiling"
             return []
-        aim = self._helm.place
-        if aim is not None and aim.alt_rel_home_m - height_m >= min(AHEAD_AGAIN_M, self._ceiling_m - height_m):
-            return []
-        return self._rise_to(min(height_m + AHEAD_M, self._ceiling_m), now_s)
+        return self._climb.rise(state, now_s)
 
     def _is_clear(self, now_s: float) -> bool:
-        return not self._over or self._regions.is_clear(self.engaged, now_s)
-
-    def _rise_to(self, alt_rel_home_m: float, now_s: float) -> list[Action]:
-        assert self._column is not None
-        place = replace(self._column, alt_rel_home_m=alt_rel_home_m)
-        return self._helm.go_to(place, now_s, radius_m=THERE_M, holds=True)
+        return not self._over or self._witnesses.say_clear(now_s)
 
     def _level(self, state: VehicleState, now_s: float) -> list[Action]:
-        """Ends the climb as soon as it can end without coming down again."""
+        assert self._climb is not None
         self.phase = "levelling"
-        rising_m_s = max(0.0, state.climb_m_s or 0.0)
-        room_m = rising_m_s * self._params.latency_s + rising_m_s**2 / (2 * CLIMB_DECEL_M_S2)
-        height_m = max((state.alt_rel_home_m or 0.0) + room_m, self._least_m)
-        return self._rise_to(min(height_m, self._ceiling_m), now_s)
+        return self._climb.level(state, now_s)
 
     def _on_levelling(self, state: VehicleState, now_s: float) -> list[Action]:
-        if why := self._old(state, now_s):
-            return self._hold(why, state, now_s)
+        assert self._climb is not None
+        if why := self._witnesses.blind(state, now_s):
+            return self._hold(why, now_s, then="climb")
         if self._over and self._regions.occupied(now_s):
             self.phase = "climbing"
             return self._on_climbing(state, now_s)
-        place = self._helm.place
-        off_m = abs((state.alt_rel_home_m or 0.0) - (place.alt_rel_home_m if place else 0.0))
-        if off_m > LEVEL_M or abs(state.climb_m_s or 0.0) > LEVEL_M_S:
-            return []
-        return self._go_on(state, now_s)
+        return self._go_on(state, now_s) if self._climb.is_level(state) else []
 
     def _go_on(self, state: VehicleState, now_s: float) -> list[Action]:
         """At the new height."""
-        place = self._helm.place
-        assert place is not None
+        assert self._climb is not None
         assert self._plan_m is not None
-        climbed_m = place.alt_rel_home_m - self._plan_m
+        reached_m = self._climb.ordered_m
+        climbed_m = reached_m - self._plan_m
         self.phase = "going"
         if self.is_manoeuvre:
-            extra_m = max(0.0, place.alt_rel_home_m - self._way_from_m)
+            extra_m = max(0.0, reached_m - self._way_from_m)
             self.offset_m = max(self._wanted_offset_m, climbed_m if self._over else 0.0)
             self._legs = Legs(self._helm, _raised(self._way, extra_m))
         else:
@@ -269,22 +284,25 @@ class Detour:
 
     # What makes it stay where it is.
 
-    def _old(self, state: VehicleState, now_s: float) -> str:
-        """Why nothing can be told about what is ahead now; empty while all is well."""
-        at_s = state.position_t_mono_s
-        if at_s is None or now_s - at_s > OLD_S:
-            return "The vehicle's position is too old."
-        sight = self._regions.oldest(self.engaged, now_s)
-        return "" if sight is None else f"Nothing new from {sight.sensor}."
+    def hold_if_silent(self, state: VehicleState, now_s: float) -> list[Action]:
+        """On the rest of the flight: not without the frames of those who saw what was climbed over."""
+        why = self._witnesses.silent(state, now_s)
+        return self._hold(why, now_s, then="go") if why else []
 
-    def _hold(self, why: str, state: VehicleState, now_s: float) -> list[Action]:
-        self.phase, self.why, self._then = "holding", why, "climb"
+    def count_on_nobody(self) -> None:
+        """The rest of the flight is gone on with, whether anybody looks ahead or not."""
+        if self.phase == "going" or self._then == "go":
+            self._witnesses.sensors = frozenset()
+
+    def _hold(self, why: str, now_s: float, *, then: Literal["climb", "go"]) -> list[Action]:
+        self.phase, self.why, self._then = "holding", why, then
         return self._helm.stop(now_s)
 
     def _on_holding(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._helm.has_stopped(state, now_s):
             return self._stop_again_if_unheard(state, now_s)
-        if self._paused or self._old(state, now_s):
+        missing = self._witnesses.blind if self._then == "climb" else self._witnesses.silent
+        if self._paused or missing(state, now_s):
             return []
         self.phase = "taking"
         return self._on_taking(state, now_s)

@@ -102,8 +102,11 @@ class Helm:
     # What the vehicle's state shows.
 
     def has_stopped(self, state: VehicleState, now_s: float) -> bool:
+        """In the mode that was commanded for it: one that was standing in GUIDED already is not stopped before BRAKE
+        shows, or whatever is ordered next would be undone by it."""
         speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
-        return state.mode in STOP_MODES and is_fresh(state, now_s) and speed_m_s <= STANDS_M_S
+        shows = state.mode in STOP_MODES and self._mode in ("", state.mode)
+        return shows and is_fresh(state, now_s) and speed_m_s <= STANDS_M_S
 
     def has_arrived(self, state: VehicleState, now_s: float) -> bool:
         return self._handover is not None and self._handover.has_arrived(state, now_s)

@@ -20,6 +20,8 @@ class Sight:
     t_mono_s: float
     counts: bool
     """It works: it is neither blind nor frozen nor waiting for its first frame."""
+    flows: bool
+    """Frames come and are placed, whether they show anything or not."""
     occupied: bool
     distance_m: float | None
     """Of what is nearest in its way."""
@@ -54,6 +56,7 @@ class Regions:
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
             counts=status.state == "running",
+            flows=status.state in ("running", "blind"),
             occupied=occupied,
             distance_m=found_m,
             depth_m=self._depth_m(status),
@@ -85,6 +88,14 @@ class Regions:
         """Of the sensors that are counted on: the one whose frames are too old, if there is one."""
         old = [self.sights[sensor] for sensor in engaged if not self.sights[sensor].is_fresh(now_s)]
         return min(old, key=lambda sight: sight.t_mono_s, default=None)
+
+    def silent(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
+        """Of the sensors that are counted on: one that sends no frames any more, or none that can be placed.
+
+        Not the radar: without a target it sends nothing, and high up that is how clear sky looks.
+        """
+        sights = (self.sights[sensor] for sensor in engaged if sensor != "radar")
+        return next((sight for sight in sights if not sight.flows or now_s - sight.t_mono_s > OLD_S), None)
 
     def _depth_m(self, status: PerceptionStatus) -> float:
         if status.region is not None:

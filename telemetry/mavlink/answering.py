@@ -105,7 +105,8 @@ class Answering:
     async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
         _, pilot, _ = self._link.need_vehicle()
         pilot.avoidance.check_autopilot()
-        await self._record(request, f"fly {request.kind} an obstacle, {len(request.targets)} places")
+        what = "past a moving object" if request.kind == "sidestep" else f"{request.kind} an obstacle"
+        await self._record(request, f"fly {what}, {len(request.targets)} places")
         await pilot.fly_manoeuvre(request)
 
     async def _set_avoidance(self, request: requests.SetAvoidance) -> None:

@@ -35,6 +35,8 @@ class Replayer:
         self._publish, self._raw = publish, raw
         self._player: Player | None = None
         self._opening: asyncio.Task[ReplaySource] | None = None
+        self._path = Path()
+        """Of what is being opened, or was last."""
         self._error: ErrorInfo | None = None
         self._changed = asyncio.Event()
         self._turn = asyncio.Lock()
@@ -91,10 +93,14 @@ class Replayer:
         await self._give(due)
 
     async def _open(self, path: Path) -> None:
-        async with self._turn:
-            self._close()
-        opening = self._opening = asyncio.ensure_future(asyncio.to_thread(open_source, path, raw=self._raw))
-        opening.add_done_callback(self._on_opened)
+        """A file that is being opened already goes on: one that takes long, asked for again, would never be open."""
+        opening = self._opening
+        if opening is None or opening.done() or path != self._path:
+            async with self._turn:
+                self._close()
+            self._path = path
+            opening = self._opening = asyncio.ensure_future(asyncio.to_thread(open_source, path, raw=self._raw))
+            opening.add_done_callback(self._on_opened)
         await asyncio.wait((opening,), timeout=_PATIENCE_S)
         if opening.done() and not opening.cancelled():
             opening.result()

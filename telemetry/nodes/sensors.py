@@ -15,16 +15,17 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from telemetry.bus import Bus
 from telemetry.messages import Topic
 from telemetry.node import NodeContext, run_node
-from telemetry.sensing import SimTruth
+from telemetry.sensing import RadarKind, SimTruth
 from telemetry.simulator.frame import Frame
 from telemetry.simulator.scene import World
-from telemetry.simulator.sensors import RadarSensor, SlamDrift, StereoModel, StereoSensor
+from telemetry.simulator.sensors import SlamDrift, StereoModel, StereoSensor, radar_sensor
 
 _log = logging.getLogger(__name__)
 
@@ -44,6 +45,7 @@ class SensorOptions:
     seed: int = 0
     dark: bool = False
     """At night."""
+    radar: RadarKind = "model"
     points: int = 20_000
     """Rays of the stereo camera."""
 
@@ -119,7 +121,7 @@ class _Suite:
         self._make(options, model)
 
     def _make(self, options: SensorOptions, model: StereoModel) -> None:
-        self.radar = RadarSensor(self.world, seed=options.seed)
+        self.radar = radar_sensor(options.radar, self.world, seed=options.seed)
         self.stereo = StereoSensor(self.world, seed=options.seed, dark=options.dark, model=model)
         self.slam = SlamDrift(seed=options.seed)
 
@@ -181,6 +183,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--dsm", type=Path, help="surface model that stands around the vehicle")
     parser.add_argument("--seed", type=int, default=default.seed)
     parser.add_argument("--dark", action="store_true", help="at night: the camera sees nothing")
+    parser.add_argument(
+        "--radar", choices=get_args(RadarKind), default=default.radar, help="targets (model) or samples, processed (iq)"
+    )
     parser.add_argument("--points", type=int, default=default.points, help="rays of the stereo camera")
     return parser
 

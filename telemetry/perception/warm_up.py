@@ -17,7 +17,7 @@ def warm_up(kind: SensorKind) -> None:
     perceiver = Perceiver(kind, run="warm-up", utc_minus_mono_s=0.0)
     for number in range(3):
         t_s = 100.0 + 0.1 * number
-        perceiver.on_state(_state(t_s))
+        perceiver.on_state(hovering(t_s))
         if kind.uses_camera:
             perceiver.on_camera(SlamPose(t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
         perceiver.work(_frame(kind, t_s, number), lambda t_s=t_s: t_s)
@@ -26,7 +26,8 @@ def warm_up(kind: SensorKind) -> None:
     ChangeTeller(kind, 0.0).changes(perceiver.perception.map, perceiver.where.origin, 101.0)
 
 
-def _state(t_s: float) -> VehicleState:
+def hovering(t_s: float) -> VehicleState:
+    """Over its home, with its nose to the north."""
     return VehicleState(
         1,
         1,
@@ -40,6 +41,9 @@ def _state(t_s: float) -> VehicleState:
         roll_rad=0.0,
         pitch_rad=0.0,
         heading_rad=0.0,
+        v_north_m_s=0.0,
+        v_east_m_s=0.0,
+        v_down_m_s=0.0,
         home_lat_deg=45.0,
         home_lon_deg=10.0,
         home_alt_amsl_m=100.0,

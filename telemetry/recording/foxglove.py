@@ -1,4 +1,4 @@
-"""What MCAP viewers can show of a flight (positions, attitude, texts, radar targets), once more in their schemas."""
+"""What MCAP viewers can show of a flight (positions, texts, radar targets, tracks), once more in their schemas."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import Any
 import msgspec
 
 from telemetry.messages import Published, VehicleText
-from telemetry.recording import clouds
+from telemetry.recording import clouds, track_scene
 from telemetry.sensing import RadarFrame
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 HOME_FRAME, VEHICLE_FRAME = "home", "vehicle"
@@ -77,6 +78,8 @@ class Standard:
 def standard_schema(name: str) -> bytes:
     if name == clouds.SCHEMA_NAME:
         return clouds.schema()
+    if name == track_scene.SCHEMA_NAME:
+        return track_scene.schema()
     return json.dumps({"title": name, **_SCHEMAS[name]}).encode()
 
 
@@ -92,6 +95,9 @@ class Standards:
             yield _log(message)
         elif isinstance(message, RadarFrame):
             yield Standard("foxglove/radar", clouds.SCHEMA_NAME, msgspec.json.encode(clouds.point_cloud(message)))
+        elif isinstance(message, TracksStatus):
+            scene = track_scene.scene_update(message, HOME_FRAME)
+            yield Standard("foxglove/tracks", track_scene.SCHEMA_NAME, msgspec.json.encode(scene))
         elif isinstance(message, VehicleState):
             moved = message.position_t_mono_s != self._position_t_mono_s
             turned = message.attitude_t_mono_s != self._attitude_t_mono_s

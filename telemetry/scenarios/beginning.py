@@ -16,6 +16,8 @@ def vehicle_of(setup: Setup) -> SimulatedVehicle:
     parameters = Parameters()
     if setup.climb_m_s is not None:
         parameters.set("WPNAV_SPEED_UP", 100 * setup.climb_m_s)
+    if setup.battery_mah is not None:
+        parameters.set("BATT_CAPACITY", setup.battery_mah)
     return SimulatedVehicle(
         setup.world.frame,
         ground=setup.world.ground,

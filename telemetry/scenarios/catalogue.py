@@ -13,6 +13,10 @@ _WHERE = {
     "ruined-building": ("mapped_scenes", "run_ruin"),
     "castle-building": ("castle", "run"),
     "etna-like": ("terrain_hugging", "run"),
+    "long-flight": ("long_flight", "run"),
+    "arena": ("arena", "run"),
+    "iq-reflector": ("iq_reflector", "run"),
+    "foliage": ("foliage", "run"),
 }
 NAMES = tuple(_WHERE)
 

@@ -74,11 +74,17 @@ class _Flight:
         flown, wire, setup = self._flown, self._wire, self._setup
         while not self._pilot.is_over and wire.now_s - flown.began_s < setup.longest_s:
             self._step()
-            if wire.vehicle.hit is not None or (setup.most_m is not None and flown.way_m >= setup.most_m):
+            if wire.vehicle.hit is not None or self._has_seen_enough():
                 break
         flown.ended_s, flown.hit = wire.now_s, wire.vehicle.hit
         flown.landed = self._pilot.is_over and not wire.vehicle.autopilot.crashed
         return flown
+
+    def _has_seen_enough(self) -> bool:
+        flown, setup = self._flown, self._setup
+        if setup.most_m is not None and flown.way_m >= setup.most_m:
+            return True
+        return setup.most_armed_s is not None and flown.armed_s >= setup.most_armed_s
 
     # Before the take-off.
 
@@ -223,7 +229,7 @@ class _Flight:
 
     def _look(self, truth: SimTruth) -> None:
         flown, (north, east, up) = self._flown, self._wire.vehicle.estimated_neu
-        away_m = self._setup.world.distance_m(np.array([truth.position_enu_m]))[0]
+        away_m = self._setup.world.at(truth.t_sim_s).distance_m(np.array([truth.position_enu_m]))[0]
         flown.nearest_m = min(flown.nearest_m, float(away_m))
         origin = next(iter(flown.perceivers.values())).where.origin
         if origin is None:

@@ -69,6 +69,11 @@ class Flown:
         return self.ended_s - self.began_s
 
     @property
+    def armed_s(self) -> float:
+        """For how long it has been armed, or was."""
+        return self.track[-1].t_mono_s - self.track[0].t_mono_s if self.track else 0.0
+
+    @property
     def contact(self) -> bool:
         """It crashed, or came nearer to an object than its own radius."""
         return self.hit is not None or self.nearest_m <= self.vehicle_radius_m

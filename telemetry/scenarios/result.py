@@ -77,6 +77,11 @@ class FlightResult:
         return min((alert.t_s for alert in self.alerts), default=None)
 
 
+def measured(title: str, figures: tuple[Figure, ...], notes: tuple[str, ...] = ()) -> FlightResult:
+    """Of a part in which nothing flies."""
+    return FlightResult(title, 0.0, False, math.inf, (), MapFigures(), MapFigures(), figures=figures, notes=notes)
+
+
 @dataclass(frozen=True, slots=True)
 class ScenarioResult:
     name: str
@@ -168,7 +173,7 @@ def _flight_lines(flight: FlightResult) -> list[str]:
     nearest = "nothing near" if math.isinf(flight.min_true_distance_m) else f"{flight.min_true_distance_m:.2f} m"
     first = "no alert" if flight.first_alert_s is None else f"first alert after {flight.first_alert_s:.1f} s"
     head = f"{flight.title}: {flight.duration_s:.0f} s, {'CONTACT' if flight.contact else 'no contact'}, "
-    out = [head + f"nearest {nearest}, {len(flight.alerts)} alerts, {first}"]
+    out = [head + f"nearest {nearest}, {len(flight.alerts)} alerts, {first}" if flight.duration_s else flight.title]
     for name, figures in (("radar", flight.radar), ("vision", flight.vision)):
         if figures.voxels or figures.within_m:
             out.append(f"  {name}: {_map_words(figures)}")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from telemetry.scenarios.setup import Setup
 from telemetry.sensing import CloudFrame, RadarFrame, SimTruth, SlamPose
-from telemetry.simulator.sensors import RadarSensor, SlamDrift, StereoSensor
+from telemetry.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
 
 RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 
@@ -15,7 +15,7 @@ class Sensors:
     """Measures while the vehicle is armed, from where it really is."""
 
     def __init__(self, setup: Setup) -> None:
-        self._radar = RadarSensor(setup.world, seed=setup.seed) if "radar" in setup.sensors else None
+        self._radar = radar_sensor(setup.radar, setup.world, seed=setup.seed) if "radar" in setup.sensors else None
         self._stereo = None
         if "vision" in setup.sensors:
             self._stereo = StereoSensor(setup.world, seed=setup.seed, dark=setup.dark)

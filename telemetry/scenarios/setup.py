@@ -10,6 +10,7 @@ from planning.model import Mission
 from telemetry.messages import Published
 from telemetry.obstacles import PerceptionSettings, Sensor
 from telemetry.scenarios.course import Course
+from telemetry.sensing import RadarKind
 from telemetry.simulator.gnss_script import GnssEvent
 from telemetry.simulator.scene import World
 
@@ -31,6 +32,7 @@ class Setup:
     """What is known of the ground."""
     course: Course | None = None
     sensors: tuple[Sensor, ...] = ("radar", "vision")
+    radar: RadarKind = "model"
     settings: PerceptionSettings = field(default_factory=PerceptionSettings)
     avoids: bool = False
     """Only in AUTO."""
@@ -41,4 +43,8 @@ class Setup:
     climb_m_s: float | None = None
     most_m: float | None = None
     """Stop looking after so much way; None: until it has landed."""
+    most_armed_s: float | None = None
+    """Stop looking so long after it armed."""
     longest_s: float = 900.0
+    battery_mah: float | None = None
+    """None: what the simulated vehicle has."""

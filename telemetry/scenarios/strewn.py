@@ -14,20 +14,27 @@ F64 = NDArray[np.float64]
 
 FIRST_M, APART_M, LAST_M = 30.0, 35.0, 15.0
 """The first stands so far along the line, the next ones so far apart, and none this near to its end."""
+ALONE_M = 25.0
+"""Where the line crosses itself nothing stands so near to another thing: stopped before the one, a vehicle would never
+have met the other."""
 KINDS = ("mast", "wall", "tree")
 
 
-def strewn(line_enu_m: F64, terrain: SceneTerrain, random: np.random.Generator) -> list[Object]:
+def strewn(
+    line_enu_m: F64, terrain: SceneTerrain, random: np.random.Generator, *, apart_m: float = APART_M
+) -> list[Object]:
     """One kind after the other on the (K, 3) line, each reaching some metres above it."""
     objects: list[Object] = []
+    places: list[tuple[float, float]] = []
     s_m = FIRST_M + float(random.uniform(0.0, 10.0))
     while s_m < _length_m(line_enu_m) - LAST_M:
         (east, north, up), heading_rad = _at(line_enu_m, s_m)
-        ground_m = terrain.up_m(north, east)
-        height_m = up - ground_m + float(random.uniform(3.0, 8.0))
-        kind = KINDS[len(objects) % len(KINDS)]
-        objects.append(_object(kind, f"{kind} {len(objects)}", (east, north), height_m, heading_rad, random))
-        s_m += APART_M + float(random.uniform(0.0, 10.0))
+        if all(math.dist((east, north), place) >= ALONE_M for place in places):
+            places.append((east, north))
+            height_m = up - terrain.up_m(north, east) + float(random.uniform(3.0, 8.0))
+            kind = KINDS[len(objects) % len(KINDS)]
+            objects.append(_object(kind, f"{kind} {len(objects)}", (east, north), height_m, heading_rad, random))
+        s_m += apart_m + float(random.uniform(0.0, 10.0))
     return objects
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,15 +10,13 @@ from numpy.typing import NDArray
 
 from planning.demo import demo_dsm
 from planning.dsm import Dsm
-from telemetry.obstacles import PerceptionSettings, Sensor
-from telemetry.scenarios.flown import Flown, Told
+from telemetry.scenarios.encounters import encounters
 from telemetry.scenarios.hugging import Hugging, hugging, random_route
 from telemetry.scenarios.map_figures import radar_figures, vision_figures
-from telemetry.scenarios.nearness import away_m, level_away_m, objects_of
 from telemetry.scenarios.objects import world_document
-from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult
+from telemetry.scenarios.result import FlightResult, ScenarioResult
 from telemetry.scenarios.running import flown_of, own_ground, surveyed
-from telemetry.scenarios.setup import ORDER_S, Setup
+from telemetry.scenarios.setup import Setup
 from telemetry.scenarios.strewn import strewn
 from telemetry.scenarios.wanted import Wanted
 from telemetry.simulator.scene import SceneTerrain, World
@@ -29,27 +26,6 @@ F64 = NDArray[np.float64]
 NAME = "etna-like"
 ETNA_SEED = 7
 POINTS, APART_M = 5, 90.0
-IN_THE_WAY_M = 0.5
-"""An object this near to the line, or nearer, must be alarmed."""
-ITS_OWN_M, ITS_OWN_RAD = 2.0, math.radians(3.5)
-"""An alert is about an object when it is this near to it as seen from above: two of the radar's voxels, and, seen from
-the vehicle, three sigma of its azimuth with the heading's bias."""
-MOST_FALSE_PER_KM, LEAST_ALARMED = 1.0, 0.95
-
-
-@dataclass(frozen=True, slots=True)
-class Passed:
-    """An object in the way, and how far away its surface was when the vehicle could first have begun to brake."""
-
-    name: str
-    distance_m: float
-    needed_m: float
-    seen_by: tuple[Sensor, ...]
-    """Before it was met."""
-
-    @property
-    def in_time(self) -> bool:
-        return self.distance_m >= self.needed_m
 
 
 def run(wanted: Wanted) -> ScenarioResult:
@@ -73,14 +49,7 @@ def run_over(
     plan = hugging(dsm, random_route(dsm, random, points=POINTS, apart_m=apart_m))
     setup = _setup(plan, wanted, name, random, most_m)
     flown = flown_of(setup, wanted)
-    passed = passings(flown, setup.world, setup.settings)
-    false = false_alarms(flown, setup.world)
-    per_km = len(false) / max(flown.way_m / 1000, 1e-9)
-    missed = sum(not one.in_time for one in passed)
-    figures = [
-        Figure("false alarms per km", per_km, most=MOST_FALSE_PER_KM),
-        Figure("share of unknown objects alarmed in time", 1 - missed / max(len(passed), 1), least=LEAST_ALARMED),
-    ]
+    found = encounters(flown, setup.world, setup.settings)
     flight = FlightResult(
         title="terrain hugging",
         duration_s=flown.duration_s,
@@ -89,13 +58,10 @@ def run_over(
         alerts=flown.alerts_seen(),
         radar=radar_figures(flown, setup),
         vision=vision_figures(flown, setup),
-        false_alarms_per_km=per_km,
-        missed=missed,
-        figures=tuple(figures),
-        notes=(
-            f"{flown.way_m:.0f} m flown, {len(passed)} unknown objects in the way",
-            *_words(passed, false, flown, setup.world),
-        ),
+        false_alarms_per_km=found.false_per_km,
+        missed=found.missed,
+        figures=found.figures,
+        notes=found.notes,
     )
     return ScenarioResult(name, wanted.seed, (flight,))
 
@@ -115,65 +81,4 @@ def _setup(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator
         ground=surveyed(plan.dsm, wanted.seed),
         solid=False,
         most_m=min(most_m, plan.length_m),
-    )
-
-
-def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[Passed]:
-    """For every object that the vehicle flew into: was it told while there was room to stop?"""
-    track = np.array([truth.position_enu_m for truth in flown.track])
-    times = np.array([truth.t_mono_s for truth in flown.track])
-    speeds = np.array([math.hypot(*truth.velocity_enu_m_s) for truth in flown.track])
-    out = []
-    for name, rows in objects_of(world).items():
-        far_m = away_m(rows, track)
-        if far_m.min() > IN_THE_WAY_M:
-            continue
-        met = int(np.argmax(far_m <= IN_THE_WAY_M))
-        told: dict[Sensor, float] = {sensor: _told_s(flown, rows, sensor) + ORDER_S for sensor in flown.perceivers}
-        at = min(int(np.searchsorted(times, min(told.values()))), met)
-        needed_m = speeds[at] ** 2 / (2 * settings.brake_m_s2) + settings.vehicle_radius_m
-        seen_by: tuple[Sensor, ...] = tuple(sensor for sensor, t_s in told.items() if t_s < times[met])
-        out.append(Passed(name, float(far_m[at]), float(needed_m), seen_by))
-    return out
-
-
-def _told_s(flown: Flown, rows: F64, sensor: Sensor) -> float:
-    mine = (told for told in flown.told if told.alert.sensor == sensor and _is_about(told, rows))
-    return min((told.alert.done_t_mono_s for told in mine), default=math.inf)
-
-
-def false_alarms(flown: Flown, world: World) -> list[Told]:
-    """Obstacles that were told where none is."""
-    begun = [told for told in flown.told if told.alert.phase == "begins" and told.place_enu_m is not None]
-    return [told for told in begun if not _is_about(told, world.placed.rows)]
-
-
-def _is_about(told: Told, rows: F64) -> bool:
-    """Whether the alert's obstacle is one of these, as seen from above: a radar knows no heights."""
-    obstacle = told.alert.obstacle
-    if told.alert.phase == "ends" or told.place_enu_m is None or obstacle is None:
-        return False
-    return level_away_m(rows, told.place_enu_m) <= ITS_OWN_M + ITS_OWN_RAD * obstacle.distance_m
-
-
-def _words(passed: list[Passed], false: list[Told], flown: Flown, world: World) -> list[str]:
-    return [_passed_words(one) for one in passed] + [_false_words(told, flown, world) for told in false]
-
-
-def _passed_words(one: Passed) -> str:
-    told = f"told {one.distance_m:.1f} m before" if one.seen_by else "never told"
-    by = f" by {' and '.join(one.seen_by)}" if one.seen_by else ""
-    return f"{one.name}: {told}{by}, {one.needed_m:.1f} m needed{'' if one.in_time else '  MISSED'}"
-
-
-def _false_words(told: Told, flown: Flown, world: World) -> str:
-    """With what an engineer asks next: how far from anything, how high over the ground."""
-    alert, place = told.alert, told.place_enu_m
-    assert alert.obstacle is not None
-    assert place is not None
-    above_m = place[2] - world.ground_up_m(float(place[0]), float(place[1]))
-    return (
-        f"FALSE alarm of {alert.sensor} after {alert.t_mono_s - flown.began_s:.1f} s, {alert.obstacle.region}, "
-        f"{alert.obstacle.distance_m:.1f} m away, {alert.obstacle.voxels} voxels, {above_m:.1f} m over the ground, "
-        f"{level_away_m(world.placed.rows, place):.1f} m from the nearest object"
     )

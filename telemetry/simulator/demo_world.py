@@ -1,7 +1,8 @@
 """The demo's world: what has changed around the demo's mission since its surface model was made.
 
-A new building stands on the mission's first leg, trees beside a later one, and a crane farther off. Home, its column
-and every way home at the demo's RTL height are free.
+A new building stands on the mission's first leg, trees beside a later one, and a crane farther off. Another drone
+flies to and fro straight ahead of the second leg, beyond the point where the mission turns off: it comes up to the
+vehicle head-on and turns back before it. Home, its column and every way home at the demo's RTL height are free.
 """
 
 from __future__ import annotations
@@ -17,6 +18,10 @@ from telemetry.simulator.scene.world_file import FORMAT, VERSION
 NAME = "Demo hillside, some years later"
 _BUILDING_ALONG_M = 33.0
 """From home, on the way to the second point."""
+_DRONE_BEYOND_M = (18.0, 52.0)
+"""The gully, where the mission turns off: never in the region that is searched ahead, 10 m deep."""
+_DRONE_M_S = 6.0
+"""So that it comes up and turns back at least once while the vehicle flies towards it, whenever the flight began."""
 
 
 def write_demo_world(path: Path) -> None:
@@ -32,7 +37,7 @@ def demo_world() -> dict[str, object]:
         "version": VERSION,
         "name": NAME,
         "origin": {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg},
-        "objects": [_building(), *_trees(), *_crane()],
+        "objects": [_building(), *_trees(), *_crane(), _drone()],
     }
 
 
@@ -83,6 +88,22 @@ def _crane() -> list[dict[str, object]]:
             "material": "metal",
         },
     ]
+
+
+def _drone() -> dict[str, object]:
+    """On the line from the ruin to the gully."""
+    (e1, n1), (e2, n2) = _towards(1), _towards(2)
+    length = math.dist((e1, n1), (e2, n2))
+    u, v = (e2 - e1) / length, (n2 - n1) / length
+    ends = [[round(e2 + beyond * u, 3), round(n2 + beyond * v, 3)] for beyond in reversed(_DRONE_BEYOND_M)]
+    return {
+        "type": "box",
+        "name": "Other drone",
+        "path": {"points_m": ends, "speed_m_s": _DRONE_M_S},
+        "base_m": 5.0,
+        "size_m": [0.9, 0.9, 0.4],
+        "material": "metal",
+    }
 
 
 def _towards(poi: int) -> tuple[float, float]:

@@ -149,8 +149,9 @@ class SimulatedVehicle:
         self._ground_m = self.ground.up_m(n, e)
         if self.obstacles is None:
             return
-        self._ground_m = max(self._ground_m, self.obstacles.top_under_m((e, n, u + STANDING_M)))
-        if self.autopilot.flying and (name := self.obstacles.touching((e, n, u + BODY_M), REACH_M)):
+        obstacles = self.obstacles.at(self.now_s)
+        self._ground_m = max(self._ground_m, obstacles.top_under_m((e, n, u + STANDING_M)))
+        if self.autopilot.flying and (name := obstacles.touching((e, n, u + BODY_M), REACH_M)):
             self._crash_into(name)
             self.truth.v_neu = (0.0, 0.0, min(0.0, self.truth.v_neu[2]))
 

@@ -26,6 +26,10 @@ class Obstacles(Protocol):
         """The name of what a ball of this radius touches."""
         ...
 
+    def at(self, t_s: float) -> Obstacles:
+        """As they are at that simulated time: some may move."""
+        ...
+
     def top_under_m(self, p_enu: Vec3) -> float:
         """Height of the highest thing under a place that carries a vehicle; -inf without one."""
         ...

@@ -40,14 +40,19 @@ class Fields:
         return self._number(self.raw(name, default), name, low, high)
 
     def numbers(self, name: str, count: int, low: float, high: float) -> tuple[float, ...]:
-        values = self.raw(name)
-        if not isinstance(values, list) or len(values) != count:
-            raise self._wrong(name, f"{count} numbers in brackets belong here, not {_short(values)}.")
-        return tuple(self._number(value, f"{name}[{i}]", low, high) for i, value in enumerate(values))
+        return self._numbers(self.raw(name), name, count, low, high)
 
     def pair(self, name: str, low: float, high: float) -> tuple[float, float]:
         first, second = self.numbers(name, 2, low, high)
         return first, second
+
+    def pairs(self, name: str, most: int, low: float, high: float) -> tuple[tuple[float, float], ...]:
+        """At least two."""
+        values = self.raw(name)
+        if not isinstance(values, list) or not 2 <= len(values) <= most:
+            raise self._wrong(name, f"2 to {most} pairs of numbers belong here, not {_short(values)}.")
+        pairs = [self._numbers(value, f"{name}[{i}]", 2, low, high) for i, value in enumerate(values)]
+        return tuple((first, second) for first, second in pairs)
 
     def word(self, name: str, choices: Collection[str], default: object = MISSING) -> str:
         value = self.raw(name, default)
@@ -60,6 +65,11 @@ class Fields:
         if not isinstance(value, str):
             raise self._wrong(name, f"Text belongs here, not {_short(value)}.")
         return value
+
+    def _numbers(self, values: object, name: str, count: int, low: float, high: float) -> tuple[float, ...]:
+        if not isinstance(values, list) or len(values) != count:
+            raise self._wrong(name, f"{count} numbers in brackets belong here, not {_short(values)}.")
+        return tuple(self._number(value, f"{name}[{i}]", low, high) for i, value in enumerate(values))
 
     def _number(self, value: object, name: str, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):

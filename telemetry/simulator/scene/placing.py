@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ class Placed:
     """(K,)"""
     corner_m2: F64
     """(K,) radar cross section of a corner reflector; 0 for all else"""
+    velocity_enu_m_s: F64
+    """(K, 3)"""
 
 
 def place(shapes: tuple[AnyShape, ...], terrain: SceneTerrain, shift_m: tuple[float, float]) -> Placed:
@@ -48,7 +50,23 @@ def place(shapes: tuple[AnyShape, ...], terrain: SceneTerrain, shift_m: tuple[fl
         np.array([10 ** (m.reflectivity_db / 10) for m in materials], dtype=np.float64),
         np.array([m.texture for m in materials], dtype=np.float64),
         np.array(corners, dtype=np.float64),
+        np.zeros((len(rows), 3)),
     )
+
+
+def moved(
+    placed: Placed, shapes: tuple[AnyShape, ...], terrain: SceneTerrain, shift_m: tuple[float, float], t_s: float
+) -> Placed:
+    """With the shapes that move where they are at ``t_s``; what counts from the ground goes up and down with it."""
+    rows, velocity = placed.rows.copy(), placed.velocity_enu_m_s.copy()
+    for number, shape in enumerate(shapes):
+        if shape.motion is None:
+            continue
+        at_m, (v_east, v_north) = shape.motion.at(t_s)
+        of_shape = placed.owner == number
+        rows[of_shape] = [row for row, _, _ in _parts(replace(shape, at_m=at_m), terrain, shift_m)]
+        velocity[of_shape] = (v_east, v_north, 0.0)
+    return replace(placed, rows=rows, velocity_enu_m_s=velocity)
 
 
 _Part = tuple[list[float], str, float]

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from telemetry.simulator.scene.motion import Motion
+
 WAVELENGTH_M = 299_792_458.0 / 77.5e9
 """Of the radar that corner reflectors are made for."""
 
@@ -21,6 +23,8 @@ class Shape:
     base_m: float = 0.0
     """Height of its lower end; a base of 0 above the ground reaches down to it on slopes."""
     above: Above = "ground"
+    motion: Motion | None = None
+    """None: it stays at ``at_m``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

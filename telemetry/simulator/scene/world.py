@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from pathlib import Path
 from typing import Self
@@ -14,7 +15,7 @@ from planning.errors import ParameterError
 from telemetry.simulator.frame import Frame, Vec3
 from telemetry.simulator.scene import surfaces
 from telemetry.simulator.scene.materials import GROUND as GROUND_MATERIAL
-from telemetry.simulator.scene.placing import place
+from telemetry.simulator.scene.placing import moved, place
 from telemetry.simulator.scene.primitives import bounding_spheres, distances, top_under
 from telemetry.simulator.scene.rays import Hits, cast
 from telemetry.simulator.scene.terrain import SceneTerrain
@@ -45,7 +46,9 @@ class World:
                 where=file.name or "simulated world",
                 advice="Give a home in the world, or leave the origin out of the file.",
             )
-        self.placed = place(file.shapes, terrain, (east, north))
+        self._shift_m = (east, north)
+        self._moves = any(shape.motion for shape in file.shapes)
+        self.placed = place(file.shapes, terrain, self._shift_m)
         self._spheres = bounding_spheres(self.placed.rows)
 
     @classmethod
@@ -90,6 +93,15 @@ class World:
         if terrain is None:
             terrain = SceneTerrain.from_dsm(dsm, frame) if dsm else SceneTerrain.level()
         return cls(file, frame, terrain)
+
+    def at(self, t_s: float) -> Self:
+        """The world at that simulated time: what moves stands where it is then. This one shows the beginning."""
+        if not self._moves:
+            return self
+        then = copy.copy(self)
+        then.placed = moved(self.placed, self.shapes, self.terrain, self._shift_m, t_s)
+        then._spheres = bounding_spheres(then.placed.rows)
+        return then
 
     @property
     def ground(self) -> SceneTerrain:
@@ -154,6 +166,10 @@ class World:
 
     def texture(self, what: NDArray[np.int32]) -> F64:
         return self._of(what, self.placed.texture, GROUND_MATERIAL.texture, 0.0)
+
+    def velocity_enu_m_s(self, what: NDArray[np.int32]) -> F64:
+        """(N, 3) Of what rays met; the ground stands still."""
+        return np.concatenate([self.placed.velocity_enu_m_s, np.zeros((2, 3))])[what]
 
     def _of(self, what: NDArray[np.int32], values: F64, ground: float, nothing: float) -> F64:
         # GROUND is -1 and NOTHING -2: they stand at the end.

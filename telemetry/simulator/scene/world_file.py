@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal, cast
 
@@ -12,12 +13,15 @@ from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES, check_lat_lon, clean_name, decode_text, load_json
 from telemetry.simulator.scene.fields import Fields
 from telemetry.simulator.scene.materials import MATERIALS
+from telemetry.simulator.scene.motion import REPEATS, Motion, Pair, Repeat
 from telemetry.simulator.scene.shapes import Above, AnyShape, Box, CornerReflector, Cylinder, Tree, wall
 
 FORMAT, VERSION = "hedgehop-world", 1
 MOST_OBJECTS = 10_000
 FAR_M = 20_000.0
 _THIN_M, _LARGE_M = 0.01, 2_000.0
+MOST_MOVING, MOST_POINTS = 100, 100
+_SLOW_M_S, _FAST_M_S = 0.01, 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +74,8 @@ def parse_world(data: object, *, where: str = "world", folder: Path | None = Non
     if not isinstance(objects, list) or len(objects) > MOST_OBJECTS:
         raise FormatError(f"A list of at most {MOST_OBJECTS} objects belongs here.", where=f"{where}.objects")
     shapes = tuple(_shape(item, f"{where}: objects[{i}]", i) for i, item in enumerate(objects))
+    if sum(shape.motion is not None for shape in shapes) > MOST_MOVING:
+        raise FormatError(f"At most {MOST_MOVING} objects may move.", where=f"{where}.objects")
     return WorldFile(name, origin, (folder or Path()) / dsm if dsm else None, shapes)
 
 
@@ -102,6 +108,41 @@ def _base(fields: Fields) -> _Base:
     return _Base(fields.number("base_m", -FAR_M, FAR_M, 0.0), above)
 
 
+@dataclass(frozen=True, slots=True)
+class _Where:
+    at_m: Pair
+    motion: Motion | None
+
+
+def _where(fields: Fields) -> _Where:
+    """A place, or a path whose first point it is."""
+    path = fields.raw("path", None)
+    if path is None:
+        return _Where(_place(fields), None)
+    if fields.raw("at_m", None) is not None:
+        raise FormatError(
+            "What moves along a path stands at no place.", where=f"{fields.where}.at_m", advice="Leave it out."
+        )
+    motion = _motion(path, f"{fields.where}.path")
+    return _Where(motion.points_m[0], motion)
+
+
+def _motion(value: object, where: str) -> Motion:
+    fields = Fields(value, where)
+    points = fields.pairs("points_m", MOST_POINTS, -FAR_M, FAR_M)
+    for i, (one, other) in enumerate(pairwise(points), 1):
+        if math.dist(one, other) < _THIN_M:
+            raise FormatError("The point before is the same.", where=f"{where}.points_m[{i}]", advice="Leave it out.")
+    motion = Motion(
+        points,
+        fields.number("speed_m_s", _SLOW_M_S, _FAST_M_S),
+        cast(Repeat, fields.word("repeat", REPEATS, REPEATS[0])),
+        fields.number("after_s", 0.0, 1e6, 0.0),
+    )
+    fields.done()
+    return motion
+
+
 def _place(fields: Fields, name: str = "at_m") -> tuple[float, float]:
     return fields.pair(name, -FAR_M, FAR_M)
 
@@ -115,10 +156,12 @@ def _material(fields: Fields) -> str:
 
 
 def _box(fields: Fields, name: str) -> Box:
-    base, (width_m, depth_m, height_m) = _base(fields), fields.numbers("size_m", 3, _THIN_M, _LARGE_M)
+    place, base = _where(fields), _base(fields)
+    (width_m, depth_m, height_m) = fields.numbers("size_m", 3, _THIN_M, _LARGE_M)
     return Box(
         name=name,
-        at_m=_place(fields),
+        at_m=place.at_m,
+        motion=place.motion,
         base_m=base.base_m,
         above=base.above,
         size_m=(width_m, depth_m, height_m),
@@ -144,10 +187,11 @@ def _wall(fields: Fields, name: str) -> Box:
 
 
 def _cylinder(fields: Fields, name: str) -> Cylinder:
-    base = _base(fields)
+    place, base = _where(fields), _base(fields)
     return Cylinder(
         name=name,
-        at_m=_place(fields),
+        at_m=place.at_m,
+        motion=place.motion,
         base_m=base.base_m,
         above=base.above,
         radius_m=_size(fields, "radius_m"),
@@ -157,10 +201,11 @@ def _cylinder(fields: Fields, name: str) -> Cylinder:
 
 
 def _tree(fields: Fields, name: str) -> Tree:
-    base, height_m = _base(fields), _size(fields, "height_m")
+    place, base, height_m = _where(fields), _base(fields), _size(fields, "height_m")
     return Tree(
         name=name,
-        at_m=_place(fields),
+        at_m=place.at_m,
+        motion=place.motion,
         base_m=base.base_m,
         above=base.above,
         height_m=height_m,
@@ -172,10 +217,11 @@ def _tree(fields: Fields, name: str) -> Tree:
 
 
 def _reflector(fields: Fields, name: str) -> CornerReflector:
-    base = _base(fields)
+    place, base = _where(fields), _base(fields)
     return CornerReflector(
         name=name,
-        at_m=_place(fields),
+        at_m=place.at_m,
+        motion=place.motion,
         base_m=base.base_m,
         above=base.above,
         edge_m=fields.number("edge_m", _THIN_M, 2.0, 0.1),

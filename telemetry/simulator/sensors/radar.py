@@ -60,10 +60,10 @@ class RadarSensor:
     def _real(self, truth: SimTruth) -> _Targets:
         body_enu = of_truth(truth)
         position = np.array(truth.position_enu_m) + self.model.mount_m * body_enu[:, 2]
-        lit = echoes(self._world, self.model, position, body_enu, self._random)
+        lit = echoes(self._world.at(truth.t_sim_s), self.model, position, body_enu, self._random)
         x, y, z = (lit.offset_enu @ body_enu).T
         azimuth, elevation = np.arctan2(x, y), np.arctan2(z, np.hypot(x, y))
-        speed = -(lit.offset_enu @ np.array(truth.velocity_enu_m_s)) / lit.range_m
+        speed = lit.radial_speed_m_s(truth.velocity_enu_m_s)
         snr = self.model.snr(lit.cross_section_m2, lit.range_m, azimuth, elevation)
         seen = np.flatnonzero(np.abs(azimuth) <= self.model.half_width_rad)
         patches = Scatterers(lit.range_m[seen], azimuth[seen], elevation[seen], speed[seen], snr[seen])

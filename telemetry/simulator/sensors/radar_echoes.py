@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from telemetry.simulator.scene.world import World
 from telemetry.simulator.sensors.radar_model import RadarModel
@@ -26,6 +26,13 @@ class Echoes:
     """(N, 3) from the radar"""
     range_m: F64
     cross_section_m2: F64
+    velocity_enu_m_s: F64
+    """(N, 3) Of the scatterers, over ground."""
+
+    def radial_speed_m_s(self, own_velocity_enu_m_s: ArrayLike) -> F64:
+        """(N,) As a radar that moves itself sees them; positive: moving away."""
+        relative = self.velocity_enu_m_s - np.asarray(own_velocity_enu_m_s, np.float64)
+        return (self.offset_enu * relative).sum(axis=1) / self.range_m
 
 
 def echoes(world: World, model: RadarModel, position_enu: F64, body_enu: F64, random: np.random.Generator) -> Echoes:
@@ -48,6 +55,7 @@ def echoes(world: World, model: RadarModel, position_enu: F64, body_enu: F64, ra
         sent.direction_enu[kept] * range_m[:, None],
         range_m,
         world.reflectivity(hits.what[kept]) * sent.solid_angle[kept] * range_m**2,
+        world.velocity_enu_m_s(hits.what[kept]),
     )
     return _joined(patches, _corners(world, position_enu, near, model.range_m))
 
@@ -62,7 +70,8 @@ def _corners(world: World, position_enu: F64, near: I32, most_m: float) -> Echoe
     # Half of what is sent gets past the leaves within ln 2 of their mean way.
     hits = world.cast(position_enu, direction, np.full(len(numbers), 0.5), most_m=most_m, near=near)
     seen = (hits.what == numbers) & (range_m > NEAREST_M)
-    return Echoes(offset[seen], range_m[seen], world.placed.corner_m2[numbers][seen])
+    velocity = world.velocity_enu_m_s(numbers)
+    return Echoes(offset[seen], range_m[seen], world.placed.corner_m2[numbers][seen], velocity[seen])
 
 
 def _joined(a: Echoes, b: Echoes) -> Echoes:
@@ -70,4 +79,5 @@ def _joined(a: Echoes, b: Echoes) -> Echoes:
         np.concatenate([a.offset_enu, b.offset_enu]),
         np.concatenate([a.range_m, b.range_m]),
         np.concatenate([a.cross_section_m2, b.cross_section_m2]),
+        np.concatenate([a.velocity_enu_m_s, b.velocity_enu_m_s]),
     )

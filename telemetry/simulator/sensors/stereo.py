@@ -73,15 +73,16 @@ class StereoSensor:
         position = np.array(truth.position_enu_m) + model.mount_m * body_enu[:, 2]
         directions = self._rays @ body_enu.T
         luck = 1.0 - random.random(len(directions))
-        near = self._world.ahead(
+        world = self._world.at(truth.t_sim_s)
+        near = world.ahead(
             position, body_enu[:, 1], within_m=model.farthest_m, half_angle_rad=math.acos(self._rays[0, 1])
         )
-        hits = self._world.cast(position, directions, luck, most_m=model.farthest_m, near=near)
+        hits = world.cast(position, directions, luck, most_m=model.farthest_m, near=near)
         met = np.flatnonzero(hits.distance_m < math.inf)
         range_m = hits.distance_m[met]
         depth_m = range_m * self._rays[met, 1]
         places = position + directions[met] * range_m[:, None]
-        kept = self._matched(range_m, places, self._world.texture(hits.what[met]))
+        kept = self._matched(range_m, places, world.texture(hits.what[met]))
         kept &= depth_m >= model.nearest_m
         depth_m, rays = depth_m[kept], self._rays[met[kept]]
         noisy = depth_m + model.depth_sigma_per_m * depth_m**2 * random.standard_normal(len(depth_m))

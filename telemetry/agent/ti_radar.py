@@ -1,0 +1,201 @@
+"""A TI radar as a source of readings: configured, read, counted, and found again after its cable was pulled."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mapping.errors import RadarDataError
+from telemetry.agent.client import NoticeReading, RadarReading
+from telemetry.agent.wire import TARGETS_MAX
+from telemetry.errors import SensorError
+from telemetry.sensors.ti_mmwave.config import LEAST_SNR_DB
+from telemetry.sensors.ti_mmwave.frame import TiFrame
+from telemetry.sensors.ti_mmwave.model import TiConfig
+from telemetry.sensors.ti_mmwave.packets import TiCounts, TiStream
+from telemetry.sensors.ti_mmwave.ports import open_port
+from telemetry.sensors.ti_mmwave.session import TiPorts, configure, empty, frames
+
+AGAIN_S = (0.5, 1.0, 2.0, 5.0)
+USUAL_PERIOD_S = 0.1
+_CHUNK_BYTES = 4096
+
+
+@dataclass(slots=True)
+class TiStatus:
+    """What an agent tells of its radar."""
+
+    stream: TiCounts = field(default_factory=TiCounts)
+    points: int = 0
+    interruptions: int = 0
+    """Times that the radar went away: a pulled cable, no power, silence."""
+    trouble: str = ""
+    """Why nothing comes at present; empty while frames come."""
+
+    def as_dict(self) -> dict[str, int | str]:
+        s = self.stream
+        return {
+            "frames": s.frames,
+            "points": self.points,
+            "bytes": s.bytes,
+            "bad_bytes": s.bad_bytes,
+            "lost_packets": s.lost_packets,
+            "damaged_packets": s.damaged_packets,
+            "implausible_lengths": s.implausible_lengths,
+            "implausible_points": s.implausible_points,
+            "interruptions": self.interruptions,
+            "trouble": self.trouble,
+        }
+
+    def __str__(self) -> str:
+        s = self.stream
+        damaged = s.damaged_packets + s.implausible_lengths
+        text = (
+            f"radar: {s.frames} frames, {self.points} points, {s.lost_packets} packets lost, {damaged} damaged, "
+            f"{s.bad_bytes} bad bytes, {self.interruptions} interruptions"
+        )
+        return f"{text}; {self.trouble}" if self.trouble else text
+
+
+class TiRadar:
+    """``readings`` blocks, in a thread of its own; ``status`` may be read from any."""
+
+    def __init__(
+        self,
+        config: TiConfig,
+        ports: TiPorts,
+        *,
+        tell: Callable[[str], None],
+        now: Callable[[], float] = time.monotonic,
+        wait: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """``tell`` hears one line when the radar goes away or sends garbage, and one when it is back."""
+        self._config, self._ports, self._tell, self._now, self._wait = config, ports, tell, now, wait
+        self._stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s)
+        self.status = TiStatus(self._stream.counts)
+
+    def readings(self) -> Generator[RadarReading | NoticeReading, None, None]:
+        """For ever, with a notice for the pilot when the radar goes away and when it is back.
+
+        Raises SensorError only while not a single frame has come: then somebody can still put it right.
+        """
+        failures = 0
+        while True:
+            try:
+                for reading in self._session():
+                    failures = 0
+                    yield reading
+            except SensorError as error:
+                if not self._stream.counts.frames:
+                    raise
+                self.status.interruptions += failures == 0
+                yield from self._trouble(error)
+            self._wait(AGAIN_S[min(failures, len(AGAIN_S) - 1)])
+            failures += 1
+
+    def _session(self) -> Iterator[RadarReading | NoticeReading]:
+        self._stream.reset()
+        with contextlib.closing(open_port(self._ports.data, self._ports.data_baud)) as port:
+            empty(port)
+            if self._ports.config is not None:
+                configure(
+                    self._ports.config,
+                    self._ports.config_baud,
+                    self._config.commands,
+                    now=self._now,
+                    before_start=lambda: empty(port),
+                )
+            lost = 0
+            for t_s, frame in frames(port, self._stream, period_s=self._config.frame_period_s, now=self._now):
+                if frame is None:
+                    yield from self._garbled()
+                    continue
+                yield from self._fine()
+                lost += frame.lost_before
+                reading = reading_of(frame, t_s, self._config.least_snr_db, lost)
+                if reading is not None:
+                    self.status.points += len(reading.targets)
+                    lost = 0
+                    yield reading
+
+    def _garbled(self) -> Iterator[NoticeReading]:
+        error = SensorError(
+            "Bytes come from the radar and no frame is among them.",
+            where=self._ports.data,
+            advice=f"Check the baud rate ({self._ports.data_baud}; 921600 is usual) and that this is its data port.",
+        )
+        if not self._stream.counts.frames:
+            raise error
+        yield from self._trouble(error)
+
+    def _trouble(self, error: SensorError) -> Iterator[NoticeReading]:
+        if str(error) != self.status.trouble:
+            self.status.trouble = str(error)
+            self._tell(str(error))
+            yield NoticeReading(self._now(), True, f"radar: {error.what}")
+
+    def _fine(self) -> Iterator[NoticeReading]:
+        if self.status.trouble:
+            self.status.trouble = ""
+            self._tell("The radar sends frames again.")
+            yield NoticeReading(self._now(), False, "radar: It sends frames again.")
+
+
+def reading_of(frame: TiFrame, t_s: float, least_snr_db: float, lost: int) -> RadarReading | None:
+    """None without targets: a radar that sees nothing publishes nothing. The strongest stay where there are too many.
+
+    Targets of unknown strength count as just strong enough to have been detected.
+    """
+    if not len(frame.xyz_m):
+        return None
+    snr_db = np.where(np.isnan(frame.snr_db), np.float32(least_snr_db), frame.snr_db)
+    targets = np.column_stack((frame.xyz_m, frame.radial_speed_m_s, snr_db)).astype(np.float32)
+    if len(targets) > TARGETS_MAX:
+        strongest = np.argsort(-snr_db, kind="stable")[:TARGETS_MAX]
+        targets = targets[np.sort(strongest)]
+    return RadarReading(t_s, targets, lost)
+
+
+def captured_readings(path: Path, config: TiConfig | None, status: TiStatus) -> Iterator[tuple[float, RadarReading]]:
+    """A data port's bytes from a file: seconds since the first frame, by the frames' numbers, and the reading.
+
+    Raises RadarDataError when there is no frame in it, or speeds that only a configuration explains; and OSError.
+    """
+    stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s if config else float("nan"))
+    status.stream = stream.counts
+    period_s = config.frame_period_s if config else USUAL_PERIOD_S
+    least_snr_db = config.least_snr_db if config else LEAST_SNR_DB
+    after_s, lost = -period_s, 0
+    for frame in _captured_frames(path, stream):
+        if frame.sub_frame == 0:
+            after_s += (1 + frame.lost_before) * period_s
+        if np.isnan(frame.radial_speed_m_s).any():
+            raise RadarDataError(
+                f"Firmware of SDK {frame.sdk[0]}.{frame.sdk[1]} tells speeds in cells of unknown size.",
+                where=path.name,
+                advice="Give the radar's configuration with --ti-config.",
+            )
+        lost += frame.lost_before
+        reading = reading_of(frame, after_s, least_snr_db, lost)
+        if reading is not None:
+            status.points += len(reading.targets)
+            lost = 0
+            yield after_s, reading
+    if not stream.counts.frames:
+        raise RadarDataError(
+            f"There is no frame in its {stream.counts.bytes:,} bytes.",
+            where=path.name,
+            advice="Record the bytes of the radar's data port, at 921600 baud.",
+        )
+
+
+def _captured_frames(path: Path, stream: TiStream) -> Iterator[TiFrame]:
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK_BYTES):
+            yield from stream.feed(chunk)
+    stream.reset()

@@ -1,0 +1,99 @@
+"""What nodes that work on a sensor's frames have in common: the bus is always read, the work is done in a thread."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from typing import Any
+
+from planning.errors import DescribedError
+from telemetry.bus import Bus
+from telemetry.errors import BusError
+from telemetry.messages import Published
+from telemetry.node import NodeContext
+from telemetry.perception.ground import ground_around, why_none
+from telemetry.perception.inbox import Inbox
+from telemetry.perception.kinds import SensorKind
+from telemetry.perception.listening import Listening
+from telemetry.perception.perceiver import GroundWanted
+from telemetry.perception.worker import GROUND
+
+_log = logging.getLogger(__name__)
+
+_UNATTENDED_S, _GIVEN_UP_S = 60.0, 600.0
+_LOOK_EVERY_S = 0.5
+
+
+class NodeShell:
+    """Inbox, listening, known ground, and the life of the node; what is worked on is the subclass's."""
+
+    def __init__(self, bus: Bus, context: NodeContext, kind: SensorKind) -> None:
+        self._bus, self._context, self._kind = bus, context, kind
+        self._loop = asyncio.get_running_loop()
+        self._run = f"{os.getpid()}-{int(time.time())}"
+        self._inbox = Inbox(backlog=kind.backlog)
+        self._listening = Listening(bus, self._inbox, kind, recording_began=self._on_recording)
+        self._wanted, self._ground = asyncio.Event(), GroundWanted(None, None)
+
+    async def _work(self, run: Callable[[], None], parts: Sequence[Coroutine[Any, Any, None]] = ()) -> None:
+        """``run`` in a thread, and ``parts`` beside it, until nobody needs the node any more."""
+        working = asyncio.ensure_future(asyncio.to_thread(run))
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(p) for p in [*self._listening.parts(), *parts, self._keep_ground()]]
+                while self._is_needed() and not working.done():
+                    await asyncio.sleep(_LOOK_EVERY_S)
+                for task in tasks:
+                    task.cancel()
+        finally:
+            self._inbox.close()
+            await asyncio.wait((working,))
+        working.result()
+
+    def _is_needed(self) -> bool:
+        """A flight goes on without a server, but not one that nobody has heard of for long."""
+        unattended_s = self._context.unattended_s()
+        return unattended_s < _UNATTENDED_S or (
+            self._listening.armed and time.monotonic() - self._listening.heard_mono_s < _GIVEN_UP_S
+        )
+
+    def _on_recording(self) -> None:
+        """A recording has begun: what was told before it is not in it."""
+
+    # What the thread gives, in the event loop.
+
+    def _from_thread(self, function: Callable[..., object]) -> Callable[..., None]:
+        def call(*arguments: object) -> None:
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+        return call
+
+    def _publish(self, topic: str, message: Published) -> None:
+        try:
+            self._bus.publish(topic, message)
+        except BusError:
+            _log.info("Nothing is told any more: the bus is closed")
+
+    def _on_ground_wanted(self, wanted: GroundWanted) -> None:
+        self._ground = wanted
+        self._wanted.set()
+
+    # What takes long, in threads of its own.
+
+    async def _keep_ground(self) -> None:
+        while True:
+            await self._wanted.wait()
+            self._wanted.clear()
+            wanted = self._ground
+            if wanted.notice is None or wanted.origin is None:
+                continue
+            try:
+                grid = await asyncio.to_thread(ground_around, wanted.notice, wanted.origin)
+            except DescribedError as error:
+                _log.warning("%s", error)
+                self._inbox.put(GROUND, (wanted, None, f"Known ground is not told apart: {why_none(error)}"))
+            else:
+                self._inbox.put(GROUND, (wanted, grid, ""))

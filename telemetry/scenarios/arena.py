@@ -1,0 +1,99 @@
+"""Scenario: past two poles in a hall, by a Position2Go's tracker and velocity obstacles (Wessendorp 2021, figs 5-8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from planning.errors import ParameterError
+from telemetry.scenarios.arena_course import Approach, approaches
+from telemetry.scenarios.arena_flight import Flown, fly
+from telemetry.scenarios.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.scenarios.wanted import Wanted
+
+NAME = "arena"
+AVOIDED = 0.98
+FAR_DEG = tuple(range(0, 40, 5))
+"""Off the nose: the steps of the table of errors."""
+LEAST_SAMPLES = 30
+
+
+def run(wanted: Wanted) -> ScenarioResult:
+    """26 ways as the paper's vehicle flew them, past the nearest obstacle only, and 78 past all of them.
+
+    Raises ParameterError for a world or a recording of one's own: the hall has a vehicle of its own.
+    """
+    for name, value in (("--world", wanted.world), ("--record", wanted.record)):
+        if value is not None:
+            raise ParameterError("The arena has poles of its own and is not recorded.", where=name, advice="Leave it.")
+    return ScenarioResult(
+        NAME,
+        wanted.seed,
+        (
+            through("nearest obstacle only", 26, np.random.default_rng([wanted.seed, 6]), nearest_only=True),
+            through("all obstacles", 78, np.random.default_rng([wanted.seed, 5]), nearest_only=False),
+        ),
+    )
+
+
+def through(title: str, count: int, random: np.random.Generator, *, nearest_only: bool) -> FlightResult:
+    """So many ways from all around."""
+    ways = approaches(count, random)
+    flown = [fly(way, random, nearest_only=nearest_only) for way in ways]
+    contacts = [one.nearest_gap_m <= 0.0 for one in flown]
+    return FlightResult(
+        title=f"{count} approaches, {title}",
+        duration_s=sum(one.duration_s for one in flown),
+        contact=any(contacts),
+        min_true_distance_m=min(one.nearest_gap_m for one in flown),
+        alerts=_alerts(flown),
+        radar=MapFigures(),
+        vision=MapFigures(),
+        figures=_figures(title, ways, flown),
+        notes=_errors_by_angle([error for one in flown for error in one.errors]),
+    )
+
+
+def _figures(title: str, ways: Sequence[Approach], flown: Sequence[Flown]) -> tuple[Figure, ...]:
+    straight = np.array([way.gap_straight_on_m() <= 0.0 for way in ways])
+    clear = np.array([one.nearest_gap_m > 0.0 for one in flown])
+    errors = np.array([error for one in flown for error in one.errors]).reshape(-1, 3)
+    return (
+        Figure(f"{title}: avoided", float(clear.mean()), least=AVOIDED),
+        Figure(f"{title}: came through", float(np.mean([one.arrived for one in flown])), least=AVOIDED),
+        Figure(f"{title}: would have been avoided straight on", float(1.0 - straight.mean())),
+        Figure(f"{title}: median gap between the hulls", float(np.median([o.nearest_gap_m for o in flown])), unit=" m"),
+        Figure(f"{title}: range error, root mean square", _rms(errors[:, 1]), unit=" m"),
+        Figure(f"{title}: bearing error, root mean square", math.degrees(_rms(errors[:, 2])), unit=" deg"),
+    )
+
+
+def _errors_by_angle(errors: Sequence[tuple[float, float, float]]) -> tuple[str, ...]:
+    """Fig. 8: mean errors of tracks in view against the true places, by the distance from the nose."""
+    rows = np.array(errors).reshape(-1, 3)
+    off_deg = np.degrees(rows[:, 0])
+    out = []
+    for low in FAR_DEG:
+        some = rows[(off_deg >= low) & (off_deg < low + 5)]
+        if len(some) >= LEAST_SAMPLES:
+            range_m, bearing_deg = some[:, 1].mean(), math.degrees(some[:, 2].mean())
+            out.append(
+                f"{low:2d}-{low + 5} deg off the nose: {range_m:.2f} m, {bearing_deg:.1f} deg, {len(some)} frames"
+            )
+    return tuple(out)
+
+
+def _alerts(flown: Sequence[Flown]) -> tuple[AlertSeen, ...]:
+    """When each way was first left for an obstacle, on the clock of all of them."""
+    out, began_s = [], 0.0
+    for one in flown:
+        if one.first_evasion_s is not None:
+            out.append(AlertSeen(began_s + one.first_evasion_s, "radar", None))
+        began_s += one.duration_s
+    return tuple(out)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan

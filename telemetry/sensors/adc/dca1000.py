@@ -1,0 +1,71 @@
+"""Captures of TI's DCA1000 card (.bin) from an xWR18xx: 16-bit samples that two lanes send two by two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from mapping.errors import RadarDataError
+from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, refuse_empty
+from telemetry.sensors.ti_mmwave.model import TiConfig
+from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+
+SAMPLE_BYTES = 4
+"""I and Q."""
+
+
+def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None) -> AdcFile:
+    """``most``: of a longer file only so many frames are looked at.
+
+    A chirp holds all samples of its first receiver, then those of the next; in each, two I are followed by their two Q
+    (or the other way round, by adcbufCfg). Raises RadarDataError, and OSError.
+    """
+    params = fmcw_params(config)
+    _refuse_headers(config)
+    chirps, antennas, samples = params.shape
+    frame_bytes = chirps * antennas * samples * SAMPLE_BYTES
+    size = path.stat().st_size
+    refuse_empty(path.name, size)
+    count, rest = divmod(size, frame_bytes)
+    if most is not None and count >= most:
+        count, rest = most, 0
+    if rest:
+        raise RadarDataError(
+            f"It ends in the middle of frame {count}, {rest:,} bytes after its beginning at byte "
+            f"{count * frame_bytes:,}: by {config.file} a frame has {frame_bytes:,} bytes "
+            f"({chirps} chirps x {antennas} antennas x {samples} samples).",
+            where=path.name,
+            advice=_advice(count),
+        )
+
+    def frames() -> Iterator[AdcFrame]:
+        with path.open("rb") as file:
+            for number in range(count):
+                data = file.read(frame_bytes)
+                yield AdcFrame(number * config.frame_period_s, _cube(data, config, params.shape))
+
+    return AdcFile(path.name, params, config.frame_period_s, (), frames)
+
+
+def _cube(data: bytes, config: TiConfig, shape: tuple[int, int, int]) -> C64:
+    """Chirps of all transmitters in turn become virtual antennas."""
+    lanes = np.frombuffer(data, "<i2").reshape(-1, 2, 2).astype(np.float32)
+    first, second = lanes[:, 0].ravel(), lanes[:, 1].ravel()
+    real, imaginary = (second, first) if config.q_first else (first, second)
+    cube = np.empty(len(real), np.complex64)
+    cube.real, cube.imag = real, imaginary
+    return cube.reshape(shape)
+
+
+def _refuse_headers(config: TiConfig) -> None:
+    for command in config.commands:
+        if command.name == "lvdsStreamCfg" and command.whole(1, "the choice of headers") != 0:
+            raise command.error("Captures with headers between the samples are not understood (lvdsStreamCfg).")
+
+
+def _advice(whole_frames: int) -> str:
+    if not whole_frames:
+        return "Give the configuration that the radar ran with, or record again."
+    return f"If the configuration is the right one, take the whole frames alone: --frames {whole_frames}."

@@ -1,0 +1,89 @@
+"""The ODA data set's radar.csv (Wessendorp 2021): a row per frame, time in ns, then I and Q of two receivers.
+
+Four equal blocks follow the time: real and imaginary part of receiver 1, then of receiver 2; in each the chirps come
+one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from mapping.errors import RadarDataError
+from mapping.radar.params import FmcwParams
+from telemetry.sensors.adc.model import AdcFile, AdcFrame, refuse_empty
+
+RATE_HZ = 15.7
+_BLOCKS = 4
+
+
+def open_oda(path: Path, params: FmcwParams) -> AdcFile:
+    """Rows are read and checked one by one. Raises RadarDataError for a radar without two receivers, and OSError."""
+    refuse_empty(path.name, path.stat().st_size)
+    if len(params.antennas) != 2:
+        raise RadarDataError(
+            f"It holds two receivers, and this radar has {len(params.antennas)} antennas.",
+            where=path.name,
+            advice="Use --sensor position2go.",
+        )
+
+    def frames() -> Iterator[AdcFrame]:
+        first_ns: float | None = None
+        with path.open(encoding="utf-8", errors="replace") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.strip() or (number == 1 and _is_heading(line)):
+                    continue
+                values = _values(line, params, f"{path.name}, line {number}")
+                t_ns = float(values[0])
+                first_ns = t_ns if first_ns is None else first_ns
+                yield AdcFrame((t_ns - first_ns) * 1e-9, _cube(values[1:], params))
+        if first_ns is None:
+            raise RadarDataError("There is no frame in it.", where=path.name, advice="Record it again.")
+
+    return AdcFile(path.name, params, 1.0 / RATE_HZ, (), frames)
+
+
+def _is_heading(line: str) -> bool:
+    try:
+        float(line.split(",", 1)[0])
+    except ValueError:
+        return True
+    return False
+
+
+def _values(line: str, params: FmcwParams, where: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """(1 + 4 x chirps x samples,)"""
+    fields = line.strip().rstrip(",").split(",")
+    expected = 1 + _BLOCKS * params.chirps * params.samples
+    if len(fields) != expected:
+        raise RadarDataError(
+            f"A row of {len(fields):,} values; a frame of {params.chirps} chirps x {params.samples} samples of two "
+            f"receivers has {expected:,}.",
+            where=where,
+            advice="The row was cut off, or the file comes from another radar.",
+        )
+    try:
+        return np.array(fields, dtype=np.float64)
+    except ValueError:
+        column, field = next((k, field) for k, field in enumerate(fields, start=1) if not _is_number(field))
+        raise RadarDataError(
+            f'Value {column} is "{field.strip()[:20]}".', where=where, advice="Only numbers may stand in it."
+        ) from None
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
+
+
+def _cube(
+    values: np.ndarray[tuple[int], np.dtype[np.float64]], params: FmcwParams
+) -> np.ndarray[tuple[int, int, int], np.dtype[np.complex64]]:
+    blocks = values.reshape(2, 2, params.chirps, params.samples)
+    cube = blocks[:, 0] + 1j * blocks[:, 1]
+    return np.ascontiguousarray(cube.transpose(1, 0, 2), dtype=np.complex64)

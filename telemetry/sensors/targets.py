@@ -1,0 +1,52 @@
+"""Detections as the recordings of flights hold them, so that whatever reads those reads these."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from mapping.radar.detections import Detections
+from telemetry.messages import Topic
+from telemetry.recording.writer import RecordingWriter
+from telemetry.sensing import RadarFrame, packed
+
+
+def radar_frame(found: Detections, *, number: int, t_mono_s: float, t_utc_s: float, source: str) -> RadarFrame:
+    """What a live sensor would have put on the bus."""
+    return RadarFrame(
+        t_mono_s=t_mono_s,
+        t_utc_s=t_utc_s,
+        number=number,
+        source=source,
+        xyz_m=packed(found.xyz_m),
+        radial_speed_m_s=packed(found.radial_speed_m_s),
+        snr_db=packed(found.snr_db),
+    )
+
+
+def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_utc_s: float, source: str) -> int:
+    """Seconds since the first frame, and its detections, as radar frames of a recording that began at ``t_utc_s``.
+
+    Frames without a target are left out, as a live radar leaves them out. Returns how many were written. A file of
+    that name is replaced once the new one is whole. Raises RecordingError.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    written = 0
+    with contextlib.suppress(FileNotFoundError):
+        part.unlink()
+    writer = RecordingWriter(part, t_utc_s=t_utc_s, t_mono_s=0.0, name=source)
+    try:
+        for t_s, found in frames:
+            if len(found):
+                frame = radar_frame(found, number=written, t_mono_s=t_s, t_utc_s=t_utc_s + t_s, source=source)
+                writer.write(Topic.RADAR_FRAME, frame, t_utc_s + t_s)
+                written += 1
+        writer.close()
+        part.replace(path)
+    except BaseException:
+        writer.abandon()
+        part.unlink(missing_ok=True)
+        raise
+    return written

@@ -1,0 +1,118 @@
+"""The data port's stream, sans-IO: bytes in as they come, frames out; what is none of them is counted and skipped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from telemetry.sensors.ti_mmwave.frame import MAGIC, DamagedPacketError, TiFrame, decode_packet, packet_bytes
+
+_START_BYTES = 16
+"""Magic word, version and total length."""
+_RESTART_GAP = 10_000
+"""Frame numbers that jump farther have begun anew, or were damaged."""
+
+
+@dataclass(slots=True)
+class TiCounts:
+    """Since the stream began."""
+
+    bytes: int = 0
+    bad_bytes: int = 0
+    """Of no packet that could be read."""
+    frames: int = 0
+    lost_packets: int = 0
+    """Gaps in the frames' numbers."""
+    damaged_packets: int = 0
+    """Cut short, or not what their own lengths say."""
+    implausible_lengths: int = 0
+    """Magic words followed by a length or a version that no packet has."""
+    implausible_points: int = 0
+    """Left out: no number, or farther or faster than the radar can see."""
+
+
+class TiStream:
+    """Finds packets by their magic word, and finds the next one again after anything that is none.
+
+    The protocol has no checksum. What guards against damage: the packet's length, a walk over its parts that must
+    come out even, and a magic word inside a packet, which says that its end was lost.
+    """
+
+    def __init__(self, *, velocity_cell_m_s: float = float("nan")) -> None:
+        """``velocity_cell_m_s``: SDK 2 tells speeds as cells; without it they come as NaN."""
+        self.counts = TiCounts()
+        self.bytes_since_frame = 0
+        """Much of it without a frame: this is no such stream, or the baud rate is wrong."""
+        self._velocity_cell_m_s = velocity_cell_m_s
+        self._buffer = bytearray()
+        self._last: tuple[int, int] | None = None
+
+    def feed(self, data: bytes) -> list[TiFrame]:
+        self.counts.bytes += len(data)
+        self.bytes_since_frame += len(data)
+        self._buffer += data
+        frames: list[TiFrame] = []
+        while (packet := self._next_packet()) is not None:
+            frame = self._decode(packet)
+            if frame is not None:
+                frames.append(frame)
+        return frames
+
+    def reset(self) -> None:
+        """The line was interrupted: what waits for its rest will not get it."""
+        self._drop(len(self._buffer))
+
+    def _next_packet(self) -> bytes | None:
+        """A whole packet by its length, still at the buffer's head; None when more bytes are needed."""
+        while True:
+            start = self._buffer.find(MAGIC)
+            if start < 0:
+                self._drop(max(0, len(self._buffer) - len(MAGIC) + 1))
+                return None
+            self._drop(start)
+            if len(self._buffer) < _START_BYTES:
+                return None
+            length = packet_bytes(self._buffer)
+            if length is None:
+                self.counts.implausible_lengths += 1
+                self._drop(len(MAGIC))
+                continue
+            another = self._buffer.find(MAGIC, len(MAGIC), length + len(MAGIC) - 1)
+            if 0 <= another < length:
+                self.counts.damaged_packets += 1
+                self._drop(another)
+                continue
+            return bytes(self._buffer[:length]) if self._is_complete(length) else None
+
+    def _is_complete(self, length: int) -> bool:
+        """Not while its last bytes may begin a magic word: the packet was cut then, and that is the next one."""
+        behind = len(self._buffer) - length
+        if behind < 0:
+            return False
+        return not any(
+            self._buffer[length - begun :] == MAGIC[: begun + behind] for begun in range(1, len(MAGIC) - behind)
+        )
+
+    def _decode(self, packet: bytes) -> TiFrame | None:
+        try:
+            frame, left_out = decode_packet(packet, velocity_cell_m_s=self._velocity_cell_m_s)
+        except DamagedPacketError:
+            self.counts.damaged_packets += 1
+            self._drop(len(MAGIC))
+            return None
+        del self._buffer[: len(packet)]
+        self.bytes_since_frame = len(self._buffer)
+        self.counts.frames += 1
+        self.counts.implausible_points += left_out
+        self._count_gap(frame)
+        return frame
+
+    def _count_gap(self, frame: TiFrame) -> None:
+        """Numbers count frames; several packets may share one, told apart by their sub-frames."""
+        if self._last is not None and 1 < frame.number - self._last[0] < _RESTART_GAP:
+            frame.lost_before = frame.number - self._last[0] - 1
+            self.counts.lost_packets += frame.lost_before
+        self._last = (frame.number, frame.sub_frame)
+
+    def _drop(self, count: int) -> None:
+        del self._buffer[:count]
+        self.counts.bad_bytes += count

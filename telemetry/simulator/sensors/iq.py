@@ -1,0 +1,87 @@
+"""A simulated radar from its samples on: the world's echoes as the converters get them, and the chain of processing.
+
+What it leaves out of a real one: leakage from transmitter to receiver, converters that round and clip, antennas that
+are not quite alike, echoes by way of several surfaces, other radars.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.radar import Detections, RadarChain
+from telemetry.sensing import RadarFrame, SimTruth, packed
+from telemetry.simulator.scene.world import World
+from telemetry.simulator.sensors.body import of_truth, rotation_enu_body
+from telemetry.simulator.sensors.iq_model import AWR1843_IQ, IqModel
+from telemetry.simulator.sensors.iq_synthesis import Returns, sampled, strongest
+from telemetry.simulator.sensors.radar_echoes import echoes
+
+C64 = NDArray[np.complex64]
+
+
+class IqRadarSensor:
+    """Looks forward along the body's y axis. The same seed and the same truths give the same frames."""
+
+    def __init__(self, world: World, *, seed: int, model: IqModel = AWR1843_IQ) -> None:
+        self.model = model
+        self.chain = RadarChain(model.params, model.chain)
+        self.left_out = 0
+        """Echoes of the newest frame that were too many to be sampled: its weakest."""
+        self._world = world
+        self._random = np.random.default_rng([seed, 5])
+        self._body_radar = rotation_enu_body(0.0, model.tilt_rad, 0.0)
+        self._mount_m = np.array([0.0, 0.0, model.beam.mount_m])
+        self._published = 0
+
+    def frame(self, truth: SimTruth) -> RadarFrame | None:
+        """What the chain finds in the samples taken there, at that moment; None when it finds nothing."""
+        found = self.chain.process(self.cube(truth))
+        if not len(found.range_m):
+            return None
+        self._published += 1
+        return self._told(truth, found)
+
+    def cube(self, truth: SimTruth) -> C64:
+        """(chirps, virtual antennas, samples): echoes and noise."""
+        everything = self._returns(truth)
+        loudest = strongest(everything, self.model.most_echoes)
+        self.left_out = len(everything.range_m) - len(loudest.range_m)
+        return sampled(self.model.params, loudest) + noise(self.model.params.shape, self._random)
+
+    def _returns(self, truth: SimTruth) -> Returns:
+        """Echoes fade as Swerling's first case: each has a complex normal amplitude, another one at every frame."""
+        model, random = self.model, self._random
+        body_enu = of_truth(truth)
+        radar_enu = body_enu @ self._body_radar
+        position = np.array(truth.position_enu_m) + self._mount_m[2] * body_enu[:, 2]
+        lit = echoes(self._world.at(truth.t_sim_s), model.beam, position, radar_enu, random)
+        x, y, z = (lit.offset_enu @ radar_enu).T
+        azimuth, elevation = np.arctan2(x, y), np.arctan2(z, np.hypot(x, y))
+        speed = lit.radial_speed_m_s(truth.velocity_enu_m_s)
+        snr = model.beam.snr(lit.cross_section_m2, lit.range_m, azimuth, elevation)
+        snr[np.abs(azimuth) > model.beam.half_width_rad] = 0.0
+        kicks = random.standard_normal((2, len(snr)))
+        amplitude = np.sqrt(snr / model.gain / 2) * (kicks[0] + 1j * kicks[1])
+        return Returns(lit.range_m, speed, azimuth, elevation, amplitude)
+
+    def _told(self, truth: SimTruth, found: Detections) -> RadarFrame:
+        xyz_m = found.xyz_m @ self._body_radar.T + self._mount_m
+        return RadarFrame(
+            t_mono_s=truth.t_mono_s,
+            t_utc_s=truth.t_utc_s,
+            number=self._published,
+            source="simulated",
+            xyz_m=packed(xyz_m),
+            radial_speed_m_s=packed(found.radial_speed_m_s),
+            snr_db=packed(found.snr_db),
+        )
+
+
+def noise(shape: tuple[int, int, int], random: np.random.Generator) -> C64:
+    """White, of variance 1, half of it in the real part."""
+    pairs = random.standard_normal((*shape[:2], 2 * shape[2]), np.float32)
+    pairs *= np.float32(math.sqrt(0.5))
+    return pairs.view(np.complex64)

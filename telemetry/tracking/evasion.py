@@ -1,0 +1,81 @@
+"""What the tracks forbid the vehicle to do, and what it might do instead (velocity obstacles, Wessendorp 2021)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping.poses import Pose
+from planning.velocity_obstacles import Limits, Obstacles, Proposal, cones, propose
+from telemetry.tracking.followed import Followed
+from telemetry.tracks import VelocityCone, VelocityProposal
+
+MOST_CONES, MOST_EVADED = 8, 24
+NEAR_RADII = 5.0
+"""Objects nearer than so many safety radii are shown with their cones, whether they come nearer or not."""
+SPARE = 1.25
+"""A proposal keeps so many safety radii: the next frame's estimate is a little different."""
+LEAST_HOLD_S = 1.0
+_STOPPED_M_S, _STRAIGHT_RAD = 0.2, math.radians(2.5)
+_FORBIDDEN = "Every velocity within the vehicle's limits leads into something: stop or climb."
+
+
+@dataclass(frozen=True, slots=True)
+class Evasion:
+    cones: tuple[VelocityCone, ...] = ()
+    proposal: VelocityProposal | None = None
+    why_none: str = ""
+
+
+def evasion(followed: Sequence[Followed], pose: Pose, limits: Limits, *, radius_m: float, within_s: float) -> Evasion:
+    """``followed`` are the nearest first. Something is proposed while an object that moves is dangerous."""
+    dangerous = [one for one in followed if one.is_dangerous(radius_m, within_s)]
+    near = [one for one in followed if one.range_m < NEAR_RADII * radius_m or one in dangerous][:MOST_CONES]
+    shown = tuple(_cones(near, pose, radius_m))
+    if not any(one.moving for one in dangerous):
+        return Evasion(shown)
+    reach_m = limits.max_speed_m_s * within_s
+    matter = [one for one in followed if one.moving or one.range_m < reach_m][:MOST_EVADED]
+    found = propose(_obstacles(matter, pose, SPARE * radius_m), pose.velocity_enu_m_s[:2], limits)
+    if found is None:
+        return Evasion(shown, None, _FORBIDDEN)
+    return Evasion(shown, _proposed(found, pose))
+
+
+def _obstacles(followed: Sequence[Followed], pose: Pose, radius_m: float) -> Obstacles:
+    return Obstacles.of(
+        pose.position_enu_m[:2],
+        np.array([one.state.position_enu_m for one in followed]).reshape(-1, 2),
+        np.array([one.state.velocity_enu_m_s for one in followed]).reshape(-1, 2),
+        radius_m=radius_m,
+    )
+
+
+def _cones(followed: Sequence[Followed], pose: Pose, radius_m: float) -> list[VelocityCone]:
+    found = cones(_obstacles(followed, pose, radius_m))
+    return [
+        VelocityCone(one.id, cone.apex_enu_m_s, math.degrees(cone.axis_rad) % 360.0, math.degrees(cone.half_angle_rad))
+        for one, cone in zip(followed, found, strict=True)
+    ]
+
+
+def _proposed(found: Proposal, pose: Pose) -> VelocityProposal:
+    return VelocityProposal(
+        found.velocity_enu_m_s, max(LEAST_HOLD_S, found.hold_s), found.closest_m, words(found, pose)
+    )
+
+
+def words(found: Proposal, pose: Pose) -> str:
+    """For the pilot: "Turn 25 deg left, 4.2 m/s"."""
+    speed = math.hypot(*found.velocity_enu_m_s)
+    if speed < _STOPPED_M_S:
+        return "Stop"
+    if math.hypot(*pose.velocity_enu_m_s[:2]) < _STOPPED_M_S:
+        return f"Fly {math.degrees(math.atan2(*found.velocity_enu_m_s)) % 360:.0f} deg, {speed:.1f} m/s"
+    if abs(found.turn_rad) < _STRAIGHT_RAD:
+        return f"Straight on, {speed:.1f} m/s"
+    side = "right" if found.turn_rad > 0 else "left"
+    return f"Turn {math.degrees(abs(found.turn_rad)):.0f} deg {side}, {speed:.1f} m/s"

@@ -1,0 +1,195 @@
+"""Frames, poses and settings in; tracks and approach alerts out: no threads, no sockets, no clock of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.perceiving.base import SILENT_S
+from telemetry.messages import PlanRecord
+from telemetry.obstacles import ObstacleAlert
+from telemetry.perception.perceiver import Perceiver
+from telemetry.perception.status import Outcome
+from telemetry.sensing import RadarFrame
+from telemetry.tracking.approach import FOLLOWED_AFRESH, LANDED, ApproachBook
+from telemetry.tracking.evasion import Evasion, evasion
+from telemetry.tracking.followed import UNSEEN_S, Followed, Memory
+from telemetry.tracking.kind import tracks_kind
+from telemetry.tracking.limits import USUAL, limits_of
+from telemetry.tracking.movers import Movers
+from telemetry.tracks import Track, TracksState, TracksStatus
+
+F64 = NDArray[np.float64]
+
+MOST_TRACKS = 64
+KEEP_S = UNSEEN_S
+"""After the newest frame that could be followed: then its objects are somewhere else, and what it proposed is wrong."""
+
+
+class Told(NamedTuple):
+    status: TracksStatus
+    alerts: tuple[ObstacleAlert, ...]
+    accepted: bool
+    """A frame went into the tracker."""
+
+
+class Following:
+    """A perceiver whose perception follows what moves; ``perceiver`` takes states, settings and ground."""
+
+    def __init__(self, *, run: str, utc_minus_mono_s: float) -> None:
+        self.perceiver = _Quiet(tracks_kind(), run=run, utc_minus_mono_s=utc_minus_mono_s)
+        self.limits = USUAL
+        self._memory = Memory()
+        self._followed: list[Followed] = []
+        self._followed_t_s = -math.inf
+        self._evasion = Evasion()
+        self._approaches = ApproachBook(f"approach-{run}", utc_minus_mono_s)
+        self._begun = 0
+
+    def on_plan(self, plan: PlanRecord) -> None:
+        """Of the vehicle's profile in it come the limits that a proposal keeps to."""
+        self.limits = limits_of(plan)
+
+    def work(self, frame: RadarFrame, clock: Callable[[], float]) -> Told:
+        """One frame; never raises for what is in it."""
+        outcome = self.perceiver.work(frame, clock)
+        alerts = self._begin_afresh(outcome)
+        if outcome.accepted:
+            self._follow()
+            alerts += self._alerts(outcome)
+        else:
+            alerts += self._pass_time(clock())
+        return self._told(outcome, alerts, clock())
+
+    def tick(self, clock: Callable[[], float]) -> Told:
+        """A second without a frame."""
+        outcome = self.perceiver.tick(clock, feed=True)
+        alerts, now_s = self._begin_afresh(outcome), clock()
+        return self._told(outcome, alerts + self._pass_time(now_s), now_s)
+
+    def _pass_time(self, now_s: float) -> list[ObstacleAlert]:
+        """Nothing was followed now, whether no frame came or one that is of no use."""
+        if now_s - self._followed_t_s > KEEP_S:
+            self._followed, self._evasion = [], Evasion()
+        return self._approaches.pass_time(now_s, now_s)
+
+    def _begin_afresh(self, outcome: Outcome) -> list[ObstacleAlert]:
+        if self._begun == self.perceiver.begun:
+            return []
+        self._begun = self.perceiver.begun
+        self._memory, self._followed, self._evasion = Memory(), [], Evasion()
+        return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, FOLLOWED_AFRESH)
+
+    def _follow(self) -> None:
+        movers: Movers = self.perceiver.perception
+        assert movers.pose is not None
+        assert movers.blobs is not None
+        settings = self.perceiver.settings
+        self._followed = self._memory.observe(movers.states, movers.blobs, movers.pose)
+        self._followed_t_s = movers.pose.t_mono_s
+        self._evasion = evasion(
+            self._followed,
+            movers.pose,
+            self.limits,
+            radius_m=settings.safety_radius_m,
+            within_s=settings.approach_s,
+        )
+
+    def _alerts(self, outcome: Outcome) -> list[ObstacleAlert]:
+        settings, movers = self.perceiver.settings, self.perceiver.perception
+        if not movers.is_flying:
+            return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, LANDED)
+        return self._approaches.observe(
+            self._followed,
+            heading_rad=movers.pose.heading_rad,
+            radius_m=settings.safety_radius_m,
+            within_s=settings.approach_s,
+            t_mono_s=outcome.status.t_mono_s,
+            done_t_mono_s=outcome.status.done_t_mono_s,
+        )
+
+    def _told(self, outcome: Outcome, alerts: list[ObstacleAlert], done_s: float) -> Told:
+        base, pose, settings = outcome.status, self.perceiver.perception.pose, self.perceiver.settings
+        shown, evading = self._followed[:MOST_TRACKS], self._evasion
+        state, text = self._state(outcome, done_s)
+        t_mono_s = self._followed_t_s if math.isfinite(self._followed_t_s) else base.t_mono_s
+        status = TracksStatus(
+            state=state,
+            text=text,
+            t_mono_s=t_mono_s,
+            t_utc_s=base.t_utc_s + (t_mono_s - base.t_mono_s),
+            done_t_mono_s=done_s,
+            frames=base.frames,
+            dropped=base.dropped,
+            lost_frames=base.lost_frames,
+            detections=base.points,
+            tracks=self._tracks(shown),
+            hidden=len(self._followed) - len(shown),
+            velocity_enu_m_s=None
+            if pose is None
+            else (float(pose.velocity_enu_m_s[0]), float(pose.velocity_enu_m_s[1])),
+            max_speed_m_s=self.limits.max_speed_m_s,
+            safety_radius_m=settings.safety_radius_m,
+            cones=evading.cones,
+            proposal=evading.proposal,
+            no_proposal=evading.why_none,
+            origin=base.origin,
+            latency_s=base.latency_s,
+        )
+        return Told(status, tuple(alerts), outcome.accepted)
+
+    def _state(self, outcome: Outcome, now_s: float) -> tuple[TracksState, str]:
+        """Frames that come and are refused, all of them, are no better than none."""
+        base, unused_s = outcome.status, now_s - self._followed_t_s
+        if base.state == "running" and unused_s > SILENT_S:
+            since = f" for {unused_s:.0f} s" if math.isfinite(unused_s) else " yet"
+            why = f"No radar frame could be used{since}. Check the sensor and the vehicle."
+            return "stale", f"{why} {base.text}".rstrip()
+        return "frozen" if base.state == "blind" else base.state, base.text
+
+    def _tracks(self, shown: list[Followed]) -> tuple[Track, ...]:
+        """At the vehicle's own height: the radar knows no better."""
+        frame = self.perceiver.where.frame
+        if not shown or frame is None:
+            return ()
+        up_m = float(self.perceiver.perception.pose.position_enu_m[2])
+        places = np.array([[*one.state.position_enu_m, up_m] for one in shown])
+        geodetic = frame.to_geodetic(places)
+        return tuple(
+            self._track(one, place, lat_lon)
+            for one, place, lat_lon in zip(shown, places.tolist(), geodetic[:, :2].tolist(), strict=True)
+        )
+
+    def _track(self, one: Followed, place: list[float], lat_lon: list[float]) -> Track:
+        settings, state, spread = self.perceiver.settings, one.state, one.state.covariance
+        return Track(
+            id=state.id,
+            enu_m=(place[0], place[1], place[2]),
+            velocity_enu_m_s=_flat(state.velocity_enu_m_s),
+            covariance_m2=(float(spread[0, 0]), float(spread[0, 1]), float(spread[1, 1])),
+            age_s=state.age_s,
+            updates=state.updates,
+            moving=one.moving,
+            range_m=one.range_m,
+            bearing_deg=math.degrees(one.bearing_rad) % 360.0,
+            closest_m=one.closest_m,
+            closest_in_s=one.closest_in_s,
+            dangerous=one.is_dangerous(settings.safety_radius_m, settings.approach_s),
+            lat_deg=lat_lon[0],
+            lon_deg=lat_lon[1],
+        )
+
+
+def _flat(vector: F64) -> tuple[float, float]:
+    return float(vector[0]), float(vector[1])
+
+
+class _Quiet(Perceiver):
+    """Says nothing of maps that begin afresh: there is none."""
+
+    def _begin_afresh(self, why: str) -> None:
+        super()._begin_afresh("")

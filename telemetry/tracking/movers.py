@@ -1,0 +1,105 @@
+"""Perception of what moves: believed radar targets into a tracker instead of a map."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.perceiving import FrameResult, RadarPerception, RadarScan, Settings
+from mapping.perceiving.model import State
+from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence
+from mapping.poses import Pose
+from mapping.radar_targets import Gate, polar, to_enu
+from mapping.tracker import Tracker, TrackerParams, TrackState
+from telemetry.tracking.blobs import Blobs, blobs
+
+F64 = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+LEVEL_RAD = math.radians(-10.0)
+"""Elevations are measured to 7 degrees: from 0 on, half of the echoes of what comes at the same height were lost."""
+EVIDENCE = EvidenceParams(most_aside_m=2.5)
+"""A track knows how uncertain its place is; a map's voxel does not, which is why maps take nothing that far off."""
+LOW_M = 2.0
+"""Above known ground: lower, while it takes off and lands, every echo grazes it."""
+MOST_TARGETS, MOST_TRACKS = 250, 400
+"""A thousand objects in a frame must not hold up the next one: what moves counts first, then what is nearest."""
+
+
+def tracker() -> Tracker:
+    """As this radar's echoes of this kind of objects want it."""
+    return Tracker(TrackerParams(radial_speed_folded_m_s=EVIDENCE.folded_m_s, extent_m=0.6, most=MOST_TRACKS))
+
+
+class Movers(RadarPerception):
+    """Frames, poses and ground as for the radar's map, which stays empty here. ``states`` are of the newest frame."""
+
+    def __init__(self, settings: Settings, tracker: Tracker, *, alert_prefix: str = "") -> None:
+        """``tracker`` is emptied; it outlives this flight so that no id is ever used twice."""
+        super().__init__(settings, alert_prefix=alert_prefix)
+        self.gate = Gate(elevation_low_rad=LEVEL_RAD)
+        self._evidence = RadarEvidence(EVIDENCE)
+        self._tracker = tracker
+        tracker.clear()
+        self._has_velocity = True
+        self.states: list[TrackState] = []
+        self.blobs: Blobs | None = None
+        self.pose: Pose | None = None
+
+    @property
+    def is_flying(self) -> bool:
+        """On the ground nothing alarms."""
+        return self._flying
+
+    def feed_position(
+        self, t_mono_s: float, enu_m: ArrayLike, velocity_enu_m_s: ArrayLike | None = None, *, has_fix: bool = True
+    ) -> None:
+        """Without its velocity what moves cannot be told from what stands still."""
+        self._has_velocity = velocity_enu_m_s is not None
+        super().feed_position(t_mono_s, enu_m, velocity_enu_m_s, has_fix=has_fix)
+
+    def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
+        """One step of the tracker; never raises for what is in the frame."""
+        pose = self._pose_for(scan, now_mono_s)
+        if isinstance(pose, FrameResult):
+            return pose
+        if not self._has_velocity:
+            return self._drop(scan, "no velocity", now_mono_s)
+        columns = self._columns(scan)
+        if columns is None:
+            return self._drop(scan, "columns of different length", now_mono_s)
+        xyz, speed, snr, ghost = self._kept(*columns)
+        self.pose, self.blobs = pose, self._believed(scan.t_mono_s, pose, xyz, speed, snr, ghost)
+        self.states = self._tracker.step(
+            scan.t_mono_s,
+            self.blobs.detections,
+            position_enu_m=pose.position_enu_m[:2],
+            velocity_enu_m_s=pose.velocity_enu_m_s[:2],
+            heading_rad=pose.heading_rad,
+        )
+        self.frames += 1
+        state, text = self._state(now_mono_s)
+        return FrameResult(scan.t_mono_s, state, text, True, None, pose, len(self.blobs))
+
+    def _believed(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> Blobs:
+        """What moves for sure, and what neither known ground nor noise accounts for: something that crosses the line
+        of sight at right angles has the radial speed of what stands still, all the way into a collision."""
+        moving = self._evidence.moving(polar(xyz), snr, speed, pose) & ~ghost
+        most = np.lexsort((np.hypot(xyz[:, 0], xyz[:, 1]), ~moving))[:MOST_TARGETS]
+        xyz, speed, snr, ghost, moving = xyz[most], speed[most], snr[most], ghost[most], moving[most]
+        targets, ground = polar(xyz), self._known_ground
+        weight = np.where(ghost, 0.0, self._evidence.weights(targets, snr, speed, pose, ground))
+        points = to_enu(xyz, pose.position_enu_m, pose.rotation_enu_body, pose.heading_rad, "heading_only")
+        believed, _ = self._evidence.judge(t_mono_s, points, weight)
+        fed = moving | (believed & (weight > 0))
+        if ground is not None and pose.position_enu_m[2] - ground.up(pose.position_enu_m[None, :])[0] < LOW_M:
+            fed[:] = False
+        return blobs(polar(xyz[fed]), speed[fed], snr[fed], moving[fed])
+
+    def _pose_state(self, now_mono_s: float) -> tuple[State, str]:
+        state, text = super()._pose_state(now_mono_s)
+        if state == "running" and not self._has_velocity:
+            return "frozen", "The vehicle's own velocity is unknown: nothing is followed."
+        return state, text.replace("the radar map stands still", "nothing is followed")
