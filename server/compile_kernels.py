@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 
 from planning.avoidance import Seen, around, over
@@ -18,10 +20,10 @@ from planning.seen import conflicts
 from server import file_tasks, tasks
 from telemetry.perception.kinds import KINDS
 from telemetry.perception.warm_up import warm_up
-from telemetry.sensing import SimTruth
+from telemetry.sensing import RadarKind, SimTruth
 from telemetry.simulator.demo_world import demo_world
 from telemetry.simulator.scene import World
-from telemetry.simulator.sensors import RadarSensor, StereoSensor
+from telemetry.simulator.sensors import StereoSensor, radar_sensor
 
 
 def main() -> None:
@@ -43,7 +45,8 @@ def _see_and_avoid() -> None:
     here = (0.0, 0.0, 5.0)
     place = world.frame.lat_deg, world.frame.lon_deg, world.frame.alt_amsl_m
     truth = SimTruth(0.0, 0.0, 0.0, *place, here, (0.0, 3.0, 0.0), 0.0, 0.0, 0.0, armed=True)
-    RadarSensor(world, seed=0).frame(truth)
+    for kind in get_args(RadarKind):
+        radar_sensor(kind, world, seed=0).frame(truth)
     StereoSensor(world, seed=0).frame(truth)
     wall_m = np.array([(x, 20.0, z) for x in np.arange(-3.0, 4.0) for z in np.arange(0.0, 8.0)])
     line_m = np.array([here, (0.0, 60.0, 5.0)])

@@ -26,6 +26,7 @@ JSON_LIMIT_BYTES = 8 * 1024**2
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 CHUNK_TIMEOUT_S = 30.0
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+UPLOADS = frozenset({"/api/terrains", "/api/orthophotos", "/api/recordings/import", "/api/traversability/uwb"})
 # Neither can be sent across origins without a preflight, which nothing here answers.
 BODY_TYPES = frozenset({"application/json", "application/octet-stream"})
 PAGE_POLICY = (
@@ -157,7 +158,7 @@ class Guard:
         return None
 
     def _body_limit(self, path: str) -> int:
-        if path in ("/api/terrains", "/api/orthophotos", "/api/recordings/import"):
+        if path in UPLOADS:
             return self._upload_limit
         return IMPORT_LIMIT_BYTES if path == "/api/plan/import" else JSON_LIMIT_BYTES
 

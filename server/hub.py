@@ -59,7 +59,7 @@ def key_of(message: schemas.ServerMessage) -> object | None:
             return None
         case schemas.JobMessage():
             return message.type, message.job.id
-        case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage():
+        case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage() | schemas.TracksMessage():
             return message.type, message.source
         case schemas.PerceptionMessage():
             return message.type, message.source, message.sensor

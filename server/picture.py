@@ -15,7 +15,7 @@ from server import tasks
 from server.errors import JobCancelledError, NotFoundError, reported
 from server.jobs import Lane
 from server.library import Library
-from server.scene.payload import PlanScene, ReviewScene, SceneState, TerrainScene
+from server.scene.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
 from server.scene.shots import Target
 from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, ViewDoc
 
@@ -59,6 +59,7 @@ class Picture:
         self._terrain: TerrainScene | None = None
         self._terrain_key: tuple[str | None, str | None, str] | None = None
         self._dsm: Dsm | None = None
+        self._overlay: tuple[OverlayScene | None, tuple[SiteMark, ...]] = (None, ())
 
     @property
     def legend_m(self) -> tuple[float, float] | None:
@@ -79,6 +80,11 @@ class Picture:
     def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
         """A recorded flight over its surface model; without either, the plan again."""
         self._review = None if terrain_id is None or scene is None else (terrain_id, scene)
+        self.again()
+
+    def lay_over(self, overlay: OverlayScene | None, sites: tuple[SiteMark, ...]) -> None:
+        """Colours and landing sites on the surface model that the overlay belongs to, and on no other."""
+        self._overlay = overlay, sites
         self.again()
 
     def again(self) -> None:
@@ -114,6 +120,9 @@ class Picture:
             document, selection = PlanDoc(terrain_id=terrain_id, orthophoto_id=photo_id), SelectionDoc()
             plan, stale = None, False
         await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
+        overlay, sites = self._overlay
+        if overlay is None or overlay.terrain_id != document.terrain_id:
+            overlay, sites = None, ()
         state = SceneState(
             terrain=self._terrain,
             plan=plan,
@@ -122,6 +131,8 @@ class Picture:
             selection=selection,
             view=view,
             review=review,
+            overlay=overlay,
+            sites=sites,
         )
         await self._view.show(self._dsm, state)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from server.edits import clicked, moved
 from server.errors import reported
 from server.plan_desk import PlanDesk, Proposal
-from server.schemas import ErrorDoc, NoticeMessage, PlanDoc, SelectionDoc
+from server.schemas import ErrorDoc, NoticeMessage, PlaceDoc, PlanDoc, SelectionDoc
 
 log = logging.getLogger("hedgehop.plan")
 
@@ -28,10 +28,15 @@ class Pointing:
 
     async def on_terrain(self, lat_deg: float, lon_deg: float, *, known: bool) -> None:
         """A click on the surface model."""
-        if clicked(self._desk.document, self._selection(), lat_deg, lon_deg) is None:
+        is_landing = self._selection().tool == "landing"
+        if not is_landing and clicked(self._desk.document, self._selection(), lat_deg, lon_deg) is None:
             return
         if not known:
             self._tell(NoticeMessage(level="warning", error=_unknown_ground(lat_deg, lon_deg)))
+            return
+        if is_landing:
+            # Edits nothing: the page that took the tool asks for sites there.
+            self._select(SelectionDoc(place=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg)))
             return
         selections: list[SelectionDoc] = []
 

@@ -20,6 +20,7 @@ from pydantic_settings import (
 )
 
 from server.errors import StartError, error_doc
+from telemetry.sensing import RadarKind
 
 GIB = 1024**3
 _SCRYPT = {"n": 2**14, "r": 8, "p": 1, "maxmem": 64 * 1024**2}
@@ -95,6 +96,9 @@ class Settings(BaseSettings):
     demo_world: bool = True
     """Whether the demo's simulated vehicle has radar and camera, in a world with things that its surface model does not
     know."""
+    demo_radar: RadarKind = "model"
+    """How the demo's radar is simulated. model: its targets are drawn to the errors of the real one; iq: the samples of
+    its converters are, and the whole chain of processing runs on them, at a third of a processor core."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)

@@ -18,7 +18,19 @@ from starlette.requests import ClientDisconnect
 
 from planning import __version__
 from planning.errors import DescribedError
-from server.api import console, flight, link, obstacles, plan, recordings, sensors, session, terrain, view
+from server.api import (
+    console,
+    flight,
+    link,
+    obstacles,
+    plan,
+    recordings,
+    sensors,
+    session,
+    terrain,
+    traversability,
+    view,
+)
 from server.api.access import Parts, answer
 from server.auth import Auth
 from server.errors import error_doc, status_of
@@ -42,7 +54,7 @@ MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
 OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
 """Joins the bus and all that hangs on it."""
-ROUTERS = (session, plan, terrain, view, console, link, flight, obstacles, sensors, recordings, proxy)
+ROUTERS = (session, plan, terrain, traversability, view, console, link, flight, obstacles, sensors, recordings, proxy)
 
 
 def create_app(

@@ -49,38 +49,38 @@ async def state(workspace: Work) -> Response:
 @router.put("/plan", response_model=PlanState)
 async def edit(edit: PlanEdit, workspace: Work) -> Response:
     """Replaces the document; 409 when it has changed since ``base_revision``."""
-    return answer(await workspace.edit(edit))
+    return answer(await workspace.plans.edit(edit))
 
 
 @router.post("/plan/undo", response_model=PlanState)
 async def undo(workspace: Work) -> Response:
-    return answer(await workspace.undo())
+    return answer(await workspace.plans.undo())
 
 
 @router.post("/plan/redo", response_model=PlanState)
 async def redo(workspace: Work) -> Response:
-    return answer(await workspace.redo())
+    return answer(await workspace.plans.redo())
 
 
 @router.post("/plan/new", response_model=PlanState)
 async def new(workspace: Work) -> Response:
-    return answer(await workspace.new())
+    return answer(await workspace.plans.new())
 
 
 @router.post("/plan/open", response_model=PlanState)
 async def open_plan(body: OpenPlan, workspace: Work) -> Response:
-    return answer(await workspace.open(body.plan_id))
+    return answer(await workspace.plans.open(body.plan_id))
 
 
 @router.post("/plan/save_as", response_model=PlanState)
 async def save_as(body: SavePlanAs, workspace: Work) -> Response:
     """A copy under another name, which is then the open plan."""
-    return answer(await workspace.save_as(body.name))
+    return answer(await workspace.plans.save_as(body.name))
 
 
 @router.delete("/plans/{plan_id}", status_code=204)
 async def delete(plan_id: str, workspace: Work) -> Response:
-    await workspace.delete(plan_id)
+    await workspace.plans.delete(plan_id)
     return Response(status_code=204)
 
 
@@ -93,18 +93,18 @@ async def import_points(
     request: Request, workspace: Work, filename: Annotated[str, Query(max_length=1000)]
 ) -> Response:
     """Points or a polygon from the raw bytes of a CSV, GeoJSON, KML, .waypoints or .plan file."""
-    return answer(await workspace.import_points(display_name(filename), await request.body()))
+    return answer(await workspace.plans.import_points(display_name(filename), await request.body()))
 
 
 @router.post("/plan/shortest_order", response_model=PlanState)
 async def shortest_order(workspace: Work) -> Response:
-    return answer(await workspace.shortest_order())
+    return answer(await workspace.plans.shortest_order())
 
 
 @router.get("/plan/export/{file}", response_class=Response)
 async def export(file: ExportFile, workspace: Work, inline: bool = False) -> Response:
     """One file of the finished plan, or all of them; 409 while there is none."""
-    data = await workspace.export(file)
+    data = await workspace.plans.export(file)
     shown = inline and file == "report.html"
     headers = {"content-disposition": f'{"inline" if shown else "attachment"}; filename="{file}"'}
     if file.endswith(".html"):

@@ -60,8 +60,9 @@ async def _take(websocket: WebSocket, intake: Intake, agents: Agents) -> None:
         taken = intake.on_data(data, now_mono_s=time.monotonic(), now_utc_s=time.time())
         if taken.answer is not None:
             await websocket.send_bytes(encode(taken.answer))
-        if taken.frame is not None:
-            agents.publish(taken.frame)
+        for told in (taken.frame, taken.notice):
+            if told is not None:
+                agents.publish(told)
 
 
 async def _report(websocket: WebSocket, intake: Intake) -> None:

@@ -47,7 +47,7 @@ async def add_terrain(
 @router.post("/terrains/demo", response_model=TerrainDoc)
 async def add_demo_terrain(workspace: Work) -> Response:
     """The generated demo model; opens the demo plan."""
-    return answer(await workspace.add_demo_terrain())
+    return answer(await workspace.terrains.add_demo())
 
 
 @router.post("/terrains/{terrain_id}/remove_spikes", response_model=JobDoc, status_code=202)
@@ -59,7 +59,7 @@ async def remove_spikes(terrain_id: str, workspace: Work) -> Response:
 @router.delete("/terrains/{terrain_id}", status_code=204)
 async def delete_terrain(terrain_id: str, workspace: Work) -> Response:
     """409 while a plan uses it."""
-    await workspace.delete_terrain(terrain_id)
+    await workspace.terrains.delete(terrain_id)
     return Response(status_code=204)
 
 
@@ -77,7 +77,7 @@ async def add_orthophoto(
 
 @router.post("/jobs/{job_id}/cancel", status_code=204)
 async def cancel_job(job_id: str, workspace: Work) -> Response:
-    await workspace.cancel_job(job_id)
+    workspace.board.cancel(job_id)
     return Response(status_code=204)
 
 

@@ -32,8 +32,8 @@ async def stream(websocket: WebSocket) -> None:
             session_key=key,
             session_remaining_s=parts.auth.remaining_s(session_id),
             snapshot=parts.workspace.snapshot,
-            present=lambda: parts.flying.present_for(key),
-            on_message=parts.workspace.on_client_message,
+            present=lambda: [*parts.workspace.present(), *parts.flying.present_for(key)],
+            on_message=parts.workspace.on_show.on_client_message,
         )
     except BusyError:
         await websocket.close(CLOSE_TRY_LATER)

@@ -17,11 +17,13 @@ from server.cli.certify import certify
 from server.cli.fly import fly
 from server.cli.map import build_map
 from server.cli.plan import plan
+from server.cli.radar import radar
 from server.cli.review import review
 from server.cli.scenario import scenario
 from server.cli.serve import serve
 from server.cli.sim import sim
 from server.cli.survey import survey
+from server.cli.traversability import traversability
 from server.cli.upload import upload
 from server.cli.usage import run_command
 
@@ -53,7 +55,9 @@ app.command(epilog=examples.SIM)(sim)
 app.command(epilog=examples.REVIEW)(review)
 app.command(epilog=examples.SCENARIO)(scenario)
 app.command("map", epilog=examples.MAP)(build_map)
+app.command(epilog=examples.TRAVERSABILITY)(traversability)
 app.command(epilog=examples.AGENT)(agent)
+app.add_typer(radar)
 app.command(epilog=examples.BENCH)(bench)
 
 

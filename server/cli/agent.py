@@ -7,9 +7,7 @@ import contextlib
 import os
 import signal
 import socket
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
@@ -17,11 +15,13 @@ from typing import Annotated
 import typer
 
 from planning.errors import DescribedError
+from server.cli.agent_source import Source, SourceOptions, source_of
 from server.cli.output import print_json, refusing, say
 from server.errors import BadRequestError
 from telemetry.agent.client import Agent, Reading, sensor_url
-from telemetry.agent.sources import at, readings_of_lines, recorded_readings
+from telemetry.agent.ti_radar import TiStatus
 from telemetry.agent.wire import Report
+from telemetry.sensors.ti_mmwave.ports import DATA_BAUD
 
 TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
 TELL_EVERY_S = 5.0
@@ -36,6 +36,24 @@ def agent(
     ],
     recording: Annotated[
         Path | None, typer.Option("--recording", metavar="FILE", help="Send the frames of a recorded flight.")
+    ] = None,
+    ti_config: Annotated[
+        Path | None, typer.Option("--ti-config", metavar="CFG", help="The configuration that a TI radar is sent.")
+    ] = None,
+    ti_data: Annotated[
+        str | None, typer.Option("--ti-data", metavar="PORT", help="Data port of a TI radar (often /dev/ttyACM1).")
+    ] = None,
+    ti_config_port: Annotated[
+        str | None,
+        typer.Option(
+            "--ti-config-port",
+            metavar="PORT",
+            help='Its config port; default: the one before; "none": it runs already.',
+        ),
+    ] = None,
+    ti_baud: Annotated[int, typer.Option("--ti-baud", help="Baud rate of the data port.")] = DATA_BAUD,
+    ti_capture: Annotated[
+        Path | None, typer.Option("--ti-capture", metavar="FILE", help="Send what a TI radar's data port once sent.")
     ] = None,
     token_file: Annotated[
         Path | None,
@@ -52,7 +70,7 @@ def agent(
     ] = 1000.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was sent as JSON at the end.")] = False,
 ) -> None:
-    """Send radar frames and point clouds to a ground station: lines of JSON on stdin, or those of a recording."""
+    """Send radar frames and point clouds to a ground station: from stdin, a TI radar or a recording."""
     with refusing(as_json=as_json):
         sensor_url(address)
         _check(voxel_m, limit_kb_s)
@@ -63,8 +81,9 @@ def agent(
             voxel_m=voxel_m,
             limit_bytes_per_s=1000.0 * limit_kb_s,
         )
-        asyncio.run(_run(made, _paced(recording) if recording else readings_of_lines(sys.stdin)))
-        _answer(made, as_json=as_json)
+        source = source_of(SourceOptions(recording, ti_config, ti_data, ti_config_port, ti_baud, ti_capture))
+        asyncio.run(_run(made, source))
+        _answer(made, source.radar, as_json=as_json)
 
 
 def _check(voxel_m: float, limit_kb_s: float) -> None:
@@ -84,25 +103,25 @@ def _token(file: Path | None) -> str:
     return token
 
 
-async def _run(made: Agent, readings: Iterator[Reading]) -> None:
+async def _run(made: Agent, source: Source) -> None:
     """Until the source ends or Ctrl+C; the connection is made again as often as it is lost."""
     loop = asyncio.get_running_loop()
     connection = asyncio.ensure_future(made.run())
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, connection.cancel)
-    source = loop.create_future()
+    ended = loop.create_future()
     try:
         async with asyncio.timeout(CONNECT_WITHIN_S):
             while not made.is_ready and not connection.done():
                 await asyncio.sleep(0.02)
     except TimeoutError:
         say(f"The ground station does not answer ({made.counts.trouble or 'no answer'}): it is tried again.")
-    threading.Thread(target=_read, args=(readings, made.put, loop, source), daemon=True).start()
-    teller = asyncio.ensure_future(_tell(made))
+    threading.Thread(target=_read, args=(source.readings, made.put, loop, ended), daemon=True).start()
+    teller = asyncio.ensure_future(_tell(made, source.radar))
     try:
-        await asyncio.wait((source, connection), return_when=asyncio.FIRST_COMPLETED)
-        if source.done() and not connection.done():
-            source.result()
+        await asyncio.wait((ended, connection), return_when=asyncio.FIRST_COMPLETED)
+        if ended.done() and not connection.done():
+            ended.result()
             await asyncio.sleep(LAST_FRAMES_S)
     finally:
         for task in (connection, teller):
@@ -115,13 +134,13 @@ def _read(
     readings: Iterator[Reading],
     put: Callable[[Reading], None],
     loop: asyncio.AbstractEventLoop,
-    source: asyncio.Future[None],
+    ended: asyncio.Future[None],
 ) -> None:
     """In a thread of its own: a pipe may be silent for ever."""
 
     def end(error: Exception | None) -> None:
-        if not source.done():
-            source.set_exception(error) if error else source.set_result(None)
+        if not ended.done():
+            ended.set_exception(error) if error else ended.set_result(None)
 
     try:
         for reading in readings:
@@ -133,26 +152,18 @@ def _read(
         loop.call_soon_threadsafe(end, error)
 
 
-def _paced(recording: Path) -> Iterator[Reading]:
-    """At the recorded pace, as if measured now."""
-    began_s = time.monotonic()
-    for after_s, reading in recorded_readings(recording):
-        wait_s = began_s + after_s - time.monotonic()
-        if wait_s > 0:
-            time.sleep(wait_s)
-        yield at(reading, began_s + after_s)
-
-
-async def _tell(made: Agent) -> None:
+async def _tell(made: Agent, radar: TiStatus | None) -> None:
     while True:
         await asyncio.sleep(TELL_EVERY_S)
         counts = made.counts
         rate = f"{(counts.report.bytes_per_s if counts.report else 0.0) / 1000:.0f} kB/s"
         state = f"no connection: {counts.trouble}" if counts.trouble else rate
         say(f"{counts.sent} frames sent, {counts.skipped} left out, {state}")
+        if radar is not None:
+            say(str(radar))
 
 
-def _answer(made: Agent, *, as_json: bool) -> None:
+def _answer(made: Agent, radar: TiStatus | None, *, as_json: bool) -> None:
     counts = made.counts
     report = counts.report or Report(0, 0, 0, 0, 0.0, "")
     if as_json:
@@ -167,9 +178,12 @@ def _answer(made: Agent, *, as_json: bool) -> None:
                 "late": report.late,
                 "refused": report.refused,
             }
+            | ({} if radar is None else {"radar": radar.as_dict()})
         )
     else:
         say(
             f"{counts.sent} frames sent ({counts.sent_bytes / 1e6:.1f} MB), {counts.skipped} left out; the ground "
             f"station took {report.received}, {report.late} of them late, and refused {report.refused}."
         )
+        if radar is not None:
+            say(str(radar))

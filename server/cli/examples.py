@@ -14,6 +14,7 @@ def _examples(*pairs: tuple[str, str]) -> str:
 EXIT_CODES = "Exit codes: 0 done, 1 not certified or failed, 2 wrong input."
 SERVE = _examples(
     ("A first look, with the demo terrain", "hedgehop serve --demo"),
+    ("The same, the radar simulated from its samples on", "hedgehop serve --demo --radar iq"),
     ("Another port and place for the data", "hedgehop serve --port 8010 --data-dir ~/flights"),
 )
 PLAN = _examples(
@@ -55,10 +56,23 @@ MAP = _examples(
     ("The highest obstacles as a raster", "hedgehop map flight.mcap --sensor radar --out radar.tif --json"),
 )
 AGENT = _examples(
+    ("A TI radar at its two serial ports", "hedgehop agent https://gcs.example --token-file sensor-token.txt "
+     "--ti-config radar.cfg --ti-data /dev/ttyACM1"),
     ("From a driver that writes lines of JSON", "radar_driver | hedgehop agent https://gcs.example "
      "--token-file sensor-token.txt"),
     ("A recorded flight's frames once more", "hedgehop agent http://10.0.0.5:8000 --token-file sensor-token.txt "
      "--recording flight.mcap --json"),
+)  # fmt: skip
+RADAR_PROCESS = _examples(
+    ("A capture of TI's DCA1000 card", "hedgehop radar process adc_data_Raw_0.bin --cfg AWR1843config.cfg --plots "
+     "figures"),
+    ("The ODA data set, as a recording", "hedgehop radar process radar.csv --sensor position2go --out targets.mcap"),
+    ("For a script", "hedgehop radar process cube.npy --sensor awr1843 --json > detections.json"),
+)  # fmt: skip
+TRAVERSABILITY = _examples(
+    ("Where a rover can drive, as rasters", "hedgehop traversability dsm.tif --out ground"),
+    ("Foliage cleared by a radar, landing sites near a point", "hedgehop traversability dsm.tif --uwb drive.npz "
+     "--near 37.72902,14.99262 --rotor-span-m 0.8 --out ground --json"),
 )  # fmt: skip
 BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))
 SCENARIO = _examples(

@@ -27,7 +27,11 @@ def scenario(
     seeds: Annotated[int, typer.Option("--seeds", min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
     record: Annotated[
         Path | None,
-        typer.Option("--record", metavar="FILE", help="Keep the flight (.mcap) with frames, maps and alerts here."),
+        typer.Option(
+            "--record",
+            metavar="FILE",
+            help="Keep the flight (.mcap) with frames, maps and alerts here; of foliage the radar log (.npz).",
+        ),
     ] = None,
     as_json: o.AsJson = False,
 ) -> None:

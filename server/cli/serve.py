@@ -10,6 +10,7 @@ import typer
 from server.app import run
 from server.cli.output import refusing
 from server.settings import load_settings
+from telemetry.sensing import RadarKind
 
 
 def serve(
@@ -20,6 +21,13 @@ def serve(
         bool | None,
         typer.Option(
             "--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."
+        ),
+    ] = None,
+    radar: Annotated[
+        RadarKind | None,
+        typer.Option(
+            "--radar",
+            help="How the demo's radar is simulated: its targets (model, the default) or its samples, processed (iq).",
         ),
     ] = None,
     link: Annotated[
@@ -36,5 +44,7 @@ def serve(
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
     with refusing(as_json=False):
-        settings = load_settings(host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world)
+        settings = load_settings(
+            host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world, demo_radar=radar
+        )
         run(settings, demo=demo)

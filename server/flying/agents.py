@@ -8,7 +8,7 @@ from typing import Protocol
 
 from server.errors import BusyError
 from telemetry.agent.intake import Frame, Intake
-from telemetry.messages import Published, Topic
+from telemetry.messages import Published, Topic, VehicleText
 from telemetry.sensing import CloudFrame, RadarFrame
 
 AGENTS_MAX = 4
@@ -38,8 +38,10 @@ class Agents:
         finally:
             self._connected.remove(intake)
 
-    def publish(self, frame: Frame) -> None:
+    def publish(self, frame: Frame | VehicleText) -> None:
         match frame:
+            case VehicleText():
+                self._bus.publish(Topic.TEXT, frame)
             case RadarFrame():
                 self._bus.publish(Topic.RADAR_FRAME, frame)
             case CloudFrame():

@@ -68,7 +68,7 @@ class Flying:
         tell = self._present.tell
         runtime_dir = library.root / RUNTIME_FOLDER
         self.shelf = RecordingShelf(library.root, terrains=library.terrains)
-        self.nodes = Nodes(runtime_dir, self.shelf.folder, tell)
+        self.nodes = Nodes(runtime_dir, self.shelf.folder, tell, demo_radar=settings.demo_radar)
         self._lane = Lane("flight")
         self.agents = Agents(bus)
         self.live, self.replay = Channel("live", tell), Channel("replay", tell)
@@ -115,7 +115,7 @@ class Flying:
         self.reviewing = Reviewing(
             library,
             self.shelf,
-            workspace,
+            workspace.on_show,
             self.replay,
             ask=self._ask_replay,
             run=workspace.board.run,
@@ -189,7 +189,7 @@ class Flying:
     async def _start_demo(self) -> None:
         """Once the demo's plan is open; whoever is in charge by then stays so."""
         try:
-            await self._workspace.demo_is_open.wait()
+            await self._workspace.terrains.demo_is_open.wait()
             await self.simulation.start(self.lease.server_operator())
         except Exception as error:
             doc = reported(error, log, "Starting the simulated vehicle")
@@ -250,7 +250,7 @@ class Flying:
         self._obstacles.on_plan()
 
     def _forget_replay(self) -> None:
-        self._obstacles.watches["replay"].forget()
+        self._obstacles.forget_replay()
         self._present.forget_replay()
 
     def _publish_plan(self, record: PlanRecord) -> None:

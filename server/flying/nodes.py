@@ -11,8 +11,10 @@ from server.schemas import NodeDoc, NodesMessage, ServerMessage
 from server.supervisor import NodeState, Supervisor
 from telemetry.node_lock import running_node
 from telemetry.obstacles import SENSORS, Sensor
+from telemetry.sensing import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
+TRACKS = "tracks"
 SIMULATED_SENSORS = "sensors"
 
 _SENSOR_SEED = 1
@@ -21,8 +23,16 @@ _SENSOR_SEED = 1
 class Nodes:
     """Starts nodes when they are needed. Those that outlived a server before this one are taken over."""
 
-    def __init__(self, runtime_dir: Path, recordings_dir: Path, tell: Callable[[ServerMessage], None]) -> None:
+    def __init__(
+        self,
+        runtime_dir: Path,
+        recordings_dir: Path,
+        tell: Callable[[ServerMessage], None],
+        *,
+        demo_radar: RadarKind = "model",
+    ) -> None:
         self._runtime_dir, self._recordings_dir, self._tell = runtime_dir, recordings_dir, tell
+        self._demo_radar = demo_radar
         self.supervisor = Supervisor(runtime_dir, changed=self._changed)
 
     async def simulator_link(self) -> str | None:
@@ -47,9 +57,14 @@ class Nodes:
         """A map, regions and alerts of what one sensor sends."""
         await self.supervisor.start(sensor, [])
 
+    async def tracks(self) -> None:
+        """Moving objects in what the radar sends."""
+        await self.supervisor.start(TRACKS, [])
+
     async def simulated_sensors(self, ground: Ground, world: Path) -> None:
         """Radar, camera and its pose, of the simulated vehicle in its world."""
         arguments = ["--world", str(world), "--dsm", str(ground.path), "--seed", str(_SENSOR_SEED)]
+        arguments += ["--radar", self._demo_radar]
         await self.supervisor.start(SIMULATED_SENSORS, arguments)
 
     async def simulator(self, ground: Ground, link: str, *, rtl_height_m: float, world: Path | None = None) -> None:
@@ -63,7 +78,7 @@ class Nodes:
 
     async def stop_all(self) -> None:
         """The simulated vehicle last: until then its link may say farewell."""
-        for names in ((REPLAY, LINK, RECORDER, SIMULATED_SENSORS, *SENSORS), (SIMULATOR,)):
+        for names in ((REPLAY, LINK, RECORDER, SIMULATED_SENSORS, TRACKS, *SENSORS), (SIMULATOR,)):
             await asyncio.gather(*(self.supervisor.stop(name) for name in names))
 
     def _changed(self, nodes: Sequence[NodeState]) -> None:

@@ -7,7 +7,15 @@ from collections import deque
 from collections.abc import Callable
 
 from server.hub import key_of
-from server.schemas import AlertMessage, PerceptionMessage, ReplayMessage, ServerMessage, TextMessage, VehicleMessage
+from server.schemas import (
+    AlertMessage,
+    PerceptionMessage,
+    ReplayMessage,
+    ServerMessage,
+    TextMessage,
+    TracksMessage,
+    VehicleMessage,
+)
 
 TEXTS_KEPT = 50
 
@@ -41,7 +49,7 @@ class Present:
 
 
 def _at_present(message: ServerMessage) -> ServerMessage:
-    live = isinstance(message, (VehicleMessage, PerceptionMessage)) and message.source == "live"
+    live = isinstance(message, (VehicleMessage, PerceptionMessage, TracksMessage)) and message.source == "live"
     if live or isinstance(message, ReplayMessage):
         return message.model_copy(update={"now_mono_s": time.monotonic()})
     return message

@@ -40,7 +40,7 @@ _SEEK_S = 2.0
 
 
 class Screen(Protocol):
-    """The part of the workspace that shows a recording in the 3D view instead of the plan."""
+    """The part of ``server.on_show.OnShow`` that shows a recording in the 3D view instead of the plan."""
 
     @property
     def document(self) -> PlanDoc: ...
@@ -78,7 +78,7 @@ class Reviewing:
         self._open: _Open | None = None
         self._opening = asyncio.Lock()
         self._last: ReplayStatus | None = None
-        self._last_mono_s = 0.0
+        self._last_mono_s = self._asked_mono_s = 0.0
 
     @property
     def file_name(self) -> str | None:
@@ -98,7 +98,7 @@ class Reviewing:
             reviewed = await self._run(f"Opening {doc.name}", work)
             assert isinstance(reviewed, Reviewed)
             followed = await asyncio.to_thread(self._followed, reviewed)
-            await self._ask(OpenRecording(str(path)))
+            await self._ask_to_open(path)
             self._show(_Open(path, reviewed), Follower(followed))
 
     async def close(self) -> None:
@@ -132,10 +132,16 @@ class Reviewing:
                 await self._ask(CloseRecording())
             return
         if status.recording is None and status.error is None:
-            await self._ask(OpenRecording(str(self._open.path)))
+            # One told before it was asked would have it open again from the start, and stop what plays by now.
+            if status.t_mono_s > self._asked_mono_s:
+                await self._ask_to_open(self._open.path)
         elif before is None or _jumped(before, status, now_mono_s - before_mono_s):
             self._jumped()
             self._cut_track(self._open.reviewed, status.at_utc_s)
+
+    async def _ask_to_open(self, path: Path) -> None:
+        await self._ask(OpenRecording(str(path)))
+        self._asked_mono_s = time.monotonic()
 
     async def _reviewed(
         self,

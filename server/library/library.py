@@ -12,7 +12,7 @@ from pathlib import Path
 
 from planning.dsm import Dsm
 from planning.orthophoto import Orthophoto
-from server.errors import DataDirError, StorageError
+from server.errors import DataDirError, StorageError, error_doc
 from server.history import History
 from server.library import orthophotos, plans, terrains
 from server.library.files import clean, new_id, storage_errors, write_atomically
@@ -22,6 +22,7 @@ from server.library.plans import PlanSummary
 from server.library.profiles import read_profiles
 from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
+from server.library.unneeded import remove_unneeded
 from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
 
 _LAST_PLAN = "last-plan"
@@ -29,7 +30,7 @@ _PROFILES = "profiles"
 
 
 class Library:
-    """Opens and locks the directory, clears half-written leftovers, and sets damaged things aside."""
+    """Opens and locks the directory, clears what is half-written or in no plan any more, sets damaged things aside."""
 
     def __init__(self, data_dir: Path) -> None:
         self.root = data_dir.expanduser().absolute()
@@ -48,7 +49,7 @@ class Library:
             )
             self._plans = Shelf(self.root, kind="plan", folder=plans.FOLDER, model=PlanSummary, on_damage=told)
             self._profiles, unreadable = read_profiles(self.root / _PROFILES)
-            self.notices += unreadable
+            self.notices += unreadable + _remove_unneeded(self.root)
         except BaseException:
             self._lock.release()
             raise
@@ -195,6 +196,15 @@ class Library:
             for path in folder.iterdir():
                 path.unlink(missing_ok=True)
         return folder
+
+
+def _remove_unneeded(root: Path) -> list[ErrorDoc]:
+    """A file too many is no reason not to start."""
+    try:
+        remove_unneeded(root)
+    except StorageError as error:
+        return [error_doc(error)]
+    return []
 
 
 def _open_directory(data_dir: Path) -> DirectoryLock:

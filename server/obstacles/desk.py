@@ -36,7 +36,7 @@ log = logging.getLogger("hedgehop.obstacles")
 
 
 class SeesPlans(Protocol):
-    """The part of the workspace that takes what was seen into the plan."""
+    """The part of ``server.plan_requests.PlanRequests`` that takes what was seen into the plan."""
 
     async def plan_with_seen(self, maps: list[Voxels]) -> PlanState: ...
 
@@ -113,7 +113,7 @@ class ObstacleDesk:
 
     async def fly(self, operator: Operator, manoeuvre_id: str) -> None:
         """Raises NotFoundError for one that is out of date, and what the link says."""
-        await self._link.call(self._manoeuvres.request(operator, manoeuvre_id))
+        await self._link.call(await self._manoeuvres.request(operator, manoeuvre_id))
 
     async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
         """Raises NotReadyError when nothing was seen."""

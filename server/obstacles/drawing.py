@@ -16,11 +16,13 @@ from typing import Protocol
 
 from server.errors import reported
 from server.obstacles.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, Voxels, coarser
+from server.obstacles.tracks import TracksWatch
 from server.obstacles.watch import Watch
 from server.scene.regions import Route
 from server.scene.sights import MapLook
 from server.schemas import MapDrawn, Source
 from telemetry.obstacles import SENSORS, MapOrigin, PerceptionStatus, Sensor
+from telemetry.tracks import TracksStatus
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -48,6 +50,7 @@ class Stage(Protocol):
         origin: MapOrigin | None,
         statuses: Mapping[Sensor, PerceptionStatus],
         routes: list[Route],
+        tracks: TracksStatus | None,
     ) -> None: ...
 
     def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int: ...
@@ -93,8 +96,14 @@ class Allowance:
 class MapDrawing:
     """``run`` draws until it is cancelled. While a replay has maps they are drawn instead of the live ones."""
 
-    def __init__(self, stage: Stage | None, watches: Mapping[Source, Watch], routes: Routes) -> None:
-        self._stage, self._watches, self._routes = stage, watches, routes
+    def __init__(
+        self,
+        stage: Stage | None,
+        watches: Mapping[Source, Watch],
+        routes: Routes,
+        tracks: Mapping[Source, TracksWatch],
+    ) -> None:
+        self._stage, self._watches, self._routes, self._tracks = stage, watches, routes, tracks
         self._pictures = {sensor: _Picture() for sensor in SENSORS}
         self._allowance = Allowance(time.monotonic())
         self._told_s = 0.0
@@ -116,7 +125,9 @@ class MapDrawing:
             source = self._shown_source()
             watch = self._watches[source]
             routes = self._routes.routes() if source == "live" else []
-            stage.draw_now(source, _origin(watch), watch.statuses, routes)
+            tracks = self._tracks[source].status
+            origin = _origin(watch) or (None if tracks is None else tracks.origin)
+            stage.draw_now(source, origin, watch.statuses, routes, tracks)
 
     async def _draw_maps(self, stage: Stage) -> None:
         while True:

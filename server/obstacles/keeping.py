@@ -34,6 +34,8 @@ def _makes_sense(settings: PerceptionSettings) -> bool:
         settings.radar_resolution_m,
         settings.vision_resolution_m,
         settings.memory_limit_bytes,
+        settings.safety_radius_m,
+        settings.approach_s,
     )
     spare = (settings.vehicle_radius_m, settings.position_error_m, settings.clear_count)
     return all(value > 0 for value in lengths) and all(value >= 0 for value in spare) and 0 < settings.fov_deg <= 180

@@ -20,6 +20,7 @@ from server.obstacles.mirror import Voxels
 from server.schemas import ManoeuvreDoc
 from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
 from telemetry.obstacles import GroundNotice, MapOrigin, ObstacleAlert
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from planning.avoiding.model import Manoeuvre, NoWay
     from telemetry.perception.mission_line import Line
 
+BESIDE_M = 3.0
+"""A vehicle farther than this from where its leg begins is on its way to it."""
 _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -34,7 +37,8 @@ _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
 class Situation:
     """Where everything is at one moment."""
 
-    alert: ObstacleAlert
+    alert: ObstacleAlert | None
+    """Of what stands in the way."""
     state: VehicleState
     flight: FlightStatus
     height_offset_m: float
@@ -46,6 +50,12 @@ class Situation:
     """Each with an origin of its own: home may move a little between the starts of two sensors' nodes."""
     radius_m: float = 0.5
     """Of the vehicle."""
+    approach: ObstacleAlert | None = None
+    """Of a moving object."""
+    tracks: TracksStatus | None = None
+    """None unless they are of now."""
+    safety_radius_m: float = 3.0
+    """Kept from moving objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,35 +73,50 @@ class Prepared:
 
 
 @dataclass(frozen=True, slots=True)
-class _Ahead:
+class Ahead:
+    """What is left of the mission."""
+
     line: Line
     points_enu_m: F64
     """From beside the vehicle on."""
     leg: int
-    """Of the mission's line, on which they begin."""
+    """Of the mission's line, on which they begin; the one before where the vehicle has yet to come to the line."""
+
+    def item(self, leg: int) -> int:
+        """That is flown to at the end of a leg of ``points_enu_m``."""
+        items = self.line.leg_item
+        return items[max(0, min(self.leg + leg, len(items) - 1))]
 
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
-    """Over and around, each possible or with the reason why not; nothing without a mission that is flown."""
+    """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
     from planning.avoidance import AvoidanceParams, around, over
     from planning.avoiding.room import Seen
+    from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
     report("Looking for a way past the obstacle", None)
     line, state = mission_line(situation.record, situation.origin), situation.state
-    if line is None or state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
+    if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
         return ()
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
-    ahead = _ahead(line, position, situation)
+    ahead = None if line is None else _ahead(line, position, situation)
     seen = [Seen(_centres_enu_m(v, situation.origin, frame), v.resolution_m) for v in situation.maps if len(v.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
     usual = AvoidanceParams()
     params = AvoidanceParams(
         radius_m=situation.radius_m, ceiling_m=max(0.0, usual.ceiling_m - situation.height_offset_m)
     )
-    ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
-    return tuple(_prepared(way, situation, ahead, frame) for way in ways)
+    prepared: list[Prepared] = []
+    if (alert := situation.alert) is not None and ahead is not None:
+        ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
+        prepared += [_prepared(way, alert, situation, ahead, frame) for way in ways]
+    if situation.approach is not None:
+        prepared.append(
+            sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
+        )
+    return tuple(prepared)
 
 
 def _centres_enu_m(voxels: Voxels, origin: MapOrigin, frame: LocalFrame) -> F64:
@@ -109,30 +134,32 @@ def _surface(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
     return ground_around(notice, origin)
 
 
-def _ahead(line: Line, position: F64, situation: Situation) -> _Ahead:
+def _ahead(line: Line, position: F64, situation: Situation) -> Ahead:
     """The rest of the mission from the place of the leg that is flown which is nearest to the vehicle."""
     points = line.points_enu + np.array([0.0, 0.0, situation.height_offset_m])
     target = situation.flight.target or 0
     leg = next((n for n, item in enumerate(line.leg_item) if item >= target), len(line.leg_item) - 1)
     a, d = points[leg], points[leg + 1] - points[leg]
     share = float(np.clip((position - a) @ d / max(float(d @ d), 1e-9), 0.0, 1.0))
-    return _Ahead(line, np.vstack([a + share * d, points[leg + 1 :]]), leg)
+    if share == 0.0 and math.dist(position[:2], a[:2]) > BESIDE_M:
+        return Ahead(line, np.vstack([position, points[leg:]]), leg - 1)
+    return Ahead(line, np.vstack([a + share * d, points[leg + 1 :]]), leg)
 
 
-def _prepared(way: Manoeuvre | NoWay, situation: Situation, ahead: _Ahead, frame: LocalFrame) -> Prepared:
+def _prepared(
+    way: Manoeuvre | NoWay, alert: ObstacleAlert, situation: Situation, ahead: Ahead, frame: LocalFrame
+) -> Prepared:
     from planning.avoiding.model import NoWay
 
-    handle = f"{way.kind}-{_HANDLE.sub('-', situation.alert.id)}"[:80]
     if isinstance(way, NoWay):
-        doc = ManoeuvreDoc(id=handle, kind=way.kind, for_alert=situation.alert.id, possible=False, text=way.reason)
-        return Prepared(doc)
-    speed_m_s = parse_profile(situation.record.profile_toml.encode(), where="the plan's profile").mean_speed_m_s
-    item = ahead.line.leg_item[min(ahead.leg + way.leg, len(ahead.line.leg_item) - 1)]
+        return impossible(way, alert)
+    speed_m_s = cruise_m_s(situation.record)
+    item = ahead.item(way.leg)
     clearance_m, climb_m = min(way.seen_m, way.surface_m), float(np.ptp(way.points_enu_m[:, 2]))
     doc = ManoeuvreDoc(
-        id=handle,
+        id=handle_of(way.kind, alert),
         kind=way.kind,
-        for_alert=situation.alert.id,
+        for_alert=alert.id,
         possible=True,
         text=_words(way, climb_m),
         clearance_m=clearance_m if math.isfinite(clearance_m) else None,
@@ -149,6 +176,19 @@ def _prepared(way: Manoeuvre | NoWay, situation: Situation, ahead: _Ahead, frame
     begins = frame.to_geodetic(way.points_enu_m[:1])[0].tolist()
     height_offset_m = situation.height_offset_m + way.height_offset_m
     return Prepared(doc, targets, item, height_offset_m, points, (begins[0], begins[1]))
+
+
+def handle_of(kind: str, alert: ObstacleAlert) -> str:
+    return f"{kind}-{_HANDLE.sub('-', alert.id)}"[:80]
+
+
+def impossible(way: NoWay, alert: ObstacleAlert) -> Prepared:
+    handle = handle_of(way.kind, alert)
+    return Prepared(ManoeuvreDoc(id=handle, kind=way.kind, for_alert=alert.id, possible=False, text=way.reason))
+
+
+def cruise_m_s(record: PlanRecord) -> float:
+    return parse_profile(record.profile_toml.encode(), where="the plan's profile").mean_speed_m_s
 
 
 def _words(way: Manoeuvre, climb_m: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Awaitable, Callable
 
 import numpy as np
@@ -20,20 +21,23 @@ from telemetry.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
+KINDS = ("obstacle", "conflict", "approach")
 AGAIN_AFTER_S = 1.0
 """While the obstacle stands in the region: the vehicle moves, and more of it is seen."""
 MOVED_ON_M = 8.0
 """A way that begins farther away than this is not the one that would be flown."""
+TURNED_RAD = math.radians(60.0)
+"""Between the sidestep on show and the one prepared when it is flown: beyond it the pilot has chosen another one."""
 
 
 class Manoeuvres:
-    """One obstacle at a time, the newest: ``run`` prepares, the desk flies."""
+    """One obstacle and one moving object at a time, the newest of each: ``run`` prepares, the desk flies."""
 
     def __init__(
         self,
         watch: Watch,
         *,
-        situation: Callable[[ObstacleAlert], Situation | None],
+        situation: Callable[[ObstacleAlert | None, ObstacleAlert | None], Situation | None],
         prepare: Callable[[Situation], Awaitable[tuple[Prepared, ...]]],
         vehicle: Callable[[], VehicleState | None],
     ) -> None:
@@ -45,7 +49,7 @@ class Manoeuvres:
         watch.begins, watch.ends = self.on_begin, self.on_end
 
     def on_begin(self, alert: ObstacleAlert) -> None:
-        if alert.kind in ("obstacle", "conflict"):
+        if alert.kind in KINDS:
             self._alerts[alert.id] = alert
             self._wake.set()
 
@@ -56,22 +60,45 @@ class Manoeuvres:
             self._wake.set()
 
     @property
-    def _alert(self) -> ObstacleAlert | None:
-        """The newest that is not over."""
-        return next(reversed(self._alerts.values()), None)
+    def _standing(self) -> ObstacleAlert | None:
+        """The newest of something that stands in the way, unless it is over."""
+        return next((each for each in reversed(self._alerts.values()) if each.kind != "approach"), None)
+
+    @property
+    def _moving(self) -> ObstacleAlert | None:
+        """The newest of a moving object."""
+        return next((each for each in reversed(self._alerts.values()) if each.kind == "approach"), None)
 
     def routes(self) -> list[Route]:
         """Those that can be flown, as lines."""
         return list(self._routes)
 
-    def request(self, operator: Operator, manoeuvre_id: str) -> FlyManoeuvre:
-        """Raises NotFoundError for one that is out of date, NotAllowedError for one that cannot be flown."""
+    async def request(self, operator: Operator, manoeuvre_id: str) -> FlyManoeuvre:
+        """Raises NotFoundError for one that is out of date, NotAllowedError for one that cannot be flown.
+
+        One past a moving object is prepared anew: a second ago the object was somewhere else.
+        """
+        found = self._found(manoeuvre_id)
+        if found.doc.kind == "sidestep" and found.doc.possible:
+            shown = found
+            await self._renew(self._standing, self._moving)
+            found = self._found(manoeuvre_id)
+            if found.doc.possible and _turned_rad(shown, found) > TURNED_RAD:
+                raise NotAllowedError(
+                    f"The way out is another one now: {found.doc.text}", advice="Look at it, then press Fly again."
+                )
+        return self._request(operator, found)
+
+    def _found(self, manoeuvre_id: str) -> Prepared:
         found = next((each for each in self.prepared if each.doc.id == manoeuvre_id), None)
         if found is None:
             raise NotFoundError(
                 "This manoeuvre is out of date: the obstacle or the vehicle has moved on.",
                 advice="Choose one of those on show.",
             )
+        return found
+
+    def _request(self, operator: Operator, found: Prepared) -> FlyManoeuvre:
         if not found.doc.possible:
             raise NotAllowedError(f"This manoeuvre cannot be flown: {found.doc.text}", advice="Choose the other one.")
         self._check_begins_here(found)
@@ -95,8 +122,8 @@ class Manoeuvres:
         while True:
             await self._wake.wait()
             self._wake.clear()
-            while (alert := self._alert) is not None:
-                await self._renew(alert)
+            while self._alerts:
+                await self._renew(self._standing, self._moving)
                 try:
                     async with asyncio.timeout(AGAIN_AFTER_S):
                         await self._wake.wait()
@@ -104,10 +131,10 @@ class Manoeuvres:
                 except TimeoutError:
                     continue
 
-    async def _renew(self, alert: ObstacleAlert) -> None:
+    async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
         try:
-            situation = await asyncio.to_thread(self._situation, alert)  # maps may be large
-            if situation is None or self._watch.avoidance.state in ("climbing", "holding", "ceiling"):
+            situation = await asyncio.to_thread(self._situation, standing, moving)  # maps may be large
+            if situation is None or self._watch.avoidance.state == "climbing":
                 self._show(())  # those on show begin where the vehicle is no more
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
@@ -117,7 +144,8 @@ class Manoeuvres:
             prepared = ()
         self._watch.busy = ""
         # Another alert, or none, while the worker was at it: what it found is void.
-        self._show(prepared if self._alert is alert else self.prepared)
+        served = self._standing is standing and self._moving is moving
+        self._show(prepared if served else self.prepared)
 
     def _busy(self, what: str) -> None:
         self._watch.busy = what
@@ -130,6 +158,16 @@ class Manoeuvres:
         ]
         self._watch.manoeuvres = [each.doc for each in prepared]
         self._watch.refresh()
+
+
+def _turned_rad(shown: Prepared, now: Prepared) -> float:
+    """Between the directions in which two ways begin; 0 where one of them begins with staying."""
+    (a, b), (c, d) = shown.points_enu_m[:2], now.points_enu_m[:2]
+    first, second = (b[0] - a[0], b[1] - a[1]), (d[0] - c[0], d[1] - c[1])
+    if min(math.hypot(*first), math.hypot(*second)) < 1.0:
+        return 0.0
+    turn = math.atan2(first[0] * second[1] - first[1] * second[0], first[0] * second[0] + first[1] * second[1])
+    return abs(turn)
 
 
 def _words(prepared: Prepared) -> str:

@@ -23,6 +23,7 @@ from server.obstacles.ground import KnownGround
 from server.obstacles.manoeuvre_task import Situation, prepare
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.sensor_nodes import SensorNodes
+from server.obstacles.tracks import TracksWatch
 from server.obstacles.watch import Watch
 from server.schemas import ServerMessage, Source
 from server.workspace import Workspace
@@ -59,18 +60,21 @@ class Obstacles:
         self._live, self._onboard, self._lane = live, onboard, lane
         self.watches: dict[Source, Watch] = {"live": Watch("live", tell), "replay": Watch("replay", tell)}
         watch = self.watches["live"]
+        self.tracks: dict[Source, TracksWatch] = {
+            source: TracksWatch(source, tell, each.on_alert) for source, each in self.watches.items()
+        }
         self._manoeuvres = Manoeuvres(
             watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: live.state
         )
         self._ground = KnownGround(library, lambda notice: bus.publish(Topic.GROUND, notice))
         self.sensor_nodes = SensorNodes(bus, nodes)
-        self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres)
+        self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres, self.tracks)
         self.desk = ObstacleDesk(
             library.root,
             self.watches,
             self._manoeuvres,
             link,
-            workspace,
+            workspace.plans,
             lane=lane,
             publish_settings=lambda settings: bus.publish(Topic.PERCEPTION_SETTINGS, settings),
             server_operator=server_operator,
@@ -87,6 +91,8 @@ class Obstacles:
         for watch, replayed in ((live, False), (replay, True)):
             relay.on(Topic.ALERT, watch.on_alert, replayed=replayed, each=True)
             relay.on(Topic.AVOIDANCE, watch.on_avoidance, replayed=replayed)
+        for source, tracks in self.tracks.items():
+            relay.on(Topic.TRACKS, tracks.on_status, replayed=source == "replay")
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         whole = [self._ask_for_whole(sensor) for sensor in SENSORS]
@@ -104,6 +110,12 @@ class Obstacles:
 
     def tick(self) -> None:
         self.watches["live"].tick()
+        self.tracks["live"].tick()
+
+    def forget_replay(self) -> None:
+        """Another recording, or none."""
+        self.watches["replay"].forget()
+        self.tracks["replay"].forget()
 
     async def on_link(self, status: LinkStatus) -> None:
         self.on_plan()
@@ -115,7 +127,7 @@ class Obstacles:
         self.watches["live"].seen_in_plan = self._workspace.seen_columns
         self.watches["live"].refresh()
 
-    def _situation(self, alert: ObstacleAlert) -> Situation | None:
+    def _situation(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> Situation | None:
         """None without a vehicle, its plan, or the surface model of that."""
         record, state = self._onboard(), self._live.state
         if record is None or state is None:
@@ -124,14 +136,27 @@ class Obstacles:
         if terrain is None:
             return None
         watch = self.watches["live"]
-        origin = next((status.origin for status in watch.statuses.values() if status.origin is not None), None)
+        tracks = self.tracks["live"].fresh()
+        statuses = [*watch.statuses.values(), *([] if tracks is None else [tracks])]
+        origin = next((status.origin for status in statuses if status.origin is not None), None)
         if origin is None:
             return None
         maps = tuple(mirror.voxels() for mirror in watch.mirrors.values() if mirror.origin is not None)
         directory = self._library.terrain_dir(terrain.id)
-        offset_m = watch.avoidance.height_offset_m
-        radius_m = watch.settings.vehicle_radius_m
-        return Situation(alert, state, self._live.flight, offset_m, record, directory, origin, maps, radius_m)
+        return Situation(
+            standing,
+            state,
+            self._live.flight,
+            watch.avoidance.height_offset_m,
+            record,
+            directory,
+            origin,
+            maps,
+            watch.settings.vehicle_radius_m,
+            approach=moving,
+            tracks=tracks,
+            safety_radius_m=watch.settings.safety_radius_m,
+        )
 
     async def _ask_for_whole(self, sensor: Sensor) -> None:
         """A part was missed, or came before this server was there: the node tells its map once more."""

@@ -28,7 +28,7 @@ class SensorNodes:
 
     async def start(self, *sensors: Sensor) -> None:
         for sensor in sensors:
-            await self._nodes.sensor(sensor)
+            await self._start(sensor)
 
     async def _await_frame(self, sensor: Sensor) -> None:
         """Heard once: later frames are none of the server's business."""
@@ -38,4 +38,10 @@ class SensorNodes:
                 break
         finally:
             subscription.close()
+        await self._start(sensor)
+
+    async def _start(self, sensor: Sensor) -> None:
+        """Moving objects are told from the radar's frames by a process of its own, beside the map's."""
         await self._nodes.sensor(sensor)
+        if sensor == "radar":
+            await self._nodes.tracks()

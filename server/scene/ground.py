@@ -9,6 +9,7 @@ from server.scene.drawing import Drawing
 from server.scene.glb import textured_glb
 from server.scene.mesh import gap_mesh, grid_mesh
 from server.scene.nodes import Node
+from server.scene.overlay import laid_over
 from server.scene.payload import U8, HeightGrid
 
 _SURFACE_OPACITY = 0.26
@@ -17,7 +18,8 @@ _HATCH_TEXTURE_PX = 1200
 
 
 def terrain_nodes(drawing: Drawing) -> list[Node]:
-    glb = textured_glb(grid_mesh(drawing.terrain.grid, drawing.frame), drawing.terrain.texture_rgb)
+    texture = laid_over(drawing.terrain, drawing.state.overlay)
+    glb = textured_glb(grid_mesh(drawing.terrain.grid, drawing.frame), texture)
     return [_glb_node("/terrain", glb, drawing)]
 
 

@@ -11,12 +11,13 @@ from server.scene.flight import flight_nodes
 from server.scene.ground import surface_nodes, terrain_nodes, unknown_nodes
 from server.scene.marks import place_nodes, poi_nodes
 from server.scene.nodes import Node, Ready
-from server.scene.payload import PlanScene, ReviewScene, TerrainScene
+from server.scene.payload import OverlayScene, PlanScene, ReviewScene, TerrainScene
 from server.scene.review import review_nodes
+from server.scene.sites import site_nodes
 
 POIS = "pois"
 Key = tuple[Any, ...]
-_PAYLOADS = (TerrainScene, PlanScene, ReviewScene)
+_PAYLOADS = (TerrainScene, PlanScene, ReviewScene, OverlayScene)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +30,11 @@ class Layer:
 
 def layers(gizmo_ready: Ready) -> tuple[Layer, ...]:
     return (
-        Layer("terrain", terrain_nodes, lambda d: (d.terrain, d.frame)),
+        Layer("terrain", terrain_nodes, lambda d: (d.terrain, d.frame, d.state.overlay)),
         Layer("unknown", unknown_nodes, lambda d: (d.terrain, d.frame, d.state.view.show_unknown)),
         Layer("surface", surface_nodes, lambda d: (*_plan_key(d), d.state.view.show_surface)),
         Layer("flight", flight_nodes, lambda d: (*_plan_key(d), d.state.view.show_path)),
+        Layer("sites", site_nodes, _sites_key),
         Layer("review", review_nodes, lambda d: (d.terrain, d.frame, d.state.review)),
         Layer("places", place_nodes, _places_key),
         Layer(POIS, lambda d: poi_nodes(d, gizmo_ready), _pois_key),
@@ -56,6 +58,13 @@ def _places_key(drawing: Drawing) -> Key:
     mission = document.mission
     places = document.home, document.source, document.survey.polygon, mission.look_at, mission.heading, planned_home
     return drawing.terrain, drawing.frame, *places
+
+
+def _sites_key(drawing: Drawing) -> Key:
+    """Their numbers keep off the names of points of interest."""
+    document, sites = drawing.state.document, drawing.state.sites
+    names = (document.pois, document.source, document.home) if sites else ()
+    return drawing.terrain, drawing.frame, sites, drawing.state.selection.site_rank, *names
 
 
 def _pois_key(drawing: Drawing) -> Key:

@@ -29,6 +29,9 @@ UNKNOWN = ((104, 92, 120), (130, 115, 148))
 RADAR = (240, 90, 205)
 VISION = (255, 225, 80)
 """Of the sensors that see obstacles: magenta and yellow stay apart for every kind of colour blindness."""
+TRACK = (255, 255, 255)
+TRACK_DANGEROUS = INSIDE
+SITE = (250, 250, 250)
 KNOWN_GROUND = (150, 154, 162)
 """Voxels that the surface model explains."""
 _FAINT_SHARE = 0.6

@@ -74,6 +74,27 @@ class ReviewScene:
 
 
 @dataclass(frozen=True, slots=True)
+class OverlayScene:
+    """Colours that are laid over a surface model; its extent may end within the model's."""
+
+    terrain_id: str
+    rgba: U8
+    """(h, w, 4) row 0 northernmost"""
+    west_m: float
+    north_m: float
+    cell_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SiteMark:
+    """A numbered place to land."""
+
+    rank: int
+    lat_deg: float
+    lon_deg: float
+
+
+@dataclass(frozen=True, slots=True)
 class SceneState:
     """Everything the view has to show; the view draws the difference to what it shows already."""
 
@@ -86,3 +107,5 @@ class SceneState:
     view: ViewDoc
     review: ReviewScene | None = None
     """The recording that is open; then there is no plan."""
+    overlay: OverlayScene | None = None
+    sites: tuple[SiteMark, ...] = ()

@@ -16,9 +16,11 @@ from server.scene.drawing import Drawing
 from server.scene.enu import EnuPlacing
 from server.scene.nodes import Canvas, Node
 from server.scene.regions import Route, conflict_nodes, region_nodes, route_nodes
+from server.scene.tracks import track_nodes
 from server.scene.voxels import chunk_nodes, chunk_place, sent_bytes
 from server.schemas import Source
 from telemetry.obstacles import MapOrigin, PerceptionStatus, Sensor
+from telemetry.tracks import TracksStatus
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +75,11 @@ class Sights:
         origin: MapOrigin | None,
         statuses: Mapping[Sensor, PerceptionStatus],
         routes: Sequence[Route],
+        tracks: TracksStatus | None = None,
     ) -> None:
-        """Regions, conflicts and manoeuvres: few and small, ten times a second."""
+        """Regions, conflicts, manoeuvres and moving objects: few and small, ten times a second."""
         drawing, placing = self._drawing, self._place(origin)
-        key = (drawing, placing, *statuses.values(), *routes)
+        key = (drawing, placing, tracks, *statuses.values(), *routes)
         if len(key) == len(self._now) and all(a is b for a, b in zip(key, self._now, strict=True)):
             return
         self._now = key
@@ -87,6 +90,7 @@ class Sights:
                 f"regions_{source}": region_nodes(drawing, placing, statuses, prefix=prefix),
                 f"conflicts_{source}": conflict_nodes(drawing, placing, statuses, prefix=prefix),
                 f"routes_{source}": route_nodes(drawing, placing, routes, prefix=prefix),
+                f"tracks_{source}": track_nodes(drawing, placing, tracks, prefix=prefix),
             }
         gone = self._shown - {layer for layer, nodes in drawn.items() if nodes}
         self._shown = {layer for layer, nodes in drawn.items() if nodes}

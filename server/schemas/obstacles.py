@@ -30,7 +30,8 @@ class ManoeuvreDoc(Strict):
     """A prepared way past an obstacle; never below it."""
 
     id: str
-    kind: Literal["over", "around"]
+    kind: Literal["over", "around", "sidestep"]
+    """sidestep: the velocity proposed against a moving object, flown level, then back to the mission."""
     for_alert: str
     """``ObstacleAlert.id``"""
     possible: bool
@@ -96,6 +97,8 @@ class PerceptionSettingsBody(Strict):
     fov_deg: Annotated[float, Field(ge=4, le=120)] | None = None
     height_m: Annotated[float, Field(ge=0.5, le=20)] | None = None
     paper_bare: bool | None = None
+    safety_radius_m: Annotated[float, Field(ge=0.5, le=30)] | None = None
+    approach_s: Annotated[float, Field(ge=2, le=30)] | None = None
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] | None = None
 
 

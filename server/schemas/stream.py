@@ -12,9 +12,11 @@ from server.schemas.library import JobDoc, LibraryState
 from server.schemas.obstacles import ObstaclesState, SensorName
 from server.schemas.results import ErrorDoc, PlanState
 from server.schemas.review import ReviewDoc
+from server.schemas.traversability import TraversabilityState
 from server.schemas.view import SelectionDoc, ViewDoc
 from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
 from telemetry.obstacles import ObstacleAlert, PerceptionStatus
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 
@@ -194,6 +196,24 @@ class ObstaclesMessage(Strict):
     obstacles: ObstaclesState
 
 
+class TracksMessage(Strict):
+    """Moving objects: with every radar frame, at most 10 times a second; null: forget them."""
+
+    v: Literal[1] = 1
+    type: Literal["tracks"] = "tracks"
+    source: Source
+    now_mono_s: float
+    status: TracksStatus | None
+
+
+class TraversabilityMessage(Strict):
+    """What is known of where ground can be driven on or landed on."""
+
+    v: Literal[1] = 1
+    type: Literal["traversability"] = "traversability"
+    traversability: TraversabilityState
+
+
 class NoticeMessage(Strict):
     """Something the operator must read: a failed click, a warning."""
 
@@ -227,6 +247,8 @@ ServerMessage = Annotated[
     | PerceptionMessage
     | AlertMessage
     | ObstaclesMessage
+    | TracksMessage
+    | TraversabilityMessage
     | NoticeMessage,
     Field(discriminator="type"),
 ]

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.base import Strict
+from server.schemas.plan import PlaceDoc
+from server.schemas.traversability import LayerName
 
 
 class ViewDoc(Strict):
@@ -22,6 +24,10 @@ class ViewDoc(Strict):
     show_explained: bool = True
     """Voxels that are known ground, in grey."""
     show_regions: bool = True
+    show_tracks: bool = True
+    show_traversability: bool = False
+    """Untraversable ground, cleared foliage and landing sites."""
+    traversability_layer: LayerName = "cleared"
     vertical_exaggeration: Annotated[float, Field(ge=1, le=5)] = 1.0
     legend_min_m: float | None = None
     legend_max_m: float | None = None
@@ -30,5 +36,9 @@ class ViewDoc(Strict):
 class SelectionDoc(Strict):
     """Which tool clicks in the 3D view act through, and what is selected."""
 
-    tool: Literal["select", "add_poi", "polygon", "home", "look_at"] = "select"
+    tool: Literal["select", "add_poi", "polygon", "home", "look_at", "landing"] = "select"
     poi_id: str | None = None
+    place: PlaceDoc | None = None
+    """Clicked with the tool "landing": sites are looked for near it."""
+    site_rank: int | None = None
+    """Of the landing site that is pointed out."""

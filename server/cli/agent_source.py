@@ -1,0 +1,116 @@
+"""Where ``hedgehop agent`` takes its readings from, by its options."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.cli.output import say
+from server.errors import BadRequestError
+from telemetry.agent.client import Reading
+from telemetry.agent.sources import at, readings_of_lines, recorded_readings
+from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings
+from telemetry.sensors.ti_mmwave.config import read_config
+from telemetry.sensors.ti_mmwave.differences import differences
+from telemetry.sensors.ti_mmwave.model import TiConfig
+from telemetry.sensors.ti_mmwave.ports import config_port_beside, open_port
+from telemetry.sensors.ti_mmwave.session import TiPorts
+
+NO_PORT = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class SourceOptions:
+    """As given on the command line."""
+
+    recording: Path | None = None
+    ti_config: Path | None = None
+    ti_data: str | None = None
+    ti_config_port: str | None = None
+    ti_baud: int = 921_600
+    ti_capture: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """``readings`` block; run them through in a thread of their own."""
+
+    readings: Iterator[Reading]
+    radar: TiStatus | None = None
+    """Of a TI radar, live or from a file."""
+
+
+def source_of(options: SourceOptions) -> Source:
+    """Raises DescribedError for options that do not go together and for a configuration that cannot be read."""
+    _check(options)
+    if options.recording is not None:
+        return Source(_paced(recorded_readings(options.recording)))
+    config = _config(options.ti_config)
+    if options.ti_capture is not None:
+        status = TiStatus()
+        return Source(_paced(captured_readings(options.ti_capture, config, status)), status)
+    if options.ti_data is not None and config is not None:
+        radar = TiRadar(config, _ports(options, options.ti_data), tell=say)
+        return Source(radar.readings(), radar.status)
+    return Source(readings_of_lines(sys.stdin))
+
+
+def _check(options: SourceOptions) -> None:
+    sources = {"--recording": options.recording, "--ti-data": options.ti_data, "--ti-capture": options.ti_capture}
+    given = [name for name, value in sources.items() if value is not None]
+    if len(given) > 1:
+        raise BadRequestError(f"{' and '.join(given)} are two sources.", advice="Give one of them.")
+    if options.ti_data is not None and options.ti_config is None:
+        raise BadRequestError(
+            "The radar's configuration is missing.", where="--ti-config", advice="Give the .cfg file that it is sent."
+        )
+    if options.ti_config is not None and options.ti_data is None and options.ti_capture is None:
+        raise BadRequestError(
+            "There is no radar for this configuration.", where="--ti-config", advice="Name its data port: --ti-data."
+        )
+    if options.ti_config_port is not None and options.ti_data is None:
+        raise BadRequestError("A config port needs a data port.", where="--ti-config-port", advice="Add --ti-data.")
+
+
+def _config(path: Path | None) -> TiConfig | None:
+    if path is None:
+        return None
+    config = read_config(path)
+    if not config.sends_points:
+        raise BadRequestError(
+            "With this configuration the radar sends no points.",
+            where=path.name,
+            advice="Set guiMonitor -1 1 0 0 0 0 0.",
+        )
+    for note in differences(config):
+        say(f"Note: {note}")
+    return config
+
+
+def _ports(options: SourceOptions, data: str) -> TiPorts:
+    """Raises SensorError at once for a data port that cannot be opened, before any ground station is asked for."""
+    open_port(data, options.ti_baud).close()
+    config = options.ti_config_port or config_port_beside(data)
+    if config is None:
+        raise BadRequestError(
+            f"Which config port belongs to {data} is not known.",
+            where="--ti-config-port",
+            advice=f'Name it, or write "{NO_PORT}" for a radar that runs already.',
+        )
+    if config == NO_PORT:
+        return TiPorts(data, None, options.ti_baud)
+    say(f"The radar is configured through {config}, its frames come from {data}.")
+    return TiPorts(data, config, options.ti_baud)
+
+
+def _paced(timed: Iterator[tuple[float, Reading]]) -> Iterator[Reading]:
+    """At the recorded pace, as if measured now."""
+    began_s = time.monotonic()
+    for after_s, reading in timed:
+        wait_s = began_s + after_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(wait_s)
+        yield at(reading, began_s + after_s)

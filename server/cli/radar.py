@@ -1,0 +1,208 @@
+"""``hedgehop radar process``: raw samples of a radar to detections and figures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from planning.errors import DescribedError
+from server.cli import examples
+from server.cli import options as o
+from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
+
+if TYPE_CHECKING:
+    from mapping.radar import Detections, FmcwParams, RadarChain
+    from telemetry.sensors.adc.model import AdcFile, AdcFrame
+    from telemetry.sensors.ti_mmwave.model import TiConfig
+
+SHOWN = 10
+"""Detections of the first frame, in the answer for people."""
+
+Sensor = Literal["awr1843", "position2go"]
+
+radar = typer.Typer(name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich")
+
+
+class RadarOptionsError(DescribedError):
+    """Options that do not go together."""
+
+    code = "radar_options"
+
+
+@dataclass(slots=True)
+class Processed:
+    """What became of a file."""
+
+    frames: int = 0
+    detections: int = 0
+    seconds: float = 0.0
+    first: Detections | None = field(default=None)
+
+
+def process(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Raw samples: .npy, .bin (DCA1000) or .csv (ODA).")],
+    sensor: Annotated[
+        Sensor | None, typer.Option("--sensor", help="Which radar; default: position2go for .csv, else awr1843.")
+    ] = None,
+    cfg: Annotated[
+        Path | None, typer.Option("--cfg", metavar="CFG", help="The configuration that a TI radar ran with.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write the detections as a recording (.mcap).")
+    ] = None,
+    plots: Annotated[Path | None, typer.Option("--plots", metavar="DIR", help="Write figures of one frame.")] = None,
+    plot_frame: Annotated[int, typer.Option("--plot-frame", min=0, help="Of which frame, counted from 0.")] = 0,
+    most: Annotated[
+        int | None, typer.Option("--frames", metavar="N", min=1, help="Only the first N frames.", show_default=False)
+    ] = None,
+    as_json: o.AsJson = False,
+) -> None:
+    """Turn raw samples into detections: range and Doppler FFT, CFAR, direction of arrival."""
+    with refusing(as_json=as_json):
+        if out is not None and out.suffix.lower() != ".mcap":
+            what = f"{out.suffix or 'No ending'} is no format of recordings."
+            raise RadarOptionsError(what, where=out.name, advice="Choose .mcap.")
+        chosen: Sensor = sensor or ("position2go" if file.suffix.lower() == ".csv" else "awr1843")
+        opened, chain, config = _opened(file, chosen, cfg, most)
+        for note in (*opened.notes, *_differences(config)):
+            say(f"Note: {note}")
+        done = Processed()
+        _run(_detections(opened, chain, done, most, plots, plot_frame), opened, out, file, chosen)
+        end_progress()
+        if plots is not None and plot_frame >= done.frames:
+            what = f"Frame {plot_frame} is not in the file, which has {done.frames}."
+            raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
+        _answer(file, done, parameters(chosen, opened), as_json=as_json)
+        raise typer.Exit(DONE)
+
+
+radar.command("process", epilog=examples.RADAR_PROCESS)(process)
+
+
+def _opened(
+    file: Path, sensor: Sensor, cfg: Path | None, most: int | None
+) -> tuple[AdcFile, RadarChain, TiConfig | None]:
+    """Loaded only now: the help must not wait for compilers."""
+    from mapping.radar import AWR1843, AWR1843_SETTINGS, POSITION2GO, POSITION2GO_SETTINGS, RadarChain
+    from telemetry.sensors.adc.opening import open_adc
+    from telemetry.sensors.ti_mmwave.config import read_config
+
+    if cfg is not None and sensor != "awr1843":
+        raise RadarOptionsError("A Position2Go has no .cfg.", where="--cfg", advice="Leave it out, or the sensor.")
+    config = read_config(cfg) if cfg is not None else None
+    usual, settings = (AWR1843, AWR1843_SETTINGS) if sensor == "awr1843" else (POSITION2GO, POSITION2GO_SETTINGS)
+    opened = open_adc(file, usual, config, most=most)
+    return opened, RadarChain(opened.params, settings), config
+
+
+def _differences(config: TiConfig | None) -> list[str]:
+    if config is None:
+        return []
+    from telemetry.sensors.ti_mmwave.differences import differences
+
+    return differences(config)
+
+
+def _detections(
+    opened: AdcFile, chain: RadarChain, done: Processed, most: int | None, plots: Path | None, plot_frame: int
+) -> Iterator[tuple[float, Detections]]:
+    """Frame by frame; counts what it did, and draws the chosen frame."""
+    for number, frame in enumerate(islice(opened.frames(), most)):
+        if number == 0:
+            _processed(chain, frame, opened.name, number)  # compiles, which is not the frame's time
+        began_s = time.perf_counter()
+        spectra, found = _processed(chain, frame, opened.name, number)
+        done.seconds += time.perf_counter() - began_s
+        done.frames, done.detections = number + 1, done.detections + len(found)
+        done.first = found if number == 0 else done.first
+        if plots is not None and number == plot_frame:
+            from server.cli.radar_plots import write_figures
+
+            write_figures(plots, chain, spectra, found, f"{opened.name}, frame {number}")
+        progress(f"Frame {number}", None)
+        yield frame.t_s, found
+
+
+def _processed(chain: RadarChain, frame: AdcFrame, name: str, number: int) -> Any:
+    from mapping.errors import RadarDataError
+
+    try:
+        spectra = chain.spectra(frame.cube)
+        return spectra, chain.detect(spectra)
+    except RadarDataError as error:
+        raise RadarDataError(error.what, where=f"{name}, frame {number}", advice=error.advice) from error
+
+
+def _run(
+    frames: Iterator[tuple[float, Detections]], opened: AdcFile, out: Path | None, file: Path, sensor: Sensor
+) -> None:
+    if out is None:
+        for _ in frames:
+            continue
+    else:
+        from telemetry.sensors.targets import write_targets
+
+        write_targets(out, frames, t_utc_s=file.stat().st_mtime, source=sensor)
+
+
+def parameters(sensor: Sensor, opened: AdcFile) -> dict[str, Any]:
+    """What the frames were taken for."""
+    p: FmcwParams = opened.params
+    return {
+        "sensor": sensor,
+        "chirps": p.chirps,
+        "antennas": len(p.antennas),
+        "samples": p.samples,
+        "start_frequency_hz": p.start_frequency_hz,
+        "slope_hz_per_s": p.slope_hz_per_s,
+        "sample_rate_hz": p.sample_rate_hz,
+        "chirp_interval_s": p.chirp_interval_s,
+        "frame_period_s": opened.period_s,
+        "wavelength_m": p.wavelength_m,
+        "range_resolution_m": p.range_resolution_m,
+        "max_range_m": p.max_range_m,
+        "velocity_resolution_m_s": p.velocity_resolution_m_s,
+        "max_velocity_m_s": p.max_velocity_m_s,
+    }
+
+
+def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool) -> None:
+    """One JSON object, or a few lines."""
+    per_frame_s = done.seconds / max(done.frames, 1)
+    if as_json:
+        print_json(
+            {
+                "frames": done.frames,
+                "detections": done.detections,
+                "seconds_per_frame": round(per_frame_s, 6),
+                "parameters": used,
+            }
+        )
+        return
+    frames = "1 frame" if done.frames == 1 else f"{done.frames:,} frames"
+    typer.echo(f"{file.name}: {done.detections:,} detections in {frames}, {1e3 * per_frame_s:.2f} ms per frame")
+    typer.echo(
+        f"  range cells {used['range_resolution_m']:.3g} m to {used['max_range_m']:.4g} m, speed cells "
+        f"{used['velocity_resolution_m_s']:.3g} m/s to {used['max_velocity_m_s']:.3g} m/s"
+    )
+    if done.first is not None and len(done.first):
+        typer.echo("  the strongest of the first frame:")
+        for line in _table(done.first):
+            typer.echo(f"    {line}")
+
+
+def _table(found: Detections) -> list[str]:
+    import numpy as np
+
+    order = np.argsort(-found.snr_db, kind="stable")[:SHOWN]
+    return [
+        f"{found.range_m[k]:8.2f} m  {found.radial_speed_m_s[k]:+7.2f} m/s  azimuth "
+        f"{np.degrees(found.azimuth_rad[k]):+6.1f} deg  {found.snr_db[k]:5.1f} dB"
+        for k in order
+    ]

@@ -1,0 +1,93 @@
+"""What all pages show together: layers, selection, the tool in hand, and the place that profile and 3D view mark."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from server.computing import Computing
+from server.picture import Picture
+from server.plan_desk import PlanDesk
+from server.scene.payload import PlanScene, ReviewScene
+from server.schemas import (
+    ClientMessage,
+    FrameView,
+    HoverProfile,
+    HoverView,
+    PlanDoc,
+    SelectionDoc,
+    SelectionMessage,
+    ServerMessage,
+    SetSelection,
+    SetView,
+    ViewDoc,
+    ViewMessage,
+)
+
+
+class OnShow:
+    """Any page changes it for all. ``layers_changed`` follows every new view, ``publish`` reaches all pages."""
+
+    def __init__(
+        self,
+        picture: Picture,
+        desk: PlanDesk,
+        computing: Computing,
+        *,
+        layers_changed: Callable[[], None],
+        publish: Callable[[ServerMessage], None],
+    ) -> None:
+        self._picture, self._desk, self._computing = picture, desk, computing
+        self._layers_changed, self._publish = layers_changed, publish
+        self.view, self.selection = ViewDoc(), SelectionDoc()
+
+    @property
+    def document(self) -> PlanDoc:
+        """The open plan, also while a recording is shown instead of it."""
+        return self._desk.document
+
+    async def on_client_message(self, page_id: str, message: ClientMessage) -> None:
+        match message:
+            case HoverProfile():
+                self._publish(await self._picture.mark(self._plan, message.s_m))
+            case HoverView():
+                place = None if message.x is None or message.y is None else (message.x, message.y)
+                self._publish(await self._picture.mark_under(self._plan, page_id, place))
+            case SetView():
+                self.show_view(message.view)
+            case SetSelection():
+                self.select(message.selection)
+            case FrameView():
+                await self._picture.frame(message, page_id)
+
+    def show_view(self, view: ViewDoc) -> None:
+        self.view = view
+        self._layers_changed()
+        self.tell_legend()
+        self.draw()
+
+    def show_orthophoto(self) -> None:
+        self.show_view(self.view.model_copy(update={"shading": "orthophoto"}))
+
+    def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
+        """A recording in the 3D view instead of the plan; None: the plan again."""
+        self._picture.show_review(terrain_id, scene)
+
+    def select(self, selection: SelectionDoc) -> None:
+        self.selection = selection
+        self._publish(SelectionMessage(selection=selection))
+        self.draw()
+
+    def tell_legend(self) -> None:
+        """The heights that the colours mean change with the surface model on show."""
+        low_m, high_m = self._picture.legend_m or (None, None)
+        self.view = self.view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
+        self._publish(ViewMessage(view=self.view))
+
+    def draw(self) -> None:
+        stale = self._computing.state.state == "running"
+        self._picture.want(self.document, self.selection, self.view, self._computing.scene, stale=stale)
+
+    @property
+    def _plan(self) -> PlanScene | None:
+        """The plan on show; while a recording is, there is none to point at."""
+        return None if self._picture.review is not None else self._computing.scene

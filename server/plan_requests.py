@@ -1,0 +1,123 @@
+"""What pages, and the flight desk, ask of the open plan: each request is answered with the plan as it is then."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from planning.dsm import Dsm
+from planning.poi_files import looks_swapped, read_pois
+from server import ordering
+from server.computing import Computing
+from server.documents import with_points
+from server.errors import NotReadyError
+from server.exporting import exported
+from server.jobs import Lane
+from server.library import Library
+from server.obstacles.mirror import Voxels
+from server.obstacles.seen_task import keep_seen
+from server.plan_desk import PlanDesk
+from server.schemas import Imported, PlanDoc, PlanEdit, PlanState
+
+
+class PlanRequests:
+    """``dsm`` is the surface model on show; ``library_changed`` follows what changes the list of plans."""
+
+    def __init__(
+        self,
+        desk: PlanDesk,
+        computing: Computing,
+        library: Library,
+        lane: Lane,
+        *,
+        dsm: Callable[[], Dsm | None],
+        library_changed: Callable[[], None],
+    ) -> None:
+        self._desk, self._computing, self._library, self._lane = desk, computing, library, lane
+        self._dsm, self._library_changed = dsm, library_changed
+
+    @property
+    def state(self) -> PlanState:
+        history = self._desk.history
+        return PlanState(
+            plan_id=self._desk.plan_id,
+            revision=self._desk.revision,
+            document=self._desk.document,
+            can_undo=history.can_undo,
+            can_redo=history.can_redo,
+            undo_label=history.undo_label,
+            redo_label=history.redo_label,
+            saved_utc=self._desk.saved_utc,
+            computation=self._computing.state,
+        )
+
+    async def edit(self, edit: PlanEdit) -> PlanState:
+        """Raises StaleRevisionError when the plan has changed since ``base_revision``."""
+        await self._desk.edit(edit)
+        return self.state
+
+    async def undo(self) -> PlanState:
+        await self._desk.undo()
+        return self.state
+
+    async def redo(self) -> PlanState:
+        await self._desk.redo()
+        return self.state
+
+    async def new(self) -> PlanState:
+        await self._desk.create(lambda present: PlanDoc(terrain_id=present.terrain_id, profile=present.profile))
+        return self.state
+
+    async def open(self, plan_id: str) -> PlanState:
+        try:
+            await self._desk.open(plan_id)
+        finally:
+            # A damaged one has left the list.
+            self._library_changed()
+        return self.state
+
+    async def save_as(self, name: str) -> PlanState:
+        await self._desk.create(lambda present: present.model_copy(update={"name": name}))
+        return self.state
+
+    async def delete(self, plan_id: str) -> None:
+        await self._desk.delete(plan_id)
+        self._library_changed()
+
+    async def import_points(self, filename: str, data: bytes) -> Imported:
+        """Replaces the points, or the polygon, by those of a file. Raises FormatError, PoiError."""
+        points = await asyncio.to_thread(read_pois, filename, data)
+        warnings = list(points.warnings)
+        dsm = self._dsm()
+        if dsm is not None and await asyncio.to_thread(looks_swapped, points.pois, dsm):
+            warnings.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
+        await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, points)))
+        return Imported(state=self.state, warnings=warnings)
+
+    async def shortest_order(self) -> PlanState:
+        """Reorders the points to the shortest route that keeps the first one."""
+        ordered = await ordering.shortest(self._lane, self._desk.document, self._dsm())
+        await self._desk.propose(lambda document: ("Shortest order", ordering.reordered(document, ordered)))
+        return self.state
+
+    async def export(self, file: str) -> bytes:
+        """One export file, or ``all.zip``, of the present document. Raises NotReadyError."""
+        return await exported(self._lane, self._library, self._desk.document, file)
+
+    async def plan_with_seen(self, maps: list[Voxels]) -> PlanState:
+        """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other."""
+        terrain_id = self._desk.document.terrain_id
+        if terrain_id is None:
+            raise NotReadyError("There is no surface model to add to.", advice="Open the plan that is flown.")
+        directory = self._library.terrain_dir(terrain_id)
+        seen_id = await self._lane.call(keep_seen, directory, maps)
+        await self._desk.propose(
+            lambda document: ("Plan against what was seen", document.model_copy(update={"seen_id": seen_id}))
+        )
+        return self.state
+
+    async def plan_without_seen(self) -> PlanState:
+        await self._desk.propose(
+            lambda document: ("Plan without what was seen", document.model_copy(update={"seen_id": None}))
+        )
+        return self.state

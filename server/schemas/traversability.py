@@ -1,0 +1,77 @@
+"""Traversability: where ground can be driven on, what of it a UWB radar has shown to be foliage, and where to land."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Strict
+from server.schemas.results import ErrorDoc
+
+LayerName = Literal["before", "cleared", "probability", "time_in_view"]
+
+
+class LandingSiteDoc(Strict):
+    """A place to land, best first."""
+
+    rank: int
+    lat_deg: float
+    lon_deg: float
+    alt_dsm_m: float
+    distance_m: float
+    """From the point that was asked about."""
+    slope_deg: float
+    """Largest within the touchdown circle."""
+    roughness_m: float
+    obstacle_distance_m: float
+    """To the nearest untraversable cell of the map BEFORE clearing."""
+    reasons: list[str]
+    """For the pilot, such as "Slope 3.1 deg" and "6.4 m from the nearest obstacle"."""
+
+
+class TraversabilityState(Strict):
+    """Of the open surface model; everything is 0 or empty until it has been worked out."""
+
+    state: Literal["none", "working", "ready", "failed"] = "none"
+    text: str = ""
+    """What is being done, or what the map says in one line."""
+    error: ErrorDoc | None = None
+    terrain_id: str = ""
+    resolution_m: float = 0.0
+    cells: int = 0
+    """That are known."""
+    untraversable: int = 0
+    """Before clearing."""
+    cleared: int = 0
+    """Of those, shown to be soft vegetation by the radar: a rover may pass, a rotor may not touch."""
+    seen: int = 0
+    """Cells that were in the radar's view for more than 2 s."""
+    uwb_log: str = ""
+    """Name of the radar log that cleared it; empty: none."""
+    scans: int = 0
+    legend: list[str] = Field(default_factory=list)
+    """What the colours of the layer on show mean, from the lowest to the highest."""
+    legend_colors: list[str] = Field(default_factory=list)
+    """Of each of them, as "#3a2a78"."""
+    sites_near: tuple[float, float] | None = None
+    """Latitude and longitude that landing sites were asked for."""
+    sites: list[LandingSiteDoc] = Field(default_factory=list)
+    no_site: str = ""
+    """Why there is none, if one was asked for."""
+
+
+class TraversabilityBody(Strict):
+    """Works out the traversability of the open surface model."""
+
+    resolution_m: Annotated[float, Field(ge=0.1, le=10)] | None = None
+    """Of the grid; null: 0.3 m, or the model's own where that is coarser."""
+
+
+class LandingSitesBody(Strict):
+    lat_deg: Annotated[float, Field(ge=-90, le=90)]
+    lon_deg: Annotated[float, Field(ge=-180, le=180)]
+    rotor_span_m: Annotated[float, Field(ge=0.1, le=10)] = 0.8
+    """Across all rotors; sites keep twice as much from any obstacle."""
+    radius_m: Annotated[float, Field(ge=5, le=2000)] = 150.0
+    """So far from the point sites are looked for."""

@@ -1,0 +1,44 @@
+"""What the plan lane's worker does to find landing sites: the map before clearing, searched around a point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from planning.landing_sites import LandingSite
+from planning.traversable import site_places, sites_near
+from server.jobs import Progress
+from server.schemas import LandingSiteDoc, LandingSitesBody
+from server.traversability.maps import read_maps
+
+
+@dataclass(frozen=True, slots=True)
+class FoundSites:
+    sites: tuple[LandingSiteDoc, ...]
+    no_site: str = ""
+
+
+def find_sites(source: Path, body: LandingSitesBody, *, report: Progress) -> FoundSites:
+    """Best first. Raises PlanningError."""
+    report("Looking for landing sites", None)
+    ground = read_maps(source).ground
+    found = sites_near(ground, (body.lat_deg, body.lon_deg), body.rotor_span_m, body.radius_m)
+    places = site_places(ground, found).tolist()
+    return FoundSites(
+        tuple(_described(site, *place) for site, place in zip(found.sites, places, strict=True)), found.no_site
+    )
+
+
+def _described(site: LandingSite, lat_deg: float, lon_deg: float, alt_dsm_m: float) -> LandingSiteDoc:
+    return LandingSiteDoc(
+        rank=site.rank,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        alt_dsm_m=alt_dsm_m,
+        distance_m=site.distance_m,
+        slope_deg=math.degrees(site.slope_rad),
+        roughness_m=site.roughness_m,
+        obstacle_distance_m=site.obstacle_distance_m,
+        reasons=list(site.reasons),
+    )
