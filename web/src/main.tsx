@@ -25,6 +25,8 @@ import "./styles/review.css";
 import "./styles/obstacles.css";
 import "./styles/polar.css";
 import "./styles/alerts.css";
+import "./styles/tracks.css";
+import "./styles/traversability.css";
 import { App } from "./shell/App";
 import { startSound } from "./obstacles/sound";
 import { startClock } from "./store/clock";

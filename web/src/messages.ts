@@ -120,7 +120,7 @@ export interface Obstacle {
 export interface ObstacleAlert {
   id: string;
   sensor: "radar" | "vision" | "ranges";
-  kind: "obstacle" | "conflict" | "divergence" | "sensor";
+  kind: "obstacle" | "conflict" | "approach" | "divergence" | "sensor";
   phase: "begins" | "goes_on" | "ends";
   t_mono_s: number;
   t_utc_s: number;
@@ -145,6 +145,8 @@ export interface PerceptionSettings {
   radar_resolution_m: number;
   vision_resolution_m: number;
   memory_limit_bytes: number;
+  safety_radius_m: number;
+  approach_s: number;
 }
 
 /** One sensor's node after each frame, and once a second when none comes. */
@@ -215,6 +217,47 @@ export interface Rounded {
   kept: number | null;
 }
 
+/** One object that is followed from radar frame to radar frame. */
+export interface Track {
+  id: number;
+  enu_m: [number, number, number];
+  velocity_enu_m_s: [number, number];
+  covariance_m2: [number, number, number];
+  age_s: number;
+  updates: number;
+  moving: boolean;
+  range_m: number;
+  bearing_deg: number;
+  closest_m: number;
+  closest_in_s: number;
+  dangerous: boolean;
+  lat_deg: number;
+  lon_deg: number;
+}
+
+/** The tracks node after each radar frame, and once a second when none comes. */
+export interface TracksStatus {
+  state: "waiting" | "running" | "frozen" | "stale";
+  text: string;
+  t_mono_s: number;
+  t_utc_s: number;
+  done_t_mono_s: number;
+  frames: number;
+  dropped: Count[];
+  lost_frames: number;
+  detections: number;
+  tracks: Track[];
+  hidden: number;
+  velocity_enu_m_s: [number, number] | null;
+  max_speed_m_s: number;
+  safety_radius_m: number;
+  cones: VelocityCone[];
+  proposal: VelocityProposal | null;
+  no_proposal: string;
+  origin: MapOrigin | null;
+  latency_s: number | null;
+}
+
 /** A mission on its way to or from the vehicle. */
 export interface TransferStatus {
   direction: "upload" | "download";
@@ -280,6 +323,22 @@ export interface VehicleState {
 export interface VehicleText {
   t_utc_s: number;
   severity: number;
+  text: string;
+}
+
+/** The vehicle's velocities over ground that lead into one object (velocity obstacle, Wessendorp 2021). */
+export interface VelocityCone {
+  track_id: number;
+  apex_enu_m_s: [number, number];
+  axis_deg: number;
+  half_angle_deg: number;
+}
+
+/** The velocity nearest to the present one that leads into nothing, within the limits of speed and turn. */
+export interface VelocityProposal {
+  velocity_enu_m_s: [number, number];
+  hold_s: number;
+  closest_m: number;
   text: string;
 }
 
@@ -556,6 +615,10 @@ export interface ViewDoc {
   /** Voxels that are known ground, in grey. */
   show_explained: boolean;
   show_regions: boolean;
+  show_tracks: boolean;
+  /** Untraversable ground, cleared foliage and landing sites. */
+  show_traversability: boolean;
+  traversability_layer: "before" | "cleared" | "probability" | "time_in_view";
   vertical_exaggeration: number;
   legend_min_m: number | null;
   legend_max_m: number | null;
@@ -563,8 +626,12 @@ export interface ViewDoc {
 
 /** Which tool clicks in the 3D view act through, and what is selected. */
 export interface SelectionDoc {
-  tool: "select" | "add_poi" | "polygon" | "home" | "look_at";
+  tool: "select" | "add_poi" | "polygon" | "home" | "look_at" | "landing";
   poi_id: string | null;
+  /** Clicked with the tool "landing": sites are looked for near it. */
+  place: PlaceDoc | null;
+  /** Of the landing site that is pointed out. */
+  site_rank: number | null;
 }
 
 export interface PlanEdit {
@@ -829,7 +896,8 @@ export interface AlertDoc {
 /** A prepared way past an obstacle; never below it. */
 export interface ManoeuvreDoc {
   id: string;
-  kind: "over" | "around";
+  /** sidestep: the velocity proposed against a moving object, flown level, then back to the mission. */
+  kind: "over" | "around" | "sidestep";
   /** ``ObstacleAlert.id`` */
   for_alert: string;
   possible: boolean;
@@ -888,6 +956,8 @@ export interface PerceptionSettingsBody {
   fov_deg?: number | null;
   height_m?: number | null;
   paper_bare?: boolean | null;
+  safety_radius_m?: number | null;
+  approach_s?: number | null;
   radar_variant?: "heading_only" | "full_attitude" | "full_attitude_flat" | null;
 }
 
@@ -895,6 +965,68 @@ export interface PerceptionSettingsBody {
 export interface PlanWithSeen {
   seen: boolean;
   sensors?: ("radar" | "vision" | "ranges")[];
+}
+
+/** A place to land, best first. */
+export interface LandingSiteDoc {
+  rank: number;
+  lat_deg: number;
+  lon_deg: number;
+  alt_dsm_m: number;
+  /** From the point that was asked about. */
+  distance_m: number;
+  /** Largest within the touchdown circle. */
+  slope_deg: number;
+  roughness_m: number;
+  /** To the nearest untraversable cell of the map BEFORE clearing. */
+  obstacle_distance_m: number;
+  /** For the pilot, such as "Slope 3.1 deg" and "6.4 m from the nearest obstacle". */
+  reasons: string[];
+}
+
+/** Of the open surface model; everything is 0 or empty until it has been worked out. */
+export interface TraversabilityState {
+  state: "none" | "working" | "ready" | "failed";
+  /** What is being done, or what the map says in one line. */
+  text: string;
+  error: ErrorDoc | null;
+  terrain_id: string;
+  resolution_m: number;
+  /** That are known. */
+  cells: number;
+  /** Before clearing. */
+  untraversable: number;
+  /** Of those, shown to be soft vegetation by the radar: a rover may pass, a rotor may not touch. */
+  cleared: number;
+  /** Cells that were in the radar's view for more than 2 s. */
+  seen: number;
+  /** Name of the radar log that cleared it; empty: none. */
+  uwb_log: string;
+  scans: number;
+  /** What the colours of the layer on show mean, from the lowest to the highest. */
+  legend: string[];
+  /** Of each of them, as "#3a2a78". */
+  legend_colors: string[];
+  /** Latitude and longitude that landing sites were asked for. */
+  sites_near: [number, number] | null;
+  sites: LandingSiteDoc[];
+  /** Why there is none, if one was asked for. */
+  no_site: string;
+}
+
+/** Works out the traversability of the open surface model. */
+export interface TraversabilityBody {
+  /** Of the grid; null: 0.3 m, or the model's own where that is coarser. */
+  resolution_m?: number | null;
+}
+
+export interface LandingSitesBody {
+  lat_deg: number;
+  lon_deg: number;
+  /** Across all rotors; sites keep twice as much from any obstacle. */
+  rotor_span_m?: number;
+  /** So far from the point sites are looked for. */
+  radius_m?: number;
 }
 
 export interface Snapshot {
@@ -1066,6 +1198,22 @@ export interface ObstaclesMessage {
   obstacles: ObstaclesState;
 }
 
+/** Moving objects: with every radar frame, at most 10 times a second; null: forget them. */
+export interface TracksMessage {
+  v: 1;
+  type: "tracks";
+  source: "live" | "replay";
+  now_mono_s: number;
+  status: TracksStatus | null;
+}
+
+/** What is known of where ground can be driven on or landed on. */
+export interface TraversabilityMessage {
+  v: 1;
+  type: "traversability";
+  traversability: TraversabilityState;
+}
+
 /** Something the operator must read: a failed click, a warning. */
 export interface NoticeMessage {
   v: 1;
@@ -1127,6 +1275,8 @@ export type ServerMessage =
   | PerceptionMessage
   | AlertMessage
   | ObstaclesMessage
+  | TracksMessage
+  | TraversabilityMessage
   | NoticeMessage;
 
 export type ClientMessage =

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { cardsFor } from "../src/obstacles/manoeuvres";
+import { cardsFor, sidestepWords } from "../src/obstacles/manoeuvres";
 import { inOrder, isCalling, isShown, withAlert } from "../src/store/alerts";
 import { alert, alertDoc, manoeuvre, obstacle, obstaclesState } from "./obstacle_samples";
 
@@ -113,5 +113,45 @@ describe("the ways past an obstacle", () => {
     expect(cardsFor([alertDoc("a", { over: true })], { manoeuvres, busy: "" })).toBeNull();
     expect(cardsFor([], { manoeuvres, busy: "Looking" })).toBeNull();
     expect(cardsFor(there, { manoeuvres: [], busy: "" })).toBeNull();
+  });
+});
+
+describe("an approach", () => {
+  const approach = alertDoc("moving", { alert: alert("moving", { kind: "approach", obstacle: null }) });
+  const sidestep = manoeuvre("s", "sidestep", { for_alert: "moving" });
+
+  it("is as urgent as an obstacle seconds away, and stands before one that is not", () => {
+    const at = (id: string, time_to_contact_s: number | null) =>
+      alertDoc(id, { alert: alert(id, { obstacle: obstacle({ time_to_contact_s }) }) });
+    const order = inOrder([at("still", null), approach, at("now", 2)]);
+    expect(order.map((entry) => entry.alert.id)).toEqual(["now", "moving", "still"]);
+  });
+
+  it("has one way out of it, whose place is there while it is being looked for", () => {
+    const busy = "Looking for a sidestep";
+    expect(cardsFor([approach], { manoeuvres: [], busy })).toEqual([{ kind: "sidestep", doc: null }]);
+    expect(cardsFor([approach], { manoeuvres: [sidestep], busy: "" })).toEqual([
+      { kind: "sidestep", doc: sidestep },
+    ]);
+  });
+
+  it("says first what is flown, then what comes of it", () => {
+    expect(
+      sidestepWords("Turn 3 deg right, 4.9 m/s for 6 s, passes 3.7 m away, then back to the mission."),
+    ).toEqual({
+      does: "Turn 3 deg right, 4.9 m/s",
+      detail: "for 6 s, passes 3.7 m away",
+    });
+    expect(sidestepWords("Stop here").does).toBe("Stop here");
+  });
+
+  it("and an obstacle do not hide each other's ways, whichever calls first", () => {
+    const over = manoeuvre("m", "over");
+    const known = { manoeuvres: [over, sidestep], busy: "" };
+    const kinds = (docs: readonly ReturnType<typeof alertDoc>[]) =>
+      cardsFor(docs, known)?.map(({ kind }) => kind);
+    expect(kinds([approach, alertDoc("a")])).toEqual(["sidestep", "over", "around"]);
+    expect(kinds([alertDoc("a"), approach])).toEqual(["sidestep", "over", "around"]);
+    expect(kinds([alertDoc("a"), { ...approach, over: true }])).toEqual(["over", "around"]);
   });
 });

@@ -104,7 +104,7 @@ export const perceptionMessage = (
 
 export const manoeuvre = (
   id: string,
-  kind: "over" | "around",
+  kind: ManoeuvreDoc["kind"],
   fields: Partial<ManoeuvreDoc> = {},
 ): ManoeuvreDoc => ({
   id,

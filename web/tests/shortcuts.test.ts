@@ -22,9 +22,9 @@ describe("keys", () => {
     expect(shortcutOf(key, false)?.id).toBe(id);
   });
 
-  it("1 to 6 are the sections", () => {
+  it("1 to 7 are the sections", () => {
     expect(shortcutOf(press("4"), false)).toEqual({ id: "section", section: 4 });
-    expect(shortcutOf(press("7"), false)).toBeNull();
+    expect(shortcutOf(press("8"), false)).toBeNull();
   });
 
   it("inside inputs belong to the input, but for saving and opening", () => {

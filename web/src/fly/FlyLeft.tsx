@@ -1,6 +1,7 @@
 import { adopted, isInAir, linkStatus } from "../store/flying";
 import { closeReview } from "../review/commands";
 import { isReplaying, review } from "../store/review";
+import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
 import { ObstaclesSection } from "../obstacles/ObstaclesSection";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -43,7 +44,7 @@ function LinkWarnings() {
   );
 }
 
-/** From the connection to the flight, with the next step as the one primary action. */
+/** From the connection to the flight, with the ways past what is ahead and the next step at its lower edge. */
 export function FlyLeft() {
   // A vehicle that is there needs the least room: its connection closes once it is used.
   const hasTrouble = linkStatus.value?.status.connections.some((connection) => connection.state === "failed");
@@ -59,6 +60,11 @@ export function FlyLeft() {
         {!isInAir.value && <FlightSection />}
         <ObstaclesSection />
       </div>
+      {standLeft.value && adopted.value && (
+        <div class="ways">
+          <Manoeuvres />
+        </div>
+      )}
       <NextAction />
     </>
   );

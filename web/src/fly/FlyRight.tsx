@@ -1,7 +1,9 @@
 import { Avoidance } from "../obstacles/Avoidance";
-import { Manoeuvres } from "../obstacles/Manoeuvres";
+import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
 import { AheadLine, MissionAhead } from "../obstacles/MissionAhead";
 import { Sensors } from "../obstacles/Sensors";
+import { hasRoom } from "../tracks/Displays";
+import { ROWS, TrackList } from "../tracks/TrackList";
 import { adopted, heard, texts } from "../store/flying";
 import { hasSensors } from "../store/obstacles";
 import { Instruments } from "./Instruments";
@@ -16,13 +18,16 @@ function Teaching() {
   );
 }
 
-/** At the lower edge, where nothing moves when an obstacle appears: the ways past it, and avoidance. */
+/**
+ * At the lower edge: the mission ahead and avoidance, always as tall, so that no instrument above is cut when something
+ * appears. The ways past it stand here only where the left panel is a drawer.
+ */
 function Evasion() {
   if (!adopted.value || !hasSensors.live.value) return null;
   return (
     <footer class="evasion">
       <AheadLine />
-      <Manoeuvres />
+      {!standLeft.value && <Manoeuvres />}
       <Avoidance />
     </footer>
   );
@@ -35,6 +40,7 @@ export function FlyRight() {
     <>
       <div class="panel-scroll truth" tabIndex={0}>
         {isEmpty ? <Teaching /> : <Instruments source="live" />}
+        {(isEmpty || !hasRoom("live")) && <TrackList source="live" rows={ROWS.narrow} />}
         <MissionAhead source="live" />
         <Sensors source="live" />
         {(!isEmpty || texts.value.length > 0) && <VehicleMessages />}

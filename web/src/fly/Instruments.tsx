@@ -3,7 +3,7 @@ import { age_s, isStale, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, linkStatus, silence_s, type Source } from "../store/flying";
 import { link } from "../store/state";
-import { Polar } from "../obstacles/Polar";
+import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
 import { Attitude } from "./Attitude";
 import { Following } from "./Following";
@@ -49,7 +49,7 @@ export function Instruments({ source }: { source: Source }) {
           {lost && <Lost />}
           {position.age && !lost && <span class="age position-age">{position.age}</span>}
         </div>
-        <Polar source={source} state={state} />
+        <Displays source={source} state={state} />
       </div>
       <Tiles state={state} follow={follow} isOld={position.isOld} />
       <Following state={state} follow={follow} isOld={position.isOld} />

@@ -121,7 +121,13 @@ function Banner({ first, others, isReplay }: { first: AlertDoc; others: AlertDoc
       data-sensor={alert.sensor}
     >
       <Head entry={first} isReplay={isReplay} />
-      {alert.obstacle ? <Figures obstacle={alert.obstacle} isOver={first.over} /> : <p>{alert.text}</p>}
+      {alert.obstacle ? (
+        <Figures obstacle={alert.obstacle} isOver={first.over} />
+      ) : (
+        <p class={alert.kind === "approach" ? `alert-figures ${first.over ? "over" : ""}` : ""}>
+          {alert.text}
+        </p>
+      )}
       <div class="row alert-actions">
         {alert.obstacle && <Place obstacle={alert.obstacle} />}
         <span class="spring" />

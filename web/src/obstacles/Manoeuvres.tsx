@@ -4,13 +4,23 @@ import { lease } from "../store/flying";
 import { alerts, obstacles } from "../store/obstacles";
 import { link } from "../store/state";
 import { HoldButton } from "../ui/HoldButton";
-import { Icon } from "../ui/Icon";
+import { Icon, type IconName } from "../ui/Icon";
+import { matching } from "../ui/media";
 import { Outcome } from "../ui/Outcome";
 import { MANOEUVRE, flyManoeuvre } from "./commands";
-import { cardsFor, type Card } from "./manoeuvres";
+import { cardsFor, sidestepWords, type Card, type Kind } from "./manoeuvres";
 
-const TITLES = { over: "Over it", around: "Around it" } as const;
-const ICONS = { over: "up", around: "redo" } as const;
+interface Words {
+  title: string;
+  action: string;
+  icon: IconName;
+}
+
+const WORDS: Record<Kind, Words> = {
+  over: { title: "Over it", action: "Fly over", icon: "up" },
+  around: { title: "Around it", action: "Fly around", icon: "redo" },
+  sidestep: { title: "Sidestep", action: "Sidestep", icon: "sidestep" },
+};
 
 /** Why nothing can be commanded from here now. */
 function obstacleToFlying(): string | null {
@@ -18,7 +28,27 @@ function obstacleToFlying(): string | null {
   return lease.value.mine ? null : "You observe: take control first";
 }
 
+/** Out of the way of what moves: level, so what it does says more than how high it climbs. */
+function SidestepFacts({ doc }: { doc: ManoeuvreDoc }) {
+  const { does, detail } = sidestepWords(doc.text);
+  return (
+    <>
+      <p class="sidestep-does" title={doc.text} data-testid="sidestep-does">
+        <strong>{does}</strong>
+        {detail && <span>{detail}</span>}
+      </p>
+      <dl class="manoeuvre-facts">
+        <dt>Clear by</dt>
+        <dd data-testid={`clearance-${doc.kind}`}>{clearance(doc.clearance_m)}</dd>
+        <dt class="visually-hidden">Takes</dt>
+        <dd>{withUnit(doc.seconds, "s")}</dd>
+      </dl>
+    </>
+  );
+}
+
 function Facts({ doc }: { doc: ManoeuvreDoc }) {
+  if (doc.kind === "sidestep") return <SidestepFacts doc={doc} />;
   return (
     <dl class="manoeuvre-facts">
       <dt>Clear by</dt>
@@ -33,22 +63,23 @@ function Facts({ doc }: { doc: ManoeuvreDoc }) {
 
 function ManoeuvreCard({ card }: { card: Card }) {
   const { kind, doc } = card;
+  const { title, action, icon } = WORDS[kind];
   const why = obstacleToFlying();
   const isPossible = doc?.possible ?? false;
   return (
     <li
-      class={`manoeuvre ${isPossible ? "" : "impossible"}`}
+      class={`manoeuvre ${kind} ${isPossible ? "" : "impossible"}`}
       data-testid={`manoeuvre-${kind}`}
       data-possible={isPossible}
     >
       <strong>
-        <Icon name={ICONS[kind]} size={16} /> {TITLES[kind]}
+        <Icon name={icon} size={16} /> {title}
       </strong>
       {doc?.possible ? <Facts doc={doc} /> : <p class="muted">{doc ? doc.text : "Looking for it…"}</p>}
       {doc?.possible && (
         <HoldButton
           wide
-          label={kind === "over" ? "Fly over" : "Fly around"}
+          label={action}
           icon="play"
           place={MANOEUVRE}
           disabled={why !== null}
@@ -61,7 +92,10 @@ function ManoeuvreCard({ card }: { card: Card }) {
   );
 }
 
-/** Two ways past the obstacle that calls first, as drawn in the 3D view; never below it. */
+/** As in `layout.css`: from this width on the left panel, where everything is commanded from, is always there. */
+export const standLeft = matching("(min-width: 1100px)");
+
+/** The ways past what calls first, as drawn in the 3D view; never below it. */
 export function Manoeuvres() {
   const cards = cardsFor(alerts.live.value, obstacles.live.value);
   return (

@@ -17,6 +17,8 @@ const FIELDS = [
   { key: "ranges_depth_m", label: "Range finder looks ahead", unit: "m", min: 2, max: 40, step: 1 },
   { key: "fov_deg", label: "Width of the region", unit: "°", min: 4, max: 120, step: 2 },
   { key: "height_m", label: "Height of the region", unit: "m", min: 0.5, max: 20, step: 0.5 },
+  { key: "safety_radius_m", label: "Clear of what moves", unit: "m", min: 0.5, max: 30, step: 0.5 },
+  { key: "approach_s", label: "Warn of it ahead by", unit: "s", min: 2, max: 30, step: 1 },
 ] as const;
 
 const VARIANTS: readonly { value: PerceptionSettings["radar_variant"]; label: string }[] = [

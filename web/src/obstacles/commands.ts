@@ -1,5 +1,6 @@
 import type {
   AcknowledgeBody,
+  ManoeuvreDoc,
   PerceptionSettingsBody,
   PlanState,
   PlanWithSeen,
@@ -49,11 +50,17 @@ export function wantsConsent(): boolean {
   return error !== undefined && /consent/i.test(`${error.code} ${error.what} ${error.advice}`);
 }
 
-export const flyManoeuvre = (id: string, kind: string) =>
+const FLOWN: Record<ManoeuvreDoc["kind"], string> = {
+  over: "The vehicle flies over it.",
+  around: "The vehicle flies around it.",
+  sidestep: "The vehicle steps aside.",
+};
+
+export const flyManoeuvre = (id: string, kind: ManoeuvreDoc["kind"]) =>
   order({
     place: MANOEUVRE,
     path: `/api/obstacles/manoeuvre/${encodeURIComponent(id)}/fly`,
-    done: `The vehicle flies ${kind} it.`,
+    done: FLOWN[kind],
   });
 
 export function setPerception(body: PerceptionSettingsBody): Promise<Response | null> {

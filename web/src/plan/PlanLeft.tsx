@@ -1,6 +1,7 @@
 import { ErrorBox } from "../ui/ErrorBox";
 import { SeenInPlan } from "../obstacles/SeenInPlan";
 import { document_ } from "../store/state";
+import { TraversabilitySection } from "../traversability/TraversabilitySection";
 import { PlanActions } from "./PlanActions";
 import { MissionSection } from "./sections/Mission";
 import { PointsSection } from "./sections/Points";
@@ -25,6 +26,7 @@ export function PlanLeft() {
             <SurfaceSection plan={plan} />
             <SpeedsSection plan={plan} />
             <MissionSection plan={plan} />
+            <TraversabilitySection plan={plan} />
           </>
         ) : (
           <p class="muted panel-empty">Loading the plan…</p>

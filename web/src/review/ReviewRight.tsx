@@ -4,6 +4,7 @@ import type { ReviewDoc } from "../messages";
 import { Instruments } from "../fly/Instruments";
 import { MissionAhead } from "../obstacles/MissionAhead";
 import { Sensors } from "../obstacles/Sensors";
+import { ROWS, TrackList } from "../tracks/TrackList";
 import { review } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -79,6 +80,7 @@ export function ReviewRight() {
       <div class="panel-scroll truth" tabIndex={0}>
         <div class="part part-instruments">
           <Instruments source="replay" />
+          <TrackList source="replay" rows={ROWS.narrow} />
           <MissionAhead source="replay" />
           <Sensors source="replay" />
         </div>

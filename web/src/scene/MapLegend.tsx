@@ -3,11 +3,12 @@ import type { ViewDoc } from "../messages";
 import { SensorMark } from "../obstacles/SensorMark";
 import { SENSOR_WORDS } from "../obstacles/words";
 import { drawnOf, hasSensors, obstacles, type SensorName } from "../store/obstacles";
+import { hasTracks } from "../store/moving";
 import { isReplaying } from "../store/review";
 import { view } from "../store/state";
 import { setView } from "../store/stream";
 
-type Layer = "show_radar_map" | "show_vision_map" | "show_explained" | "show_regions";
+type Layer = "show_radar_map" | "show_vision_map" | "show_explained" | "show_regions" | "show_tracks";
 
 interface Key {
   layer: Layer;
@@ -35,9 +36,26 @@ const KEYS: readonly Key[] = [
     label: "Regions",
     title: "What is searched ahead; its edge is thick when it is occupied",
   },
+  {
+    layer: "show_tracks",
+    label: "Moving",
+    title: "Moving objects: arrow to where each goes, ellipse of its uncertainty, predicted closest approach",
+  },
 ];
 
+const SWATCHES: Partial<Record<Layer, string>> = {
+  show_explained: "explained",
+  show_regions: "region",
+};
+
 const toggle = (layer: Layer) => setView({ [layer]: !view.value[layer] } as Partial<ViewDoc>);
+
+/** As drawn in 3D: white, whatever the theme. */
+const MovingMark = () => (
+  <svg class="moving-mark" viewBox="0 0 20 14" width="20" height="14" aria-hidden="true">
+    <path d="M1.5 5.2h8V1.5L18.5 7l-9 5.5V8.8h-8z" />
+  </svg>
+);
 
 function Sample({ entry }: { entry: Key }) {
   if (entry.sensor) {
@@ -48,9 +66,8 @@ function Sample({ entry }: { entry: Key }) {
       </>
     );
   }
-  return (
-    <span class={`swatch ${entry.layer === "show_explained" ? "explained" : "region"}`} aria-hidden="true" />
-  );
+  if (entry.layer === "show_tracks") return <MovingMark />;
+  return <span class={`swatch ${SWATCHES[entry.layer]}`} aria-hidden="true" />;
 }
 
 /** Of large maps only so much is drawn that the browser keeps up: the key says how large its boxes are then. */
@@ -71,9 +88,12 @@ function Coarser({ sensor }: { sensor: SensorName }) {
   );
 }
 
+const isAny = ({ live, replay }: typeof hasSensors) => live.value || replay.value;
+
 /** What the colours of the maps mean; each key shows and hides what it stands for. */
 export function MapLegend() {
-  if (!hasSensors.live.value && !hasSensors.replay.value) return null;
+  const all = KEYS.filter(({ layer }) => (layer === "show_tracks" ? isAny(hasTracks) : isAny(hasSensors)));
+  if (all.length === 0) return null;
   return (
     <div
       class="map-legend overlay layers"
@@ -81,7 +101,7 @@ export function MapLegend() {
       aria-label="Maps of obstacles"
       data-testid="map-legend"
     >
-      {KEYS.map((entry) => (
+      {all.map((entry) => (
         <button
           type="button"
           key={entry.layer}

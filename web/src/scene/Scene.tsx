@@ -6,7 +6,9 @@ import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
 import { Toasts } from "../shell/Notices";
-import { document_, pageId, selection, terrain } from "../store/state";
+import { document_, pageId, selection, terrain, view } from "../store/state";
+import { hasTraversability } from "../store/traversability";
+import { MapKey } from "../traversability/MapKey";
 
 const HINTS = {
   select: null,
@@ -14,6 +16,7 @@ const HINTS = {
   polygon: "Click the surface to add a corner",
   home: "Click the surface to put home there",
   look_at: "Click the surface where the nose shall point",
+  landing: "Click the surface near which to land",
 } as const;
 
 /** viser's handle for moving in the plane is a blue square beside its point: nobody would guess. */
@@ -62,6 +65,7 @@ export function Scene() {
         <ToolHint />
         {hasTerrain && (
           <>
+            {hasTraversability.value && view.value.show_traversability && <MapKey isOverlay />}
             <MapLegend />
             <Legend />
           </>

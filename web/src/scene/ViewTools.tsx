@@ -3,18 +3,23 @@ import { heard } from "../store/flying";
 import { Button } from "../ui/Button";
 import type { ViewDoc } from "../messages";
 import { result, view } from "../store/state";
+import { hasTraversability } from "../store/traversability";
 import { frame, setView } from "../store/stream";
 
 /** Flown or replayed, it is somewhere. Told once: its values change twenty times a second. */
 const hasVehicle = computed(() => (heard.live.value ?? heard.replay.value)?.message.state?.lat_deg != null);
 
-type Layer = "show_surface" | "show_path" | "show_unknown";
+type Layer = "show_surface" | "show_path" | "show_unknown" | "show_traversability";
 
 const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
   { layer: "show_surface", label: "Surface", title: "The safe surface" },
   { layer: "show_path", label: "Path", title: "The path and the mission as it will be flown" },
   { layer: "show_unknown", label: "Unknown", title: "Where the surface model knows no height" },
+  { layer: "show_traversability", label: "Ground", title: "Where one can drive and land" },
 ];
+
+/** Traversability has to be worked out first. */
+const isThere = ({ layer }: { layer: Layer }) => layer !== "show_traversability" || hasTraversability.value;
 
 function toggle(layer: Layer): void {
   const fields: Partial<ViewDoc> = { [layer]: !view.value[layer] };
@@ -26,7 +31,7 @@ export function ViewTools() {
   return (
     <div class="view-tools">
       <div class="overlay layers" role="group" aria-label="Layers">
-        {LAYERS.map(({ layer, label, title }) => (
+        {LAYERS.filter(isThere).map(({ layer, label, title }) => (
           <button
             type="button"
             key={layer}

@@ -1,7 +1,8 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
-import { isRecording, takeFiles } from "../store/files";
+import { isRadarLog, isRecording, takeFiles } from "../store/files";
+import { takeRadarLogs } from "../traversability/commands";
 import { dragging } from "./ui_state";
 
 export const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -29,7 +30,8 @@ export function FileDrop() {
     end();
     const files = [...(event.dataTransfer?.files ?? [])];
     takeRecordings(files.filter(isRecording));
-    takeFiles(files.filter((file) => !isRecording(file)));
+    takeRadarLogs(files.filter(isRadarLog));
+    takeFiles(files.filter((file) => !isRecording(file) && !isRadarLog(file)));
   };
   return (
     <div
@@ -46,6 +48,7 @@ export function FileDrop() {
         <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
         <p>Points or polygon: CSV, GeoJSON, KML, .waypoints, .plan</p>
         <p>Recorded flight: .tlog, .mcap</p>
+        <p>UWB radar log: .npz</p>
       </div>
     </div>
   );

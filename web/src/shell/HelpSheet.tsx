@@ -25,6 +25,9 @@ const TERMS = [
   ["Cross-track", "How far beside the planned line; height error: how far above or below it."],
   ["Region, corridor", "What is searched: a sector ahead of the nose, and the mission's own next seconds."],
   ["Known ground", "Seen, and already in the surface model: drawn grey, never an alert."],
+  ["Velocities", "Cones hold the velocities that lead into a moving object: red where the present one does."],
+  ["Sidestep", "The nearest velocity that leads into nothing, flown level, then back to the mission."],
+  ["Traversable", "Level and smooth enough to drive on. Foliage that a radar saw through: never to land on."],
   ["m above home", "Heights count from the surface model at the home point."],
 ];
 

@@ -11,7 +11,7 @@ export const SHORTCUTS = [
   { id: "top", keys: "T", text: "Look from above, north up" },
   {
     id: "section",
-    keys: "1 to 6",
+    keys: "1 to 7",
     text: "Open or close that section on the left",
   },
   { id: "view", keys: "G then P or F or R", text: "Go to Plan, Fly or Review, from any view" },
@@ -92,7 +92,7 @@ function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
     m: "sound",
     "?": "help",
   };
-  if (/^[1-6]$/.test(key)) return { id: "section", section: Number(key) };
+  if (/^[1-7]$/.test(key)) return { id: "section", section: Number(key) };
   const id = plain[lower];
   return id ? { id } : null;
 }

@@ -32,7 +32,7 @@ export const views: readonly [View, ...View[]] = [
     Left: PlanLeft,
     Right: PlanRight,
     Below: ProfilePane,
-    sections: ["terrain", "points", "vehicle", "surface", "speeds", "mission"],
+    sections: ["terrain", "points", "vehicle", "surface", "speeds", "mission", "traversability"],
   },
   {
     id: "fly",

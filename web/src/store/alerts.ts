@@ -25,7 +25,13 @@ export const isShown = (entry: AlertDoc) => !entry.over || !entry.acknowledged;
 /** Sounds and shouts: it is there, and nobody has said that they saw it. */
 export const isCalling = (entry: AlertDoc) => !entry.over && !entry.acknowledged;
 
-const KINDS: Record<ObstacleAlert["kind"], number> = { obstacle: 0, conflict: 1, divergence: 2, sensor: 3 };
+const KINDS: Record<ObstacleAlert["kind"], number> = {
+  approach: 0,
+  obstacle: 0,
+  conflict: 1,
+  divergence: 2,
+  sensor: 3,
+};
 
 /** Coarsely, so that two obstacles do not change places with every frame, under the hand that acknowledges one. */
 function haste(time_to_contact_s: number | null): number {
@@ -33,11 +39,15 @@ function haste(time_to_contact_s: number | null): number {
   return time_to_contact_s < 3 ? 0 : time_to_contact_s < 10 ? 1 : 2;
 }
 
+/** An approach is alerted when it is seconds away. */
+const APPROACH_HASTE = 1;
+
 /** Calling before seen before over; then obstacles first, what will be reached soon, and what was there first. */
 function rank(entry: AlertDoc): number[] {
   const { obstacle, kind } = entry.alert;
   const stage = isCalling(entry) ? 0 : entry.over ? 2 : 1;
-  return [stage, KINDS[kind], haste(obstacle?.time_to_contact_s ?? null), entry.began_utc_s];
+  const soon = kind === "approach" ? APPROACH_HASTE : haste(obstacle?.time_to_contact_s ?? null);
+  return [stage, KINDS[kind], soon, entry.began_utc_s];
 }
 
 function compare(a: readonly number[], b: readonly number[]): number {

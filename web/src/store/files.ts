@@ -121,6 +121,26 @@ export async function sendRecording(file: File, then: (recording: RecordingDoc) 
   }
 }
 
+/** Name of the radar log that is on its way, or being worked on before the server says so. */
+export const radarLog = signal<string | null>(null);
+
+/** A UWB radar's log, to clear the foliage; whether the server took it. */
+export async function sendRadarLog(file: File): Promise<boolean> {
+  setError("traversability", null);
+  radarLog.value = file.name;
+  try {
+    await sendFile(`/api/traversability/uwb?${new URLSearchParams({ name: file.name })}`, file);
+    return true;
+  } catch (error) {
+    report("traversability", error);
+    return false;
+  } finally {
+    radarLog.value = null;
+  }
+}
+
+export const isRadarLog = (file: File) => /\.npz$/i.test(file.name);
+
 /** Any dropped file but a recording: points by their ending, everything else is tried as a surface model. */
 export function takeFiles(files: Iterable<File>): void {
   for (const file of files) void (POINT_FILES.test(file.name) ? sendPoints(file) : sendTerrain(file));

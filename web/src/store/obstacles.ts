@@ -53,6 +53,8 @@ const NOTHING: ObstaclesState = {
     radar_resolution_m: 1,
     vision_resolution_m: 0.5,
     memory_limit_bytes: 1e9,
+    safety_radius_m: 3,
+    approach_s: 8,
   },
   maps: [],
   seen_in_plan: 0,

@@ -34,6 +34,8 @@ const isOpenMap = (value: unknown): value is Record<string, boolean> =>
 
 const isYesNo = (value: unknown): value is boolean => typeof value === "boolean";
 const isRange = (value: unknown): value is number => typeof value === "number" && value >= 10 && value <= 120;
+const isDisplay = (value: unknown): value is "obstacles" | "velocity" =>
+  value === "obstacles" || value === "velocity";
 const isText = (value: unknown): value is string => typeof value === "string" && value.length < 40;
 
 export const theme = remembered<Theme>("theme", "dark", isTheme);
@@ -43,6 +45,8 @@ export const openSections = remembered<Record<string, boolean>>("sections", {}, 
 export const lastView = remembered<string>("view", "plan", isText);
 /** Alerts sound on this computer. */
 export const sound = remembered<boolean>("sound", true, isYesNo);
+/** Which of the two displays stands at their common place. */
+export const aroundDisplay = remembered<"obstacles" | "velocity">("display", "obstacles", isDisplay);
 /** What the rim of the polar display stands for. */
 export const polarRange_m = remembered<number>("polarRange", 20, isRange);
 

@@ -2,7 +2,9 @@ import { batch } from "@preact/signals";
 import type { ServerMessage } from "../messages";
 import { fly, flight, heard, linkStatus, nodes, recorder, transfer } from "./flying";
 import { forgetObstacles, forgetSensing } from "./obstacles";
+import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
+import { forgetTraversability } from "./traversability";
 
 /**
  * After a lost connection the server tells anew what holds. Until then the page keeps what it knew, so that Hold and
@@ -24,6 +26,9 @@ const FORGET: Partial<Record<string, () => void>> = {
   "vehicle replay": () => (heard.replay.value = null),
   "perception live": () => forgetSensing("live"),
   "perception replay": () => forgetSensing("replay"),
+  "tracks live": () => forgetMoving("live"),
+  "tracks replay": () => forgetMoving("replay"),
+  traversability: forgetTraversability,
   "obstacles live": () => forgetObstacles("live"),
   "obstacles replay": () => forgetObstacles("replay"),
 };

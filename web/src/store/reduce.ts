@@ -5,7 +5,9 @@ import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
+import { takeMoving } from "./moving";
 import * as state from "./state";
+import { traversability } from "./traversability";
 
 /** Takes one message of the stream into the page's state. */
 export function receive(message: ServerMessage): void {
@@ -59,6 +61,12 @@ export function receive(message: ServerMessage): void {
     case "alert":
     case "obstacles":
       takeSensing(message, performance.now());
+      return;
+    case "tracks":
+      takeMoving(message, performance.now());
+      return;
+    case "traversability":
+      traversability.value = message.traversability;
       return;
     default:
       message satisfies never;

@@ -8,6 +8,7 @@ import type {
   ReviewMessage,
 } from "../messages";
 import { now_ms } from "./clock";
+import { forgetMoving } from "./moving";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 
 /** Recordings, and the one that is open for review. */
@@ -27,6 +28,7 @@ export function takeReviewing(message: ReviewingMessage, received_ms: number): v
     case "review":
       if (message.review?.recording.id !== review.value?.recording.id) seeking.value = null;
       if (message.review === null) {
+        forgetMoving("replay");
         forgetSensing("replay");
         forgetObstacles("replay");
       }

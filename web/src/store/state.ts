@@ -34,13 +34,16 @@ export const view = signal<ViewDoc>({
   show_vision_map: true,
   show_explained: true,
   show_regions: true,
+  show_tracks: true,
+  show_traversability: false,
+  traversability_layer: "cleared",
   vertical_exaggeration: 1,
   legend_min_m: null,
   legend_max_m: null,
 });
 /** The terrain that the 3D view shows; null until the server says so. */
 export const pictured = signal<string | null>(null);
-export const selection = signal<SelectionDoc>({ tool: "select", poi_id: null });
+export const selection = signal<SelectionDoc>({ tool: "select", poi_id: null, place: null, site_rank: null });
 export const jobs = signal<ReadonlyMap<string, JobDoc>>(new Map());
 export const cursor = signal<CursorMessage | null>(null);
 export const link = signal<LinkState>("connecting");

@@ -13,6 +13,7 @@ import {
   type RasterHints,
 } from "../../store/files";
 import { jobs, terrain } from "../../store/state";
+import { isGroundJob } from "../../store/traversability";
 import { chooseFiles } from "../../shell/keyboard";
 
 /** Errors that a declaration of the operator can mend, or that a wrong one has made. */
@@ -116,7 +117,9 @@ function DrapeInstead({ job, file }: { job: JobDoc; file: File }) {
 
 /** Jobs that failed, where they were started, until they are dismissed. */
 export function FailedJobs() {
-  const failed = [...jobs.value.values()].filter((job) => job.state === "failed" && job.error);
+  const failed = [...jobs.value.values()].filter(
+    (job) => job.state === "failed" && job.error && !isGroundJob(job),
+  );
   return (
     <>
       {failed.map((job) => {
