@@ -1,24 +1,19 @@
-"""A whole Hedgehop in a process of its own, and a real browser that signs in to it."""
+"""Stations that tests share, vehicles, and a real browser whose every page is watched."""
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-import socket
-import subprocess
-import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from server.settings import default_console_dir
-from telemetry.node_lock import running_nodes
+from tests.e2e.stations import SimulatedVehicle, Station
+from tests.e2e.steps import PATIENCE_MS
 
-# The browser renders in software while other tests keep the processors busy.
-PATIENCE_MS = 90_000
 expect.set_options(timeout=PATIENCE_MS)
 
 # viser's page tries to evaluate a string, which the content security policy forbids, and goes on without.
@@ -40,93 +35,18 @@ FLAGS = [
     "--no-first-run",
 ]
 
+VIEW = re.compile(r"/view/[^/]+/(\?.*)?$")
+"""The 3D view's page, a frame within the console."""
 
-class Station:
-    """A running server; ``kill()`` is the power cut, ``start()`` the next morning."""
-
-    def __init__(self, data_dir: Path, *arguments: str) -> None:
-        self.data_dir, self._arguments = data_dir, arguments
-        self.origin = self.link = ""
-        self.start()
-
-    def start(self) -> None:
-        port = _free_port()
-        command = [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
-        # Flights of other tests meet no obstacles: a later option wins.
-        command.append("--no-demo-world")
-        self._process = subprocess.Popen(
-            [*command, *self._arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
-        self.origin = f"http://127.0.0.1:{port}"
-        self.link = self._read_link()
-
-    def _read_link(self) -> str:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            if found := re.search(r"http://\S+/login\?token=\S+", line):
-                return found.group(0)
-        raise AssertionError(f"the server ended with {self._process.wait()} before it printed its sign-in link")
-
-    def kill(self) -> None:
-        self._process.send_signal(signal.SIGKILL)
-        self._process.communicate()
-
-    def stop(self) -> None:
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGTERM)
-        try:
-            self._process.communicate(timeout=20)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.communicate()
-            raise AssertionError("the server did not stop within 20 s of SIGTERM") from None
-        finally:
-            self._end_nodes()
-
-    def _end_nodes(self) -> None:
-        """With an armed vehicle they outlive their server on purpose."""
-        for facts in running_nodes(self.data_dir / "run"):
-            os.kill(facts.pid, signal.SIGKILL)
-
-
-class SimulatedVehicle:
-    """A vehicle at the demo plan's home that flies faster than time; ground stations connect to ``address``."""
-
-    HOME = "37.7290205,14.9926236,1712.0"
-    RTL_CM = 6000
-
-    def __init__(self, *, speedup: float = 10.0) -> None:
-        self.address = f"tcp:127.0.0.1:{_free_port()}"
-        command = [sys.executable, "-m", "server", "sim", "--link", self.address.replace("tcp", "tcpin", 1)]
-        command += ["--home", self.HOME, "--speedup", str(speedup), "--parameter", f"RTL_ALT={self.RTL_CM}"]
-        self._process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
-        assert self._process.stdout is not None
-        self.said = self._process.stdout.readline()
-
-    def stop(self) -> None:
-        """As when its battery is unplugged; more than once is no harm."""
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.communicate()
-
-
-@pytest.fixture
-def vehicle(console: None) -> Iterator[SimulatedVehicle]:
-    flying = SimulatedVehicle()
-    try:
-        yield flying
-    finally:
-        flying.stop()
+SELDOM = """
+if (location.pathname.startsWith("/view/")) {
+  const draw = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), PAUSE_MS);
+  window.cancelAnimationFrame = clearTimeout;
+}
+"""
+"""Each picture of the 3D view takes up to half a second of a processor that renders it in software: drawn one after the
+other without a pause, they would leave little to everything that is being tested."""
 
 
 @pytest.fixture(scope="session")
@@ -135,17 +55,60 @@ def console() -> None:
         pytest.skip("the console is not built: make setup")
 
 
+@pytest.fixture(scope="package")
+def shared_station(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[Station]:
+    with _running(tmp_path_factory.mktemp("data")) as station:
+        yield station
+
+
 @pytest.fixture
-def station(tmp_path: Path, console: None) -> Iterator[Station]:
-    running = Station(tmp_path / "data")
+def station(shared_station: Station) -> Station:
+    """With an empty plan; tests that kill theirs have one of their own."""
+    shared_station.clear()
+    return shared_station
+
+
+@pytest.fixture
+def own_station(tmp_path: Path, console: None) -> Iterator[Station]:
+    with _running(tmp_path / "data") as station:
+        yield station
+
+
+@pytest.fixture(scope="module")
+def sighted(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[Station]:
+    """A station whose demo stands in a world with things that the surface model does not know."""
+    with _running(tmp_path_factory.mktemp("data"), "--demo-world") as station:
+        yield station
+
+
+@pytest.fixture
+def vehicle(station: Station) -> Iterator[SimulatedVehicle]:
+    with simulated_vehicle() as flying:
+        yield flying
+        # Before it is gone: the next test's station has never heard of it.
+        station.http.post("/api/link/disconnect", json={"address": flying.address})
+
+
+@contextmanager
+def simulated_vehicle() -> Iterator[SimulatedVehicle]:
+    flying = SimulatedVehicle()
     try:
-        yield running
+        yield flying
     finally:
-        running.stop()
+        flying.stop()
+
+
+@contextmanager
+def _running(data_dir: Path, *arguments: str) -> Iterator[Station]:
+    station = Station(data_dir, *arguments)
+    try:
+        yield station
+    finally:
+        station.stop()
 
 
 # Not for the session: while Playwright runs, no other test of this process can run an event loop.
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser(chromium_path: str) -> Iterator[Browser]:
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(executable_path=chromium_path, args=FLAGS)
@@ -155,24 +118,52 @@ def browser(chromium_path: str) -> Iterator[Browser]:
 
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
-    """A page that fails the test when it asks any other origin, or when the console logs an error."""
-    context = browser.new_context(viewport={"width": 1366, "height": 768}, accept_downloads=True)
+    """Its 3D view stays empty: what it costs to render in software would slow down everything else."""
+    with _watched(browser) as context:
+        context.route(
+            VIEW, lambda route: route.fulfill(content_type="text/html", body="<!doctype html><title>3D</title>")
+        )
+        yield _opened(context)
+
+
+@pytest.fixture
+def page_3d(browser: Browser) -> Iterator[Page]:
+    """With the real 3D view."""
+    yield from _page_3d(browser, pause_ms=400)
+
+
+@pytest.fixture
+def page_3d_in_flight(browser: Browser) -> Iterator[Page]:
+    """With the real 3D view, beside which sensors and what works on their frames must keep up."""
+    yield from _page_3d(browser, pause_ms=5000)
+
+
+def _page_3d(browser: Browser, *, pause_ms: int) -> Iterator[Page]:
+    with _watched(browser) as context:
+        context.add_init_script(SELDOM.replace("PAUSE_MS", str(pause_ms)))
+        yield _opened(context)
+
+
+def _opened(context: BrowserContext) -> Page:
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
+    return page
+
+
+@contextmanager
+def _watched(browser: Browser) -> Iterator[BrowserContext]:
+    """Fails the test when one of its pages asks any other origin, or when its console logs an error."""
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, accept_downloads=True)
     asked: set[str] = set()
     errors: list[str] = []
-    page.on("request", lambda request: asked.add("/".join(request.url.split("/")[:3])))
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    context.close()
+    context.on("request", lambda request: asked.add("/".join(request.url.split("/")[:3])))
+    context.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    context.on("weberror", lambda error: errors.append(str(error.error)))
+    try:
+        yield context
+    finally:
+        context.close()
     errors = [error for error in errors if not error.startswith(GONE) and not REFUSED.search(error)]
     foreign = {origin for origin in asked if not origin.startswith(("http://127.0.0.1:", "data:", "blob:"))}
     assert not foreign
     assert not [error for error in errors if KNOWN_ERROR not in error]
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from io import BytesIO
 from pathlib import Path
 
@@ -11,9 +10,10 @@ import numpy as np
 import pytest
 import rasterio
 from PIL import Image
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import PATIENCE_MS, Station
+from tests.e2e.stations import Station
+from tests.e2e.steps import certified, choose, drawn, open_demo, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
@@ -23,15 +23,21 @@ MOVE_HANDLE_RGB = (51, 145, 238)
 
 @pytest.fixture
 def demo(station: Station, page: Page) -> Page:
-    """A page with the demo's plan, drawn and certified."""
-    page.goto(station.link)
-    page.get_by_test_id("empty-demo").click()
-    _settled(page)
+    """A page with the demo's plan, certified."""
+    open_demo(page, station)
     return page
 
 
-def test_points_are_dragged_reordered_and_brought_back(demo: Page) -> None:
-    page, rows = demo, demo.get_by_test_id("poi-row")
+@pytest.fixture
+def demo_3d(station: Station, page_3d: Page) -> Page:
+    """As ``demo``, drawn as well."""
+    open_demo(page_3d, station)
+    drawn(page_3d)
+    return page_3d
+
+
+def test_points_are_dragged_reordered_and_brought_back(demo_3d: Page) -> None:
+    page, rows = demo_3d, demo_3d.get_by_test_id("poi-row")
     order = _names(page)
     _drag_row(page, 4, 1)
     moved = [order[0], order[4], *order[1:4], order[5]]
@@ -59,7 +65,8 @@ def test_points_are_dragged_reordered_and_brought_back(demo: Page) -> None:
     expect(place).to_have_text(before, use_inner_text=True)
 
 
-def test_profile_and_view_mark_the_same_place(demo: Page) -> None:
+def test_profile_and_view_mark_the_same_place(demo_3d: Page) -> None:
+    demo = demo_3d
     chart = demo.locator(".u-over").bounding_box()
     assert chart is not None
     values = demo.get_by_test_id("cursor-values")
@@ -70,7 +77,7 @@ def test_profile_and_view_mark_the_same_place(demo: Page) -> None:
     demo.get_by_test_id("view-worst").click()  # which also takes the pointer off the chart
     expect(values).to_have_count(0)
     # The camera looks at the nearest place, which lies on the path: the middle of the view points at it.
-    _wait_until(demo, lambda: _hovers(demo))
+    wait_until(demo, lambda: _hovers(demo))
 
 
 def test_two_pages_stay_in_step(demo: Page) -> None:
@@ -92,18 +99,20 @@ def test_two_pages_stay_in_step(demo: Page) -> None:
     other.close()
 
 
-def test_a_survey_under_an_orthophoto(station: Station, page: Page, shared_data: Path, tmp_path: Path) -> None:
-    page.goto(station.link)
+def test_a_survey_under_an_orthophoto(station: Station, page_3d: Page, shared_data: Path, tmp_path: Path) -> None:
+    page = page_3d
+    visit(page, station)
     model = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
-    _choose(page, page.get_by_test_id("terrain-file"), model)
-    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
-    _drawn(page)
+    choose(page, page.get_by_test_id("terrain-file"), model)
+    expect(page.get_by_test_id("terrain-row").filter(has_text=model.name)).to_have_class("current")
+    drawn(page)
     photo = _photo_like(model, tmp_path / "photo.tif")
-    _choose(page, page.get_by_test_id("terrain-file"), photo)
-    expect(page.get_by_test_id("failed-job")).to_contain_text("orthomosaic")
+    choose(page, page.get_by_test_id("terrain-file"), photo)
+    refused = page.get_by_test_id("failed-job").filter(has_text="orthomosaic")
+    expect(refused).to_be_visible()
     page.get_by_test_id("drape-instead").click()
     expect(page.get_by_test_id("shading-orthophoto")).to_have_attribute("aria-pressed", "true")
-    expect(page.get_by_test_id("failed-job")).to_have_count(0)
+    expect(refused).to_have_count(0)
 
     page.get_by_test_id("source-survey").click()
     page.get_by_test_id("tool-polygon").click()
@@ -147,8 +156,9 @@ def test_plans_are_copied_opened_and_deleted(demo: Page) -> None:
 def test_a_model_for_another_place_is_offered(demo: Page, shared_data: Path) -> None:
     page = demo
     page.reload()
-    _settled(page)
-    _choose(page, page.get_by_test_id("terrain-file"), shared_data / "dsm" / "campus" / "dsm.tif")
+    certified(page)
+    drawn(page)
+    choose(page, page.get_by_test_id("terrain-file"), shared_data / "dsm" / "campus" / "dsm.tif")
     page.get_by_test_id("offer-new").click()
     expect(page.get_by_test_id("terrain-row").filter(has_text="dsm.tif")).to_have_class("current")
     expect(page.get_by_test_id("poi-row")).to_have_count(0)
@@ -162,15 +172,6 @@ def test_the_page_leaves_when_its_session_ends(demo: Page) -> None:
     other.get_by_test_id("sign-out").click()
     expect(demo).to_have_url(re.compile(r"/signin\?ended=true$"))
     other.close()
-
-
-def _settled(page: Page) -> None:
-    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
-    _drawn(page)
-
-
-def _drawn(page: Page) -> None:
-    expect(page.get_by_test_id("scene-busy")).to_have_count(0)
 
 
 def _names(page: Page) -> list[str]:
@@ -204,10 +205,11 @@ def _resting_handle(page: Page) -> tuple[float, float]:
     seen: list[tuple[float, float] | None] = [None]
 
     def rests() -> bool:
+        page.wait_for_timeout(1000)  # a few pictures
         seen.append(_handle(page))
         return seen[-1] is not None and seen[-1] == seen[-2]
 
-    _wait_until(page, rests)
+    wait_until(page, rests)
     assert seen[-1] is not None
     return seen[-1]
 
@@ -237,12 +239,6 @@ def _hovers(page: Page) -> bool:
     return False
 
 
-def _choose(page: Page, button: Locator, path: Path) -> None:
-    with page.expect_file_chooser() as chooser:
-        button.first.click()
-    chooser.value.set_files(str(path))
-
-
 def _photo_like(model: Path, path: Path) -> Path:
     """An orthomosaic of the very place of a surface model."""
     with rasterio.open(model) as dsm:
@@ -258,7 +254,7 @@ def _click_corners(page: Page, shares: list[tuple[float, float]]) -> None:
     assert box is not None
     for number, (x, y) in enumerate(shares, start=1):
         place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
-        _wait_until(page, lambda number=number, place=place: _corner(page, place, number))
+        wait_until(page, lambda number=number, place=place: _corner(page, place, number))
 
 
 def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
@@ -267,12 +263,3 @@ def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
         page.mouse.click(*place)
         page.wait_for_timeout(1200)
     return rows.count() == wanted
-
-
-def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    end_s = time.monotonic() + timeout_ms / 1000
-    while time.monotonic() < end_s:
-        if condition():
-            return
-        page.wait_for_timeout(200)
-    raise AssertionError("not within the time allowed")

@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 import re
-import time
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import PATIENCE_MS, SimulatedVehicle, Station
+from tests.e2e.stations import SimulatedVehicle, Station
+from tests.e2e.steps import (
+    connect,
+    disarmed,
+    open_demo,
+    open_recording,
+    percent,
+    play,
+    start,
+    upload,
+    visit,
+    wait_until,
+)
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
 
 def test_plan_upload_fly_review(station: Station, page: Page, vehicle: SimulatedVehicle) -> None:
-    _open_demo(page, station)
-    _connect(page, vehicle)
-    _upload(page)
-    _start(page)
+    open_demo(page, station)
+    connect(page, vehicle)
+    upload(page)
+    start(page)
 
     expect(page.get_by_test_id("chip-mode")).to_contain_text(re.compile(r"AUTO \d+/\d+"))
     expect(page.get_by_test_id("attitude")).to_have_attribute("aria-label", re.compile("Attitude: .* heading"))
-    _wait_until(page, lambda: _percent(page) >= 5)
+    wait_until(page, lambda: percent(page) >= 5)
     expect(page.get_by_test_id("cross-track")).to_contain_text(re.compile(r"\d\.\d\d\sm"))
     expect(page.get_by_test_id("vehicle-marker")).to_be_visible()
     expect(page.get_by_test_id("chip-rec")).to_contain_text("REC")
@@ -32,16 +43,16 @@ def test_plan_upload_fly_review(station: Station, page: Page, vehicle: Simulated
     page.get_by_test_id("next-resume").click()
     expect(page.get_by_test_id("next-pause")).to_be_visible()
 
-    expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed", timeout=2 * PATIENCE_MS)
+    disarmed(page)
     _review_what_was_flown(page)
 
 
 def test_return_is_held_by_key_and_can_be_let_go(station: Station, page: Page, vehicle: SimulatedVehicle) -> None:
-    _open_demo(page, station)
-    _connect(page, vehicle)
-    _upload(page)
-    _start(page)
-    _wait_until(page, lambda: _percent(page) >= 3)
+    open_demo(page, station)
+    connect(page, vehicle)
+    upload(page)
+    start(page)
+    wait_until(page, lambda: percent(page) >= 3)
 
     page.get_by_test_id("tab-plan").click()
     home = page.get_by_test_id("return-home")
@@ -56,13 +67,14 @@ def test_return_is_held_by_key_and_can_be_let_go(station: Station, page: Page, v
     expect(page.get_by_test_id("outcome-safety")).to_contain_text("returns home")
     page.keyboard.up("Enter")
     expect(page.get_by_test_id("chip-mode")).to_contain_text("RTL")
+    disarmed(page)
 
 
 def test_a_vehicle_that_falls_silent_is_said_and_its_values_age(
     station: Station, page: Page, vehicle: SimulatedVehicle
 ) -> None:
-    _open_demo(page, station)
-    _connect(page, vehicle)
+    open_demo(page, station)
+    connect(page, vehicle)
     expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
     vehicle.stop()
     expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
@@ -72,7 +84,7 @@ def test_a_vehicle_that_falls_silent_is_said_and_its_values_age(
 
 
 def test_an_address_that_names_a_file_is_refused_where_it_was_typed(station: Station, page: Page) -> None:
-    _open_demo(page, station)
+    visit(page, station)
     page.get_by_test_id("tab-fly").click()
     page.get_by_test_id("link-address").fill("/etc/passwd")
     page.get_by_test_id("link-connect").click()
@@ -80,7 +92,7 @@ def test_an_address_that_names_a_file_is_refused_where_it_was_typed(station: Sta
 
 
 def test_the_view_is_in_the_address_and_on_the_keys(station: Station, page: Page) -> None:
-    _open_demo(page, station)
+    open_demo(page, station)
     page.get_by_test_id("verdict-badge").click()
     page.keyboard.press("g")
     page.keyboard.press("f")
@@ -94,57 +106,14 @@ def test_the_view_is_in_the_address_and_on_the_keys(station: Station, page: Page
     expect(page.get_by_test_id("recording-drop")).to_be_visible()
 
 
-def _open_demo(page: Page, station: Station) -> None:
-    page.goto(station.link)
-    page.get_by_test_id("empty-demo").click()
-    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
-
-
-def _connect(page: Page, vehicle: SimulatedVehicle) -> None:
-    page.get_by_test_id("tab-fly").click()
-    page.get_by_test_id("link-address").fill(vehicle.address)
-    page.get_by_test_id("link-connect").click()
-    expect(page.get_by_test_id("hold-position")).to_be_visible()
-    expect(page.get_by_test_id("chip-gnss")).to_contain_text("RTK")
-
-
-def _upload(page: Page) -> None:
-    page.get_by_test_id("tab-plan").click()
-    page.get_by_test_id("upload").click()
-    expect(page.get_by_test_id("outcome-upload")).to_contain_text("verified")
-    expect(page.get_by_test_id("upload")).to_have_text("On board")
-    page.get_by_test_id("tab-fly").click()
-    expect(page.get_by_test_id("rounded-note")).to_contain_text("centimetres")
-
-
-def _start(page: Page) -> None:
-    """Checks until the vehicle is ready, accepts what may be accepted, and holds Start."""
-    start, check = page.get_by_test_id("next-start"), page.get_by_test_id("next-check")
-
-    def is_ready() -> bool:
-        if check.count() and check.is_enabled():
-            check.click()
-            expect(start.or_(check).and_(page.locator(":enabled"))).to_be_visible()
-        return bool(start.count())
-
-    expect(check).to_be_visible()
-    _wait_until(page, is_ready)
-    for tick in page.locator("[data-testid^=accept-]").all():
-        tick.check()
-    hold(page, "next-start")
-    expect(page.get_by_test_id("next-action")).to_have_attribute("data-step", "pause")
-
-
 def _review_what_was_flown(page: Page) -> None:
-    page.get_by_test_id("tab-review").click()
-    page.get_by_test_id("recording-open").first.click()
-    expect(page.get_by_test_id("replay-badge")).to_be_visible()
+    open_recording(page)
     expect(page.get_by_test_id("completed")).to_have_text("completed")
     expect(page.get_by_test_id("cross-track-p95")).to_contain_text(re.compile(r"\d\.\d\d"))
     expect(page.locator(".time-pane .u-over")).to_be_visible()
 
     page.get_by_test_id("speed").select_option("5")
-    page.get_by_test_id("play").click()
+    play(page)
     before = page.get_by_test_id("replay-time").inner_text()
     expect(page.get_by_test_id("replay-time")).not_to_have_text(before, use_inner_text=True)
     page.get_by_test_id("play").click()
@@ -154,30 +123,3 @@ def _review_what_was_flown(page: Page) -> None:
     # A recording is only looked at: what commands the live vehicle is marked, and there is nothing else.
     expect(page.get_by_text("LIVE", exact=True)).to_be_visible()
     expect(page.get_by_test_id("next-action")).to_have_count(0)
-
-
-def hold(page: Page, testid: str) -> None:
-    button = page.get_by_test_id(testid)
-    expect(button).to_be_enabled()
-    button.scroll_into_view_if_needed()
-    box = button.bounding_box()
-    assert box is not None
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.mouse.down()
-    # Until the page has taken it: its frames come slowly where the browser renders in software.
-    expect(button).to_have_count(0)
-    page.mouse.up()
-
-
-def _percent(page: Page) -> int:
-    found = re.search(r"\d+", page.get_by_test_id("progress").inner_text())
-    return int(found.group(0)) if found else 0
-
-
-def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    end_s = time.monotonic() + timeout_ms / 1000
-    while time.monotonic() < end_s:
-        if condition():
-            return
-        page.wait_for_timeout(200)
-    raise AssertionError("not within the time allowed")

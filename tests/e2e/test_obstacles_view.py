@@ -4,46 +4,59 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import PATIENCE_MS, SimulatedVehicle, Station
-from tests.e2e.test_fly_view import _connect, _open_demo, _start, _upload, _wait_until
+from tests.e2e.conftest import simulated_vehicle
+from tests.e2e.stations import Point, Station
+from tests.e2e.steps import (
+    connect,
+    open_recording,
+    play,
+    return_home,
+    start,
+    start_simulator,
+    upload,
+    visit,
+    wait_until,
+)
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
 PLACE = re.compile(r"-?\d+\.\d{7}, -?\d+\.\d{7}")
 
 
-@pytest.fixture
-def sighted(tmp_path: Path, console: None) -> Iterator[Station]:
-    """A station whose demo stands in a world with things that the surface model does not know."""
-    running = Station(tmp_path / "data", "--demo-world")
-    try:
-        yield running
-    finally:
-        running.stop()
+@pytest.fixture(scope="module")
+def demo(sighted: Station) -> Station:
+    """The building stands on the first leg; the way home is less high than usual."""
+    sighted.open_demo(_past_the_building, {"rtl_height_m": 30.0})
+    return sighted
+
+
+def _past_the_building(points: dict[str, Point]) -> list[Point]:
+    """With a stay in sight of it, so that a slow page sees the ways past it, and one behind it, until called home."""
+    meadow, ruin = points["Meadow"], points["Ruin"]
+    before = {axis: meadow[axis] + 0.15 * (ruin[axis] - meadow[axis]) for axis in ("lat_deg", "lon_deg")}
+    return [meadow, {**meadow, **before, "id": "before", "loiter_s": 45.0}, {**ruin, "loiter_s": 600.0}]
 
 
 def test_an_obstacle_is_alerted_climbed_over_planned_around_and_reviewed(
-    sighted: Station, page: Page, tmp_path: Path
+    demo: Station, page_3d_in_flight: Page, tmp_path: Path
 ) -> None:
-    _open_demo(page, sighted)
-    page.get_by_test_id("tab-fly").click()
-    page.get_by_test_id("next-simulator").click()
-    expect(page.get_by_test_id("hold-position")).to_be_visible()
+    page = page_3d_in_flight
+    visit(page, demo)
+    start_simulator(page)
     expect(page.get_by_test_id("avoidance")).to_have_attribute("data-enabled", "true")
-    _upload(page)
-    _start(page)
+    upload(page)
+    start(page)
 
     _is_alerted(page)
     expect(page.get_by_test_id("avoidance")).to_have_attribute("data-state", "offset")
     _is_acknowledged(page)
     _is_planned_against(page)
-    _returns(page)
+    return_home(page)
     _is_reviewed(page, tmp_path)
 
 
@@ -77,7 +90,7 @@ def _is_acknowledged(page: Page) -> None:
             page.keyboard.press("k")
         return not left.count()
 
-    _wait_until(page, none_calls)
+    wait_until(page, none_calls)
 
 
 def _is_planned_against(page: Page) -> None:
@@ -92,21 +105,11 @@ def _is_planned_against(page: Page) -> None:
     page.get_by_test_id("tab-fly").click()
 
 
-def _returns(page: Page) -> None:
-    page.get_by_test_id("return-home").focus()
-    page.keyboard.down("Enter")
-    expect(page.get_by_test_id("outcome-safety")).to_contain_text("returns home")
-    page.keyboard.up("Enter")
-    expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed", timeout=2 * PATIENCE_MS)
-
-
 def _is_reviewed(page: Page, tmp_path: Path) -> None:
-    page.get_by_test_id("tab-review").click()
-    page.get_by_test_id("recording-open").first.click()
-    expect(page.get_by_test_id("replay-badge")).to_be_visible()
+    open_recording(page)
     page.get_by_test_id("review-part-instruments").click()
     page.get_by_test_id("speed").select_option("2")
-    page.get_by_test_id("play").click()
+    play(page)
     replayed = page.get_by_test_id("instruments-replay")
     expect(replayed.get_by_test_id("polar")).to_be_visible()
     expect(page.get_by_test_id("sensors-replay").get_by_test_id("sensor-radar")).to_be_visible()
@@ -120,15 +123,16 @@ def _is_reviewed(page: Page, tmp_path: Path) -> None:
     assert json.loads(kept.read_text())["type"] == "FeatureCollection"
 
 
-def test_maps_are_shown_and_hidden_and_the_regions_set(sighted: Station, page: Page) -> None:
-    _open_demo(page, sighted)
-    page.get_by_test_id("tab-fly").click()
-    page.get_by_test_id("next-simulator").click()
+def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page) -> None:
+    visit(page, demo)
+    start_simulator(page)
     for layer in ("radar_map", "vision_map", "explained", "regions"):
         toggle = page.get_by_test_id(f"layer-{layer}")
         expect(toggle).to_have_attribute("aria-pressed", "true")
         toggle.click()
         expect(toggle).to_have_attribute("aria-pressed", "false")
+        toggle.click()
+        expect(toggle).to_have_attribute("aria-pressed", "true")
 
     page.get_by_test_id("section-obstacles").get_by_role("button").first.click()
     depth = page.get_by_test_id("perception-radar_depth_m")
@@ -141,12 +145,15 @@ def test_maps_are_shown_and_hidden_and_the_regions_set(sighted: Station, page: P
     expect(polar).to_have_attribute("data-range", "40")
 
 
-def test_without_the_server_hold_and_return_are_disabled_and_say_why(
-    station: Station, page: Page, vehicle: SimulatedVehicle
-) -> None:
-    _open_demo(page, station)
-    _connect(page, vehicle)
-    station.kill()
+def test_without_the_server_hold_and_return_are_disabled_and_say_why(own_station: Station, page: Page) -> None:
+    with simulated_vehicle() as vehicle:
+        page.goto(own_station.link)
+        connect(page, vehicle)
+        own_station.kill()
+        _is_left_alone(page)
+
+
+def _is_left_alone(page: Page) -> None:
     expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
     expect(page.get_by_test_id("hold-position")).to_be_disabled()
     expect(page.get_by_test_id("return-home")).to_be_disabled()

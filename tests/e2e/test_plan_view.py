@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import time
 import zipfile
 from io import BytesIO
 from pathlib import Path
@@ -13,14 +12,16 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from planning.formats import read_mission
-from tests.e2e.conftest import PATIENCE_MS, Station
+from tests.e2e.stations import Station
+from tests.e2e.steps import choose, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
 
 def test_plan_on_a_real_model_from_sign_in_to_export(
-    station: Station, page: Page, shared_data: Path, tmp_path: Path
+    station: Station, page_3d: Page, shared_data: Path, tmp_path: Path
 ) -> None:
+    page = page_3d
     _sign_in(page, station)
     _load_model(page, shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
     _click_points(page, [(0.40, 0.50), (0.55, 0.55), (0.62, 0.45)])
@@ -29,7 +30,7 @@ def test_plan_on_a_real_model_from_sign_in_to_export(
     height = page.get_by_test_id("height-input")
     height.fill("9")
     height.press("Enter")
-    _wait_until(page, lambda: _distance_m(page) > before + 2)
+    wait_until(page, lambda: _distance_m(page) > before + 2)
     radius = page.get_by_test_id("radius-input")
     radius.fill("8")
     radius.press("Enter")
@@ -40,7 +41,7 @@ def test_plan_on_a_real_model_from_sign_in_to_export(
     expect(radius).to_have_value("20")
     page.get_by_test_id("undo").click()
     expect(height).to_have_value("5")
-    _wait_until(page, lambda: abs(_distance_m(page) - before) < 0.02)
+    wait_until(page, lambda: abs(_distance_m(page) - before) < 0.02)
     page.get_by_test_id("redo").click()
     expect(height).to_have_value("9")
 
@@ -52,7 +53,8 @@ def test_plan_on_a_real_model_from_sign_in_to_export(
     assert b"<script" not in archive.read("report.html")
 
 
-def test_a_plan_survives_a_power_cut(station: Station, page: Page) -> None:
+def test_a_plan_survives_a_power_cut(own_station: Station, page: Page) -> None:
+    station = own_station
     _sign_in(page, station)
     page.get_by_test_id("empty-demo").click()
     expect(page.get_by_test_id("poi-row")).to_have_count(6)
@@ -72,19 +74,19 @@ def test_a_plan_survives_a_power_cut(station: Station, page: Page) -> None:
 def test_a_file_that_is_no_surface_model_is_explained_where_it_was_dropped(
     station: Station, page: Page, shared_data: Path, tmp_path: Path
 ) -> None:
-    _sign_in(page, station)
+    visit(page, station)
     fake = tmp_path / "model.tif"
     fake.write_text("<VRTDataset></VRTDataset>", encoding="utf-8")
-    _choose_file(page, fake)
+    choose(page, page.get_by_test_id("terrain-file"), fake)
     expect(page.get_by_text("model.tif").first).to_be_visible()
     expect(page.get_by_text(re.compile("virtual raster")).first).to_be_visible()
 
-    _choose_file(page, shared_data / "dsm" / "landslide" / "pre_runout_DEM.asc")
+    choose(page, page.get_by_test_id("terrain-file"), shared_data / "dsm" / "landslide" / "pre_runout_DEM.asc")
     crs = page.get_by_test_id("raster-crs")
     expect(crs).to_be_visible()
     crs.fill("EPSG:32633")
     page.get_by_test_id("raster-retry").click()
-    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+    expect(page.get_by_test_id("terrain-row").filter(has_text="pre_runout_DEM.asc")).to_have_count(1)
 
 
 def _sign_in(page: Page, station: Station) -> None:
@@ -92,15 +94,9 @@ def _sign_in(page: Page, station: Station) -> None:
     expect(page.get_by_test_id("verdict")).to_be_visible()
 
 
-def _choose_file(page: Page, path: Path) -> None:
-    with page.expect_file_chooser() as chooser:
-        page.get_by_test_id("terrain-file").first.click()
-    chooser.value.set_files(str(path))
-
-
 def _load_model(page: Page, path: Path) -> None:
-    _choose_file(page, path)
-    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+    choose(page, page.get_by_test_id("terrain-file"), path)
+    expect(page.get_by_test_id("terrain-row").filter(has_text=path.name)).to_have_class("current")
 
 
 def _click_points(page: Page, shares: list[tuple[float, float]]) -> None:
@@ -111,7 +107,7 @@ def _click_points(page: Page, shares: list[tuple[float, float]]) -> None:
     # The surface is there once a click finds it: until then clicks meet nothing.
     for number, (x, y) in enumerate(shares, start=1):
         place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
-        _wait_until(page, lambda number=number, place=place: _clicked(page, place, number))
+        wait_until(page, lambda number=number, place=place: _clicked(page, place, number))
     page.keyboard.press("Escape")
 
 
@@ -128,15 +124,6 @@ def _distance_m(page: Page) -> float:
     text = page.get_by_test_id("min-distance").inner_text() if page.get_by_test_id("min-distance").count() else ""
     found = re.search(r"-?\d+\.\d+", text)
     return float(found.group(0)) if found else -1.0
-
-
-def _wait_until(page: Page, condition, timeout_ms: int = PATIENCE_MS) -> None:
-    end_s = time.monotonic() + timeout_ms / 1000
-    while time.monotonic() < end_s:
-        if condition():
-            return
-        page.wait_for_timeout(200)
-    raise AssertionError("not within the time allowed")
 
 
 def _export_all(page: Page) -> bytes:

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import Station
+from tests.e2e.stations import Station
+from tests.e2e.steps import choose, play, visit
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
@@ -16,11 +17,11 @@ pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 @pytest.fixture
 def reviewed(station: Station, page: Page, shared_data: Path) -> Page:
     """A page with a real autopilot's .tlog open, over the surface model that it was flown over."""
-    page.goto(station.link)
-    _choose(page, "terrain-file", shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
-    expect(page.get_by_test_id("terrain-row")).to_have_count(1)
+    visit(page, station)
+    choose(page, page.get_by_test_id("terrain-file"), shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
+    expect(page.get_by_test_id("terrain-row").filter(has_text="coromandel")).to_have_class("current")
     page.get_by_test_id("tab-review").click()
-    _choose(page, "recording-import", _tlog(shared_data))
+    choose(page, page.get_by_test_id("recording-import"), _tlog(shared_data))
     expect(page.get_by_test_id("replay-badge")).to_be_visible()
     return page
 
@@ -38,8 +39,7 @@ def test_a_tlog_is_judged_and_played(reviewed: Page) -> None:
     expect(page.get_by_test_id("playhead")).to_be_visible()
 
     page.get_by_test_id("review-part-instruments").click()
-    page.get_by_test_id("transport-play").click()
-    expect(page.get_by_test_id("play")).to_have_text("Pause")
+    play(page, "transport-play")
     expect(page.get_by_test_id("instruments-replay").get_by_test_id("above-home")).to_contain_text(re.compile(r"\d"))
     page.get_by_test_id("play").click()
     expect(page.get_by_test_id("play")).to_have_text("Play")
@@ -86,22 +86,16 @@ def test_a_recording_is_downloaded_closed_and_deleted(reviewed: Page, shared_dat
 
 
 def test_a_file_that_is_no_recording_is_explained(station: Station, page: Page, tmp_path: Path) -> None:
-    page.goto(station.link)
+    visit(page, station)
     page.get_by_test_id("tab-review").click()
     fake = tmp_path / "flight.tlog"
     fake.write_text("not a recording", encoding="utf-8")
-    _choose(page, "recording-import", fake)
+    choose(page, page.get_by_test_id("recording-import"), fake)
     expect(page.get_by_test_id("section-recordings").get_by_test_id("error-box")).to_contain_text("flight.tlog")
 
 
 def _tlog(shared_data: Path) -> Path:
     return sorted((shared_data / "logs" / "arducopter").glob("*.tlog"))[0]
-
-
-def _choose(page: Page, testid: str, path: Path) -> None:
-    with page.expect_file_chooser() as chooser:
-        page.get_by_test_id(testid).first.click()
-    chooser.value.set_files(str(path))
 
 
 def _seconds(page: Page, *, last: bool = False) -> float:

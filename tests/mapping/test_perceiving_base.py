@@ -72,6 +72,24 @@ def test_states() -> None:
     assert "3 s" in late.text
 
 
+@pytest.mark.parametrize(("stops", "other"), [("position", "attitude"), ("attitude", "position")])
+def test_what_the_vehicle_does_not_tell_any_more_is_said(stops: str, other: str) -> None:
+    radar = RadarPerception(Settings())
+    feed = {
+        "position": lambda t: radar.feed_position(t, (0, 0, 10), (0, 0, 0)),
+        "attitude": lambda t: radar.feed_attitude(t, 0, 0, 0),
+    }
+    for what in feed.values():
+        what(102.0)
+    for k in range(1, 14):
+        feed[other](102.0 + 0.1 * k)
+    result = radar.on_frame(scan(103.3, 1), 103.3)
+    assert result.dropped_because == f"{stops} too far in time"
+    assert (result.state, result.text) == ("frozen", f"No {stops} from the vehicle: the radar map stands still.")
+    feed[stops](103.4)
+    assert radar.on_frame(scan(103.5, 2), 103.5).state == "running"
+
+
 def test_without_gnss_the_map_is_frozen_and_says_so() -> None:
     flight = Flight(RadarPerception(Settings()))
     flight.move()

@@ -103,10 +103,20 @@ def test_around_leaves_the_line_on_the_shorter_side() -> None:
     seen = block(5, 20, 20, 30)  # reaches 5 m to the left and 15 m to the right
     way = around(HERE, LINE, [seen])
     assert isinstance(way, Manoeuvre)
-    assert way.points_enu_m[:, 0].min() == pytest.approx(-8.0, abs=1.1)
+    assert way.points_enu_m[:, 0].min() == pytest.approx(-10.0, abs=1.1)
     assert way.points_enu_m[:, 0].max() < 1.0
     assert way.height_offset_m == 0.0
     assert way.points_enu_m[-1, 1] > 25
+
+
+@pytest.mark.parametrize("deep_m", [3.0, 8.0, 14.0])
+def test_around_does_not_cut_into_a_building_of_which_only_the_face_was_seen(deep_m: float) -> None:
+    face, deeper_m = block(0, 20, 14, 30), np.arange(0.0, deep_m - 2.0)
+    body = face.centres_enu_m[None] + deeper_m[:, None, None] * np.array([0.0, 1.0, 0.0])
+    way = around(HERE, LINE, [face])
+    assert isinstance(way, Manoeuvre)
+    assert polyline_boxes_m(way.points_enu_m, body.reshape(-1, 3), 0.5) >= 2.0
+    assert way.points_enu_m[-1, 1] > 20 + deep_m
 
 
 def test_around_keeps_clear_of_the_hillside_beside_the_line() -> None:
@@ -128,6 +138,7 @@ def test_around_keeps_clear_of_the_hillside_beside_the_line() -> None:
         (around(HERE, LINE[:2], [block(0, 43, 12, 30)]), "no way back"),
         (around(HERE, LINE, [block(0, 20, 120, 30)]), "within 40 m"),
         (around(HERE, LINE, [block(0, -1, 4, 30)]), "only 0.0 m"),
+        (around(HERE, LINE, [block(2.9, 0, 4, 30), block(0, 20, 8, 30)]), "only 0.9 m"),
         (over(HERE, LINE[:1], []), "no mission"),
         (over(HERE, [[0, 0, 0], [np.nan, 0, 0]], []), "no mission"),
     ],

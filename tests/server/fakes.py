@@ -20,6 +20,8 @@ from server.schemas import (
     FlyState,
     Imported,
     JobDoc,
+    LandingSitesBody,
+    LayerName,
     LeaseDoc,
     LibraryState,
     NoticeMessage,
@@ -34,6 +36,8 @@ from server.schemas import (
     ServerMessage,
     SetSelection,
     Snapshot,
+    TraversabilityBody,
+    TraversabilityState,
     ViewDoc,
 )
 
@@ -80,6 +84,9 @@ class FakeWorkspace:
             add_terrain=self._add_terrain, add_orthophoto=self._add_orthophoto, remove_spikes=self._remove_spikes
         )
 
+        self.plans = self.terrains = self.on_show = self.board = self
+        self.traversability = FakeTraversability(self.calls)
+
     async def start(self, *, with_demo: bool = False) -> None:
         self.calls.append("start with demo" if with_demo else "start")
 
@@ -91,6 +98,9 @@ class FakeWorkspace:
 
     def snapshot(self, page_id: str) -> Snapshot:
         return snapshot(page_id)
+
+    def present(self) -> list[ServerMessage]:
+        return []
 
     async def edit(self, edit: PlanEdit) -> PlanState:
         self.calls.append("edit")
@@ -114,14 +124,14 @@ class FakeWorkspace:
         document = PlanDoc(pois=[PoiDoc(id="a", lat_deg=1, lon_deg=2)])
         return Imported(state=plan_state(2, document), warnings=[])
 
-    async def add_demo_terrain(self) -> None:
+    async def add_demo(self) -> None:
         self.calls.append("demo")
 
-    async def delete_terrain(self, terrain_id: str) -> None:
+    async def delete(self, terrain_id: str) -> None:
         self.calls.append("delete_terrain")
         self.library.delete_terrain(terrain_id)
 
-    async def cancel_job(self, job_id: str) -> None:
+    def cancel(self, job_id: str) -> None:
         self.calls.append(f"cancel {job_id}")
 
     async def on_client_message(self, page_id: str, message: ClientMessage) -> None:
@@ -143,6 +153,34 @@ class FakeWorkspace:
     def _remove_spikes(self, terrain_id: str) -> JobDoc:
         self.library.terrain_dir(terrain_id)
         return JobDoc(id="j2", label="Removing spikes", state="running")
+
+
+class FakeTraversability:
+    """Counts what it was asked for."""
+
+    def __init__(self, calls: list[str]) -> None:
+        self.calls = calls
+        self.uploads: dict[str, bytes] = {}
+
+    def work_out(self, body: TraversabilityBody) -> JobDoc:
+        self.calls.append(f"work out {body.resolution_m}")
+        return JobDoc(id="j3", label="Traversability", state="running")
+
+    def clear_foliage(self, upload: Path, name: str) -> JobDoc:
+        self.uploads[name] = upload.read_bytes()
+        upload.unlink()
+        return JobDoc(id="j4", label=f"Reading {name}", state="running")
+
+    async def sites(self, body: LandingSitesBody) -> TraversabilityState:
+        return TraversabilityState(state="ready", sites_near=(body.lat_deg, body.lon_deg))
+
+    async def layer_file(self, layer: LayerName) -> bytes:
+        if layer == "probability":
+            raise NotReadyError("No radar log has been taken in yet.")
+        return b"II*"
+
+    def forget(self) -> None:
+        self.calls.append("forget")
 
 
 class FakeFlying:

@@ -69,6 +69,8 @@ class Running:
             origin=options.pop("origin", self.origin),
             additional_headers=headers,
             max_size=None,
+            # As a browser does, it reads on while its test waits for an answer: who does not is dropped as too slow.
+            max_queue=None,
             compression=None,
             **options,
         )
@@ -105,14 +107,14 @@ def running(
         thread = threading.Thread(target=server.run, args=([listening],))
         thread.start()
         try:
-            assert ready.wait(30)
+            assert ready.wait(90)
             origin = f"http://127.0.0.1:{port}"
-            with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=30) as client:
+            with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=90) as client:
                 client.get("/login", params={"token": app.state.parts.auth.new_link_token()})
                 yield Running(settings, app, client, server)
         finally:
             server.should_exit = True
-            thread.join(30)
+            thread.join(90)
 
 
 class _Signalling(uvicorn.Server):

@@ -27,6 +27,8 @@ from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import simulated_vehicle
 
 SHORT = mission([(50.0, 150.0, 12.0), (90.0, 150.0, 12.0), (90.0, 175.0, 14.0)])
+TO_AND_FRO = mission([(50.0, 150.0, 12.0), *8 * [(110.0, 150.0, 12.0), (60.0, 150.0, 12.0)]])
+"""Still on its way when a busy machine has heard Ctrl+C twice."""
 HOME = f"{SHORT.home.lat_deg:.7f},{SHORT.home.lon_deg:.7f},100"
 KEYS = [
     "completed", "cross_track_max_m", "cross_track_mean_m", "cross_track_p95_m", "height_error_max_m",
@@ -208,9 +210,9 @@ def test_review_without_figures(shared_data: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_in_the_air_asks_twice_before_it_commands_the_return(ground: Ground, tmp_path: Path) -> None:
-    record = tmp_path / "cut.mcap"
-    with simulated_vehicle(HOME, "--speedup", 4, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
-        command = [sys.executable, "-c", "from server.cli import main; main()", "fly", str(ground.mission)]
+    record, long = tmp_path / "cut.mcap", write_mission(tmp_path / "long.waypoints", TO_AND_FRO)
+    with simulated_vehicle(HOME, "--speedup", 8, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
+        command = [sys.executable, "-c", "from server.cli import main; main()", "fly", str(long)]
         command += ["--link", link, "--dsm", str(ground.dsm), "--profile", "mapper-rtk", "--record", str(record)]
         process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert process.stdout is not None

@@ -31,7 +31,7 @@ class FakeStage:
     def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
         return None if origin is None else MapLook(self._drawing, origin, **self.view)
 
-    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any) -> None:
+    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
         raise AssertionError("maps only")
 
     def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
@@ -49,7 +49,7 @@ class NoRoutes:
 
 def made() -> MapDrawing:
     watches = {source: Watch(source, lambda message: None) for source in ("live", "replay")}
-    return MapDrawing(None, watches, NoRoutes())  # pyright: ignore[reportArgumentType]
+    return MapDrawing(None, watches, NoRoutes(), {})  # pyright: ignore[reportArgumentType]
 
 
 def test_only_what_changed_is_drawn_again() -> None:

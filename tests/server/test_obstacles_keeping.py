@@ -19,7 +19,7 @@ def test_what_was_set_is_there_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     ["", "{", "[]", '{"brake_m_s2": 0}', '{"vision_depth_m": -1}', '{"fov_deg": 400}', '{"radar_resolution_m": 0}',
-     '{"memory_limit_bytes": 0}', '{"height_m": "high"}'],
+     '{"memory_limit_bytes": 0}', '{"height_m": "high"}', '{"safety_radius_m": 0}', '{"approach_s": -1}'],
 )  # fmt: skip
 def test_damaged_settings_are_the_defaults(text: str, tmp_path: Path) -> None:
     (tmp_path / FILE).write_text(text)

@@ -30,9 +30,11 @@ from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
 from telemetry.obstacles import AvoidanceStatus, MapOrigin
 from telemetry.perception.mission_line import mission_line
 from telemetry.requests import Operator
+from telemetry.tracks import VelocityProposal
 from telemetry.vehicle import VehicleState
 from tests.server.obstacle_messages import alert, delta
 from tests.server.scene_fixtures import hill
+from tests.server.track_messages import track, tracks_status
 
 ANNA = Operator("Anna", 3)
 
@@ -56,8 +58,11 @@ class Desk:
             self.watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: self.vehicle
         )
 
-    def _situation(self, each: Any) -> Any:
-        return each
+    def _situation(self, standing: Any, moving: Any) -> Any:
+        return standing or moving
+
+    def request(self, manoeuvre_id: str) -> Any:
+        return asyncio.run(self.manoeuvres.request(ANNA, manoeuvre_id))
 
     async def _prepare(self, situation: Any) -> tuple[Prepared, ...]:
         self.asked.append(situation.id)
@@ -88,10 +93,10 @@ def test_a_way_that_begins_elsewhere_is_not_flown() -> None:
     desk.watch.on_alert(alert())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     desk.vehicle = VehicleState(1, 1, lat_deg=37.70005, lon_deg=15.0)
-    assert desk.manoeuvres.request(ANNA, "over-radar-1").kind == "over"
+    assert desk.request("over-radar-1").kind == "over"
     desk.vehicle = VehicleState(1, 1, lat_deg=37.7001, lon_deg=15.0)
     with pytest.raises(NotAllowedError, match="11 m from where"):
-        desk.manoeuvres.request(ANNA, "over-radar-1")
+        desk.request("over-radar-1")
 
 
 def test_they_come_with_the_alert_and_go_with_it() -> None:
@@ -102,14 +107,14 @@ def test_they_come_with_the_alert_and_go_with_it() -> None:
     assert [route.words for route in desk.manoeuvres.routes()] == ["Over", "Around"]
     assert desk.watch.state.busy == ""
     assert any(m.type == "obstacles" and m.obstacles.busy for m in desk.told)
-    request = desk.manoeuvres.request(ANNA, "over-radar-1")
+    request = desk.request("over-radar-1")
     assert (request.operator, request.kind, request.rejoin_item, request.height_offset_m) == (ANNA, "over", 4, 6.0)
     with pytest.raises(NotAllowedError, match="cannot be flown"):
-        desk.manoeuvres.request(ANNA, "around-radar-1")
+        desk.request("around-radar-1")
     desk.watch.on_alert(alert(phase="ends"))
     assert desk.watch.state.manoeuvres == []
     with pytest.raises(NotFoundError, match="out of date"):
-        desk.manoeuvres.request(ANNA, "over-radar-1")
+        desk.request("over-radar-1")
 
 
 def test_a_worker_that_fails_costs_this_manoeuvre_only() -> None:
@@ -131,6 +136,60 @@ def test_when_the_newest_is_over_the_one_before_counts() -> None:
     assert desk.asked == ["a"]
 
 
+def side(east_m: float, text: str = "Turn.", *, possible: bool = True) -> Prepared:
+    doc = ManoeuvreDoc(id="sidestep-t7", kind="sidestep", for_alert="t7", possible=possible, text=text)
+    way = ((0.0, 0.0, 5.0), (east_m, 20.0, 5.0)) if possible else ()
+    return Prepared(doc, (GuidedTarget(4, 37.7, 15.0, 5.0, 3.0),), None, 0.0, way)
+
+
+def approach(**more: Any) -> Any:
+    return alert("t7", kind="approach", **more)
+
+
+def shown_with(*answers: Any) -> Desk:
+    """The first answer is on show, the others come when it is flown."""
+    desk = Desk(*answers)
+    desk.watch.on_alert(approach())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    return desk
+
+
+def test_a_sidestep_is_made_anew_at_the_moment_it_is_flown() -> None:
+    desk = shown_with((side(5.0),), (side(9.0, "Turn more."),))
+    assert desk.manoeuvres.routes()[0].kind == "sidestep"
+    request = desk.request("sidestep-t7")
+    assert (request.kind, request.rejoin_item) == ("sidestep", None)
+    assert desk.asked == ["t7", "t7"]
+    assert desk.watch.state.manoeuvres[0].text == "Turn more."
+
+
+def test_a_sidestep_to_the_other_side_is_looked_at_first() -> None:
+    desk = shown_with((side(25.0),), (side(-25.0, "Turn left."),))
+    with pytest.raises(NotAllowedError, match=r"another one now: Turn left\."):
+        desk.request("sidestep-t7")
+    assert desk.watch.state.manoeuvres[0].text == "Turn left."
+
+
+def test_a_sidestep_that_is_not_possible_any_more_is_not_flown() -> None:
+    desk = shown_with((side(5.0),), (side(5.0, "The present velocity leads into nothing.", possible=False),))
+    with pytest.raises(NotAllowedError, match="leads into nothing"):
+        desk.request("sidestep-t7")
+    failing = shown_with((side(5.0),), RuntimeError("broken"))
+    with pytest.raises(NotFoundError, match="out of date"):
+        failing.request("sidestep-t7")
+
+
+def test_what_stands_and_what_moves_are_served_together() -> None:
+    pairs: list[tuple[Any, Any]] = []
+    desk = Desk((prepared(), side(5.0)), (prepared(), side(5.0)))
+    desk.manoeuvres._situation = lambda *both: pairs.append(both) or both[0]  # pyright: ignore[reportPrivateUsage]
+    desk.watch.on_alert(approach())
+    desk.watch.on_alert(alert("wall"))
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert [each.id for each in pairs[0]] == ["wall", "t7"]
+    assert [doc.kind for doc in desk.watch.state.manoeuvres] == ["over", "sidestep"]
+
+
 @pytest.mark.parametrize("kind", ["sensor", "divergence"])
 def test_what_stands_nowhere_is_not_avoided(kind: str) -> None:
     desk = Desk()
@@ -143,10 +202,19 @@ def test_while_the_vehicle_climbs_by_itself_nothing_is_prepared() -> None:
     desk = Desk()
     desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
     asked: list[str] = []
-    desk.manoeuvres._situation = lambda each: asked.append(each.id) or each  # pyright: ignore[reportPrivateUsage]
+    desk.manoeuvres._situation = lambda standing, moving: asked.append(standing.id) or standing  # pyright: ignore[reportPrivateUsage]
     desk.watch.on_alert(alert())
     asyncio.run(desk.until(lambda: asked))
     assert desk.asked == []
+
+
+@pytest.mark.parametrize("state", ["holding", "ceiling"])
+def test_where_avoidance_stands_and_waits_ways_out_are_offered(state: str) -> None:
+    desk = Desk((prepared(),))
+    desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state=state))  # pyright: ignore[reportArgumentType]
+    desk.watch.on_alert(alert())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert len(desk.watch.state.manoeuvres) == 1
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +283,19 @@ def test_over_and_around_a_wall_on_the_mission(planned: tuple[Dsm, PlanRecord, P
     assert ways[0].height_offset_m > 4.0
 
 
+def test_on_the_way_to_where_the_mission_is_joined_again_what_stands_before_it_counts(
+    planned: tuple[Dsm, PlanRecord, Path],
+) -> None:
+    there = situation(planned, 4)
+    line = mission_line(there.record, there.origin)
+    assert line is not None
+    assert line.points_enu[-2, 0] > 35.0  # the last leg begins behind the wall
+    late = replace(there, flight=replace(there.flight, target=line.leg_item[-1]))
+    ways = prepare(late, report=lambda step, share: None)
+    assert [way.doc.possible for way in ways] == [True, True]
+    assert all(way.points_enu_m[-1][0] > 31.0 for way in ways)
+
+
 def test_a_mission_that_nothing_blocks_needs_no_manoeuvre(planned: tuple[Dsm, PlanRecord, Path]) -> None:
     ways = prepare(situation(planned, -6), report=lambda step, share: None)
     assert [way.doc.possible for way in ways] == [False, False]
@@ -261,3 +342,63 @@ def test_those_on_show_go_when_the_vehicle_begins_to_climb_by_itself() -> None:
     desk.watch.on_alert(alert("b"))
     asyncio.run(desk.until(lambda: not desk.manoeuvres.prepared))
     assert desk.watch.state.manoeuvres == []
+
+
+def coming(planned: tuple[Dsm, PlanRecord, Path], **more: Any) -> Situation:
+    """Something flies towards the vehicle along the mission's line; nothing stands there."""
+    here = situation(planned, -6)
+    state = replace(here.state, position_t_mono_s=10.0)
+    at = planned[0].lat_lon_from_xy(np.array([[500_045.0, 3_999_945.0]]))[0].tolist()
+    other = track(lat_deg=at[0], lon_deg=at[1], velocity_enu_m_s=(-3.0, 0.0))
+    ahead = VelocityProposal((2.8, 0.8), 5.0, 3.3, "Turn 16 deg left, 2.9 m/s.")
+    status = tracks_status(tracks=(other,), proposal=ahead, origin=here.origin)
+    fields: dict[str, Any] = {"alert": None, "state": state, "approach": approach(), "tracks": status, **more}
+    return replace(here, **fields)
+
+
+def test_the_proposed_velocity_is_flown_level_and_then_back_to_the_mission(
+    planned: tuple[Dsm, PlanRecord, Path],
+) -> None:
+    there = coming(planned)
+    (way,) = prepare(there, report=lambda *_: None)
+    assert (way.doc.kind, way.doc.for_alert, way.doc.possible) == ("sidestep", "t7", True), way.doc.text
+    assert way.doc.text.startswith("Turn 16 deg left, 2.9 m/s for 5 s, passes")
+    assert way.doc.text.endswith("then back to the mission.")
+    a, b = np.array(way.points_enu_m[0]), np.array(way.points_enu_m[1])
+    assert b - a == pytest.approx([14.0, 4.0, 0.0], abs=0.01)
+    assert way.targets[0].speed_m_s == pytest.approx(np.hypot(2.8, 0.8))
+    assert way.rejoin_item is not None
+    assert min(t.alt_rel_home_m for t in way.targets) >= a[2] - 1e-6
+    assert way.doc.seconds is not None
+    assert way.doc.seconds > 5.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"tracks": None}, "not followed at the moment"),
+        ({"tracks": tracks_status(proposal=None)}, "leads into nothing"),
+        ({"tracks": tracks_status(proposal=None, no_proposal="Too slow.")}, "Too slow"),
+        ({"radius_m": 50.0}, "only"),
+    ],
+)
+def test_why_there_is_no_sidestep_is_said(
+    planned: tuple[Dsm, PlanRecord, Path], changes: dict[str, Any], why: str
+) -> None:
+    (way,) = prepare(coming(planned, **changes), report=lambda *_: None)
+    assert not way.doc.possible
+    assert why in way.doc.text
+
+
+def test_on_the_way_home_it_holds_after_the_sidestep(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    home = coming(planned, flight=FlightStatus(way="auto", phase="returning", target=2))
+    (way,) = prepare(home, report=lambda *_: None)
+    assert (way.rejoin_item, len(way.targets)) == (None, 1)
+    assert way.doc.text.endswith("then it holds there.")
+
+
+def test_where_the_object_is_by_now_counts(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    there = coming(planned)
+    late = replace(there, state=replace(there.state, position_t_mono_s=16.0))
+    (way,) = prepare(late, report=lambda *_: None)
+    assert way.doc.text != prepare(there, report=lambda *_: None)[0].doc.text

@@ -74,7 +74,7 @@ def serving(data_dir: Path, *more: str) -> Iterator[Serving]:
     finally:
         if process.poll() is None:
             process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def refused(data_dir: Path, port: int) -> str:
@@ -109,7 +109,7 @@ def test_a_kill_loses_nothing_and_leaves_no_process(tmp_path: Path) -> None:
         handles = [os.pidfd_open(pid) for pid in station.workers()]
         assert handles
         station.process.kill()
-        station.process.wait(10)
+        station.process.wait(PATIENCE_S)
         for handle in handles:
             assert _ended(handle)
     with serving(tmp_path) as again:
@@ -119,7 +119,7 @@ def test_a_kill_loses_nothing_and_leaves_no_process(tmp_path: Path) -> None:
 def _ended(handle: int) -> bool:
     """A process's handle is readable once it has ended."""
     try:
-        return bool(select.select([handle], [], [], 30)[0])
+        return bool(select.select([handle], [], [], PATIENCE_S)[0])
     finally:
         os.close(handle)
 

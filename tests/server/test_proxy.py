@@ -92,7 +92,8 @@ def test_two_pages_are_told_apart(served: Running) -> None:
         pages = [page_id_of(one), page_id_of(two)]
         with view(served, pages[1]), view(served, pages[0]):
             assert eventually(lambda: all(host.client_of_page(page) is not None for page in pages))
-            assert [host.page_of_client(host.client_of_page(page) or -1) for page in pages] == pages
+            clients = [client for page in pages if (client := host.client_of_page(page)) is not None]
+            assert [host.page_of_client(client) for client in clients] == pages
 
 
 def test_hostile_messages_reach_no_callback(served: Running) -> None:

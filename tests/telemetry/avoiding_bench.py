@@ -37,10 +37,13 @@ class Wall:
     north_m: float
     top_m: float
     thick_m: float = 4.0
+    half_wide_m: float = math.inf
 
-    def ahead_m(self, north_m: float, up_m: float, depth_m: float, half_m: float = 1.0) -> float | None:
+    def ahead_m(
+        self, north_m: float, up_m: float, depth_m: float, half_m: float = 1.0, east_m: float = 0.0
+    ) -> float | None:
         """Distance to it for a vehicle that looks north, if it is in the region."""
-        if up_m - half_m > self.top_m or north_m > self.north_m + self.thick_m:
+        if up_m - half_m > self.top_m or north_m > self.north_m + self.thick_m or abs(east_m) > self.half_wide_m:
             return None
         away_m = max(0.0, self.north_m - north_m)
         return away_m if away_m <= depth_m else None
@@ -161,8 +164,10 @@ class Craft:
                 self.perform(self.avoiding.on_perception(sense.waiting.pop(0)[1], self.now_s))
 
     def _status(self, sense: Sense) -> PerceptionStatus:
-        north_m, _, up_m = self.truth
-        found = [d for wall in self.walls if (d := wall.ahead_m(north_m, up_m, sense.depth_m)) is not None]
+        north_m, east_m, up_m = self.truth
+        ahead = [wall.ahead_m(north_m, up_m, sense.depth_m, east_m=east_m) for wall in self.walls]
+        sideways = abs(math.sin(self.state.heading_rad or 0.0)) > 0.7  # then it looks along the walls
+        found = [away_m for away_m in ahead if away_m is not None and not sideways]
         blank = replace(seen_at(min(found)), height_difference_m=0.0) if found else None
         region = Region((0.0, north_m, up_m), 0.0, sense.depth_m, math.radians(24), 2.0, bool(found))
         return PerceptionStatus(

@@ -7,9 +7,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from telemetry.bus import Bus
 from telemetry.messages import ServerAlive, Topic
@@ -42,11 +43,56 @@ class Processes:
             node.wait(timeout=PATIENCE_S)
 
 
-class Sky:
-    """Flies on the bus in real time, and keeps what comes back."""
+class Flight(ABC):
+    """Something that flies on the bus in real time, and keeps what comes back."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+
+    @abstractmethod
+    async def live(self) -> None:
+        """Until cancelled."""
+
+    async def until(self, condition: Callable[[], Any]) -> Any:
+        async with asyncio.timeout(PATIENCE_S):
+            while not (found := condition()):
+                await asyncio.sleep(0.02)
+            return found
+
+    async def hear(self, topic: str, into: list[Any]) -> None:
+        async for _, message in self.bus.subscribe(topic, keep_all=True):
+            into.append(message)
+
+
+F = TypeVar("F", bound=Flight)
+
+
+def flown(processes: Processes, take_off: Callable[[Bus], F], act: Callable[[F], Awaitable[object]]) -> None:
+    """Runs ``act`` while a flight goes on."""
+
+    async def whole() -> None:
+        async with await Bus.open(processes.runtime, "link") as bus:
+            flight = take_off(bus)
+            flying, acting = asyncio.ensure_future(flight.live()), asyncio.ensure_future(act(flight))
+            try:
+                await asyncio.wait((flying, acting), return_when=asyncio.FIRST_COMPLETED)
+                if flying.done():
+                    flying.result()
+                acting.result()
+            finally:
+                for task in (flying, acting):
+                    task.cancel()
+                await asyncio.gather(flying, acting, return_exceptions=True)
+
+    asyncio.run(whole())
+
+
+class Sky(Flight):
+    """Flies towards a wall, again and again."""
 
     def __init__(self, bus: Bus, *, sensors: tuple[str, ...] = ("radar", "vision")) -> None:
-        self.bus, self.sensors = bus, sensors
+        super().__init__(bus)
+        self.sensors = sensors
         self.deltas: dict[str, list[MapDelta]] = {"radar": [], "vision": [], "ranges": []}
         self.statuses: dict[str, list[PerceptionStatus]] = {"radar": [], "vision": [], "ranges": []}
         self.alerts: list[ObstacleAlert] = []
@@ -63,23 +109,13 @@ class Sky:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._fly())
             for sensor in self.sensors:
-                group.create_task(self._hear(f"map/{sensor}", self.deltas[sensor]))
-                group.create_task(self._hear(f"perception/{sensor}", self.statuses[sensor]))
-            group.create_task(self._hear(Topic.ALERT, self.alerts))
-
-    async def until(self, condition: Callable[[], Any]) -> Any:
-        async with asyncio.timeout(PATIENCE_S):
-            while not (found := condition()):
-                await asyncio.sleep(0.02)
-            return found
+                group.create_task(self.hear(f"map/{sensor}", self.deltas[sensor]))
+                group.create_task(self.hear(f"perception/{sensor}", self.statuses[sensor]))
+            group.create_task(self.hear(Topic.ALERT, self.alerts))
 
     def begin_anew(self) -> None:
         """Back over home, on the ground for a moment."""
         self._begin_mono_s, self._begin_utc_s = time.monotonic() + 1.0, time.time() + 1.0
-
-    async def _hear(self, topic: str, into: list[Any]) -> None:
-        async for _, message in self.bus.subscribe(topic, keep_all=True):
-            into.append(message)
 
     async def _fly(self) -> None:
         """States at 20 Hz, radar frames and ranges at 10 Hz, clouds at 5 Hz, camera poses at 20 Hz."""
@@ -113,22 +149,8 @@ class Sky:
                 self.bus.publish(Topic.RANGE_FRAME, flights.range_frame(t_s, self._number // 2, t0_mono_s, t0_utc_s))
 
 
-def fly(processes: Processes, act: Callable[[Sky], Any], *, sensors: tuple[str, ...] = ("radar", "vision")) -> None:
-    """Runs ``act`` while a flight goes on."""
-
-    async def whole() -> None:
-        async with await Bus.open(processes.runtime, "link") as bus:
-            sky = Sky(bus, sensors=sensors)
-            flying = asyncio.ensure_future(sky.live())
-            acting = asyncio.ensure_future(act(sky))
-            try:
-                await asyncio.wait((flying, acting), return_when=asyncio.FIRST_COMPLETED)
-                if flying.done():
-                    flying.result()
-                acting.result()
-            finally:
-                for task in (flying, acting):
-                    task.cancel()
-                await asyncio.gather(flying, acting, return_exceptions=True)
-
-    asyncio.run(whole())
+def fly(
+    processes: Processes, act: Callable[[Sky], Awaitable[object]], *, sensors: tuple[str, ...] = ("radar", "vision")
+) -> None:
+    """Runs ``act`` while flights towards the wall go on."""
+    flown(processes, lambda bus: Sky(bus, sensors=sensors), act)

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 from telemetry.agent.intake import Intake
 from telemetry.agent.wire import (
+    NOTICE_LONGEST,
     STEP_M,
     Cloud,
     Hello,
+    Notice,
     Ping,
     Pong,
     Radar,
@@ -34,7 +36,7 @@ def greeted() -> Intake:
     return intake
 
 
-def give(intake: Intake, message: Radar | Cloud | Slam | Ping, now_mono_s: float = 100.0):
+def give(intake: Intake, message: Radar | Cloud | Slam | Ping | Notice, now_mono_s: float = 100.0):
     return intake.on_data(encode(message), now_mono_s=now_mono_s, now_utc_s=1000.0 + now_mono_s - 100.0)
 
 
@@ -72,6 +74,21 @@ def test_a_pose_passes_and_one_without_numbers_does_not() -> None:
     assert give(intake, pose).frame == SlamPose(99.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), "poor")
     assert give(intake, Slam(99.0, (float("nan"), 0, 0), (1.0, 0, 0, 0), "good")).frame is None
     assert intake.refused == 1
+
+
+def test_a_notice_is_for_the_pilot_once_a_second() -> None:
+    intake = greeted()
+    first = give(intake, Notice(True, "radar: gone\x1b[2J" + "!" * 300)).notice
+    assert first is not None
+    assert (first.severity, first.t_utc_s) == (4, 1000.0)
+    assert first.text.startswith("drone: radar: gone [2J!!!")
+    assert len(first.text) == len("drone: ") + NOTICE_LONGEST
+    assert give(intake, Notice(False, "radar: back"), 100.5).notice is None
+    assert intake.refused == 1
+    second = give(intake, Notice(False, "radar: back"), 101.0).notice
+    assert second is not None
+    assert (second.severity, second.text) == (6, "drone: radar: back")
+    assert intake.received == 0
 
 
 def test_gaps_and_late_frames_are_counted() -> None:

@@ -101,6 +101,57 @@ def test_frames_that_stop_while_it_climbs_make_it_hold_until_they_come_again() -
     assert it.truth[2] > 18.5
 
 
+def silenced_on_the_rest() -> Craft:
+    """The camera saw the building; it falls silent on the way on at the new height."""
+    it = craft(Wall(25, 14))
+    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
+    it.senses[0].silent = True
+    it.until(lambda: state(it) == "holding", 3)
+    it.until(lambda: it.state.mode == "BRAKE" and (it.state.ground_speed_m_s or 0.0) < 0.2, 10)
+    return it
+
+
+def test_frames_that_stop_on_the_rest_of_the_flight_make_it_brake_until_they_come_again() -> None:
+    it = silenced_on_the_rest()
+    assert it.avoiding.status.text.startswith("No frames from vision.")
+    held_m = it.truth[0]
+    it.advance(10.0)
+    assert it.truth[0] - held_m < 0.3
+    it.senses[0].silent = False
+    it.until(lambda: state(it) == "offset", 5)
+    it.until(lambda: it.state.mode == "RTL")
+
+
+def test_without_its_frames_the_rest_is_flown_when_the_operator_says_so() -> None:
+    it = silenced_on_the_rest()
+    it.perform(it.avoiding.resume(it.now_s))
+    it.until(lambda: state(it) == "offset", 5)
+    it.until(lambda: it.state.mode == "RTL")
+
+
+def test_switched_off_the_rest_is_flown_without_frames() -> None:
+    it = silenced_on_the_rest()
+    it.perform(it.avoiding.disable(it.now_s))
+    it.until(lambda: state(it) == "offset", 5)
+    it.until(lambda: it.state.mode == "RTL")
+
+
+def test_a_radar_without_targets_sends_nothing_and_does_not_stop_the_rest_of_the_flight() -> None:
+    it = craft(Wall(25, 14), senses=[Sense("radar", 7.0, 0.1)])
+    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
+    it.senses[0].silent = True
+    it.until(lambda: it.state.mode == "RTL")
+    assert "holding" not in it.states
+
+
+def test_a_camera_that_sees_nothing_in_the_open_sky_does_not_stop_the_rest_of_the_flight() -> None:
+    it = craft(Wall(25, 14))
+    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
+    it.senses[0].state = "blind"
+    it.until(lambda: it.state.mode == "RTL")
+    assert "holding" not in it.states
+
+
 def test_a_position_that_stands_still_makes_it_hold() -> None:
     it = craft(Wall(25, 18))
     it.until(lambda: it.avoiding.detour.phase == "climbing" and it.truth[2] > 10.0)
@@ -249,6 +300,30 @@ def test_a_prepared_way_around_is_flown_and_the_mission_goes_on_at_its_height() 
     assert max(n for _, n, _ in it.trail) > 59
 
 
+def test_a_prepared_way_around_that_leads_into_something_unseen_is_stopped_short_of_it() -> None:
+    it = craft(Wall(25, 30))
+    it.perform(it.avoiding.disable(it.now_s))
+    it.until(lambda: it.truth[0] > 8)
+    request = FlyManoeuvre(ME, "around", targets((12, 10, 8), (40, 10, 8), (44, 0, 8)), 2)
+    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.until(lambda: state(it) == "holding", 60)
+    it.advance(10.0)
+    assert 15.0 < max(n for _, n, _ in it.trail) < 24.3
+    assert "way past" in it.avoiding.status.text
+    assert it.state.mode == "BRAKE"
+
+
+def test_from_the_ceiling_a_prepared_way_around_is_flown_and_the_mission_goes_on() -> None:
+    it = craft(Wall(25, 90, half_wide_m=8.0))
+    it.until(lambda: state(it) == "ceiling")
+    high_m = it.truth[2]
+    way = targets((it.truth[0], 12, high_m), (31, 12, high_m), (33, 0, high_m))
+    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "around", way, 1), rest_at(it, 1), it.now_s))
+    it.until(lambda: it.state.mode == "RTL")
+    assert max(n for _, n, _ in it.trail) > 59
+    assert all(u > high_m - 0.6 for _, n, u in it.trail if 24 < n < 30)
+
+
 def test_a_prepared_way_over_climbs_on_while_it_is_not_clear() -> None:
     it = craft(Wall(25, 14))
     it.avoiding.disable(it.now_s)
@@ -333,3 +408,14 @@ def test_what_cannot_be_gone_on_with_is_not_taken_over_and_that_is_said() -> Non
     it.until(lambda: it.truth[0] > 20)
     assert it.orders == []
     assert "in the way" in it.avoiding.status.text
+
+
+def test_something_new_just_as_it_goes_on_is_climbed_over_although_the_vehicle_still_stands_in_guided() -> None:
+    it = craft(Wall(25, 12))
+    it.until(lambda: it.avoiding.detour.phase == "going")
+    north_m, _, up_m = it.truth
+    it.walls.append(Wall(north_m + 4.0, up_m + 4.0))
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.states == ["off", "watching", "climbing", "offset", "climbing", "offset", "watching"]
+    assert it.modes() == [BRAKE, GUIDED, BRAKE, GUIDED, RTL]
+    assert all(up > it.walls[1].top_m for _, north, up in it.trail if north > north_m + 4.0)

@@ -127,10 +127,10 @@ def test_latest_wins_for_who_reads_slowly(folder: Path) -> None:
 def test_keep_all_is_bounded_drops_the_oldest_and_counts(folder: Path) -> None:
     async def whole() -> None:
         async with await Bus.open(folder, "link") as link, await Bus.open(folder, "recorder") as recorder:
-            small, large = (recorder.subscribe("vehicle/*", keep_all=True, limit=limit) for limit in (10, 1000))
+            small, large = (recorder.subscribe(Topic.TEXT, keep_all=True, limit=limit) for limit in (10, 1000))
             link.publish(Topic.VEHICLE, state(1))
-            for reader in (small, large):
-                assert (await anext(reader))[0] == Topic.VEHICLE
+            # Declared after them: once it hears anything they are known, too. A kept message may come twice.
+            assert (await anext(recorder.subscribe(Topic.VEHICLE)))[0] == Topic.VEHICLE
             for number in range(200):
                 link.publish(Topic.TEXT, text(number))
             assert [(await anext(large))[1] for _ in range(200)] == [text(number) for number in range(200)]

@@ -113,7 +113,7 @@ def test_a_mission_is_paused_resumed_broken_off_and_gone_on_with() -> None:
             await phase(bench, "flying")
             await bench.link.handle(Pause(ME))
             await phase(bench, "paused")
-            assert bench.state.mode == "BRAKE"
+            await until(lambda: bench.state.mode == "BRAKE")
             with pytest.raises(NotAllowedError, match="being flown"):
                 await bench.link.handle(Upload(ME, items(), LAT_DEG, LON_DEG, ALT_M))
             with pytest.raises(NotAllowedError, match="already flying"):

@@ -40,23 +40,28 @@ async def both_alert(sky: Sky) -> None:
         await sky.until(lambda sensor=sensor: obstacle_alerts(sky, sensor) > 0)
 
 
-def kill(processes: Processes, sky: Sky) -> None:
-    processes.send("vision", signal.SIGKILL)
+def kill(processes: Processes, sky: Sky, sensor: str) -> None:
+    processes.send(sensor, signal.SIGKILL)
 
 
-def freeze(processes: Processes, sky: Sky) -> None:
-    processes.send("vision", signal.SIGSTOP)
+def freeze(processes: Processes, sky: Sky, sensor: str) -> None:
+    processes.send(sensor, signal.SIGSTOP)
 
 
-def feed_garbage(processes: Processes, sky: Sky) -> None:
+def feed_garbage(processes: Processes, sky: Sky, sensor: str) -> None:
     for number in range(300):
-        frame = flights.cloud_frame(0.0, number, 1e12, 1e12, count=10)
-        sky.bus.publish(Topic.CLOUD_FRAME, replace(frame, xyz_m=os.urandom(1 + number)))
+        if sensor == "vision":
+            cloud = flights.cloud_frame(0.0, number, 1e12, 1e12, count=10)
+            sky.bus.publish(Topic.CLOUD_FRAME, replace(cloud, xyz_m=os.urandom(1 + number)))
+        else:
+            frame = flights.radar_frame(0.0, 10_000 + number, 1e12, 1e12)
+            sky.bus.publish(Topic.RADAR_FRAME, replace(frame, xyz_m=os.urandom(1 + number)))
 
 
 @pytest.mark.parametrize("harm", [kill, freeze, feed_garbage])
+@pytest.mark.parametrize(("harmed", "other"), [("vision", "radar"), ("radar", "vision")])
 def test_harm_to_one_leaves_the_others_alerts_on_time(
-    processes: Processes, harm: Callable[[Processes, Sky], None]
+    processes: Processes, harm: Callable[[Processes, Sky, str], None], harmed: str, other: str
 ) -> None:
     """On time: within the second in which the wall comes into the region, whatever this machine does besides."""
     processes.start("radar")
@@ -64,17 +69,17 @@ def test_harm_to_one_leaves_the_others_alerts_on_time(
 
     async def act(sky: Sky) -> None:
         await both_alert(sky)
-        harm(processes, sky)
-        before = obstacle_alerts(sky, "radar")
-        done = len(sky.statuses["radar"])
+        harm(processes, sky, harmed)
+        before = obstacle_alerts(sky, other)
+        done = len(sky.statuses[other])
         sky.begin_anew()
-        await sky.until(lambda: obstacle_alerts(sky, "radar") > before)
-        latest = sky.statuses["radar"][done:]
+        await sky.until(lambda: obstacle_alerts(sky, other) > before)
+        latest = sky.statuses[other][done:]
         accepted = [status for status in latest if status.points > 0]
-        assert len(accepted) > 40
+        assert len(accepted) > {"radar": 40, "vision": 20}[other]
         late = sorted(status.done_t_mono_s - status.t_mono_s for status in accepted)
         assert late[len(late) // 2] < 0.5
-        alert = next(a for a in reversed(sky.alerts) if a.sensor == "radar" and a.phase == "begins")
+        alert = next(a for a in reversed(sky.alerts) if a.sensor == other and a.phase == "begins")
         assert alert.obstacle is not None
         assert alert.obstacle.distance_m > 3.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from telemetry.messages import REPLAY_PREFIX, Published, ReplayStatus, ServerAli
 from telemetry.node import NodeContext
 from telemetry.node_lock import NodeLock
 from telemetry.nodes.replay import Replayer, live
+from telemetry.recording.replay_sources import ReplaySource, open_source
 from telemetry.requests import CloseRecording, OpenRecording, Play, ReplayRequest
 from telemetry.vehicle import VehicleState
 from tests.telemetry.recordings import T0_UTC_S, write_flight
@@ -126,6 +128,31 @@ def test_another_file_takes_the_place_of_the_first(tmp_path: Path) -> None:
             assert spy.status.recording == path.name
 
     replayed(tmp_path, act)
+
+
+def test_a_file_that_takes_long_is_opened_once_however_often_it_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, may_open, asked = write_flight(tmp_path / "a.mcap"), threading.Event(), []
+
+    def open_slowly(path: Path, *, raw: bool) -> ReplaySource:
+        asked.append(path)
+        assert may_open.wait(PATIENCE_S)
+        return open_source(path, raw=raw)
+
+    monkeypatch.setattr("telemetry.nodes.replay.open_source", open_slowly)
+    monkeypatch.setattr("telemetry.nodes.replay._PATIENCE_S", 0.01)
+
+    async def act(replayer: Replayer, spy: Spy) -> None:
+        for _ in range(3):
+            await replayer.handle(OpenRecording(str(path)))
+        with pytest.raises(RecordingError, match="still being opened"):
+            await replayer.handle(Play(True))
+        may_open.set()
+        await until(lambda: spy.status.recording == "a.mcap")
+
+    replayed(tmp_path, act)
+    assert asked == [path]
 
 
 def test_what_cannot_be_opened_is_answered_and_shown(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from planning.geotiff import read_dsm
-from telemetry.scenarios import terrain_hugging
+from telemetry.scenarios import long_flight, terrain_hugging
 from telemetry.scenarios.castle import CASES, fly_case
 from telemetry.scenarios.catalogue import run_scenario
 from telemetry.scenarios.result import Figure, ScenarioResult
@@ -63,3 +63,21 @@ def test_things_strewn_over_a_volcano_are_told_before_it_is_too_late() -> None:
 def test_things_strewn_over_real_bush_are_told_before_it_is_too_late(shared_data: Path) -> None:
     dsm = read_dsm(shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
     hugging_is_safe(terrain_hugging.run_over(dsm, Wanted(52), "coromandel", apart_m=60.0, most_m=150.0))
+
+
+def test_a_longer_flight_makes_its_map_grow_with_what_is_new_alone(tmp_path: Path) -> None:
+    kept = tmp_path / "flight.mcap"
+    (flight,) = long_flight.run_for(Wanted(61, record=kept), 60.0, 5.0).flights
+    assert 59.0 < flight.duration_s < 61.0
+    values = {figure.words: figure.value for figure in flight.figures}
+    assert 20.0 < values["bytes per new voxel at first"] < 2000.0
+    assert values["recording"] == pytest.approx(kept.stat().st_size / 1e6, rel=0.2)
+
+
+def test_growth_that_does_not_come_from_new_voxels_is_not_reached() -> None:
+    looks = [long_flight.Look(300.0 * k, 10_000 * k, 4_000_000 + 600_000 * k, 10_000 * k) for k in range(13)]
+    assert unreached(long_flight.growth_figures(looks)) == []
+    leaking = [long_flight.Look(one.t_s, one.voxels, one.map_bytes + int(one.t_s**2), 0) for one in looks]
+    assert unreached(long_flight.growth_figures(leaking)) != []
+    idle = [*looks, long_flight.Look(3900.0, looks[-1].voxels, looks[-1].map_bytes + 600_000, 0)]
+    assert unreached(long_flight.growth_figures(idle)) != []

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from planning.errors import FormatError
@@ -76,6 +77,16 @@ def test_an_armed_vehicle_looks_out(tmp_path: Path) -> None:
     assert [frame.number for frame in of_type(bus, CloudFrame)] == list(range(1, len(of_type(bus, CloudFrame)) + 1))
 
 
+def test_the_radar_may_be_simulated_from_its_samples_on(tmp_path: Path) -> None:
+    options = SensorOptions(world=world_file(tmp_path, WALL), points=500, radar="iq")
+    bus = sensing(tmp_path, options, lambda bus: len(of_type(bus, RadarFrame)) >= 2)
+    xyz = rows(of_type(bus, RadarFrame)[-1].xyz_m, 3)
+    range_m = np.linalg.norm(xyz, axis=1)
+    assert np.abs(range_m - 11.85).min() < 1.0
+    # Targets of the other kind lie in the middle of cells.
+    assert np.abs(range_m % 0.5 - 0.25).max() > 0.01
+
+
 def test_in_the_dark_the_radar_goes_on(tmp_path: Path) -> None:
     options = SensorOptions(world=world_file(tmp_path, WALL), points=2000, dark=True)
     bus = sensing(tmp_path, options, lambda bus: len(of_type(bus, RadarFrame)) >= 2 and len(of_type(bus, SlamPose)) > 2)
@@ -101,6 +112,9 @@ def test_wrong_arguments_are_refused(capsys: pytest.CaptureFixture[str]) -> None
     with pytest.raises(SystemExit):
         main(["--world", "x.json"])
     assert "--runtime" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["--runtime", "x", "--radar", "sonar"])
+    assert "'model', 'iq'" in capsys.readouterr().err
 
 
 def test_the_vehicle_tells_where_it_really_is() -> None:

@@ -71,6 +71,32 @@ def test_everything_else_is_beside_the_line(scene: World, line: F64, name: str, 
     assert least_m < alone(scene, name).distance_m(line).min() < most_m
 
 
+def test_the_other_drone_never_comes_near_the_line_nor_into_the_region_that_is_searched(
+    scene: World, line: F64
+) -> None:
+    drone = alone(scene, "Other drone")
+    times = np.arange(0.0, 40.0, 0.5)
+    nearest = [drone.at(t_s).distance_m(line).min() for t_s in times.tolist()]
+    assert 7.0 < min(nearest) < 16.0
+    ahead = np.diff(line[:, :2], axis=0)[::5]
+    heading = np.arctan2(ahead[:, 0], ahead[:, 1])
+    for t_s in times.tolist():
+        offset = drone.at(t_s).placed.rows[0, 1:3] - line[:-1:5, :2]
+        off_nose = np.abs((np.arctan2(offset[:, 0], offset[:, 1]) - heading + np.pi) % (2 * np.pi) - np.pi)
+        assert not np.any((np.hypot(*offset.T) < 12.0) & (off_nose < np.radians(12)))
+
+
+def test_the_other_drone_flies_at_the_vehicles_height_and_not_faster_than_the_radar_can_tell(
+    scene: World, line: F64
+) -> None:
+    """Speeds over ground beyond 10.4 m/s fold back."""
+    drone = alone(scene, "Other drone")
+    assert np.hypot(*drone.at(1.0).placed.velocity_enu_m_s[0, :2]) == pytest.approx(6.0)
+    gully = line[np.argmin(np.hypot(*(line[:, :2] - drone.at(10.0).placed.rows[0, 1:3]).T))]
+    heights = [drone.at(t_s).placed.rows[0, 3:5].mean() for t_s in np.arange(0.0, 22.0, 1.0).tolist()]
+    assert max(abs(height - gully[2]) for height in heights) < 12.0
+
+
 def test_home_and_every_way_home_are_free(scene: World, line: F64) -> None:
     up = np.column_stack([np.zeros(120), np.zeros(120), np.linspace(0, RTL_M, 120)])
     assert scene.distance_m(up).min() > 20.0

@@ -13,26 +13,34 @@ from hypothesis import strategies as st
 
 from planning.errors import FormatError, ParameterError
 from telemetry.simulator.scene import World
+from telemetry.simulator.scene.motion import Motion
 from telemetry.simulator.scene.shapes import Box, CornerReflector, Cylinder, Tree
 from telemetry.simulator.scene.world_file import parse_world, read_world
 from tests.telemetry.scenes import FRAME
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "worlds.md"
 BOX = {"type": "box", "at_m": [1, 2], "size_m": [3, 4, 5]}
+PATH = {"points_m": [[0, 0], [0, 30]], "speed_m_s": 4}
 
 
 def document(*objects: Any, **more: Any) -> dict[str, Any]:
     return {"format": "hedgehop-world", "version": 1, "objects": list(objects), **more}
 
 
+def moving(**path: Any) -> dict[str, Any]:
+    return {"type": "box", "size_m": [1, 1, 1], "path": PATH | path}
+
+
 def test_the_example_of_the_documentation_is_read() -> None:
     example = DOCS.read_text(encoding="utf-8").split("```json")[1].split("```")[0]
     world = parse_world(json.loads(example), folder=Path("/somewhere"))
     kinds = [type(shape) for shape in world.shapes]
-    assert kinds == [Box, Box, Box, Cylinder, Tree, CornerReflector]
+    assert kinds == [Box, Box, Box, Cylinder, Tree, CornerReflector, Box]
     assert world.name == "Yard with a crane"
     assert world.dsm == Path("/somewhere/hillside.tif")
     assert world.shapes[2].name == "wall 2"
+    assert world.shapes[-1].motion == Motion(((-30.0, 50.0), (40.0, 62.0)), 4.0)
+    assert world.shapes[0].motion is None
 
 
 def test_what_is_left_out_has_its_documented_value() -> None:
@@ -75,6 +83,14 @@ def test_what_is_left_out_has_its_documented_value() -> None:
             document({"type": "tree", "at_m": [0, 0], "height_m": 5, "crown_radius_m": 2, "crown_base_m": 6}),
             "world: objects[0].crown_base_m: 6 is not between 0 and 4.995.",
         ),
+        (document({**BOX, "path": PATH}), "world: objects[0].at_m: What moves along a path stands at no place."),
+        (document(moving(points_m=[[0, 0]])), "world: objects[0].path.points_m: 2 to 100 pairs of numbers belong here"),
+        (document(moving(points_m=[[0, 0], [1]])), "objects[0].path.points_m[1]: 2 numbers in brackets belong here"),
+        (document(moving(points_m=[[0, 0], [0, 1], [0, 1]])), "objects[0].path.points_m[2]: The point before is the"),
+        (document(moving(speed_m_s=0)), "world: objects[0].path.speed_m_s: 0 is not between 0.01 and 100."),
+        (document(moving(repeat="often")), "objects[0].path.repeat: One of back_and_forth, around, once belongs"),
+        (document(moving(height_m=3)), 'world: objects[0].path: There is no field "height_m" here.'),
+        (document(*[moving()] * 101), "world.objects: At most 100 objects may move."),
         (document(origin={"lat_deg": 120, "lon_deg": 5}), "world: origin: Latitude 120°, longitude 5°"),
         (document(origin={"lat_deg": 12}), 'world: origin: The field "lon_deg" is missing.'),
         (document(dsm=""), "world.dsm: The name of a surface model belongs here."),

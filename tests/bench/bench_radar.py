@@ -1,0 +1,123 @@
+"""The radar chain: false alarms and detections of its CFAR stages as set, and the time of one frame of each sensor.
+
+Processor time of the one thread that works, so that a busy machine does not count.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mapping.radar import AWR1843, POSITION2GO, POSITION2GO_SETTINGS, RadarChain, fft
+from mapping.radar.cfar import Cfar, Stage, ca_along_doppler, caso_along_range, doppler_stage, range_stage
+from mapping.radar.cfar_factors import ca_detection
+from mapping.tracker import Tracker
+from tests.mapping.radar.echoes import Echo, frame, noise
+
+SET = 1e-3
+CELLS = (1000, 1000)
+PAPER_S, PAPER_FFT_S = 0.78e-3, 0.694e-3
+"""Wessendorp 2021 on its Intel UP Core: one frame, and the share of its transforms."""
+
+
+def main() -> None:
+    for line in (*false_alarms(), *detection_probabilities(), *frame_times()):
+        print(line)
+
+
+def false_alarms() -> list[str]:
+    """Each stage alone on a million cells of noise, one antenna without a window and twelve with Hann's."""
+    plain = np.random.default_rng(20).exponential(size=CELLS).astype(np.float32)
+    along, across = _stages("rectangular", CELLS[1], CELLS[0], looks=1)
+    rows = [("white noise", caso_along_range(plain, along).mean(), ca_along_doppler(plain, across).mean())]
+    along, across = _stages("hann", AWR1843.samples, AWR1843.chirps, looks=12)
+    chain = RadarChain(AWR1843)
+    rates = np.zeros(2)
+    frames = 31  # of 64 x 512 cells: just over a million
+    for seed in range(frames):
+        power = chain.spectra(noise(AWR1843.shape, seed)).power
+        rates += caso_along_range(power, along).mean() / frames, ca_along_doppler(power, across).mean() / frames
+    rows.append(("AWR1843 frames of noise, Hann", rates[0], rates[1]))
+    return [_false_alarm_line(name, float(caso), float(ca)) for name, caso, ca in rows]
+
+
+def _false_alarm_line(name: str, caso: float, ca: float) -> str:
+    good = max(abs(caso - SET), abs(ca - SET)) <= 0.2 * SET
+    return (
+        f"false alarms set to {SET:g}, {name}: CASO along range {caso:.2e} ({caso / SET:.2f} times), "
+        f"CA along Doppler {ca:.2e} ({ca / SET:.2f} times) (within 20 %: {_yes(good)})"
+    )
+
+
+def _stages(name: fft.Window, samples: int, chirps: int, *, looks: int) -> tuple[Stage, Stage]:
+    padding = 1 if looks == 1 else 2
+    return (
+        range_stage(Cfar(4, 8, SET), name=name, samples=samples, padding=padding, looks=looks),
+        doppler_stage(Cfar(2, 4, SET), name=name, chirps=chirps, padding=1, looks=looks),
+    )
+
+
+def detection_probabilities() -> list[str]:
+    """A fluctuating target (Swerling 1) in the middle of noise, beside the closed form for CA-CFAR."""
+    stage = doppler_stage(Cfar(2, 4, SET), name="rectangular", chirps=13, padding=1, looks=1)
+    lines = [f"detection probability of CA-CFAR, 8 cells, false alarms {SET:g}: measured, closed form"]
+    for snr_db in range(0, 31, 5):
+        rng, snr = np.random.default_rng(snr_db), 10 ** (snr_db / 10)
+        power = rng.exponential(size=(13, 100_000)).astype(np.float32)
+        power[6] *= 1.0 + snr
+        seen = ca_along_doppler(power, stage)[6].mean()
+        lines.append(f"  {snr_db:2d} dB: {seen:.4f}, {ca_detection(8, stage.both, snr):.4f}")
+    return lines
+
+
+def frame_times() -> list[str]:
+    small = frame(POSITION2GO, Echo(4.0, -1.0, 0.2), Echo(7.0, 0.5, -0.4), Echo(10.0, -2.0, 0.1))
+    chain, tracker, clock = RadarChain(POSITION2GO, POSITION2GO_SETTINGS), Tracker(), iter(range(1, 1_000_000))
+
+    def tracked() -> None:
+        found = chain.process(small)
+        measured = np.column_stack([found.range_m, found.azimuth_rad, found.radial_speed_m_s])
+        still: Any = {"position_enu_m": (0.0, 0.0), "velocity_enu_m_s": (0.0, 0.0), "heading_rad": 0.0}
+        tracker.step(next(clock) / 15.7, measured, **still)
+
+    whole_s, fft_s = _best(tracked), _best(lambda: _transforms(chain, small))
+    large = frame(AWR1843, Echo(20.0, -3.0, 0.2, 0.1), Echo(50.0, 4.0, -0.4), Echo(90.0, 0.0, 0.1, snr_db=20.0))
+    big = RadarChain(AWR1843)
+    big_s, big_fft_s = _best(lambda: big.process(large)), _best(lambda: _transforms(big, large))
+    return [
+        "Position2Go frame, 2 x 16 x 64 padded to 64 x 256, transforms, detection and tracking: "
+        f"{1e3 * whole_s:.3f} ms, of which the transforms {1e3 * fft_s:.3f} ms ({fft_s / whole_s:.0%}); "
+        f"the paper's {1e3 * PAPER_S:.2f} ms with {1e3 * PAPER_FFT_S:.3f} ms ({PAPER_FFT_S / PAPER_S:.0%}) "
+        f"(shorter: {_yes(whole_s < PAPER_S)})",
+        f"AWR1843 frame, 12 x 64 x 256 padded to 64 x 512: {1e3 * big_s:.2f} ms, of which the transforms "
+        f"{1e3 * big_fft_s:.2f} ms ({big_fft_s / big_s:.0%}); at 10 Hz {10 * big_s:.1%} of a core "
+        f"(under 10 %: {_yes(10 * big_s < 0.1)})",
+    ]
+
+
+def _transforms(chain: RadarChain, cube: np.ndarray) -> np.ndarray:
+    """The two transforms alone, as the chain calls them."""
+    settings, params = chain.settings, chain.params
+    ranges = fft.range_fft(cube, params.samples * settings.range_padding)
+    return fft.doppler_fft(ranges, params.chirps * settings.doppler_padding)
+
+
+def _best(run: Callable[[], object], runs: int = 200) -> float:
+    run()
+    best_s = float("inf")
+    for _ in range(runs):
+        start_s = time.thread_time()
+        run()
+        best_s = min(best_s, time.thread_time() - start_s)
+    return best_s
+
+
+def _yes(good: bool) -> str:
+    return "yes" if good else "NO"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""Steps of an operator that several tests take, each with what shows that it is done."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from playwright.sync_api import Locator, Page, TimeoutError, expect
+
+from tests.e2e.stations import SimulatedVehicle, Station
+
+PATIENCE_MS = 90_000
+"""The browser renders in software while other tests keep the processors busy."""
+LONG_MS = 3 * PATIENCE_MS
+"""A flight goes by the clock."""
+
+
+def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATIENCE_MS) -> None:
+    end_s = time.monotonic() + timeout_ms / 1000
+    while time.monotonic() < end_s:
+        if condition():
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError("not within the time allowed")
+
+
+def visit(page: Page, station: Station) -> None:
+    """As the operator who is signed in and in charge."""
+    for name, value in station.cookies.items():
+        page.context.add_cookies([{"name": name, "value": value, "url": station.origin}])
+    page.goto(station.origin)
+    expect(page.get_by_test_id("verdict")).to_be_visible()
+
+
+def open_demo(page: Page, station: Station) -> None:
+    visit(page, station)
+    page.get_by_test_id("empty-demo").click()
+    certified(page)
+
+
+def certified(page: Page) -> None:
+    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "certified")
+
+
+def drawn(page: Page) -> None:
+    expect(page.get_by_test_id("scene-busy")).to_have_count(0)
+
+
+def choose(page: Page, button: Locator, path: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        button.first.click()
+    chooser.value.set_files(str(path))
+
+
+# Flying
+
+
+def connect(page: Page, vehicle: SimulatedVehicle) -> None:
+    page.get_by_test_id("tab-fly").click()
+    page.get_by_test_id("link-address").fill(vehicle.address)
+    page.get_by_test_id("link-connect").click()
+    expect(page.get_by_test_id("hold-position")).to_be_visible()
+    expect(page.get_by_test_id("chip-gnss")).to_contain_text("RTK")
+
+
+def start_simulator(page: Page) -> None:
+    """Unless a test before this one has started it."""
+    page.get_by_test_id("tab-fly").click()
+    offered, connected = page.get_by_test_id("next-simulator"), page.get_by_test_id("hold-position")
+
+    def is_connected() -> bool:
+        """The offer goes as soon as the page has heard of the vehicle."""
+        if offered.count():
+            with contextlib.suppress(TimeoutError):
+                offered.click(timeout=2000)
+        return connected.is_visible()
+
+    wait_until(page, is_connected)
+
+
+def upload(page: Page) -> None:
+    page.get_by_test_id("tab-plan").click()
+    page.get_by_test_id("upload").click()
+    expect(page.get_by_test_id("outcome-upload")).to_contain_text("verified")
+    expect(page.get_by_test_id("upload")).to_have_text("On board")
+    page.get_by_test_id("tab-fly").click()
+    expect(page.get_by_test_id("rounded-note")).to_contain_text("centimetres")
+
+
+def start(page: Page) -> None:
+    """Checks until the vehicle is ready, accepts what may be accepted, and holds Start."""
+    ready, check = page.get_by_test_id("next-start"), page.get_by_test_id("next-check")
+
+    def is_ready() -> bool:
+        if check.count() and check.is_enabled():
+            check.click()
+            expect(ready.or_(check).and_(page.locator(":enabled"))).to_be_visible()
+        return bool(ready.count())
+
+    expect(check).to_be_visible()
+    wait_until(page, is_ready)
+    for tick in page.locator("[data-testid^=accept-]").all():
+        tick.check()
+    hold(page, "next-start")
+    expect(page.get_by_test_id("next-action")).to_have_attribute("data-step", "pause")
+
+
+def hold(page: Page, testid: str) -> None:
+    button = page.get_by_test_id(testid)
+    expect(button).to_be_enabled()
+    button.scroll_into_view_if_needed()
+    box = button.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    # Until the page has taken it: its frames come slowly where the browser renders in software.
+    expect(button).to_have_count(0)
+    page.mouse.up()
+
+
+def return_home(page: Page) -> None:
+    page.get_by_test_id("return-home").focus()
+    page.keyboard.down("Enter")
+    expect(page.get_by_test_id("outcome-safety")).to_contain_text("returns home")
+    page.keyboard.up("Enter")
+    disarmed(page)
+
+
+def disarmed(page: Page) -> None:
+    expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed", timeout=LONG_MS)
+
+
+def percent(page: Page) -> int:
+    found = re.search(r"\d+", page.get_by_test_id("progress").inner_text())
+    return int(found.group(0)) if found else 0
+
+
+def open_recording(page: Page) -> None:
+    """The newest one."""
+    page.get_by_test_id("tab-review").click()
+    page.get_by_test_id("recording-open").first.click()
+    expect(page.get_by_test_id("replay-badge")).to_be_visible()
+
+
+def play(page: Page, testid: str = "play") -> None:
+    """Again for as long as the recording is still being opened, which the page says."""
+    button, shown = page.get_by_test_id(testid), page.get_by_test_id("play")
+
+    def plays() -> bool:
+        button.click()
+        with contextlib.suppress(AssertionError):
+            expect(shown).to_have_text("Pause", timeout=10_000)
+            return True
+        return False
+
+    wait_until(page, plays)

@@ -1,0 +1,80 @@
+"""Where to drive and where to land: worked out, looked at, searched and kept as files, in a real browser."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.stations import Station
+from tests.e2e.steps import choose, drawn, open_demo
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+TIFF = (b"II*\x00", b"II+\x00")
+
+
+def test_the_ground_is_worked_out_searched_for_landing_sites_and_kept(
+    station: Station, page: Page, tmp_path: Path
+) -> None:
+    open_demo(page, station)
+    page.keyboard.press("7")
+    page.get_by_test_id("work-out").click()
+    expect(page.get_by_test_id("traversability-status")).to_have_attribute("data-state", "ready")
+    expect(page.get_by_test_id("ground-cells")).to_contain_text(re.compile(r"\d.*cells"))
+    expect(page.get_by_test_id("ground-untraversable")).to_contain_text(re.compile(r"\d\s%"))
+    # What was worked out is shown at once, with what its colours mean.
+    expect(page.get_by_test_id("layer-traversability")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_role("list", name="Colours of the layer").first).to_contain_text("Untraversable")
+    # Without a radar log there is one map.
+    expect(page.get_by_test_id("map-layer-before")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("map-layer-probability")).to_be_disabled()
+
+    page.get_by_test_id("sites-home").click()
+    expect(page.get_by_test_id("site-row").first).to_contain_text(re.compile(r"Slope \d"))
+    assert 1 <= page.get_by_test_id("site-row").count() <= 5
+    expect(page.get_by_test_id("sites-near")).to_contain_text(re.compile(r"\d\.\d{7}"))
+
+    with page.expect_download() as download:
+        page.get_by_test_id("ground-before-tif").click()
+    kept = tmp_path / "before.tif"
+    download.value.save_as(kept)
+    assert kept.read_bytes()[:4] in TIFF
+
+    page.get_by_test_id("traversability-away").click()
+    expect(page.get_by_test_id("ground-cells")).to_have_count(0)
+    expect(page.get_by_test_id("layer-traversability")).to_have_count(0)
+
+
+def test_landing_sites_are_looked_for_where_the_surface_was_clicked(station: Station, page_3d: Page) -> None:
+    page = page_3d
+    open_demo(page, station)
+    drawn(page)
+    page.keyboard.press("7")
+    page.get_by_test_id("work-out").click()
+    expect(page.get_by_test_id("ground-cells")).to_be_visible()
+    page.get_by_test_id("view-top").click()
+    page.get_by_test_id("sites-click").click()
+    expect(page.get_by_test_id("tool-hint")).to_contain_text("land")
+    view = page.get_by_test_id("view-frame").bounding_box()
+    assert view is not None
+    page.mouse.click(view["x"] + view["width"] / 2, view["y"] + view["height"] / 2)
+    expect(page.get_by_test_id("sites-near")).to_be_visible()
+    # The tool has been put down, and the plan is as it was.
+    expect(page.get_by_test_id("tool-hint")).to_have_count(0)
+    expect(page.get_by_test_id("undo")).to_be_disabled()
+
+
+def test_a_file_that_is_no_radar_log_is_refused_where_it_was_opened(
+    station: Station, page: Page, tmp_path: Path
+) -> None:
+    open_demo(page, station)
+    page.keyboard.press("7")
+    garbage = tmp_path / "wood.npz"
+    garbage.write_bytes(b"PK\x03\x04 this is no radar log")
+    choose(page, page.get_by_test_id("radar-log-open"), garbage)
+    section = page.get_by_test_id("section-traversability")
+    expect(section.get_by_test_id("error-box")).to_contain_text("wood.npz")
+    expect(page.get_by_test_id("work-out")).to_be_enabled()

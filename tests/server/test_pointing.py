@@ -1,0 +1,66 @@
+"""A click with the landing tool: it asks where, and edits nothing."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import cast
+
+from server.plan_desk import PlanDesk, Proposal
+from server.pointing import Pointing
+from server.schemas import NoticeMessage, PlaceDoc, PlanDoc, SelectionDoc
+
+
+class _Desk:
+    """Notes what it is asked to change."""
+
+    def __init__(self) -> None:
+        self.document = PlanDoc()
+        self.proposals: list[Proposal] = []
+
+    async def propose(self, proposal: Proposal) -> None:
+        self.proposals.append(proposal)
+
+
+class _Hand:
+    """A tool in hand, over a plan without anything."""
+
+    def __init__(self, tool: SelectionDoc) -> None:
+        self.desk, self.selection = _Desk(), tool
+        self.notices: list[NoticeMessage] = []
+        self._pointing = Pointing(
+            cast(PlanDesk, self.desk),
+            selection=lambda: self.selection,
+            select=lambda selection: setattr(self, "selection", selection),
+            tell=self.notices.append,
+        )
+
+    def click(self, *, known: bool = True) -> None:
+        asyncio.run(self._pointing.on_terrain(37.73, 14.99, known=known))
+
+
+def test_the_place_is_told_with_the_tool_put_down_and_the_plan_stays() -> None:
+    hand = _Hand(SelectionDoc(tool="landing"))
+    hand.click()
+    assert hand.selection == SelectionDoc(tool="select", place=PlaceDoc(lat_deg=37.73, lon_deg=14.99))
+    assert hand.desk.proposals == []
+
+
+def test_on_unknown_ground_the_tool_stays_in_hand_and_that_is_said() -> None:
+    hand = _Hand(SelectionDoc(tool="landing"))
+    hand.click(known=False)
+    assert hand.selection.tool == "landing"
+    assert [notice.level for notice in hand.notices] == ["warning"]
+
+
+def test_without_a_tool_a_click_does_nothing() -> None:
+    hand = _Hand(SelectionDoc())
+    hand.click()
+    assert hand.selection == SelectionDoc()
+    assert (hand.desk.proposals, hand.notices) == ([], [])
+
+
+def test_other_tools_propose_an_edit() -> None:
+    hand = _Hand(SelectionDoc(tool="home"))
+    hand.click()
+    assert len(hand.desk.proposals) == 1
+    assert hand.selection.tool == "home"

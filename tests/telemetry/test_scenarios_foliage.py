@@ -1,0 +1,132 @@
+"""The foliage scenario: sparse foliage is cleared and obstacles are not, the way through opens, all in real time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mapping.uwb import UwbParams
+from planning.errors import ParameterError
+from planning.geotiff import read_dsm
+from planning.traversable import cleared_ground, traversable_ground
+from telemetry.scenarios import foliage
+from telemetry.scenarios.foliage_drive import KEEP_M, SCAN_S, SPEED_M_S, drive, lawn_drive, things_on_lawn
+from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, rates, seconds_per_scan
+from telemetry.scenarios.foliage_rural import connected, route
+from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
+from telemetry.scenarios.wanted import Wanted
+from telemetry.sensors.uwb_log import read_uwb_log
+
+
+@pytest.fixture(scope="module")
+def sparse() -> Drive:
+    return driven(trial_site(1, "c"), lawn_drive(), 3)
+
+
+def test_sparse_foliage_is_cleared_and_obstacles_stay(sparse: Drive) -> None:
+    found = rates(sparse, cleared_by(sparse)[0])
+    assert found.foliage.cells > 100
+    assert found.obstacles.cells > 500
+    assert found.foliage.rate >= 0.90
+    assert found.obstacles.rate <= 0.10
+    assert found.placed["Small reflector"].rate <= 0.10
+
+
+def test_our_rule_clears_what_the_papers_leaves_before_obstacles(sparse: Drive) -> None:
+    ours, theirs = (rates(sparse, cleared_by(sparse, params)[0]) for params in (None, PAPERS_RULE))
+    assert ours.foliage.cleared > theirs.foliage.cleared
+    assert ours.on_clear_spots.cleared >= theirs.on_clear_spots.cleared
+    assert ours.obstacles.rate < theirs.obstacles.rate + 0.02
+
+
+def test_only_cells_seen_for_more_than_2_s_count(sparse: Drive) -> None:
+    result, _ = cleared_by(sparse)
+    assert (result.time_in_view_s[result.seen] > 2.0).all()
+    found = rates(sparse, result)
+    assert found.foliage.cells + found.obstacles.cells == result.seen.sum()
+
+
+def test_obstacles_are_what_would_be_untraversable_without_foliage(sparse: Drive) -> None:
+    obstacle, foliage = labels(sparse)
+    assert ((obstacle | foliage) == sparse.map.untraversable).all()
+    assert not (obstacle & foliage).any()
+    bare = driven(trial_site(1, "b"), [], 3)
+    assert (obstacle <= bare.map.untraversable).all()
+    assert not labels(bare)[1].any()
+
+
+def test_the_drive_leaves_branches_and_obstacles_alone() -> None:
+    at_m = np.array([[pose.x_m, pose.y_m] for pose in lawn_drive()])
+    for thing in things_on_lawn():
+        assert np.hypot(*(at_m - thing).T).min() >= KEEP_M - 0.1
+
+
+def test_caution_clears_less_of_both(sparse: Drive) -> None:
+    bold = rates(sparse, cleared_by(sparse, UwbParams(most_occupied=0.7, free_before=0.1, free_behind=0.2))[0])
+    careful = rates(sparse, cleared_by(sparse, UwbParams(most_occupied=0.9, free_before=0.3, free_behind=0.4))[0])
+    assert bold.foliage.rate > careful.foliage.rate
+    assert bold.obstacles.rate > careful.obstacles.rate
+
+
+def test_a_scan_takes_a_small_part_of_its_tenth_of_a_second(sparse: Drive) -> None:
+    assert 0.0 < seconds_per_scan(sparse) < 0.05
+
+
+def test_a_way_that_the_lidar_map_blocks_opens() -> None:
+    found = route(0)
+    assert not found.before
+    assert found.after
+    assert found.piles_kept > 0.9
+
+
+def test_connected_asks_for_the_vehicles_width() -> None:
+    passable = np.ones((60, 60), np.bool_)
+    passable[30, :] = False
+    passable[30, 20:26] = True
+    assert connected(passable, (5, 5), (55, 55), 0.3)
+    assert not connected(passable, (5, 5), (55, 55), 0.9)
+    assert not connected(passable, (30, 5), (55, 55), 0.1)
+
+
+def test_a_drive_is_even_and_turns_on_the_spot() -> None:
+    poses = drive(((0.0, 0.0), (0.0, 5.0), (5.0, 5.0)))
+    steps = np.hypot(*np.diff([[pose.x_m, pose.y_m] for pose in poses], axis=0).T)
+    assert steps.max() == pytest.approx(SPEED_M_S * SCAN_S, rel=0.05)
+    assert np.diff([pose.t_s for pose in poses]) == pytest.approx(SCAN_S)
+    assert poses[-1].heading_rad == pytest.approx(np.pi / 2)
+    assert (steps == 0).sum() >= 30
+
+
+def test_a_recorded_log_clears_the_same_through_files_and_degrees(sparse: Drive, tmp_path: Path) -> None:
+    foliage.record(sparse, tmp_path / "drive.npz")
+    ground = traversable_ground(read_dsm(tmp_path / "drive.tif"), 0.1)
+    found = cleared_ground(ground, read_uwb_log(tmp_path / "drive.npz"))
+    expected, _ = cleared_by(sparse)
+    blocked = sparse.map.untraversable
+    assert (ground.map.untraversable == blocked).mean() > 0.9999
+    assert (found.cleared == expected.cleared)[blocked].mean() > 0.97
+
+
+def test_the_whole_scenario_prints_all_that_the_paper_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(foliage, "lawn_drive", lambda: lawn_drive()[:260])
+    monkeypatch.setattr(foliage, "SWEEP_P_O", (0.8,))
+    monkeypatch.setattr(foliage, "TRIAL_1", {letter: TRIAL_1[letter] for letter in "ac"})
+    monkeypatch.setattr(foliage, "TRIAL_2", {letter: TRIAL_2[letter] for letter in "f"})
+    result = foliage.run(Wanted(1))
+    text = "\n".join(result.lines())
+    for words in ("Table II", "Stone: P(z|occ) 0.46", "5 layers:", "trial 2 f, 4 layers", "paper: TNR 65.7 %",
+                  "the paper's rule here: TNR", "our rule: TNR", "TNR of those alone", "Stone ",
+
+                  "P_O 0.8, P_C2 0.3: TNR", "route from A to B after clearing", "at 10 Hz"):  # fmt: skip
+        assert words in text
+    assert json.loads(json.dumps(result.as_json()))["name"] == "foliage"
+
+
+def test_a_world_of_ones_own_and_a_recording_of_another_kind_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="brings its own sites"):
+        foliage.run(Wanted(0, world=tmp_path / "own.json"))
+    with pytest.raises(ParameterError, match=r"ends with \.npz"):
+        foliage.run(Wanted(0, record=tmp_path / "drive.mcap"))
