@@ -3,7 +3,8 @@
 State (plan, library, view, selection, cursor, each job, each vehicle, each sensor) is latest-wins: a newer message
 takes the place of the one still waiting. Notices, alerts and the vehicle's own words must arrive: each waits on its
 own, and a page that lets the queue fill up is cut off, as is one that does not take a message within five seconds. It
-reconnects and starts from a fresh snapshot.
+reconnects and starts from a fresh snapshot. What a page changes for all is answered behind the new state, so that it
+can tell older states from its own.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class _Outgoing:
 def key_of(message: schemas.ServerMessage) -> object | None:
     """Messages of the same key replace each other; None: each one must arrive."""
     match message:
-        case schemas.NoticeMessage() | schemas.TextMessage() | schemas.AlertMessage():
+        case schemas.NoticeMessage() | schemas.TextMessage() | schemas.AlertMessage() | schemas.AnsweredMessage():
             return None
         case schemas.JobMessage():
             return message.type, message.job.id
@@ -226,6 +227,8 @@ class Hub:
             if notice.code == "internal":
                 log.exception("Message %s of page %s failed.", message.type, page.page_id)
             self.send(page.page_id, schemas.NoticeMessage(level="error", error=notice))
+        if isinstance(message, schemas.SetView | schemas.SetSelection):
+            self.send(page.page_id, schemas.AnsweredMessage(change=message.change))
 
 
 def parse(text: str | None) -> schemas.ClientMessage:

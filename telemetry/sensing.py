@@ -32,7 +32,7 @@ def rows(data: bytes, columns: int) -> F32:
 
 @dataclass(frozen=True, slots=True)
 class RadarFrame:
-    """Targets of one radar frame; a radar that sees nothing publishes nothing."""
+    """Targets of one radar frame. One without targets says that the radar works and sees nothing."""
 
     t_mono_s: float
     t_utc_s: float

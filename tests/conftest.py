@@ -1,6 +1,7 @@
 """Fixtures that tests of all floors share."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -20,6 +21,13 @@ CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrom
 def pytest_make_parametrize_id(val: object) -> str | None:
     """Whole files stand in no test's name: it is told apart by their size."""
     return f"{len(val)}-long" if isinstance(val, bytes | str) and len(val) > LONGEST_ID else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """By the test's own name: workers add its group, and ``--last-failed`` would not find it again."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        report.nodeid = re.sub(r"@[a-z-]+$", "", report.nodeid)
 
 
 @pytest.fixture(scope="session")

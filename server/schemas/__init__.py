@@ -87,6 +87,7 @@ from server.schemas.review import (
 )
 from server.schemas.stream import (
     AlertMessage,
+    AnsweredMessage,
     ClientMessage,
     CursorMessage,
     FlightMessage,
@@ -138,6 +139,7 @@ __all__ = [
     "AdoptVehicle",
     "AlertDoc",
     "AlertMessage",
+    "AnsweredMessage",
     "CameraDoc",
     "Chart",
     "CheckRow",

@@ -57,6 +57,14 @@ class SelectionMessage(Strict):
     selection: SelectionDoc
 
 
+class AnsweredMessage(Strict):
+    """Every change that this page asked for up to this one is carried out, or refused with a notice."""
+
+    v: Literal[1] = 1
+    type: Literal["answered"] = "answered"
+    change: int
+
+
 class JobMessage(Strict):
     v: Literal[1] = 1
     type: Literal["job"] = "job"
@@ -229,6 +237,7 @@ ServerMessage = Annotated[
     | LibraryMessage
     | ViewMessage
     | SelectionMessage
+    | AnsweredMessage
     | JobMessage
     | CursorMessage
     | VehicleMessage
@@ -254,6 +263,10 @@ ServerMessage = Annotated[
 ]
 
 
+Change = Annotated[int, Field(ge=0, le=2**53 - 1)]
+"""The page's own count of what it has changed for all; `AnsweredMessage` gives it back."""
+
+
 class HoverProfile(Strict):
     """The pointer is over the altitude profile at this distance; null: it left."""
 
@@ -272,11 +285,13 @@ class HoverView(Strict):
 class SetView(Strict):
     type: Literal["set_view"] = "set_view"
     view: ViewDoc
+    change: Change
 
 
 class SetSelection(Strict):
     type: Literal["set_selection"] = "set_selection"
     selection: SelectionDoc
+    change: Change
 
 
 class FrameView(Strict):

@@ -110,18 +110,13 @@ class TiRadar:
                     now=self._now,
                     before_start=lambda: empty(port),
                 )
-            lost = 0
             for t_s, frame in frames(port, self._stream, period_s=self._config.frame_period_s, now=self._now):
                 if frame is None:
                     yield from self._garbled()
                     continue
                 yield from self._fine()
-                lost += frame.lost_before
-                reading = reading_of(frame, t_s, self._config.least_snr_db, lost)
-                if reading is not None:
-                    self.status.points += len(reading.targets)
-                    lost = 0
-                    yield reading
+                self.status.points += len(frame.xyz_m)
+                yield reading_of(frame, t_s, self._config.least_snr_db)
 
     def _garbled(self) -> Iterator[NoticeReading]:
         error = SensorError(
@@ -146,19 +141,14 @@ class TiRadar:
             yield NoticeReading(self._now(), False, "radar: It sends frames again.")
 
 
-def reading_of(frame: TiFrame, t_s: float, least_snr_db: float, lost: int) -> RadarReading | None:
-    """None without targets: a radar that sees nothing publishes nothing. The strongest stay where there are too many.
-
-    Targets of unknown strength count as just strong enough to have been detected.
-    """
-    if not len(frame.xyz_m):
-        return None
+def reading_of(frame: TiFrame, t_s: float, least_snr_db: float) -> RadarReading:
+    """The strongest targets stay where there are too many; of unknown strength: just strong enough to be detected."""
     snr_db = np.where(np.isnan(frame.snr_db), np.float32(least_snr_db), frame.snr_db)
     targets = np.column_stack((frame.xyz_m, frame.radial_speed_m_s, snr_db)).astype(np.float32)
     if len(targets) > TARGETS_MAX:
         strongest = np.argsort(-snr_db, kind="stable")[:TARGETS_MAX]
         targets = targets[np.sort(strongest)]
-    return RadarReading(t_s, targets, lost)
+    return RadarReading(t_s, targets, frame.lost_before)
 
 
 def captured_readings(path: Path, config: TiConfig | None, status: TiStatus) -> Iterator[tuple[float, RadarReading]]:
@@ -170,7 +160,7 @@ def captured_readings(path: Path, config: TiConfig | None, status: TiStatus) -> 
     status.stream = stream.counts
     period_s = config.frame_period_s if config else USUAL_PERIOD_S
     least_snr_db = config.least_snr_db if config else LEAST_SNR_DB
-    after_s, lost = -period_s, 0
+    after_s = -period_s
     for frame in _captured_frames(path, stream):
         if frame.sub_frame == 0:
             after_s += (1 + frame.lost_before) * period_s
@@ -180,12 +170,8 @@ def captured_readings(path: Path, config: TiConfig | None, status: TiStatus) -> 
                 where=path.name,
                 advice="Give the radar's configuration with --ti-config.",
             )
-        lost += frame.lost_before
-        reading = reading_of(frame, after_s, least_snr_db, lost)
-        if reading is not None:
-            status.points += len(reading.targets)
-            lost = 0
-            yield after_s, reading
+        status.points += len(frame.xyz_m)
+        yield after_s, reading_of(frame, after_s, least_snr_db)
     if not stream.counts.frames:
         raise RadarDataError(
             f"There is no frame in its {stream.counts.bytes:,} bytes.",

@@ -90,11 +90,8 @@ class Regions:
         return min(old, key=lambda sight: sight.t_mono_s, default=None)
 
     def silent(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
-        """Of the sensors that are counted on: one that sends no frames any more, or none that can be placed.
-
-        Not the radar: without a target it sends nothing, and high up that is how clear sky looks.
-        """
-        sights = (self.sights[sensor] for sensor in engaged if sensor != "radar")
+        """Of the sensors that are counted on: one that sends no frames any more, or none that can be placed."""
+        sights = (self.sights[sensor] for sensor in engaged)
         return next((sight for sight in sights if not sight.flows or now_s - sight.t_mono_s > OLD_S), None)
 
     def _depth_m(self, status: PerceptionStatus) -> float:

@@ -139,8 +139,7 @@ async def _radar(bus: Bus, suite: _Suite, newest: _Newest) -> None:
     beat = _Beat(RADAR_HZ)
     while True:
         truth = await beat.next(newest)
-        if frame := await asyncio.to_thread(suite.radar.frame, truth):
-            bus.publish(Topic.RADAR_FRAME, frame)
+        bus.publish(Topic.RADAR_FRAME, await asyncio.to_thread(suite.radar.frame, truth))
 
 
 async def _stereo(bus: Bus, suite: _Suite, newest: _Newest) -> None:

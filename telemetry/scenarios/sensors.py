@@ -23,7 +23,7 @@ class Sensors:
         self._due_s: dict[str, float] = dict.fromkeys(("radar", "cloud", "slam"), 0.0)
 
     def measure(self, truth: SimTruth) -> Iterator[RadarFrame | CloudFrame | SlamPose]:
-        """What is due now; a radar that sees nothing gives nothing."""
+        """What is due now."""
         if not truth.armed:
             return
         if self._stereo is not None:
@@ -32,9 +32,7 @@ class Sensors:
             if self._is_due("cloud", CLOUD_HZ, truth):
                 yield self._stereo.frame(truth)
         if self._radar is not None and self._is_due("radar", RADAR_HZ, truth):
-            frame = self._radar.frame(truth)
-            if frame is not None:
-                yield frame
+            yield self._radar.frame(truth)
 
     def _is_due(self, name: str, hz: float, truth: SimTruth) -> bool:
         if truth.t_sim_s < self._due_s[name] - 1e-6:

@@ -29,8 +29,7 @@ def radar_frame(found: Detections, *, number: int, t_mono_s: float, t_utc_s: flo
 def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_utc_s: float, source: str) -> int:
     """Seconds since the first frame, and its detections, as radar frames of a recording that began at ``t_utc_s``.
 
-    Frames without a target are left out, as a live radar leaves them out. Returns how many were written. A file of
-    that name is replaced once the new one is whole. Raises RecordingError.
+    Returns how many were written. A file of that name is replaced once the new one is whole. Raises RecordingError.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     written = 0
@@ -39,10 +38,9 @@ def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_u
     writer = RecordingWriter(part, t_utc_s=t_utc_s, t_mono_s=0.0, name=source)
     try:
         for t_s, found in frames:
-            if len(found):
-                frame = radar_frame(found, number=written, t_mono_s=t_s, t_utc_s=t_utc_s + t_s, source=source)
-                writer.write(Topic.RADAR_FRAME, frame, t_utc_s + t_s)
-                written += 1
+            frame = radar_frame(found, number=written, t_mono_s=t_s, t_utc_s=t_utc_s + t_s, source=source)
+            writer.write(Topic.RADAR_FRAME, frame, t_utc_s + t_s)
+            written += 1
         writer.close()
         part.replace(path)
     except BaseException:

@@ -27,6 +27,8 @@ def test_the_velocity_display_shares_its_place_and_keeps_its_size(towards_anothe
     visit(page, towards_another)
     start_simulator(page)
     expect(page.get_by_test_id("polar")).to_be_visible()
+    # From the first sensor on both have their place, so that nothing moves when the first track comes.
+    expect(page.get_by_test_id("displays")).to_be_visible()
     around = page.get_by_test_id("polar").bounding_box()
 
     page.get_by_test_id("display-velocity").click()

@@ -96,9 +96,11 @@ def test_the_stream_answers_faulty_messages_and_hides_details(served: Running) -
         socket.send('{"type": "launch"}')
         assert "launch" in json.loads(socket.recv(timeout=10))["error"]["what"]
         for poi, code in (("refused", "not_ready"), ("broken", "internal")):
-            socket.send(json.dumps({"type": "set_selection", "selection": {"tool": "select", "poi_id": poi}}))
+            socket.send(json.dumps({"type": "set_selection", "selection": {"poi_id": poi}, "change": 7}))
             answer = json.loads(socket.recv(timeout=10))
             assert (answer["type"], answer["error"]["code"]) == ("notice", code)
             assert "secret" not in json.dumps(answer)
+            # Refused or not, the page need not wait for it any longer.
+            assert json.loads(socket.recv(timeout=10)) == {"v": 1, "type": "answered", "change": 7}
         served.workspace.loop.call_soon_threadsafe(served.parts.hub.publish, notice("still here"))
         assert json.loads(socket.recv(timeout=10))["error"]["what"] == "still here"

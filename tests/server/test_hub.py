@@ -24,6 +24,7 @@ from server.schemas import (
     PlanMessage,
     SelectionDoc,
     SelectionMessage,
+    SetSelection,
     Source,
     TextMessage,
     VehicleMessage,
@@ -148,6 +149,27 @@ def test_state_is_latest_wins_and_notices_all_arrive() -> None:
         assert jobs == {"j0": "98", "j1": "99"}
         notices = [m["error"]["what"] for m in socket.sent if m["type"] == "notice"]
         assert notices == [str(10 * k) for k in range(10)]
+
+    run(scenario)
+
+
+def test_a_change_for_all_is_answered_behind_the_state_that_it_made() -> None:
+    """Also where an older state still waits for a page that takes nothing."""
+
+    async def scenario(bench: Bench) -> None:
+        socket = await bench.join()
+        socket.flowing.clear()
+        bench.hub.publish(SelectionMessage(selection=SelectionDoc()))
+        await settled()
+        for change, tool in enumerate(("home", "polygon", "landing")):
+            bench.hub.publish(SelectionMessage(selection=SelectionDoc(tool=tool)))
+            socket.says(SetSelection(selection=SelectionDoc(tool=tool), change=change).model_dump_json())
+            await settled()
+        socket.flowing.set()
+        await settled()
+        assert socket.types() == ["snapshot", "selection", "selection", "answered", "answered", "answered"]
+        assert socket.sent[2]["selection"]["tool"] == "landing"
+        assert [m["change"] for m in socket.sent[3:]] == [0, 1, 2]
 
     run(scenario)
 

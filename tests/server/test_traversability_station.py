@@ -67,7 +67,7 @@ def test_from_a_surface_model_to_landing_sites_and_files(page: Station, tmp_path
         assert ok(page.http.get(f"{PATH}/map/{layer}.tif")).content.startswith(b"II*"), layer
 
     view = ViewDoc(show_traversability=True, traversability_layer="time_in_view")
-    page.socket.send(SetView(type="set_view", view=view).model_dump_json())
+    page.socket.send(SetView(view=view, change=1).model_dump_json())
     shown = page.until(lambda m: m.type == "traversability").traversability
     assert shown.legend[0] == "In view: up to 2 s"
 

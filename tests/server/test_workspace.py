@@ -196,7 +196,7 @@ def test_hovering_marks_the_path_on_all_pages(demo: Station) -> None:
 def test_an_unknown_message_is_told_and_the_socket_lives(demo: Station) -> None:
     demo.socket.send('{"type": "arm"}')
     assert demo.notice().what == "Messages of type 'arm' are unknown."
-    demo.socket.send(SetSelection(selection=SelectionDoc(tool="home")).model_dump_json())
+    demo.socket.send(SetSelection(selection=SelectionDoc(tool="home"), change=1).model_dump_json())
     assert demo.until(lambda m: isinstance(m, SelectionMessage) and m.selection.tool == "home")
 
 
@@ -231,7 +231,7 @@ def test_a_click_beyond_the_limit_is_told(demo: Station) -> None:
     many = [poi.model_copy(update={"id": f"p{i}", "name": f"P{i}"}) for i in range(5000)]
     demo.put(demo.state.document.model_copy(update={"pois": many}), "Many")
     workspace = demo.server.app.state.parts.workspace
-    demo.socket.send(SetSelection(selection=SelectionDoc(tool="add_poi")).model_dump_json())
+    demo.socket.send(SetSelection(selection=SelectionDoc(tool="add_poi"), change=1).model_dump_json())
     demo.until(lambda m: isinstance(m, SelectionMessage) and m.selection.tool == "add_poi")
     demo.server.on_loop(workspace.pointing.on_terrain(poi.lat_deg, poi.lon_deg, known=True))
     notice = demo.until(lambda m: isinstance(m, NoticeMessage))

@@ -101,19 +101,22 @@ def test_frames_that_stop_while_it_climbs_make_it_hold_until_they_come_again() -
     assert it.truth[2] > 18.5
 
 
-def silenced_on_the_rest() -> Craft:
-    """The camera saw the building; it falls silent on the way on at the new height."""
-    it = craft(Wall(25, 14))
+def silenced_on_the_rest(sense: Sense) -> Craft:
+    """It saw the building; its frames stop on the way on at the new height."""
+    it = craft(Wall(25, 14), senses=[sense])
     it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
-    it.senses[0].silent = True
+    sense.silent = True
     it.until(lambda: state(it) == "holding", 3)
     it.until(lambda: it.state.mode == "BRAKE" and (it.state.ground_speed_m_s or 0.0) < 0.2, 10)
     return it
 
 
-def test_frames_that_stop_on_the_rest_of_the_flight_make_it_brake_until_they_come_again() -> None:
-    it = silenced_on_the_rest()
-    assert it.avoiding.status.text.startswith("No frames from vision.")
+@pytest.mark.parametrize(
+    "sense", [Sense("vision", 7.0, 0.2), Sense("radar", 10.0, 0.1)], ids=lambda sense: sense.sensor
+)
+def test_frames_that_stop_on_the_rest_of_the_flight_make_it_brake_until_they_come_again(sense: Sense) -> None:
+    it = silenced_on_the_rest(replace(sense))
+    assert it.avoiding.status.text.startswith(f"No frames from {sense.sensor}.")
     held_m = it.truth[0]
     it.advance(10.0)
     assert it.truth[0] - held_m < 0.3
@@ -123,23 +126,21 @@ def test_frames_that_stop_on_the_rest_of_the_flight_make_it_brake_until_they_com
 
 
 def test_without_its_frames_the_rest_is_flown_when_the_operator_says_so() -> None:
-    it = silenced_on_the_rest()
+    it = silenced_on_the_rest(Sense("vision", 7.0, 0.2))
     it.perform(it.avoiding.resume(it.now_s))
     it.until(lambda: state(it) == "offset", 5)
     it.until(lambda: it.state.mode == "RTL")
 
 
 def test_switched_off_the_rest_is_flown_without_frames() -> None:
-    it = silenced_on_the_rest()
+    it = silenced_on_the_rest(Sense("radar", 10.0, 0.1))
     it.perform(it.avoiding.disable(it.now_s))
     it.until(lambda: state(it) == "offset", 5)
     it.until(lambda: it.state.mode == "RTL")
 
 
-def test_a_radar_without_targets_sends_nothing_and_does_not_stop_the_rest_of_the_flight() -> None:
-    it = craft(Wall(25, 14), senses=[Sense("radar", 7.0, 0.1)])
-    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
-    it.senses[0].silent = True
+def test_a_radar_that_sees_nothing_sends_empty_frames_and_does_not_stop_the_rest_of_the_flight() -> None:
+    it = craft(Wall(25, 14), senses=[Sense("radar", 10.0, 0.1)])
     it.until(lambda: it.state.mode == "RTL")
     assert "holding" not in it.states
 

@@ -20,14 +20,14 @@ def detections(count: int) -> Detections:
     return Detections(10 * ones, -ones, 0 * ones, 0 * ones, 20 * ones, np.zeros((count, 2), np.int64))
 
 
-def test_frames_come_back_with_their_times_and_empty_ones_are_left_out(tmp_path: Path) -> None:
+def test_frames_come_back_with_their_times_and_empty_ones_too(tmp_path: Path) -> None:
     path = tmp_path / "targets.mcap"
     written = write_targets(path, [(0.1 * k, detections(k % 3)) for k in range(6)], t_utc_s=1.6e9, source="awr1843")
-    assert written == 4
+    assert written == 6
     readings = [(after_s, reading) for after_s, reading in recorded_readings(path) if isinstance(reading, RadarReading)]
-    assert [after_s for after_s, _ in readings] == pytest.approx([0.0, 0.1, 0.3, 0.4])
-    assert [len(reading.targets) for _, reading in readings] == [1, 2, 1, 2]
-    assert readings[0][1].targets[0].tolist() == [0.0, 10.0, 0.0, -1.0, 20.0]
+    assert [after_s for after_s, _ in readings] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert [len(reading.targets) for _, reading in readings] == [0, 1, 2, 0, 1, 2]
+    assert readings[1][1].targets[0].tolist() == [0.0, 10.0, 0.0, -1.0, 20.0]
 
 
 def test_a_file_of_that_name_is_replaced_only_by_a_whole_one(tmp_path: Path) -> None:

@@ -101,9 +101,8 @@ def test_the_new_building_is_alerted_in_time_and_nothing_else(scene: World, line
     for truth in truths(scene, line):
         perception.feed_position(truth.t_mono_s, truth.position_enu_m, truth.velocity_enu_m_s)
         perception.feed_attitude(truth.t_mono_s, truth.roll_rad, truth.pitch_rad, truth.heading_rad)
-        frame = radar.frame(truth)
-        if frame is not None:
-            alerts += [(alert, truth) for alert in perception.on_frame(scan(frame), truth.t_mono_s).alerts]
+        told = perception.on_frame(scan(radar.frame(truth)), truth.t_mono_s)
+        alerts += [(alert, truth) for alert in told.alerts]
     first, then = next((alert, truth) for alert, truth in alerts if alert.obstacle is not None)
     assert first.phase == "begins"
     away_m = scene.distance_m(np.array([then.position_enu_m]))[0]

@@ -120,11 +120,12 @@ def test_it_is_configured_line_by_line_and_its_points_come(tmp_path: Path) -> No
         until(configured(board))
         assert board.lines == [command.text.encode() for command in CONFIG.commands]
         board.send(b"\x00garbage" + frame(1) + sdk3(2, []) + frame(5))
-        first, second = listener.next(), listener.next()
+        first, nothing, second = (listener.next() for _ in range(3))
         status = listener.radar.status
         assert (status.stream.bad_bytes, status.stream.lost_packets, status.interruptions) == (8, 2, 0)
     assert first.targets == pytest.approx(np.array([[1, 20, 0.5, -3, 20], [-4, 60, 2, 0.31, 15.5]], np.float32))
-    assert (first.lost, second.lost) == (0, 2)
+    assert nothing.targets.shape == (0, 5)  # It sees nothing, and says so.
+    assert (first.lost, nothing.lost, second.lost) == (0, 0, 2)
     assert second.t_s >= first.t_s
     assert told == []
 
@@ -286,8 +287,7 @@ def test_the_config_port_is_the_one_before(tmp_path: Path) -> None:
 def test_a_thousand_targets_are_sent_and_no_more() -> None:
     points = [(0.0, 10.0 + 0.01 * k, 0.0, 0.0) for k in range(1500)]
     (found,) = TiStream().feed(sdk3(1, points, [10.0 + 0.1 * (k // 500) for k in range(1500)]))
-    reading = reading_of(found, 0.0, 15.0, 0)
-    assert reading is not None
+    reading = reading_of(found, 0.0, 15.0)
     assert reading.targets.shape == (1000, 5)
     assert reading.targets[0, 1] == pytest.approx(15.0)
     assert reading.targets[:, 4].min() > 10.05
@@ -295,8 +295,7 @@ def test_a_thousand_targets_are_sent_and_no_more() -> None:
 
 def test_targets_of_unknown_strength_count_as_just_detected() -> None:
     (found,) = TiStream().feed(sdk3(1, POINTS))
-    reading = reading_of(found, 0.0, 13.5, 0)
-    assert reading is not None
+    reading = reading_of(found, 0.0, 13.5)
     assert reading.targets[:, 4].tolist() == [13.5, 13.5]
 
 
@@ -304,10 +303,11 @@ def test_a_capture_plays_by_the_numbers_of_its_frames(tmp_path: Path) -> None:
     path, status = tmp_path / "radar.bin", TiStatus()
     path.write_bytes(frame(10) + sdk3(11, []) + b"noise" + frame(14) + frame(15)[:60])
     readings = list(captured_readings(path, CONFIG, status))
-    assert [after_s for after_s, _ in readings] == pytest.approx([0.0, 0.4])
-    assert [reading.lost for _, reading in readings] == [0, 2]
+    assert [after_s for after_s, _ in readings] == pytest.approx([0.0, 0.1, 0.4])
+    assert [len(reading.targets) for _, reading in readings] == [2, 0, 2]
+    assert [reading.lost for _, reading in readings] == [0, 0, 2]
     assert (status.stream.bad_bytes, status.stream.lost_packets, status.points) == (65, 2, 4)
-    moved = at(readings[1][1], 9.0)
+    moved = at(readings[2][1], 9.0)
     assert isinstance(moved, RadarReading)
     assert (moved.t_s, moved.lost) == (9.0, 2)
 

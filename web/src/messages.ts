@@ -1066,6 +1066,13 @@ export interface SelectionMessage {
   selection: SelectionDoc;
 }
 
+/** Every change that this page asked for up to this one is carried out, or refused with a notice. */
+export interface AnsweredMessage {
+  v: 1;
+  type: "answered";
+  change: number;
+}
+
 export interface JobMessage {
   v: 1;
   type: "job";
@@ -1238,11 +1245,13 @@ export interface HoverView {
 export interface SetView {
   type: "set_view";
   view: ViewDoc;
+  change: number;
 }
 
 export interface SetSelection {
   type: "set_selection";
   selection: SelectionDoc;
+  change: number;
 }
 
 /** Move this page's camera: to the whole terrain, the plan, from above, the worst point, or the vehicle. */
@@ -1257,6 +1266,7 @@ export type ServerMessage =
   | LibraryMessage
   | ViewMessage
   | SelectionMessage
+  | AnsweredMessage
   | JobMessage
   | CursorMessage
   | VehicleMessage

@@ -36,13 +36,10 @@ class IqRadarSensor:
         self._mount_m = np.array([0.0, 0.0, model.beam.mount_m])
         self._published = 0
 
-    def frame(self, truth: SimTruth) -> RadarFrame | None:
-        """What the chain finds in the samples taken there, at that moment; None when it finds nothing."""
-        found = self.chain.process(self.cube(truth))
-        if not len(found.range_m):
-            return None
+    def frame(self, truth: SimTruth) -> RadarFrame:
+        """What the chain finds in the samples taken there, at that moment."""
         self._published += 1
-        return self._told(truth, found)
+        return self._told(truth, self.chain.process(self.cube(truth)))
 
     def cube(self, truth: SimTruth) -> C64:
         """(chirps, virtual antennas, samples): echoes and noise."""

@@ -39,12 +39,10 @@ class RadarSensor:
         self._random = np.random.default_rng([seed, 1])
         self._published = 0
 
-    def frame(self, truth: SimTruth) -> RadarFrame | None:
-        """What is seen from there, at that moment; None when nothing is: such a frame is not published."""
+    def frame(self, truth: SimTruth) -> RadarFrame:
+        """What is seen from there, at that moment."""
         real = self._real(truth)
         found = _joined([real, self._side_lobes(real), self._false_alarms()])
-        if not len(found.range_m):
-            return None
         xyz_m, speed_m_s = self._measured(found)
         self._published += 1
         return RadarFrame(

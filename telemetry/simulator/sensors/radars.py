@@ -10,7 +10,7 @@ from telemetry.simulator.sensors.radar import RadarSensor
 
 
 class Radar(Protocol):
-    def frame(self, truth: SimTruth) -> RadarFrame | None: ...
+    def frame(self, truth: SimTruth) -> RadarFrame: ...
 
 
 def radar_sensor(kind: RadarKind, world: World, *, seed: int) -> Radar:

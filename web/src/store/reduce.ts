@@ -1,11 +1,12 @@
 import { batch } from "@preact/signals";
-import type { ServerMessage, Snapshot, ViewDoc } from "../messages";
+import type { ServerMessage, Snapshot } from "../messages";
 import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
+import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
 import { traversability } from "./traversability";
 
@@ -26,10 +27,13 @@ export function receive(message: ServerMessage): void {
       state.library.value = message.library;
       return;
     case "view":
-      showView(message.view, state.document_.value?.terrain_id ?? null);
+      takeView(message.view);
       return;
     case "selection":
-      state.selection.value = message.selection;
+      takeSelection(message.selection);
+      return;
+    case "answered":
+      takeAnswer(message.change);
       return;
     case "job":
       state.jobs.value = new Map(state.jobs.value).set(message.job.id, message.job);
@@ -79,14 +83,9 @@ function takeSnapshot(message: Snapshot): void {
   state.productVersion.value = message.product_version;
   state.pageId.value = message.page_id;
   state.library.value = message.library;
-  showView(message.view, message.plan.document.terrain_id);
-  state.selection.value = message.selection;
   state.jobs.value = new Map(message.jobs.map((job) => [job.id, job]));
   showPlan();
-}
-
-/** The server tells the legend's ends when it has drawn a terrain. */
-function showView(view: ViewDoc, terrainId: string | null): void {
-  state.view.value = view;
-  state.pictured.value = view.legend_min_m === null ? null : terrainId;
+  forgetAsked();
+  takeView(message.view);
+  takeSelection(message.selection);
 }

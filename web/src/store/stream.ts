@@ -2,6 +2,7 @@ import type { ClientMessage, SelectionDoc, ViewDoc } from "../messages";
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
 import { receive } from "./reduce";
+import { nextChange } from "./shared";
 import { cursor, link, notifyText, selection, view } from "./state";
 
 const stream = new Stream(streamUrl(location), {
@@ -20,12 +21,12 @@ export const send = (message: ClientMessage) => stream.send(message);
 
 export function setView(fields: Partial<ViewDoc>): void {
   view.value = { ...view.value, ...fields };
-  send({ type: "set_view", view: view.value });
+  send({ type: "set_view", view: view.value, change: nextChange() });
 }
 
 export function setSelection(fields: Partial<SelectionDoc>): void {
   selection.value = { ...selection.value, ...fields };
-  send({ type: "set_selection", selection: selection.value });
+  send({ type: "set_selection", selection: selection.value, change: nextChange() });
 }
 
 export type FrameTarget = "terrain" | "plan" | "top" | "worst" | "poi" | "vehicle";

@@ -20,6 +20,9 @@ const TABS = [
   { id: "velocity", label: "Velocities" },
 ] as const;
 
+/** Of the two: the chosen one, if there is something in it. */
+const displayed = (source: Source) => (hasTracks[source].value ? aroundDisplay.value : "obstacles");
+
 /** Which of the two stands at their common place; the mark has its room always. */
 function Tabs({ source }: { source: Source }) {
   return (
@@ -28,7 +31,8 @@ function Tabs({ source }: { source: Source }) {
         <button
           type="button"
           key={id}
-          aria-pressed={aroundDisplay.value === id}
+          aria-pressed={displayed(source) === id}
+          disabled={id === "velocity" && !hasTracks[source].value}
           data-testid={`display-${id}`}
           onClick={() => (aroundDisplay.value = id)}
         >
@@ -53,7 +57,8 @@ interface Props {
 /** What is around, and which velocities lead into it: side by side where there is room, else one at a time. */
 export function Displays({ source, state }: Props) {
   const polar = <Polar source={source} state={state} />;
-  if (!hasTracks[source].value) return polar;
+  // Live their place is kept from the first sensor on: nothing moves when tracks come.
+  if (!hasTracks[source].value && (source === "replay" || !hasSensors.live.value)) return polar;
   const velocity = <VelocityDisplay source={source} state={state} />;
   if (hasRoom(source))
     return (
@@ -67,7 +72,7 @@ export function Displays({ source, state }: Props) {
   return (
     <>
       <Tabs source={source} />
-      {aroundDisplay.value === "velocity" ? velocity : polar}
+      {displayed(source) === "velocity" ? velocity : polar}
     </>
   );
 }
