@@ -16,7 +16,7 @@ from mapping import quaternions
 F64 = NDArray[np.float64]
 
 DOUBTED_FASTER_M_S = 3.0
-"""Than at the last believed position."""
+"""Than the vehicle says it is: while positions are doubted."""
 
 Refused = Literal["not finite", "out of order", "position jumped", "no fix"]
 Missing = Literal["no position", "no attitude", "position too far in time", "attitude too far in time"]
@@ -124,6 +124,8 @@ class PoseTrack:
         self._positions = _Series(self._params)
         self._attitudes = _Series(self._params)
         self._doubted: list[_Sample] = []
+        self._reckoned: _Sample | None = None
+        """Where the vehicle is by the velocities that it has told since its position is doubted."""
 
     @property
     def position_t_mono_s(self) -> float | None:
@@ -154,7 +156,8 @@ class PoseTrack:
             return None
         if t_mono_s <= samples[-1].t_s:
             return None if t_mono_s == samples[-1].t_s and np.array_equal(p, samples[-1].value) else "out of order"
-        if self._is_plausible(samples[-1], sample):
+        is_back = self._is_back(samples[-1], sample) if self._doubted else self._is_plausible(samples[-1], sample)
+        if is_back:
             self._doubted.clear()
             self._positions.add(sample)
             return None
@@ -191,9 +194,23 @@ class PoseTrack:
         allowed_m = speed * min(new.t_s - old.t_s, self._params.settle_s) + self._params.slack_m
         return float(np.linalg.norm(new.value - old.value)) <= allowed_m
 
+    def _is_back(self, old: _Sample, new: _Sample) -> bool:
+        """Where it must have flown to: a glitch would wait out any circle that grows around the last place."""
+        reckoned = self._reckoned
+        if reckoned is None or new.rate is None:
+            return self._is_plausible(old, new)
+        there = reckoned.value + new.rate * (new.t_s - reckoned.t_s)
+        self._reckoned = _Sample(new.t_s, there)
+        allowed_m = DOUBTED_FASTER_M_S * min(new.t_s - old.t_s, self._params.settle_s) + self._params.slack_m
+        return float(np.linalg.norm(new.value - there)) <= allowed_m
+
     def _doubt(self, sample: _Sample) -> Refused | None:
         """A jump: refused until the new place has been consistent with itself for long enough."""
-        doubted = self._doubted
+        doubted, last = self._doubted, self._positions.samples[-1]
+        if not doubted:
+            told = sample.rate is not None and last.rate is not None
+            there = last.value if sample.rate is None else last.value + sample.rate * (sample.t_s - last.t_s)
+            self._reckoned = _Sample(sample.t_s, there) if told else None
         if doubted and not self._is_plausible(doubted[-1], sample):
             doubted.clear()
         doubted.append(sample)

@@ -25,21 +25,32 @@ def sector_points(*, depth_m: float, fov_rad: float, height_m: float, resolution
     up to half of ``height_m`` above and below. Rings run to ceil(depth / resolution) + 1: one more than printed, which
     is what gives the counts of Table 1. Raises ParameterError, and CapacityError beyond ``MOST_POINTS``.
     """
+    half_arcs, layers = checked_sector(depth_m=depth_m, fov_rad=fov_rad, height_m=height_m, resolution_m=resolution_m)
+    levels = np.arange(-layers, layers + 1)
+    nearest_first = levels[np.argsort(np.abs(levels), kind="stable")]
+    points = np.concatenate([_ring(n, int(half), nearest_first) for n, half in enumerate(half_arcs, start=1)])
+    return points * resolution_m
+
+
+def checked_sector(
+    *, depth_m: float, fov_rad: float, height_m: float, resolution_m: float
+) -> tuple[NDArray[np.int64], int]:
+    """(points on each side of every ring's middle, layers on each side of the middle one), without making a point.
+
+    Raises as ``sector_points`` does.
+    """
     _check_sector(depth_m, fov_rad, height_m, resolution_m)
     rings = math.ceil(depth_m / resolution_m) + 1
     layers = math.floor(height_m / (2.0 * resolution_m))
-    half_arcs = np.ceil(np.arange(rings + 1) * fov_rad / 2.0).astype(np.int64)
-    count = int((2 * half_arcs[1:] + 1).sum()) * (2 * layers + 1)
+    half_arcs = np.ceil(np.arange(1, rings + 1) * fov_rad / 2.0).astype(np.int64)
+    count = int((2 * half_arcs + 1).sum()) * (2 * layers + 1)
     if count > MOST_POINTS:
         raise CapacityError(
             f"A region {depth_m:g} m deep and {height_m:g} m high at {resolution_m:g} m has {count:,} points.",
             where="resolution_m",
             advice=f"{MOST_POINTS:,} are the most: choose a coarser resolution or a smaller region.",
         )
-    levels = np.arange(-layers, layers + 1)
-    nearest_first = levels[np.argsort(np.abs(levels), kind="stable")]
-    points = np.concatenate([_ring(n, int(half_arcs[n]), nearest_first) for n in range(1, rings + 1)])
-    return points * resolution_m
+    return half_arcs, layers
 
 
 def _ring(n: int, half_arc: int, levels: NDArray[np.int64]) -> F64:

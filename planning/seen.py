@@ -10,7 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from planning.avoiding.boxes import segment_box_sq
+from planning.avoiding.boxes import half_heights, segment_box_sq
+from planning.avoiding.room import Seen
+from planning.avoiding.standing import standing
 from planning.dsm import Dsm
 
 F64 = NDArray[np.float64]
@@ -49,9 +51,11 @@ class Conflict:
     distance_m: float
     """Between the line and that voxel; the vehicle's radius is not taken off."""
     enu_m: tuple[float, float, float]
-    """That voxel's centre."""
+    """That voxel's centre; of a column, its highest voxel's."""
     voxels: int
-    """That are too near at this place."""
+    """Or columns, that are too near at this place."""
+    top_unseen: bool = False
+    """It may end below the line: nobody has seen how high it is."""
 
 
 def columns_from_voxels(
@@ -91,34 +95,50 @@ def _raise_cells(elevation_m, row_f, col_f, top_m, reach_px):
 
 
 def conflicts(
-    line_enu_m: ArrayLike, centres_enu_m: ArrayLike, *, resolution_m: float, radius_m: float
+    line_enu_m: ArrayLike,
+    centres_enu_m: ArrayLike,
+    *,
+    resolution_m: float,
+    radius_m: float,
+    standing_from_enu_m: ArrayLike | None = None,
 ) -> Conflict | None:
-    """The first place of a line (K, 3) nearer than ``radius_m`` to a voxel, centres (N, 3). None: there is none."""
+    """The first place of a line (K, 3) nearer than ``radius_m`` to a voxel, centres (N, 3). None: there is none.
+
+    ``standing_from_enu_m`` (3,): the vehicle, for voxels of a sensor that does not tell heights (``standing``).
+    """
     line = np.ascontiguousarray(line_enu_m, np.float64).reshape(-1, 3)
     centres = np.ascontiguousarray(centres_enu_m, np.float64).reshape(-1, 3)
     if len(line) < 2 or len(centres) == 0:
         return None
     half_m = resolution_m / 2
-    near = _near_tiles(line, centres, half_m + radius_m)
-    if len(near) == 0:
+    near = Seen(_near_tiles(line, centres, half_m + radius_m, any_height=standing_from_enu_m is not None), resolution_m)
+    if len(near.centres_enu_m) == 0:
         return None
-    along_m, leg, distance_m = _along(line, near, half_m, radius_m)
+    if standing_from_enu_m is not None:
+        near = standing(near, np.asarray(standing_from_enu_m, np.float64).reshape(3))
+    half_up_m = half_heights(near.half_up_m, half_m, len(near.centres_enu_m))
+    along_m, leg, distance_m = _along(line, near.centres_enu_m, half_m, half_up_m, radius_m)
     found = np.flatnonzero(leg >= 0)
     if len(found) == 0:
         return None
     first = found[np.lexsort((distance_m[found], along_m[found]))[0]]
     same = along_m[found] <= along_m[first] + SAME_PLACE_M
-    e, n, u = (float(value) for value in near[first])
-    return Conflict(float(along_m[first]), int(leg[first]), float(distance_m[first]), (e, n, u), int(same.sum()))
+    e, n, u = (float(value) for value in near.centres_enu_m[first])
+    u += float(half_up_m[first]) - half_m
+    is_open = near.is_open is not None and bool(near.is_open[first])
+    along, distance = float(along_m[first]), float(distance_m[first])
+    return Conflict(along, int(leg[first]), distance, (e, n, u), int(same.sum()), is_open)
 
 
-def _near_tiles(line: F64, centres: F64, reach_m: float) -> F64:
+def _near_tiles(line: F64, centres: F64, reach_m: float, *, any_height: bool) -> F64:
     """Voxels in squares that the line may come near to."""
     low, high = line.min(axis=0) - reach_m, line.max(axis=0) + reach_m
     tile_m = max(TILE_M, math.sqrt(float(np.prod((high - low)[:2])) / MOST_TILES))
     shape = tuple(int(side) + 1 for side in (high - low)[:2] / tile_m)
     tiles = np.zeros(shape, np.bool_)
     _mark(line, low, tile_m, reach_m, tiles)
+    if any_height:
+        low[2], high[2] = -np.inf, np.inf
     return _picked(centres, low, high, tile_m, tiles)
 
 
@@ -157,16 +177,16 @@ def _picked(centres, low, high, tile_m, tiles):
 
 
 @njit(cache=True, nogil=True)
-def _along(line, centres, half_m, radius_m):
+def _along(line, centres, half_m, half_up_m, radius_m):
     """Of each voxel: how far along the line is nearest to it on the first leg that is too near; leg -1: none is."""
     count = centres.shape[0]
     along_m, distance_m = np.full(count, np.inf), np.full(count, np.inf)
     leg = np.full(count, -1, np.int64)
-    low, high = np.empty(3), np.empty(3)
+    low, high, half = np.empty(3), np.empty(3), np.full(3, half_m)
     for j in range(count):
-        passed_m = 0.0
+        passed_m, half[2] = 0.0, half_up_m[j]
         for k in range(3):
-            low[k], high[k] = centres[j, k] - half_m, centres[j, k] + half_m
+            low[k], high[k] = centres[j, k] - half[k], centres[j, k] + half[k]
         for i in range(line.shape[0] - 1):
             a, d = line[i], line[i + 1] - line[i]
             length_m = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])

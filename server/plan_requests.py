@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
 from planning.dsm import Dsm
 from planning.poi_files import looks_swapped, read_pois
@@ -104,16 +105,19 @@ class PlanRequests:
         """One export file, or ``all.zip``, of the present document. Raises NotReadyError."""
         return await exported(self._lane, self._library, self._desk.document, file)
 
-    async def plan_with_seen(self, maps: list[Voxels]) -> PlanState:
-        """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other."""
+    async def plan_with_seen(
+        self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None
+    ) -> PlanState:
+        """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other.
+
+        ``rest`` gives, of the terrain's id, the fields of a plan that begins where the vehicle is.
+        """
         terrain_id = self._desk.document.terrain_id
         if terrain_id is None:
             raise NotReadyError("There is no surface model to add to.", advice="Open the plan that is flown.")
-        directory = self._library.terrain_dir(terrain_id)
-        seen_id = await self._lane.call(keep_seen, directory, maps)
-        await self._desk.propose(
-            lambda document: ("Plan against what was seen", document.model_copy(update={"seen_id": seen_id}))
-        )
+        fields = {} if rest is None else await asyncio.to_thread(rest, terrain_id)
+        fields["seen_id"] = await self._lane.call(keep_seen, self._library.terrain_dir(terrain_id), maps)
+        await self._desk.propose(lambda document: ("Plan against what was seen", document.model_copy(update=fields)))
         return self.state
 
     async def plan_without_seen(self) -> PlanState:

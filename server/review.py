@@ -79,6 +79,8 @@ def _notes(flight: Flight | None, judged: Judged | None, dsm: Dsm | None, log: F
     figures = judged.figures
     if figures.told_by == "geometry":
         notes.append("The vehicle did not say what it reached: waypoints count where the track is nearest to them.")
+    if flight.track.detours:
+        notes.append("Avoidance flew a part of it: that counts for distances to the ground, not for errors.")
     if not figures.completed:
         notes.append("The last waypoint was not reached: the figures end where the mission was left.")
     if figures.unknown_positions:

@@ -50,6 +50,8 @@ def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
         min_distance_lon_deg=lon_deg,
         min_distance_way_home_m=home.distance_m if home else None,
         positions=figures.positions,
+        higher_m=figures.higher.most_m if figures.higher else None,
+        higher_from_item=figures.higher.from_item + 1 if figures.higher else None,
     )
 
 

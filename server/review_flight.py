@@ -17,12 +17,16 @@ from planning.following.reference import Reference, level_model, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.wpl import read_wpl
-from planning.model import F64, Home, Mission, VehicleProfile
+from planning.model import F64, Home, Mission, MissionItem, VehicleProfile
 from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, parse_profile
+from telemetry.flight.rest import RETURNS
+from telemetry.obstacles import AvoidanceStatus
 from telemetry.recording.flight_log import FlightLog
 from telemetry.recording.flight_log import Track as Columns
+from telemetry.recording.frame_facts import SentTarget
 
 MISSION_MODES = {"auto": ("AUTO", "MISSION"), "guided": ("GUIDED", "OFFBOARD")}
+WAYS_HOME = (*RETURNS, "RETURN", "LAND")
 HANDED_OVER_M = 0.5
 """A position that was sent is a waypoint of the mission when it lies this near to it."""
 SAME_HOME_M = 1.0
@@ -31,6 +35,11 @@ SAME_PLACE_M = 10.0
 SLOW_M_S, LONGEST_GAP_S, FEWEST_STEPS, CLOCK_TOLERANCE = 0.5, 1.0, 20, 0.25
 """Of comparing the vehicle's clock with the recording's."""
 METRES_PER_DEG = 111_320.0
+DETOUR_STATES = frozenset({"holding", "climbing", "offset", "manoeuvre", "ceiling"})
+"""Of ``AvoidanceStatus``: it has taken the vehicle over."""
+
+Spans = tuple[tuple[float, float], ...]
+"""(begin, end) in seconds of one clock."""
 
 
 @dataclass(slots=True)
@@ -68,9 +77,10 @@ def placed_flight(
         _compare_homes(home, mission, model, notes)
     xyz_m = _xyz(log, columns, model, home, home_alt_m, truth=truth)
     known = np.isfinite(xyz_m).all(axis=1)
-    guided = _flown_one_by_one(log)
+    detours = detours_of(log)
+    guided = _flown_one_by_one(log, detours)
     if reference is not None and guided and mission is not None:
-        reference = _as_far_as_led(log, mission, reference, notes)
+        reference = _as_far_as_led(log, mission, reference, detours, notes)
     track = Track(
         t_s=columns.t_utc_s[known] - log.start_utc_s,
         xyz_m=xyz_m[known],
@@ -78,6 +88,7 @@ def placed_flight(
         on_mission=_spans(log, "guided" if guided else "auto"),
         one_by_one=guided,
         clock_rate=_clock_rate(columns, xyz_m, notes),
+        detours=tuple((begin - log.start_utc_s, end - log.start_utc_s) for begin, end in detours),
     )
     datum_m = home_alt_m if reference is None else reference.home_alt_dsm_m
     return Flight(log, model, surface, mission, reference, track, datum_m, notes)
@@ -187,9 +198,36 @@ def _clock_rate(columns: Columns, xyz_m: F64, notes: list[str]) -> float:
     return rate
 
 
-def _flown_one_by_one(log: FlightLog) -> bool:
-    """Whether a ground station handed over positions, and the vehicle was in a mode that flies to them."""
-    return bool(log.targets) and any(mode in MISSION_MODES["guided"] for _, mode in log.modes)
+def detours_of(log: FlightLog) -> Spans:
+    """When avoidance flew the rest of a mission; what it did on the way home is not of the mission."""
+    edges = [*log.avoidance, (log.end_utc_s, AvoidanceStatus())]
+    spans: list[tuple[float, float]] = []
+    for (begin, status), (end, _) in itertools.pairwise(edges):
+        if status.state not in DETOUR_STATES:
+            continue
+        if spans and spans[-1][1] == begin:
+            spans[-1] = (spans[-1][0], end)
+        elif not _goes_home(log, begin):
+            spans.append((begin, end))
+    return tuple(spans)
+
+
+def _goes_home(log: FlightLog, t_utc_s: float) -> bool:
+    ways = (mode for t, mode in reversed(log.modes) if t <= t_utc_s)
+    return next((mode in WAYS_HOME for mode in ways if mode in (*MISSION_MODES["auto"], *WAYS_HOME)), False)
+
+
+def _is_in(spans: Spans, t_utc_s: float) -> bool:
+    return any(begin <= t_utc_s <= end for begin, end in spans)
+
+
+def _flown_one_by_one(log: FlightLog, detours: Spans) -> bool:
+    """Whether a ground station handed over positions, and the vehicle was in a mode that flies to them.
+
+    Those of avoidance take over a mission that may have been flown on board.
+    """
+    led = any(not _is_in(detours, target.t_utc_s) for target in log.targets)
+    return led and any(mode in MISSION_MODES["guided"] for _, mode in log.modes)
 
 
 def _spans(log: FlightLog, way: str) -> tuple[tuple[float, float], ...] | None:
@@ -234,16 +272,27 @@ def apart_m(lat_a_deg: float, lon_a_deg: float, lat_b_deg: float, lon_b_deg: flo
     return METRES_PER_DEG * math.hypot(lat_a_deg - lat_b_deg, east)
 
 
-def _as_far_as_led(log: FlightLog, mission: Mission, reference: Reference, notes: list[str]) -> Reference:
+def _is_at(item: MissionItem, target: SentTarget) -> bool:
+    return apart_m(target.lat_deg, target.lon_deg, item.lat_deg, item.lon_deg) <= HANDED_OVER_M
+
+
+def _as_far_as_led(
+    log: FlightLog, mission: Mission, reference: Reference, detours: Spans, notes: list[str]
+) -> Reference:
     """The line up to the last waypoint that was handed over: nothing led the vehicle on from there."""
-    item, matched = -1, 0
+    item, strays = -1, 0
     for target in log.targets:
-        for k in range(max(item + 1, reference.first_item), len(mission.items)):
-            place = mission.items[k]
-            if apart_m(target.lat_deg, target.lon_deg, place.lat_deg, place.lon_deg) <= HANDED_OVER_M:
-                item, matched = k, matched + 1
-                break
-    if 2 * matched < len(log.targets):
+        led_to = next(
+            (
+                k
+                for k in range(max(item + 1, reference.first_item), len(mission.items))
+                if _is_at(mission.items[k], target)
+            ),
+            -1,
+        )
+        strays += led_to < 0 and not _is_in(detours, target.t_utc_s)
+        item = max(item, led_to)
+    if 2 * strays > sum(not _is_in(detours, target.t_utc_s) for target in log.targets):
         notes.append("The positions that were sent to the vehicle are not those of the mission.")
         return reference
     led = reference.ending_at(item)

@@ -113,6 +113,8 @@ class MissionConflict:
     lat_deg: float
     lon_deg: float
     voxels: int
+    top_unseen: bool = False
+    """It may end below the mission's line: nobody has seen how high it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +241,7 @@ class PerceptionSettings:
     """Raised by one to have all maps emptied."""
     radar_resolution_m: float = 1.0
     vision_resolution_m: float = 0.5
+    """Of the range finder's map, too."""
     memory_limit_bytes: int = 1_000_000_000
     """Per map; beyond it the map takes nothing new, and says so."""
     safety_radius_m: float = 3.0

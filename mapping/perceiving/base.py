@@ -74,7 +74,7 @@ class Perception:
         self._has_fix = True
         self._newest: tuple[float, int, str] | None = None
         self._sweep: tuple[float, tuple[float | None, ...]] = (-math.inf, ())
-        self._sector = self._sector_points()
+        self._sector = self._sector_points(settings)
 
     # What is known
 
@@ -106,12 +106,15 @@ class Perception:
         self._flying = flying
 
     def set_settings(self, settings: Settings) -> None:
-        """Other regions at once; another resolution or memory limit begins the map anew."""
-        old, self.settings = self.settings, settings
-        if (old.resolution_m, old.memory_limit_bytes) != (settings.resolution_m, settings.memory_limit_bytes):
+        """Other regions at once; another resolution or memory limit begins the map anew.
+
+        Raises ParameterError or CapacityError for what cannot be; then everything stays as it was.
+        """
+        sector = self._sector_points(settings)
+        if self.settings.makes_another_map(settings):
             self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
             self._forget()
-        self._sector = self._sector_points()
+        self.settings, self._sector = settings, sector
 
     def clear(self) -> None:
         """Empty the map."""
@@ -122,8 +125,8 @@ class Perception:
         """What a subclass knows beside the map."""
         self._sweep = (-math.inf, ())
 
-    def _sector_points(self) -> F64:
-        s = self.settings
+    @staticmethod
+    def _sector_points(s: Settings) -> F64:
         return sector_points(
             depth_m=s.depth_m, fov_rad=s.fov_rad, height_m=s.height_m, resolution_m=min(ROI_STEP_M, s.resolution_m)
         )

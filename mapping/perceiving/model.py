@@ -33,6 +33,10 @@ class Settings:
     brake_m_s2: float = 2.5
     memory_limit_bytes: int = 1_000_000_000
 
+    def makes_another_map(self, other: Settings) -> bool:
+        """Whether a map cannot go on under the other settings: it begins anew."""
+        return (self.resolution_m, self.memory_limit_bytes) != (other.resolution_m, other.memory_limit_bytes)
+
 
 @dataclass(frozen=True, slots=True)
 class RadarScan:

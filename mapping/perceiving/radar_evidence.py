@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mapping.ground import GroundGrid
 from mapping.ground_beams import BeamShape
+from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
 from mapping.poses import Pose
 from mapping.radar_targets import Polar
 
@@ -76,6 +77,13 @@ class EvidenceParams:
     """Frames in which a thing must have been seen; doubtful ones count half."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Recent:
+    t_s: float
+    points_enu: F64
+    seen: Weighted
+
+
 class RadarEvidence:
     """Remembers targets for a moment, and for good the places that are believed, as columns one metre wide with their
     tops."""
@@ -85,8 +93,8 @@ class RadarEvidence:
         self.clear()
 
     def clear(self) -> None:
-        self._recent: deque[tuple[float, F64, F64]] = deque()
-        self._believed: dict[tuple[int, int], float] = {}
+        self._recent: deque[_Recent] = deque()
+        self._believed: dict[Column, float] = {}
 
     def judge(self, t_mono_s: float, points_enu: F64, weight: F64) -> tuple[Bools, F64]:
         """Targets (N, 3) of a frame and the weight of each -> which are believed, and earlier ones that are now.
@@ -94,47 +102,42 @@ class RadarEvidence:
         The first is (N,), the second (M, 3).
         """
         p = self._params
-        while self._recent and self._recent[0][0] < t_mono_s - p.memory_s:
+        while self._recent and self._recent[0].t_s < t_mono_s - p.memory_s:
             self._recent.popleft()
         kept = weight > 0
-        self._recent.append((t_mono_s, points_enu[kept], weight[kept]))
+        counted = points_enu[kept]
+        self._recent.append(_Recent(t_mono_s, counted, weighted(counted, weight[kept])))
         score = np.zeros(len(points_enu))
-        for _, earlier, weights in self._recent:
-            score += _heaviest_near(points_enu, earlier, weights, p.same_place_m)
+        for recent in self._recent:
+            score += recent.seen.heaviest_near(points_enu, p.same_place_m)
         sure = kept & (score >= p.enough)
         fresh = self._believe(points_enu[sure])
-        believed = sure | np.array([self._is_known(q) for q in points_enu], np.bool_)
-        return believed, self._earlier_near(fresh)
+        return sure | self._are_known(points_enu), self._earlier_near(fresh)
 
-    def disbelieve(self, columns: Iterable[tuple[int, int]]) -> None:
+    def disbelieve(self, gone: Iterable[Column]) -> None:
         """What was believed there has gone."""
-        for column in columns:
+        for column in gone:
             self._believed.pop(column, None)
 
     def _believe(self, points: F64) -> F64:
         """Those of which the column is believed only now."""
-        fresh = [q for q in points if not self._is_known(q)]
-        for q in points:
-            column = self._column(q)
-            self._believed[column] = max(float(q[2]), self._believed.get(column, -math.inf))
-        return np.array(fresh).reshape(-1, 3)
+        fresh = points[~self._are_known(points)]
+        for column, top_m in zip(columns(points), points[:, 2].tolist(), strict=True):
+            self._believed[column] = max(top_m, self._believed.get(column, -math.inf))
+        return fresh
 
-    def _is_known(self, point: F64) -> bool:
-        """In a believed column, or little above it: noise far above would make a mast of a hut."""
-        top_m = self._believed.get(self._column(point))
-        return top_m is not None and float(point[2]) <= top_m + self._params.grows_m
+    def _are_known(self, points: F64) -> Bools:
+        """(N,) In a believed column, or little above it: noise far above would make a mast of a hut."""
+        tops_m = [self._believed.get(column, -math.inf) for column in columns(points)]
+        return points[:, 2] <= np.array(tops_m) + self._params.grows_m
 
     def _earlier_near(self, fresh: F64) -> F64:
         if not len(fresh):
             return fresh
-        near = [
-            earlier[_heaviest_near(earlier, fresh, np.ones(len(fresh)), self._params.same_place_m) > 0]
-            for _, earlier, _ in list(self._recent)[:-1]
-        ]
+        now, within_m = weighted(fresh, np.ones(len(fresh))), self._params.same_place_m
+        earlier = [recent.points_enu for recent in list(self._recent)[:-1]]
+        near = [points[now.heaviest_near(points, within_m) > 0] for points in earlier]
         return np.concatenate([np.empty((0, 3)), *near])
-
-    def _column(self, point: F64) -> tuple[int, int]:
-        return math.floor(point[0]), math.floor(point[1])
 
     def weights(self, targets: Polar, snr_db: F64, radial_speed_m_s: F64, pose: Pose, ground: GroundGrid | None) -> F64:
         """(N,) what each target counts: 1 unaccounted for, 0.5 doubtful, 0 accounted for."""
@@ -208,16 +211,12 @@ def side_lobes(targets: Polar, snr_db: F64, params: EvidenceParams | None = None
     Give it all targets of a frame: the stronger one may itself have been measured outside the gate.
     """
     p = params or EvidenceParams()
-    sine = np.sin(targets.azimuth_rad)
-    same = np.abs(targets.range_m[:, None] - targets.range_m[None, :]) <= p.side_lobe_range_m
-    aside = np.abs(np.abs(sine[:, None] - sine[None, :]) - p.side_lobe_sine) <= p.side_lobe_width_sine
-    return np.any(same & aside & (snr_db[None, :] > snr_db[:, None] + p.side_lobe_below_db), axis=1)
-
-
-def _heaviest_near(points: F64, others: F64, weights: F64, within_m: float) -> F64:
-    """(N,) largest weight among ``others`` within so much of each point, seen from above; 0 where none is."""
-    if not len(others):
-        return np.zeros(len(points))
-    e = points[:, None, 0] - others[None, :, 0]
-    n = points[:, None, 1] - others[None, :, 1]
-    return np.max(np.where(e * e + n * n <= within_m * within_m, weights[None, :], 0.0), axis=1)
+    return stronger_aside(
+        targets.range_m,
+        np.sin(targets.azimuth_rad),
+        snr_db,
+        within_m=p.side_lobe_range_m,
+        aside=p.side_lobe_sine,
+        width=p.side_lobe_width_sine,
+        by_db=p.side_lobe_below_db,
+    )

@@ -117,8 +117,8 @@ class Moved:
     def through(self, seen: Sightings, corner_enu_m: tuple[float, float], size_m: float, from_s: float) -> bool:
         """Whether one thing has moved through this square since then, for sure, and nothing else was there with it."""
         p = self._params
-        low, high = np.array(corner_enu_m), np.array(corner_enu_m) + size_m
-        there = np.all((seen.place_enu_m >= low) & (seen.place_enu_m < high), axis=1)
+        (east, north), (low_e, low_n) = seen.place_enu_m.T, corner_enu_m
+        there = (east >= low_e) & (east < low_e + size_m) & (north >= low_n) & (north < low_n + size_m)
         there &= seen.t_s >= from_s - p.earlier_s
         if not np.any(there):
             return False
@@ -126,15 +126,18 @@ class Moved:
         speed = abs(float(np.mean(seen.surplus_m_s[there])))
         within_s = min(max(p.way_m / max(speed, 1e-6), p.shortest_s), p.longest_s)
         off_s = np.maximum(np.maximum(first_s - seen.t_s, seen.t_s - last_s), 0.0)
-        away = np.linalg.norm(seen.place_enu_m - seen.place_enu_m[there].mean(axis=0), axis=1)
+        middle = seen.place_enu_m[there].mean(axis=0)
+        away = np.sqrt((east - middle[0]) ** 2 + (north - middle[1]) ** 2)
         mine = (off_s <= within_s) & (away <= p.near_m + p.most_share * speed * (off_s + last_s - first_s))
+        if _frames(seen.t_s[mine]) < p.least_frames:
+            return False
         return self._is_even(seen.only(mine), there[mine])
 
     def _is_even(self, seen: Sightings, there: Bools) -> bool:
         """Places on their way, and ranges, as the radial speeds say."""
         p = self._params
         lasted_s = float(np.ptp(seen.t_s))
-        if len(np.unique(seen.t_s)) < p.least_frames or lasted_s <= 0.0:
+        if lasted_s <= 0.0:
             return False
         ahead = seen.ahead_enu.mean(axis=0)
         ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
@@ -154,6 +157,11 @@ class Moved:
             and spread_m <= p.spread_m
             and float(np.abs(off_m[there]).max()) <= p.off_m
         )
+
+
+def _frames(t_s: F64) -> int:
+    """In which they were seen; (N,) times never fall."""
+    return 1 + int(np.count_nonzero(np.diff(t_s))) if len(t_s) else 0
 
 
 _PAIRS = ("place_enu_m", "ahead_enu", "own_m_s")

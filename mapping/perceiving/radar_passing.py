@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.perceiving.radar_moved import Moved, MovedParams
+from mapping.perceiving.radar_near import Column, cells, columns
 from mapping.poses import Pose
 
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 I32 = NDArray[np.int32]
 
-Column = tuple[int, int]
 Key = tuple[int, int, int]
 
 
@@ -72,10 +72,9 @@ class Passing:
 
     def observe(self, t_s: float, points_enu: F64, moving: Bools, resolution_m: float) -> tuple[I32, list[Column]]:
         """Believed targets (N, 3) of a frame, and which of them move -> voxels, and columns, of what has gone."""
-        for point in points_enu[~moving]:
-            self._stands(_column(point))
-        for point in points_enu[moving]:
-            self._passes(t_s, point, resolution_m)
+        for column in columns(points_enu[~moving]):
+            self._stands(column)
+        self._pass(t_s, points_enu[moving], resolution_m)
         return self._taken_back(self._gone(t_s), resolution_m)
 
     def _gone(self, t_s: float) -> list[_Block]:
@@ -108,28 +107,26 @@ class Passing:
         reach = range(-self._params.beside, self._params.beside + 1)
         self._standing.update((column[0] + e, column[1] + n) for e in reach for n in reach)
 
-    def _passes(self, t_s: float, point: F64, resolution_m: float) -> None:
-        column = _column(point)
-        if column in self._standing:
-            return
-        size = self._params.block_m
-        block = self._blocks.setdefault((math.floor(point[0] / size), math.floor(point[1] / size)), _Block(t_s, t_s))
-        block.last_s = t_s
-        block.columns.add(column)
-        e, n, up = (int(v) for v in np.floor(point / resolution_m))
-        block.keys.add((e, n, up))
+    def _pass(self, t_s: float, points: F64, resolution_m: float) -> None:
+        places = zip(*cells(points[:, :2], self._params.block_m), strict=True)
+        keys = zip(*cells(points, resolution_m), strict=True)
+        for column, place, key in zip(columns(points), places, keys, strict=True):
+            if column in self._standing:
+                continue
+            block = self._blocks.get(place)
+            if block is None:
+                block = self._blocks[place] = _Block(t_s, t_s)
+            block.last_s = t_s
+            block.columns.add(column)
+            block.keys.add(key)
 
     def _taken_back(self, gone: list[_Block], resolution_m: float) -> tuple[I32, list[Column]]:
         """But for what stands there."""
-        keys = {
-            key
-            for block in gone
-            for key in block.keys
-            if _column((np.array(key) + 0.5) * resolution_m) not in self._standing
-        }
+        keys = {key for block in gone for key in block.keys if _column_of(key, resolution_m) not in self._standing}
         columns = [column for block in gone for column in block.columns if column not in self._standing]
         return np.array(sorted(keys), np.int32).reshape(-1, 3), columns
 
 
-def _column(point: F64) -> Column:
-    return math.floor(point[0]), math.floor(point[1])
+def _column_of(key: Key, resolution_m: float) -> Column:
+    """In which a voxel's centre lies."""
+    return math.floor((key[0] + 0.5) * resolution_m), math.floor((key[1] + 0.5) * resolution_m)

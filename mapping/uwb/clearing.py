@@ -158,7 +158,7 @@ def clear(
 ) -> tuple[Cleared, UwbClearing]:
     """A whole log at once, (scans, bins): thresholds first, from all of its scans of traversable ground, as the paper.
 
-    Raises ParameterError when too few scans look at nothing but traversable ground.
+    Raises ParameterError when too few scans look at nothing but traversable ground, or when no time passes.
     """
     clearing = UwbClearing(traversability, geometry=geometry, params=params, west_m=west_m, north_m=north_m)
     places = list(poses)
@@ -171,6 +171,9 @@ def clear(
             where="UWB log",
             advice="Begin the log with a few metres of open ground ahead, inside the surface model.",
         )
-    for scan, pose in zip(scans, places, strict=True):
-        clearing.step(scan, pose, learn=False)
+    fused = sum(clearing.step(scan, pose, learn=False) for scan, pose in zip(scans, places, strict=True))
+    if not fused:
+        raise ParameterError(
+            "No time passes from scan to scan.", where="UWB log", advice="Give each scan its own time, in seconds."
+        )
     return clearing.result(), clearing

@@ -26,7 +26,7 @@ def way_around(
 
     What nobody has seen behind the obstacle is not flown into: the way goes on beside it first.
     """
-    seen, room = room, room.with_unseen(position, params.unseen_m)
+    seen, room = room, room.with_open_tops().with_unseen(position, params.unseen_m)
     blocked = line.blocked(room, keep_m) or blocked
     joins = _joins(line, blocked[1] + params.keep_m)
     if not joins:

@@ -1,6 +1,6 @@
-"""Exact distance in space between straight lines and voxels, which are closed cubes.
+"""Exact distance in space between straight lines and voxels, which are closed cubes or columns.
 
-The squared distance of the moving point a + t d to a cube is convex in t and quadratic between the values of t where
+The squared distance of the moving point a + t d to a box is convex in t and quadratic between the values of t where
 a coordinate passes a face, so its minimum over a segment has a closed form.
 """
 
@@ -13,14 +13,22 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 
 
-def nearest_box(points_m: F64, centres_m: F64, half_m: float, *, at_most_m: float = np.inf) -> tuple[float, int]:
-    """Smallest distance of a polyline (K, 3) to cubes with centres (N, 3), and which cube that is.
+def nearest_box(
+    points_m: F64, centres_m: F64, half_m: float, *, half_up_m: F64 | None = None, at_most_m: float = np.inf
+) -> tuple[float, int]:
+    """Smallest distance of a polyline (K, 3) to boxes with centres (N, 3), and which box that is.
 
-    Cubes farther than ``at_most_m`` are passed over: (inf, -1) when there is none nearer. 0 inside a cube.
+    ``half_up_m`` (N,): half the height of each; None: they are cubes. Boxes farther than ``at_most_m`` are passed over:
+    (inf, -1) when there is none nearer. 0 inside a box.
     """
     points = np.ascontiguousarray(points_m, np.float64)
     centres = np.ascontiguousarray(centres_m, np.float64)
-    return _nearest_box(points, centres, half_m, at_most_m)
+    return _nearest_box(points, centres, half_m, half_heights(half_up_m, half_m, len(centres)), at_most_m)
+
+
+def half_heights(half_up_m: F64 | None, half_m: float, count: int) -> F64:
+    """(N,) Of boxes; those of cubes where nothing else is said."""
+    return np.full(count, half_m) if half_up_m is None else np.ascontiguousarray(half_up_m, np.float64)
 
 
 @njit(cache=True, nogil=True)
@@ -66,15 +74,15 @@ def segment_box_sq(a, d, low, high):
 
 
 @njit(cache=True, nogil=True)
-def _nearest_box(points, centres, half_m, at_most_m):
+def _nearest_box(points, centres, half_m, half_up_m, at_most_m):
     best, which = at_most_m * at_most_m, -1
-    low, high = np.empty(3), np.empty(3)
+    low, high, half = np.empty(3), np.empty(3), np.full(3, half_m)
     for i in range(points.shape[0] - 1):
         a, d = points[i], points[i + 1] - points[i]
         for j in range(centres.shape[0]):
-            apart = 0.0
+            apart, half[2] = 0.0, half_up_m[j]
             for k in range(3):
-                low[k], high[k] = centres[j, k] - half_m, centres[j, k] + half_m
+                low[k], high[k] = centres[j, k] - half[k], centres[j, k] + half[k]
                 out = max(low[k] - max(a[k], a[k] + d[k]), min(a[k], a[k] + d[k]) - high[k], 0.0)
                 apart += out * out
             if apart > best or (which >= 0 and apart == best):

@@ -53,6 +53,9 @@ class Manoeuvre:
     surface_m: float
     """The same to the surface model; inf without one."""
     length_m: float
+    top_unseen: bool = False
+    """It leads over something that may be higher than what was seen of it: ``seen_m`` counts from as far up as the
+    radar looks."""
 
 
 @dataclass(frozen=True, slots=True)

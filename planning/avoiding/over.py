@@ -29,6 +29,7 @@ def way_over(
                 seen_m=room.seen_m(points),
                 surface_m=room.surface_m(points),
                 length_m=float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()),
+                top_unseen=not room.with_open_tops().is_clear_of_seen(points, keep_m),
             )
     return NoWay("over", f"It is not clear up to {params.ceiling_m:g} m above the plan.")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +18,8 @@ from planning.certificate.threads import threads_for
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
+ENDLESS_M = 1000.0
+"""Added to columns whose tops nobody has seen, where they count as endless."""
 
 
 class Surface(Protocol):
@@ -44,6 +46,10 @@ class Seen:
     centres_enu_m: F64
     """(N, 3)"""
     resolution_m: float
+    half_up_m: F64 | None = None
+    """(N,) Half the height of each, where they are columns; None: cubes."""
+    is_open: NDArray[np.bool_] | None = None
+    """(N,) Columns whose tops nobody has seen."""
 
 
 class Room:
@@ -60,12 +66,21 @@ class Room:
         other.seen = [*self.seen, *(_behind(each, from_enu_m, depth_m) for each in self.seen)]
         return other
 
+    def with_open_tops(self) -> Room:
+        """The same where nothing may be passed above whose top nobody has seen."""
+        other = copy.copy(self)
+        other.seen = [_endless(each) for each in self.seen]
+        return other
+
     def seen_m(self, points_enu_m: F64, *, at_most_m: float = np.inf) -> float:
         """Smallest distance to any voxel; inf when none is nearer than ``at_most_m``."""
         found = np.inf
         for each in self.seen:
             limit = min(at_most_m, found)
-            found = min(found, nearest_box(points_enu_m, each.centres_enu_m, each.resolution_m / 2, at_most_m=limit)[0])
+            distance_m, _ = nearest_box(
+                points_enu_m, each.centres_enu_m, each.resolution_m / 2, half_up_m=each.half_up_m, at_most_m=limit
+            )
+            found = min(found, distance_m)
         return found
 
     def surface_m(self, points_enu_m: F64) -> float:
@@ -73,25 +88,45 @@ class Room:
         return np.inf if self._ground is None else self._ground.distance_m(points_enu_m)
 
     def is_clear(self, points_enu_m: F64, keep_m: float) -> bool:
-        return self.seen_m(points_enu_m, at_most_m=keep_m) >= keep_m and self.surface_m(points_enu_m) >= keep_m
+        return self.is_clear_of_seen(points_enu_m, keep_m) and self.surface_m(points_enu_m) >= keep_m
+
+    def is_clear_of_seen(self, points_enu_m: F64, keep_m: float) -> bool:
+        return self.seen_m(points_enu_m, at_most_m=keep_m) >= keep_m
 
 
 def _within(seen: Seen, low: F64, high: F64) -> Seen:
     centres = np.asarray(seen.centres_enu_m, np.float64).reshape(-1, 3)
     inside = np.all((centres[:, :2] >= low[:2]) & (centres[:, :2] <= high[:2]), axis=1)
-    return Seen(centres[inside], seen.resolution_m)
+    return _picked(replace(seen, centres_enu_m=centres), inside)
+
+
+def _picked(seen: Seen, which: NDArray[np.bool_] | NDArray[np.intp]) -> Seen:
+    half_up_m = None if seen.half_up_m is None else seen.half_up_m[which]
+    is_open = None if seen.is_open is None else seen.is_open[which]
+    return Seen(seen.centres_enu_m[which], seen.resolution_m, half_up_m, is_open)
 
 
 def _behind(seen: Seen, from_enu_m: F64, depth_m: float) -> Seen:
-    """Voxels of its own size, level behind each."""
+    """Voxels or columns of its own size, level behind each."""
     edge_m = seen.resolution_m
     flat = seen.centres_enu_m[:, :2] - from_enu_m[:2]
     away = flat / np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-9)[:, None]
     steps = np.arange(edge_m, depth_m + edge_m, edge_m)
     filled = np.repeat(seen.centres_enu_m[None, :, :], len(steps), axis=0)
     filled[:, :, :2] += steps[:, None, None] * away[None, :, :]
+    if seen.half_up_m is not None:
+        which = np.tile(np.arange(len(seen.centres_enu_m)), len(steps))
+        return replace(_picked(seen, which), centres_enu_m=filled.reshape(-1, 3))
     keys = np.unique(np.floor(filled.reshape(-1, 3) / edge_m).astype(np.int64), axis=0)
     return Seen(((keys + 0.5) * edge_m).astype(np.float64), edge_m)
+
+
+def _endless(seen: Seen) -> Seen:
+    if seen.is_open is None or seen.half_up_m is None:
+        return seen
+    up_m = np.where(seen.is_open, ENDLESS_M / 2, 0.0)
+    raised = seen.centres_enu_m + np.column_stack([np.zeros((len(up_m), 2)), up_m])
+    return replace(seen, centres_enu_m=raised, half_up_m=seen.half_up_m + up_m)
 
 
 class _Ground:

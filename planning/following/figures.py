@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from planning.following.lag import lag_s, planned_s
 from planning.following.nearest import Deviations, follow_track
+from planning.following.passing import LOWER_M, REACHED_M, Passing
 from planning.following.reference import Reference
 from planning.following.surface import SurfaceDistance
-from planning.following.track import REACHED_M, Track, Window, judged_window
+from planning.following.track import Track, Window, judged_window
 from planning.model import F64
 
 AT_HOME_M = 3.0
@@ -43,12 +44,22 @@ class Nearest:
 
 
 @dataclass(frozen=True, slots=True)
+class Higher:
+    """Places that avoidance passed above the plan."""
+
+    most_m: float
+    from_item: int
+    """Index into ``Mission.items`` of the first of them."""
+
+
+@dataclass(frozen=True, slots=True)
 class TrackFigures:
     """All figures of one flight. Distances are None without a surface model, or where it knows nothing."""
 
     start_s: float
     end_s: float
     completed: bool
+    higher: Higher | None
     told_by: Literal["vehicle", "geometry"]
     positions: int
     flight_s: float
@@ -118,10 +129,12 @@ def _figures(
     edges_m, counts = _histogram(size_m)
     gone_s = _gone_s(reference, on_line)
     below = None if height_m is None else height_m[window.judged]
+    near_ground = window.judged | window.detour
     return TrackFigures(
         start_s=window.start_s,
         end_s=window.end_s,
         completed=window.completed,
+        higher=_higher(window.passed),
         told_by=window.told_by,
         positions=int(window.judged.sum()),
         flight_s=rate * (window.end_s - window.start_s),
@@ -131,14 +144,19 @@ def _figures(
         height=_spread(np.abs(above_m)),
         height_lowest_m=float(above_m.min()),
         height_highest_m=float(above_m.max()),
-        nearest=_nearest(track, found, window.judged, distance_m),
-        min_vertical_m=_smallest(height_m, window.judged),
+        nearest=_nearest(track, found, near_ground, distance_m),
+        min_vertical_m=_smallest(height_m, near_ground),
         nearest_on_way_home=_nearest(track, found, home, distance_m),
         min_vertical_on_way_home_m=_smallest(height_m, home),
         unknown_positions=0 if below is None else int(np.isnan(below).sum()),
         histogram_edges_m=edges_m,
         histogram_counts=counts,
     )
+
+
+def _higher(passed: tuple[Passing, ...]) -> Higher | None:
+    above = [place for place in passed if place.higher_m > LOWER_M]
+    return Higher(max(place.higher_m for place in above), above[0].item) if above else None
 
 
 def _gone_s(reference: Reference, on_line: Deviations) -> float:

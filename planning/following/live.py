@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from planning.following.lag import late_s, planned_s
 from planning.following.nearest import Deviation, follow
+from planning.following.passing import REACHED_M
 from planning.following.reference import Reference
-from planning.following.track import REACHED_M
 
 
 @dataclass(frozen=True, slots=True)

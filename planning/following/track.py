@@ -2,7 +2,8 @@
 
 What the vehicle itself reported as reached counts where it did; elsewhere a waypoint is reached where the
 track is nearest to it. A flight that left its mission ends there, and one that took it up again is judged
-from where it is back on the line.
+from where it is back on the line. What avoidance flew instead goes on with the mission: its places count,
+its distances to the ground too, its deviations do not.
 """
 
 from __future__ import annotations
@@ -14,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.following.nearest import Deviations
+from planning.following.passing import REACHED_M, Flown, Passing, first_approach, passings
 from planning.following.reference import Reference
 from planning.model import F64
 
-REACHED_M = 3.0
-"""Without the vehicle's own word, a waypoint counts as reached within this distance of it."""
 BACK_ON_LINE_M = 1.0
 """After an interruption a position counts again once it is this near to the line, beside and above it."""
 
@@ -39,6 +39,8 @@ class Track:
     """Waypoints were handed over one at a time: the flight goes on to the end of its last span, not to a waypoint."""
     clock_rate: float = 1.0
     """Seconds of the vehicle's clock per second of ``t_s``: not 1 in a simulation that runs faster."""
+    detours: tuple[tuple[float, float], ...] = ()
+    """Spans of time in which avoidance flew what was left of the mission, mostly higher."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +51,32 @@ class Window:
     end_s: float
     judged: NDArray[np.bool_]
     """(N,) positions that count."""
+    detour: NDArray[np.bool_]
+    """(N,) positions on detours, between start and end as well."""
     completed: bool
-    """The last waypoint was reached."""
+    """The last waypoint was reached, or passed on a detour that left out none before it."""
     told_by: Literal["vehicle", "geometry"]
+    passed: tuple[Passing, ...] = ()
+    """Of a flight with detours: the mission's places, up to the first that was left out."""
 
 
 def judged_window(reference: Reference, track: Track, found: Deviations) -> Window | None:
     """The part of the track from the first waypoint to the last; None when the first was never reached."""
-    flown = _within(track.t_s, track.on_mission)
+    detour = _within(track.t_s, track.detours)
+    flown = _within(track.t_s, track.on_mission) & ~detour
     begun = _start(reference, track, found, flown)
     if begun is None:
         return None
     start_s, told_by = begun
     end_s, completed = _end(reference, track, found, flown, start_s)
-    judged = flown & (track.t_s >= start_s) & (track.t_s <= end_s)
-    return Window(start_s, end_s, _without_ways_back(judged, found, track), completed, told_by)
+    passed: tuple[Passing, ...] = ()
+    if detour.any():
+        passed = _passed(reference, track, found, Flown(track.t_s, track.xyz_m, flown, detour), start_s)
+        if not completed:
+            end_s, completed = _end_on_detour(reference, track, passed, flown | detour, start_s)
+    within = (track.t_s >= start_s) & (track.t_s <= end_s)
+    judged = _without_ways_back(flown & within, found, track)
+    return Window(start_s, end_s, judged, detour & within, completed, told_by, passed)
 
 
 def _within(t_s: F64, spans: tuple[tuple[float, float], ...] | None) -> NDArray[np.bool_]:
@@ -109,15 +122,21 @@ def _end(
 
 
 def _nearest_approach(xyz_m: F64, place_m: F64, among: NDArray[np.bool_]) -> int | None:
-    """Index of the nearest position during the first stay within ``REACHED_M`` of a place."""
-    away_m = np.linalg.norm(xyz_m - place_m, axis=1)
-    near = among & (away_m <= REACHED_M)
-    if not near.any():
-        return None
-    begin = int(np.argmax(near))
-    left = np.flatnonzero(~near[begin:])
-    end = begin + int(left[0]) if len(left) else len(near)
-    return begin + int(np.argmin(away_m[begin:end]))
+    return first_approach(np.linalg.norm(xyz_m - place_m, axis=1), among)
+
+
+def _passed(reference: Reference, track: Track, found: Deviations, flown: Flown, start_s: float) -> tuple[Passing, ...]:
+    row = min(int(np.searchsorted(track.t_s, start_s)), len(track.t_s) - 1)
+    return passings(reference, flown, track.reached, from_s=start_s, from_line_s_m=float(found.s_m[row]))
+
+
+def _end_on_detour(
+    reference: Reference, track: Track, passed: tuple[Passing, ...], flown: NDArray[np.bool_], start_s: float
+) -> tuple[float, bool]:
+    if passed and passed[-1].item == reference.last_item:
+        return passed[-1].t_s, reference.whole
+    last = np.flatnonzero(flown & (track.t_s >= start_s))
+    return float(track.t_s[last[-1]]) if len(last) else start_s, False
 
 
 def _without_ways_back(judged: NDArray[np.bool_], found: Deviations, track: Track) -> NDArray[np.bool_]:

@@ -46,7 +46,10 @@ async def set_avoidance(body: SetAvoidanceBody, operator: InCharge, flying: Fly)
 
 @router.put("/settings", response_model=ObstaclesState)
 async def change_settings(body: PerceptionSettingsBody, operator: InCharge, flying: Fly) -> Response:
-    """Depth, width and height of the regions, and the papers' bare behaviour. What is left out stays."""
+    """Regions, the vehicle that they are for, the maps' voxels and memory; 422 for what cannot fit.
+
+    What is left out stays. Other voxels or another memory limit begin a map anew.
+    """
     del operator
     return answer(await flying.obstacles.change_settings(body))
 

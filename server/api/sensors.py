@@ -56,13 +56,21 @@ async def frames(websocket: WebSocket) -> None:
 async def _take(websocket: WebSocket, intake: Intake, agents: Agents) -> None:
     while True:
         async with asyncio.timeout(SILENT_S):
-            data = await websocket.receive_bytes()
+            data = await _received(websocket)
         taken = intake.on_data(data, now_mono_s=time.monotonic(), now_utc_s=time.time())
         if taken.answer is not None:
             await websocket.send_bytes(encode(taken.answer))
         for told in (taken.frame, taken.notice):
             if told is not None:
                 agents.publish(told)
+
+
+async def _received(websocket: WebSocket) -> bytes:
+    """Text is nothing that an agent sends: it is refused and counted as other bytes are."""
+    message = await websocket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message["code"])
+    return message.get("bytes") or (message.get("text") or "").encode()
 
 
 async def _report(websocket: WebSocket, intake: Intake) -> None:

@@ -10,17 +10,15 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from planning.errors import DescribedError
 from server.cli.agent_source import Source, SourceOptions, source_of
 from server.cli.output import print_json, refusing, say
 from server.errors import BadRequestError
-from telemetry.agent.client import Agent, Reading, sensor_url
-from telemetry.agent.ti_radar import TiStatus
-from telemetry.agent.wire import Report
+from telemetry.agent.client import Agent, AgentCounts, Reading, sensor_url
+from telemetry.agent.wire import REACH_M, Report
 from telemetry.sensors.ti_mmwave.ports import DATA_BAUD
 
 TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
@@ -51,7 +49,9 @@ def agent(
             help='Its config port; default: the one before; "none": it runs already.',
         ),
     ] = None,
-    ti_baud: Annotated[int, typer.Option("--ti-baud", help="Baud rate of the data port.")] = DATA_BAUD,
+    ti_baud: Annotated[
+        int | None, typer.Option("--ti-baud", help=f"Baud rate of the data port; default: {DATA_BAUD}.")
+    ] = None,
     ti_capture: Annotated[
         Path | None, typer.Option("--ti-capture", metavar="FILE", help="Send what a TI radar's data port once sent.")
     ] = None,
@@ -83,7 +83,7 @@ def agent(
         )
         source = source_of(SourceOptions(recording, ti_config, ti_data, ti_config_port, ti_baud, ti_capture))
         asyncio.run(_run(made, source))
-        _answer(made, source.radar, as_json=as_json)
+        _answer(made, source, as_json=as_json)
 
 
 def _check(voxel_m: float, limit_kb_s: float) -> None:
@@ -117,7 +117,7 @@ async def _run(made: Agent, source: Source) -> None:
     except TimeoutError:
         say(f"The ground station does not answer ({made.counts.trouble or 'no answer'}): it is tried again.")
     threading.Thread(target=_read, args=(source.readings, made.put, loop, ended), daemon=True).start()
-    teller = asyncio.ensure_future(_tell(made, source.radar))
+    teller = asyncio.ensure_future(_tell(made, source))
     try:
         await asyncio.wait((ended, connection), return_when=asyncio.FIRST_COMPLETED)
         if ended.done() and not connection.done():
@@ -142,48 +142,73 @@ def _read(
         if not ended.done():
             ended.set_exception(error) if error else ended.set_result(None)
 
+    wrong: Exception | None = None
     try:
         for reading in readings:
             loop.call_soon_threadsafe(put, reading)
-        loop.call_soon_threadsafe(end, None)
-    except RuntimeError:
-        return  # the loop has ended: Ctrl+C
-    except (DescribedError, OSError) as error:
-        loop.call_soon_threadsafe(end, error)
+    except Exception as error:
+        wrong = error
+    with contextlib.suppress(RuntimeError):  # the loop has ended: Ctrl+C
+        loop.call_soon_threadsafe(end, wrong)
 
 
-async def _tell(made: Agent, radar: TiStatus | None) -> None:
+async def _tell(made: Agent, source: Source) -> None:
     while True:
         await asyncio.sleep(TELL_EVERY_S)
         counts = made.counts
         rate = f"{(counts.report.bytes_per_s if counts.report else 0.0) / 1000:.0f} kB/s"
         state = f"no connection: {counts.trouble}" if counts.trouble else rate
         say(f"{counts.sent} frames sent, {counts.skipped} left out, {state}")
-        if radar is not None:
-            say(str(radar))
+        _say_losses(counts)
+        _say_source(source)
 
 
-def _answer(made: Agent, radar: TiStatus | None, *, as_json: bool) -> None:
+def _say_losses(counts: AgentCounts) -> None:
+    """What of the frames did not arrive, where there is any."""
+    if counts.points_not_finite or counts.points_out_of_reach:
+        say(
+            f"points left out of clouds: {counts.points_not_finite} without numbers, {counts.points_out_of_reach} "
+            f"beyond {REACH_M:.0f} m"
+        )
+    if counts.report is not None and counts.report.refused:
+        say(f"refused by the ground station: {counts.report.refused}; the last: {counts.refused_why}")
+    if counts.not_understood:
+        say(f"not understood of the ground station's messages: {counts.not_understood}; is it of another version?")
+
+
+def _say_source(source: Source) -> None:
+    for status in (source.radar, source.lines):
+        if status is not None:
+            say(str(status))
+
+
+def _answer(made: Agent, source: Source, *, as_json: bool) -> None:
     counts = made.counts
     report = counts.report or Report(0, 0, 0, 0, 0.0, "")
     if as_json:
-        print_json(
-            {
-                "sent": counts.sent,
-                "skipped": counts.skipped,
-                "sent_bytes": counts.sent_bytes,
-                "connections": counts.connections,
-                "received": report.received,
-                "lost": report.lost,
-                "late": report.late,
-                "refused": report.refused,
-            }
-            | ({} if radar is None else {"radar": radar.as_dict()})
-        )
-    else:
-        say(
-            f"{counts.sent} frames sent ({counts.sent_bytes / 1e6:.1f} MB), {counts.skipped} left out; the ground "
-            f"station took {report.received}, {report.late} of them late, and refused {report.refused}."
-        )
-        if radar is not None:
-            say(str(radar))
+        print_json(_summary(counts, report, source))
+        return
+    say(
+        f"{counts.sent} frames sent ({counts.sent_bytes / 1e6:.1f} MB), {counts.skipped} left out; the ground "
+        f"station took {report.received}, {report.late} of them late, and refused {report.refused}."
+    )
+    _say_losses(counts)
+    _say_source(source)
+
+
+def _summary(counts: AgentCounts, report: Report, source: Source) -> dict[str, Any]:
+    summary: dict[str, Any] = {
+        "sent": counts.sent,
+        "skipped": counts.skipped,
+        "sent_bytes": counts.sent_bytes,
+        "connections": counts.connections,
+        "received": report.received,
+        "lost": report.lost,
+        "late": report.late,
+        "refused": report.refused,
+        "refused_why": counts.refused_why,
+        "points_not_finite": counts.points_not_finite,
+        "points_out_of_reach": counts.points_out_of_reach,
+    }
+    told = {"radar": source.radar, "lines": source.lines}
+    return summary | {name: status.as_dict() for name, status in told.items() if status is not None}

@@ -11,12 +11,14 @@ from pathlib import Path
 from server.cli.output import say
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading
-from telemetry.agent.sources import at, readings_of_lines, recorded_readings
+from telemetry.agent.driver_lines import DriverLines, LineCounts
+from telemetry.agent.sources import at, recorded_readings
 from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings
+from telemetry.errors import SensorLinkError
 from telemetry.sensors.ti_mmwave.config import read_config
 from telemetry.sensors.ti_mmwave.differences import differences
 from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.ports import config_port_beside, open_port
+from telemetry.sensors.ti_mmwave.ports import DATA_BAUD, config_port_beside, open_port
 from telemetry.sensors.ti_mmwave.session import TiPorts
 
 NO_PORT = "none"
@@ -30,7 +32,8 @@ class SourceOptions:
     ti_config: Path | None = None
     ti_data: str | None = None
     ti_config_port: str | None = None
-    ti_baud: int = 921_600
+    ti_baud: int | None = None
+    """By default that of the radars' data ports."""
     ti_capture: Path | None = None
 
 
@@ -41,21 +44,28 @@ class Source:
     readings: Iterator[Reading]
     radar: TiStatus | None = None
     """Of a TI radar, live or from a file."""
+    lines: LineCounts | None = None
+    """Of a driver on standard input."""
 
 
 def source_of(options: SourceOptions) -> Source:
-    """Raises DescribedError for options that do not go together and for a configuration that cannot be read."""
+    """Raises DescribedError for options that do not go together and for a configuration that cannot be read, and
+    OSError for a file that cannot be opened: before any ground station is asked for."""
     _check(options)
+    for file in (options.recording, options.ti_capture):
+        if file is not None:
+            file.open("rb").close()
     if options.recording is not None:
         return Source(_paced(recorded_readings(options.recording)))
     config = _config(options.ti_config)
     if options.ti_capture is not None:
         status = TiStatus()
-        return Source(_paced(captured_readings(options.ti_capture, config, status)), status)
+        return Source(_paced(captured_readings(options.ti_capture, config, status, tell=say)), status)
     if options.ti_data is not None and config is not None:
         radar = TiRadar(config, _ports(options, options.ti_data), tell=say)
         return Source(radar.readings(), radar.status)
-    return Source(readings_of_lines(sys.stdin))
+    driver = DriverLines(sys.stdin.buffer, tell=say)
+    return Source(_wrong_input(driver.readings()), lines=driver.counts)
 
 
 def _check(options: SourceOptions) -> None:
@@ -73,6 +83,8 @@ def _check(options: SourceOptions) -> None:
         )
     if options.ti_config_port is not None and options.ti_data is None:
         raise BadRequestError("A config port needs a data port.", where="--ti-config-port", advice="Add --ti-data.")
+    if options.ti_baud is not None and options.ti_data is None:
+        raise BadRequestError("A baud rate needs a data port.", where="--ti-baud", advice="Add --ti-data.")
 
 
 def _config(path: Path | None) -> TiConfig | None:
@@ -92,7 +104,8 @@ def _config(path: Path | None) -> TiConfig | None:
 
 def _ports(options: SourceOptions, data: str) -> TiPorts:
     """Raises SensorError at once for a data port that cannot be opened, before any ground station is asked for."""
-    open_port(data, options.ti_baud).close()
+    baud = DATA_BAUD if options.ti_baud is None else options.ti_baud
+    open_port(data, baud).close()
     config = options.ti_config_port or config_port_beside(data)
     if config is None:
         raise BadRequestError(
@@ -101,9 +114,17 @@ def _ports(options: SourceOptions, data: str) -> TiPorts:
             advice=f'Name it, or write "{NO_PORT}" for a radar that runs already.',
         )
     if config == NO_PORT:
-        return TiPorts(data, None, options.ti_baud)
+        return TiPorts(data, None, baud)
     say(f"The radar is configured through {config}, its frames come from {data}.")
-    return TiPorts(data, config, options.ti_baud)
+    return TiPorts(data, config, baud)
+
+
+def _wrong_input(readings: Iterator[Reading]) -> Iterator[Reading]:
+    """Lines that are no readings are wrong input, and nothing that went wrong in flight."""
+    try:
+        yield from readings
+    except SensorLinkError as error:
+        raise BadRequestError(error.what, where=error.where, advice=error.advice) from error
 
 
 def _paced(timed: Iterator[tuple[float, Reading]]) -> Iterator[Reading]:

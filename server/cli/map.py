@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
+from mapping.errors import ParameterError
 from planning.errors import DescribedError
 from server.cli import options as o
 from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
 from telemetry.perception.export import KINDS as FORMATS
 from telemetry.perception.export import Kind, exported
 from telemetry.perception.kinds import KINDS
-from telemetry.perception.rebuild import Rebuilt, rebuild
+from telemetry.perception.limits import check_memory
+from telemetry.perception.rebuild import OtherMap, Rebuilt, rebuild
 
 
 class MapFileError(DescribedError):
@@ -32,16 +35,29 @@ def build_map(
         Path,
         typer.Option("--out", metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.", show_default=False),
     ],
+    resolution_m: Annotated[
+        float | None,
+        typer.Option("--resolution-m", metavar="M", help="Edge of a voxel; default: as in flight."),
+    ] = None,
+    memory_mb: Annotated[
+        float | None,
+        typer.Option("--memory-mb", metavar="MB", help="The map's memory limit; default: as in flight."),
+    ] = None,
     as_json: o.AsJson = False,
 ) -> None:
-    """Build a recording's map of obstacles again, exactly as it was in flight."""
+    """Build a recording's map of obstacles again: exactly as it was in flight, or at another resolution."""
     with refusing(as_json=as_json):
         kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
         if kind is None:
             what = f"{out.suffix or 'No ending'} is no format of maps."
             raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
         began_s = time.monotonic()
-        built = rebuild(recording, KINDS[sensor], progress=lambda share: progress("Building the map", share))
+        built = rebuild(
+            recording,
+            KINDS[sensor],
+            other=OtherMap(resolution_m, _limit_bytes(memory_mb)),
+            progress=lambda share: progress("Building the map", share),
+        )
         end_progress()
         for note in built.notes:
             say(f"Note: {note}")
@@ -50,13 +66,25 @@ def build_map(
         raise typer.Exit(DONE)
 
 
+def _limit_bytes(memory_mb: float | None) -> int | None:
+    """Raises CapacityError for more than this computer has, ParameterError for what is no size."""
+    if memory_mb is None:
+        return None
+    if not (math.isfinite(memory_mb) and memory_mb > 0.0):
+        raise ParameterError(f"{memory_mb:g} MB is no size of a map.", where="--memory-mb", advice="Try 1000.")
+    limit_bytes = round(memory_mb * 1e6)
+    check_memory(limit_bytes, maps=1)
+    return limit_bytes
+
+
 def answer(built: Rebuilt, out: Path, seconds: float, *, as_json: bool) -> None:
     """One JSON object, or a few lines."""
     if as_json:
         print_json(summary(built, seconds))
         return
     east_m, north_m, up_m = built.extent_m
-    typer.echo(f"{out.name}: {built.voxels_occupied:,} occupied voxels in {east_m:.0f} x {north_m:.0f} x {up_m:.0f} m")
+    size = f"{east_m:.0f} x {north_m:.0f} x {up_m:.0f} m"
+    typer.echo(f"{out.name}: {built.voxels_occupied:,} occupied voxels of {built.resolution_m:g} m in {size}")
     typer.echo(f"  of {built.frames:,} frames with {built.points:,} points; {built.dropped:,} frames were not taken")
 
 
@@ -66,6 +94,8 @@ def summary(built: Rebuilt, seconds: float) -> dict[str, Any]:
         "dropped": built.dropped,
         "points": built.points,
         "voxels_occupied": built.voxels_occupied,
+        "resolution_m": built.resolution_m,
+        "left_out": built.left_out,
         "extent_m": list(built.extent_m),
         "seconds": round(seconds, 3),
     }

@@ -75,9 +75,6 @@ def process(
         done = Processed()
         _run(_detections(opened, chain, done, most, plots, plot_frame), opened, out, file, chosen)
         end_progress()
-        if plots is not None and plot_frame >= done.frames:
-            what = f"Frame {plot_frame} is not in the file, which has {done.frames}."
-            raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
         _answer(file, done, parameters(chosen, opened), as_json=as_json)
         raise typer.Exit(DONE)
 
@@ -112,7 +109,9 @@ def _differences(config: TiConfig | None) -> list[str]:
 def _detections(
     opened: AdcFile, chain: RadarChain, done: Processed, most: int | None, plots: Path | None, plot_frame: int
 ) -> Iterator[tuple[float, Detections]]:
-    """Frame by frame; counts what it did, and draws the chosen frame."""
+    """Frame by frame; counts what it did, and draws the chosen frame once all have been read: until then nothing is
+    written that an error would leave behind."""
+    chosen: tuple[Any, Detections] | None = None
     for number, frame in enumerate(islice(opened.frames(), most)):
         if number == 0:
             _processed(chain, frame, opened.name, number)  # compiles, which is not the frame's time
@@ -122,11 +121,22 @@ def _detections(
         done.frames, done.detections = number + 1, done.detections + len(found)
         done.first = found if number == 0 else done.first
         if plots is not None and number == plot_frame:
-            from server.cli.radar_plots import write_figures
-
-            write_figures(plots, chain, spectra, found, f"{opened.name}, frame {number}")
+            chosen = spectra, found
         progress(f"Frame {number}", None)
         yield frame.t_s, found
+    if plots is not None:
+        _draw(plots, chain, chosen, plot_frame, opened.name, done.frames)
+
+
+def _draw(
+    plots: Path, chain: RadarChain, chosen: tuple[Any, Detections] | None, number: int, name: str, frames: int
+) -> None:
+    if chosen is None:
+        what = f"Frame {number} is not in the file, which has {frames}."
+        raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
+    from server.cli.radar_plots import write_figures
+
+    write_figures(plots, chain, *chosen, f"{name}, frame {number}")
 
 
 def _processed(chain: RadarChain, frame: AdcFrame, name: str, number: int) -> Any:

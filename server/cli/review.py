@@ -14,7 +14,7 @@ from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, 
 from server.cli.terrain import ModelOptions, read_model
 from server.review import recording_of
 from server.review import review as judge
-from server.schemas.review import ReviewDoc
+from server.schemas.review import ReviewDoc, ReviewFigures
 from server.stopwatch import StepTimer
 from telemetry.recording.flight_log import read_flight_log
 
@@ -96,7 +96,7 @@ def figure_lines(doc: ReviewDoc) -> list[str]:
             f"  recorded {doc.duration_s:.0f} s from {doc.start_utc}",
         ]
     lines = [
-        "COMPLETED" if figures.completed else "NOT COMPLETED",
+        _ending(figures),
         f"  from the first waypoint to the last: {_number(figures.duration_s, 1)} s,"
         f" predicted {_number(figures.predicted_s, 1)} s, lag {_number(figures.lag_s, 1)} s",
         f"  beside the line: at most {_number(figures.cross_track_max_m)} m, mean"
@@ -112,6 +112,13 @@ def figure_lines(doc: ReviewDoc) -> list[str]:
             f" on the way home {_number(figures.min_distance_way_home_m)} m"
         )
     return lines
+
+
+def _ending(figures: ReviewFigures) -> str:
+    word = "COMPLETED" if figures.completed else "NOT COMPLETED"
+    if figures.higher_m is None:
+        return word
+    return f"{word}, up to {_number(figures.higher_m, 0)} m higher from item {figures.higher_from_item}"
 
 
 def _number(value: float | None, digits: int = 2) -> str:

@@ -52,6 +52,16 @@ class Connections:
         self._wanted.pop(address, None)
         await self._link.call(Disconnect(operator, address))
 
+    def holds(self, address: str) -> bool:
+        """The link node has told so."""
+        return self.status is not None and any(c.address == address for c in self.status.connections)
+
+    async def forget(self, address: str) -> None:
+        """Of a vehicle that the server itself started and that has ended."""
+        self._wanted.pop(address, None)
+        await self._need_link()
+        await self._ask(Disconnect(self._server_operator(), address), f"Disconnecting {address}")
+
     async def adopt(self, operator: Operator, candidate: str) -> None:
         await self._link.call(Adopt(operator, candidate))
         self._candidate = candidate
@@ -76,7 +86,7 @@ class Connections:
         if status.adopted is None and self._candidate in {candidate.id for candidate in status.candidates}:
             await self._ask(Adopt(self._server_operator(), self._candidate or ""), "Adopting the vehicle again")
 
-    async def _ask(self, request: Connect | Adopt, doing: str) -> None:
+    async def _ask(self, request: Connect | Disconnect | Adopt, doing: str) -> None:
         try:
             await self._link.call(request)
         except Exception as error:

@@ -234,6 +234,7 @@ class Flying:
         self.desk.on_link(status)
         self._followed.want(self.desk.record)
         await self.connections.on_status(status)
+        await self.simulation.on_link(status)
         await self._obstacles.on_link(status)
 
     def _on_flight(self, flight: FlightStatus) -> None:

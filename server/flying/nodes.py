@@ -42,6 +42,11 @@ class Nodes:
             return None
         return facts.arguments[facts.arguments.index("--link") + 1]
 
+    async def simulator_is_wanted(self) -> bool:
+        """One runs, or is about to run again."""
+        states = {node.name: node.state for node in self.supervisor.states}
+        return states.get(SIMULATOR, "stopped") != "stopped" or await self.simulator_link() is not None
+
     async def link(self) -> None:
         """With the recorder: a flight that nobody recorded cannot be looked at again."""
         await self.supervisor.start(LINK, [])

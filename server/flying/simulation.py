@@ -16,6 +16,7 @@ from server.flying.nodes import Nodes
 from server.jobs import Lane
 from server.library import Library
 from server.schemas import PlanDoc
+from telemetry.messages import LinkStatus
 from telemetry.requests import Operator
 
 _OUT, _IN = "udpout:", "udpin:"
@@ -52,15 +53,26 @@ class Simulation:
         self._port_file = runtime_dir / "simulator-port.txt"
         self._world_file, self._demo_world, self._sees = runtime_dir / "world.json", demo_world, sees
         self._starting = asyncio.Lock()
+        self._last_port = self._read_port()
 
     async def start(self, operator: Operator) -> None:
         """Raises NotReadyError without a surface model and a home. One that runs already goes on where it is."""
         async with self._starting:
             link = await self._nodes.simulator_link()
             if link is None:
-                ground, link = await self._make_ground(), f"{_OUT}127.0.0.1:{self._port()}"
+                ground = await self._make_ground()
+                link = f"{_OUT}127.0.0.1:{await self._port()}"
                 await self._start_node(ground, link)
             await self._connections.connect(operator, link.replace(_OUT, _IN), adopt=True)
+
+    async def on_link(self, status: LinkStatus) -> None:
+        """The address of one that has ended goes: whatever starts the next one connects to it again."""
+        address = _address(self._last_port)
+        if self._starting.locked() or not any(connection.address == address for connection in status.connections):
+            return
+        async with self._starting:
+            if not await self._nodes.simulator_is_wanted():
+                await self._connections.forget(address)
 
     async def _start_node(self, ground: Ground, link: str) -> None:
         document = self._plans.document
@@ -73,15 +85,22 @@ class Simulation:
         if world is not None and self._sees is not None:
             await self._sees(ground, world)
 
-    def _port(self) -> int:
-        """The same as last time if it can be had: the link node remembers its connections."""
-        try:
-            last = int(self._port_file.read_text(encoding="ascii"))
-        except (FileNotFoundError, ValueError):
-            last = 0
-        port = free_udp_port(last)
+    async def _port(self) -> int:
+        """The same as last time if it can be had; else the link node does not go on listening at the last one."""
+        last, port = self._last_port, self._last_port
+        if not last or not self._connections.holds(_address(last)):
+            port = free_udp_port(last)
+        if last and port != last:
+            await self._connections.forget(_address(last))
+        self._last_port = port
         self._port_file.write_text(f"{port}\n", encoding="ascii")
         return port
+
+    def _read_port(self) -> int:
+        try:
+            return int(self._port_file.read_text(encoding="ascii"))
+        except (OSError, ValueError):
+            return 0
 
     async def _make_ground(self) -> Ground:
         document, home = self._plans.document, self._plans.planned_home
@@ -91,6 +110,11 @@ class Simulation:
             )
         directory = self._library.terrain_dir(document.terrain_id)
         return await self._lane.call(export_ground, directory, self._ground_file, home)
+
+
+def _address(port: int) -> str:
+    """Where the link node listens for it."""
+    return f"{_IN}127.0.0.1:{port}"
 
 
 def free_udp_port(wanted: int = 0) -> int:

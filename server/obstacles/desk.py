@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from server.errors import NotReadyError, reported
 from server.flying.asking import Asks
@@ -16,6 +16,7 @@ from server.obstacles.export_task import map_file
 from server.obstacles.keeping import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.mirror import Voxels
+from server.obstacles.rest_of_plan import Underway, rest_of_plan
 from server.obstacles.watch import Watch
 from server.schemas import (
     AcknowledgeBody,
@@ -29,7 +30,8 @@ from server.schemas import (
     Source,
 )
 from telemetry.messages import LinkStatus
-from telemetry.obstacles import PerceptionSettings
+from telemetry.obstacles import SENSORS, PerceptionSettings
+from telemetry.perception.limits import check_memory, check_perception
 from telemetry.requests import Operator, SetAvoidance
 
 log = logging.getLogger("hedgehop.obstacles")
@@ -38,7 +40,9 @@ log = logging.getLogger("hedgehop.obstacles")
 class SeesPlans(Protocol):
     """The part of ``server.plan_requests.PlanRequests`` that takes what was seen into the plan."""
 
-    async def plan_with_seen(self, maps: list[Voxels]) -> PlanState: ...
+    async def plan_with_seen(
+        self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None
+    ) -> PlanState: ...
 
     async def plan_without_seen(self) -> PlanState: ...
 
@@ -59,11 +63,13 @@ class ObstacleDesk:
         plans: SeesPlans,
         *,
         lane: Lane,
+        underway: Callable[[], Underway | None],
         publish_settings: Callable[[PerceptionSettings], None],
         server_operator: Callable[[], Operator],
     ) -> None:
         self._root, self._watches, self._manoeuvres = root, watches, manoeuvres
         self._link, self._plans, self._lane = link, plans, lane
+        self._underway = underway
         self._publish_settings, self._server_operator = publish_settings, server_operator
         self._live = watches["live"]
         self._avoid_when_adopted = False
@@ -102,7 +108,12 @@ class ObstacleDesk:
             log.warning("Avoidance stays off in the demo: %s", doc.what)
 
     async def change_settings(self, body: PerceptionSettingsBody) -> ObstaclesState:
-        self._set(changed(self._live.settings, body))
+        """Raises MappingError for what cannot fit: nothing is changed then."""
+        wanted = changed(self._live.settings, body)
+        check_perception(wanted)
+        if body.memory_limit_bytes is not None:
+            check_memory(body.memory_limit_bytes, maps=len(SENSORS))
+        self._set(wanted)
         await self._keep(changed(self._kept, body))
         return self._live.state
 
@@ -116,7 +127,7 @@ class ObstacleDesk:
         await self._link.call(await self._manoeuvres.request(operator, manoeuvre_id))
 
     async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
-        """Raises NotReadyError when nothing was seen."""
+        """Raises NotReadyError when nothing was seen, and for a part when no mission is flown."""
         if not body.seen:
             return await self._plans.plan_without_seen()
         maps = [await asyncio.to_thread(self._live.mirrors[sensor].voxels) for sensor in body.sensors]
@@ -125,7 +136,12 @@ class ObstacleDesk:
             raise NotReadyError(
                 "Nothing was seen that the surface model does not know.", advice="Fly on, or plan as is."
             )
-        return await self._plans.plan_with_seen(maps)
+        if body.part == "whole":
+            return await self._plans.plan_with_seen(maps)
+        part, underway = body.part, self._underway()
+        return await self._plans.plan_with_seen(
+            maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
+        )
 
     async def exported(self, source: Source, sensor: SensorName, kind: MapFormat) -> bytes:
         """Raises NotReadyError while the map is empty."""

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import msgspec
 
+from mapping.errors import MappingError
 from server.library.files import write_atomically
 from server.schemas import PerceptionSettingsBody
 from telemetry.obstacles import PerceptionSettings
+from telemetry.perception.limits import check_perception
 
 FILE = "perception.json"
+WIDEST_M = 100.0
 
 
 def read_settings(root: Path) -> PerceptionSettings:
@@ -25,20 +28,17 @@ def read_settings(root: Path) -> PerceptionSettings:
 
 def _makes_sense(settings: PerceptionSettings) -> bool:
     """Every figure is used as a divisor, a length or an angle somewhere."""
-    lengths = (
-        settings.radar_depth_m,
-        settings.vision_depth_m,
-        settings.ranges_depth_m,
-        settings.height_m,
-        settings.brake_m_s2,
-        settings.radar_resolution_m,
-        settings.vision_resolution_m,
-        settings.memory_limit_bytes,
-        settings.safety_radius_m,
-        settings.approach_s,
-    )
-    spare = (settings.vehicle_radius_m, settings.position_error_m, settings.clear_count)
-    return all(value > 0 for value in lengths) and all(value >= 0 for value in spare) and 0 < settings.fov_deg <= 180
+    lengths = (settings.brake_m_s2, settings.safety_radius_m, settings.approach_s)
+    around = (settings.vehicle_radius_m, settings.position_error_m)
+    if not (all(value > 0 for value in lengths) and all(0 <= value <= WIDEST_M for value in around)):
+        return False
+    if settings.clear_count < 0:
+        return False
+    try:
+        check_perception(settings)
+    except MappingError:
+        return False
+    return True
 
 
 def write_settings(root: Path, settings: PerceptionSettings) -> None:

@@ -26,10 +26,13 @@ from telemetry.vehicle import VehicleState
 if TYPE_CHECKING:
     from mapping.ground import GroundGrid
     from planning.avoiding.model import Manoeuvre, NoWay
+    from planning.avoiding.room import Seen
     from telemetry.perception.mission_line import Line
 
 BESIDE_M = 3.0
 """A vehicle farther than this from where its leg begins is on its way to it."""
+NEAR_M = 250.0
+"""Farther from the vehicle no way leads."""
 _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -91,7 +94,6 @@ class Ahead:
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
     from planning.avoidance import AvoidanceParams, around, over
-    from planning.avoiding.room import Seen
     from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
@@ -102,7 +104,7 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
     ahead = None if line is None else _ahead(line, position, situation)
-    seen = [Seen(_centres_enu_m(v, situation.origin, frame), v.resolution_m) for v in situation.maps if len(v.keys)]
+    seen = [_seen(voxels, situation.origin, frame, position) for voxels in situation.maps if len(voxels.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
     usual = AvoidanceParams()
     params = AvoidanceParams(
@@ -117,6 +119,17 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
             sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
         )
     return tuple(prepared)
+
+
+def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64) -> Seen:
+    """What may matter to any way from there; a radar does not tell how high things are."""
+    from planning.avoiding.room import Seen
+    from planning.avoiding.standing import standing
+
+    centres = _centres_enu_m(voxels, origin, frame)
+    centres = centres[np.hypot(*(centres[:, :2] - position[:2]).T) <= NEAR_M]
+    seen = Seen(centres, voxels.resolution_m)
+    return standing(seen, position) if voxels.sensor == "radar" else seen
 
 
 def _centres_enu_m(voxels: Voxels, origin: MapOrigin, frame: LocalFrame) -> F64:
@@ -166,6 +179,7 @@ def _prepared(
         length_m=way.length_m,
         seconds=way.length_m / speed_m_s,
         climb_m=climb_m,
+        top_unseen=way.top_unseen,
     )
     geodetic = frame.to_geodetic(way.points_enu_m[1:])
     targets = tuple(
@@ -193,6 +207,7 @@ def cruise_m_s(record: PlanRecord) -> float:
 
 def _words(way: Manoeuvre, climb_m: float) -> str:
     if way.kind == "over":
-        return f"Climb {climb_m:.0f} m straight up, then on along the mission, {way.height_offset_m:.0f} m higher."
+        top = " Its top has not been seen: the vehicle climbs on if it must." if way.top_unseen else ""
+        return f"Climb {climb_m:.0f} m straight up, then on along the mission, {way.height_offset_m:.0f} m higher.{top}"
     rest = "" if way.height_offset_m < 0.5 else f", {way.height_offset_m:.0f} m higher"
     return f"Sideways past it and back onto the mission{rest}."

@@ -173,4 +173,6 @@ def _turned_rad(shown: Prepared, now: Prepared) -> float:
 def _words(prepared: Prepared) -> str:
     clearance_m = prepared.doc.clearance_m
     kind = prepared.doc.kind.capitalize()
+    if prepared.doc.top_unseen:
+        return f"{kind}: top not seen"
     return kind if clearance_m is None else f"{kind}: {clearance_m:.1f} m clear"

@@ -46,6 +46,7 @@ class Voxels:
     explained: NDArray[np.bool_]
     resolution_m: float
     origin: MapOrigin | None
+    sensor: Sensor
 
     @property
     def centres_enu_m(self) -> F64:
@@ -175,6 +176,7 @@ class MapMirror:
             np.concatenate([chunk.explained for chunk in chunks]),
             self.resolution_m,
             self.origin,
+            self.sensor,
         )
 
 
@@ -187,7 +189,8 @@ def coarser(voxels: Voxels, detail: int) -> Voxels:
     np.maximum.at(probability, where, voxels.probability)
     unexplained = np.zeros(len(ids), dtype=np.bool_)
     unexplained[where[~voxels.explained]] = True
-    return Voxels(_keys(ids), probability, ~unexplained, voxels.resolution_m * detail, voxels.origin)
+    edge_m = voxels.resolution_m * detail
+    return Voxels(_keys(ids), probability, ~unexplained, edge_m, voxels.origin, voxels.sensor)
 
 
 def _box_counts(ids: I64) -> tuple[int, ...]:

@@ -22,6 +22,7 @@ from server.obstacles.drawing import MapDrawing
 from server.obstacles.ground import KnownGround
 from server.obstacles.manoeuvre_task import Situation, prepare
 from server.obstacles.manoeuvres import Manoeuvres
+from server.obstacles.rest_of_plan import Underway
 from server.obstacles.sensor_nodes import SensorNodes
 from server.obstacles.tracks import TracksWatch
 from server.obstacles.watch import Watch
@@ -76,6 +77,7 @@ class Obstacles:
             link,
             workspace.plans,
             lane=lane,
+            underway=self._flown,
             publish_settings=lambda settings: bus.publish(Topic.PERCEPTION_SETTINGS, settings),
             server_operator=server_operator,
         )
@@ -126,6 +128,10 @@ class Obstacles:
         self._ground.want(self._onboard(), self._workspace.document.terrain_id)
         self.watches["live"].seen_in_plan = self._workspace.seen_columns
         self.watches["live"].refresh()
+
+    def _flown(self) -> Underway | None:
+        record, state = self._onboard(), self._live.state
+        return None if record is None or state is None else Underway(record, self._live.flight, state)
 
     def _situation(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> Situation | None:
         """None without a vehicle, its plan, or the surface model of that."""

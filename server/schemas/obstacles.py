@@ -42,6 +42,9 @@ class ManoeuvreDoc(Strict):
     length_m: float | None = None
     seconds: float | None = None
     climb_m: float | None = None
+    top_unseen: bool = False
+    """It leads over something that may be higher than what was seen of it: the clearance counts from as far up as the
+    radar looks."""
 
 
 class MapDrawn(Strict):
@@ -100,6 +103,14 @@ class PerceptionSettingsBody(Strict):
     safety_radius_m: Annotated[float, Field(ge=0.5, le=30)] | None = None
     approach_s: Annotated[float, Field(ge=2, le=30)] | None = None
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] | None = None
+    vehicle_radius_m: Annotated[float, Field(ge=0.1, le=5)] | None = None
+    position_error_m: Annotated[float, Field(ge=0, le=10)] | None = None
+    brake_m_s2: Annotated[float, Field(ge=0.5, le=10)] | None = None
+    radar_resolution_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
+    vision_resolution_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
+    """Of the range finder's map, too."""
+    memory_limit_bytes: Annotated[int, Field(ge=1_000_000, le=100_000_000_000)] | None = None
+    """Per map. A new one, or another resolution, begins the map anew."""
 
 
 class PlanWithSeen(Strict):
@@ -107,3 +118,6 @@ class PlanWithSeen(Strict):
 
     seen: bool
     sensors: list[SensorName] = Field(default_factory=lambda: ["radar", "vision"])
+    part: Literal["whole", "ahead", "home"] = "whole"
+    """The open plan as it is; or of the one that is flown, from where the vehicle is: the mission ahead, the way home.
+    """

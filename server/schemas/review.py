@@ -34,6 +34,10 @@ class ReviewFigures(Strict):
     """From the last waypoint until 3 m from home."""
     positions: int = 0
     """That the figures count."""
+    higher_m: float | None = None
+    """How much above the plan avoidance passed places of the mission, at most; null where it passed none higher."""
+    higher_from_item: int | None = None
+    """The first of these places, 1 is the mission's first item."""
 
 
 class ReviewSeries(Strict):

@@ -19,11 +19,12 @@ from websockets.typing import Origin, Subprotocol
 
 from telemetry.agent.bandwidth import Bandwidth
 from telemetry.agent.clock import RemoteClock
-from telemetry.agent.thinning import thinned
+from telemetry.agent.thinning import sendable, thinned
 from telemetry.agent.wire import (
     NOTICE_LONGEST,
     PATH,
     PROTOCOL_VERSION,
+    REACH_M,
     SUBPROTOCOL,
     Hello,
     Notice,
@@ -95,8 +96,15 @@ class AgentCounts:
     """Clouds for which the bandwidth did not suffice, and what was measured while there was no connection."""
     sent_bytes: int = 0
     connections: int = 0
+    points_not_finite: int = 0
+    points_out_of_reach: int = 0
+    """Of clouds, left out on board: no numbers, or farther than the wire format reaches."""
     report: Report | None = None
     """The ground station's newest."""
+    refused_why: str = ""
+    """Why the ground station last refused something."""
+    not_understood: int = 0
+    """Messages of the ground station that this agent does not know; it goes on without them."""
     trouble: str = ""
     """Why there is no connection; empty while there is one."""
     numbers: dict[str, int] = field(default_factory=dict)
@@ -207,7 +215,11 @@ class Agent:
 
     async def _listen(self, connection: ClientConnection) -> None:
         async for data in connection:
-            message = decode_from_server(data.encode() if isinstance(data, str) else data)
+            try:
+                message = decode_from_server(data.encode() if isinstance(data, str) else data)
+            except SensorLinkError:
+                self.counts.not_understood += 1
+                continue
             match message:
                 case Welcome():
                     self._connected, self.counts.trouble = True, ""
@@ -215,6 +227,7 @@ class Agent:
                     self._clock.on_answer(asked_s=asked_s, remote_s=server_s, now_s=time.monotonic())
                 case Report():
                     self.counts.report = message
+                    self.counts.refused_why = message.text or self.counts.refused_why
         raise ConnectionClosed(connection.protocol.close_rcvd, connection.protocol.close_sent)
 
     async def _ping(self, connection: ClientConnection) -> None:
@@ -248,8 +261,10 @@ class Agent:
         number = self._number(reading)
         if isinstance(reading, RadarReading):
             return encode(Radar(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
-        points = thinned(reading.xyz_m, self._voxel_m)
-        return encode(cloud(points, number=number, t_s=t_s, voxel_m=self._voxel_m))
+        points, not_finite, out_of_reach = sendable(reading.xyz_m, REACH_M)
+        self.counts.points_not_finite += not_finite
+        self.counts.points_out_of_reach += out_of_reach
+        return encode(cloud(thinned(points, self._voxel_m), number=number, t_s=t_s, voxel_m=self._voxel_m))
 
     def _number(self, reading: Reading) -> int:
         """Counted also for what is left out, so that the ground station sees the gap."""

@@ -62,9 +62,17 @@ class Intake:
         self._noticed_s = -math.inf
 
     def on_data(self, data: bytes, *, now_mono_s: float, now_utc_s: float) -> Taken:
-        """Raises SensorLinkError where the connection must end: the protocol is another. Bad frames are counted."""
+        """Raises SensorLinkError where the connection must end: no hello, or one of another version.
+
+        What cannot be understood after that, or makes no sense, is counted and told in the next report.
+        """
         self._sizes.append((now_mono_s, len(data)))
-        message = decode_from_agent(data)
+        try:
+            message = decode_from_agent(data)
+        except SensorLinkError as error:
+            if not self.name:
+                raise
+            return self._refuse(str(error))
         if isinstance(message, Hello):
             return Taken(answer=self._greet(message, now_mono_s))
         if not self.name:
@@ -76,8 +84,7 @@ class Intake:
         try:
             frame = self._frame(message, now_mono_s, now_utc_s)
         except SensorLinkError as error:
-            self.refused, self._why = self.refused + 1, str(error)
-            return Taken()
+            return self._refuse(str(error))
         self.received += 1
         return Taken(frame=frame)
 
@@ -87,6 +94,10 @@ class Intake:
         rate = sum(size for _, size in self._sizes) / RATE_OVER_S
         why, self._why = self._why, ""
         return Report(self.received, self.lost, self.late, self.refused, rate, why)
+
+    def _refuse(self, why: str) -> Taken:
+        self.refused, self._why = self.refused + 1, why
+        return Taken()
 
     def _greet(self, hello: Hello, now_mono_s: float) -> Welcome:
         if hello.version != PROTOCOL_VERSION:
@@ -102,7 +113,7 @@ class Intake:
     def _notice(self, message: Notice, now_mono_s: float, now_utc_s: float) -> VehicleText | None:
         """None for one that comes too soon after another: an agent must not drown what the vehicle says."""
         if now_mono_s - self._noticed_s < NOTICE_EVERY_S:
-            self.refused, self._why = self.refused + 1, "Notices come too often."
+            self._refuse("Notices come too often.")
             return None
         self._noticed_s = now_mono_s
         text = "".join(c if c.isprintable() else " " for c in message.text[:NOTICE_LONGEST])

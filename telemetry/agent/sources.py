@@ -1,54 +1,20 @@
-"""Where an agent's readings come from: lines of JSON that a sensor's driver writes, or a recorded flight."""
+"""A recorded flight as an agent's source of readings."""
 
 from __future__ import annotations
 
-import json
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TextIO
 
 import numpy as np
 
 from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading
-from telemetry.agent.wire import TARGET_COLUMNS, Slam
-from telemetry.errors import SensorLinkError
+from telemetry.agent.wire import Slam
 from telemetry.messages import Topic
 from telemetry.recording.reader import open_recording
 from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
 
-_TRACKING = ("good", "poor", "lost")
 _RECORDED = (Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE)
-
-
-def readings_of_lines(lines: TextIO) -> Iterator[Reading]:
-    """One JSON object per line (docs/agent.md). Raises SensorLinkError naming the first line that is none."""
-    for number, line in enumerate(lines, start=1):
-        if line.strip():
-            yield reading_of(line, where=f"line {number}")
-
-
-def reading_of(line: str, *, where: str) -> Reading:
-    """Without "t_s" it was measured now. Raises SensorLinkError."""
-    try:
-        record = json.loads(line)
-        t_s = float(record.get("t_s", time.monotonic()))
-        match record["type"]:
-            case "radar":
-                return RadarReading(t_s, _table(record["targets"], TARGET_COLUMNS))
-            case "cloud":
-                return CloudReading(t_s, _table(record["points"], 3))
-            case "slam":
-                return SlamReading(t_s, _slam(record))
-            case other:
-                raise ValueError(f'the type is "{other}"')
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise SensorLinkError(
-            f"This is no reading of a sensor: {error}.",
-            where=where,
-            advice='Write {"type": "radar", "targets": [[x, y, z, speed, snr], ...]} or as docs/agent.md says.',
-        ) from error
 
 
 def recorded_readings(path: Path) -> Iterator[tuple[float, Reading]]:
@@ -87,21 +53,3 @@ def _reading(message: RadarFrame | CloudFrame | SlamPose) -> Reading:
             return CloudReading(t_s, rows(message.xyz_m, 3))
         case SlamPose():
             return SlamReading(t_s, Slam(t_s, message.position_m, message.q_wxyz, message.tracking))
-
-
-def _table(values: Any, columns: int) -> np.ndarray[Any, np.dtype[np.float32]]:
-    table = np.asarray(values, dtype=np.float32)
-    if table.size == 0:
-        return np.zeros((0, columns), np.float32)
-    if table.ndim != 2 or table.shape[1] != columns:
-        raise ValueError(f"a row has {columns} numbers")
-    return table
-
-
-def _slam(record: dict[str, Any]) -> Slam:
-    x, y, z = (float(value) for value in record["position_m"])
-    qw, qx, qy, qz = (float(value) for value in record["q_wxyz"])
-    tracking = record.get("tracking", "good")
-    if tracking not in _TRACKING:
-        raise ValueError(f"tracking is one of {', '.join(_TRACKING)}")
-    return Slam(0.0, (x, y, z), (qw, qx, qy, qz), tracking)

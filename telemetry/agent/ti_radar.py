@@ -15,6 +15,7 @@ from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.wire import TARGETS_MAX
 from telemetry.errors import SensorError
 from telemetry.sensors.ti_mmwave.config import LEAST_SNR_DB
+from telemetry.sensors.ti_mmwave.differences import other_configuration
 from telemetry.sensors.ti_mmwave.frame import TiFrame
 from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiCounts, TiStream
@@ -23,6 +24,9 @@ from telemetry.sensors.ti_mmwave.session import TiPorts, configure, empty, frame
 
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)
 USUAL_PERIOD_S = 0.1
+LONGEST_PAUSE_S = 5.0
+"""Between two frames of a capture: what is longer is a gap that nobody wants to wait for."""
+ADVICE = "Give the .cfg that it runs with: --ti-config."
 _CHUNK_BYTES = 4096
 
 
@@ -62,6 +66,20 @@ class TiStatus:
         return f"{text}; {self.trouble}" if self.trouble else text
 
 
+class Comparison:
+    """Once: whether frames come from a radar with the configuration that was given."""
+
+    def __init__(self, config: TiConfig | None) -> None:
+        self._config = config
+
+    def first_difference(self, frame: TiFrame) -> str:
+        """Empty where there is none, where a frame does not show it, and ever after."""
+        if self._config is None or not len(frame.range_profile):
+            return ""
+        config, self._config = self._config, None
+        return other_configuration(frame, config)
+
+
 class TiRadar:
     """``readings`` blocks, in a thread of its own; ``status`` may be read from any."""
 
@@ -78,6 +96,7 @@ class TiRadar:
         self._config, self._ports, self._tell, self._now, self._wait = config, ports, tell, now, wait
         self._stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s)
         self.status = TiStatus(self._stream.counts)
+        self._comparison = Comparison(config)
 
     def readings(self) -> Generator[RadarReading | NoticeReading, None, None]:
         """For ever, with a notice for the pilot when the radar goes away and when it is back.
@@ -115,8 +134,14 @@ class TiRadar:
                     yield from self._garbled()
                     continue
                 yield from self._fine()
+                yield from self._compare(frame)
                 self.status.points += len(frame.xyz_m)
                 yield reading_of(frame, t_s, self._config.least_snr_db)
+
+    def _compare(self, frame: TiFrame) -> Iterator[NoticeReading]:
+        if what := self._comparison.first_difference(frame):
+            self._tell(f"{what} {ADVICE}")
+            yield NoticeReading(self._now(), True, f"radar: {what}")
 
     def _garbled(self) -> Iterator[NoticeReading]:
         error = SensorError(
@@ -151,19 +176,23 @@ def reading_of(frame: TiFrame, t_s: float, least_snr_db: float) -> RadarReading:
     return RadarReading(t_s, targets, frame.lost_before)
 
 
-def captured_readings(path: Path, config: TiConfig | None, status: TiStatus) -> Iterator[tuple[float, RadarReading]]:
+def captured_readings(
+    path: Path, config: TiConfig | None, status: TiStatus, *, tell: Callable[[str], None]
+) -> Iterator[tuple[float, RadarReading]]:
     """A data port's bytes from a file: seconds since the first frame, by the frames' numbers, and the reading.
 
-    Raises RadarDataError when there is no frame in it, or speeds that only a configuration explains; and OSError.
+    ``tell`` hears one line where they come from a radar with another configuration. Raises RadarDataError when there
+    is no frame in it, or speeds that only a configuration explains; and OSError.
     """
     stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s if config else float("nan"))
     status.stream = stream.counts
     period_s = config.frame_period_s if config else USUAL_PERIOD_S
     least_snr_db = config.least_snr_db if config else LEAST_SNR_DB
-    after_s = -period_s
+    after_s, comparison = -period_s, Comparison(config)
     for frame in _captured_frames(path, stream):
-        if frame.sub_frame == 0:
-            after_s += (1 + frame.lost_before) * period_s
+        after_s += min(frame.periods * period_s, max(period_s, LONGEST_PAUSE_S))
+        if what := comparison.first_difference(frame):
+            tell(f"{what} {ADVICE}")
         if np.isnan(frame.radial_speed_m_s).any():
             raise RadarDataError(
                 f"Firmware of SDK {frame.sdk[0]}.{frame.sdk[1]} tells speeds in cells of unknown size.",
@@ -184,4 +213,4 @@ def _captured_frames(path: Path, stream: TiStream) -> Iterator[TiFrame]:
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK_BYTES):
             yield from stream.feed(chunk)
-    stream.reset()
+    yield from stream.reset()

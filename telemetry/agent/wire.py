@@ -22,7 +22,9 @@ TARGET_COLUMNS = 5
 TARGETS_MAX, POINTS_MAX = 1000, 100_000
 NOTICE_LONGEST = 200
 STEP_M = 0.005
-"""Of the coordinates of points: 16 bits reach 163 m."""
+"""Of the coordinates of points."""
+REACH_M = STEP_M * 32767
+"""16 bits reach 163 m."""
 
 F32 = NDArray[np.float32]
 
@@ -120,7 +122,7 @@ def decode_from_server(data: bytes) -> FromServer:
 
 
 def cloud(xyz_m: F32, *, number: int, t_s: float, voxel_m: float) -> Cloud:
-    """Points beyond 163 m or without a number are left out."""
+    """Points beyond ``REACH_M`` or without a number are left out."""
     steps = np.round(np.asarray(xyz_m, dtype=np.float64) / STEP_M)
     kept = (np.abs(steps) <= np.iinfo(np.int16).max).all(axis=1)
     return Cloud(number, t_s, voxel_m, STEP_M, steps[kept].astype("<i2").tobytes())

@@ -215,9 +215,10 @@ class Avoiding:
             self._on_end()
         if not actions and self.detour.goes_over:
             seen_by = self.regions.seen_by(now_s)
-            return self.detour.climb_on(seen_by, now_s) if seen_by else []
-        if not actions and self.detour.goes_past and self._is_blocked(state, now_s):
-            return self.detour.stop_short(now_s)
+            return self.detour.climb_on(seen_by, now_s) if seen_by else self.detour.hold_if_silent(state, now_s)
+        if not actions and self.detour.goes_past:
+            blocked = self._is_blocked(state, now_s)
+            return self.detour.stop_short(now_s) if blocked else self.detour.hold_if_silent(state, now_s)
         if self.enabled and not actions:
             actions = self._look_ahead(state, now_s)
         return actions

@@ -50,6 +50,8 @@ class Detour:
         self.rest = Rest((), "hold")
         self.offset_m = 0.0
         self._witnesses = Witnesses(self._regions)
+        self._lookouts: frozenset[Sensor] = frozenset()
+        """Who is counted on along a prepared way: those who saw what it leads past, else all that work."""
         self.is_manoeuvre = self._sidesteps = False
         self._paused = False
         self._then: Literal["climb", "go"] = "climb"
@@ -90,6 +92,7 @@ class Detour:
         """A prepared way, then the rest ``offset_m`` higher than planned. ``over``: climbs on while it is not clear."""
         self.rest, self.is_manoeuvre, self._over, self._way = rest, True, over, way
         self._witnesses.sensors = frozenset()
+        self._lookouts = self._regions.seen_by(now_s) or frozenset(self._regions.counted(now_s))
         self._sidesteps = False
         self._least_m = self._way_from_m = way[0].alt_rel_home_m
         self._plan_m = None
@@ -243,6 +246,7 @@ class Detour:
             extra_m = max(0.0, reached_m - self._way_from_m)
             self.offset_m = max(self._wanted_offset_m, climbed_m if self._over else 0.0)
             self._legs = Legs(self._helm, _raised(self._way, extra_m))
+            self._witnesses.sensors |= self._lookouts
         else:
             self.offset_m = max(self.offset_m, climbed_m)
             self._legs = Legs(self._helm, self.rest.raised(self.offset_m).targets)
@@ -285,12 +289,13 @@ class Detour:
     # What makes it stay where it is.
 
     def hold_if_silent(self, state: VehicleState, now_s: float) -> list[Action]:
-        """On the rest of the flight: not without the frames of those who saw what was climbed over."""
+        """On the way past and on the rest of the flight: not without the frames of those who saw what stands there."""
         why = self._witnesses.silent(state, now_s)
         return self._hold(why, now_s, then="go") if why else []
 
     def count_on_nobody(self) -> None:
         """The rest of the flight is gone on with, whether anybody looks ahead or not."""
+        self._lookouts = frozenset()
         if self.phase == "going" or self._then == "go":
             self._witnesses.sensors = frozenset()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
@@ -20,8 +21,8 @@ class Sight:
     t_mono_s: float
     counts: bool
     """It works: it is neither blind nor frozen nor waiting for its first frame."""
-    flows: bool
-    """Frames come and are placed, whether they show anything or not."""
+    flowed_t_mono_s: float
+    """Of its newest frame that was placed, whether it showed anything or not."""
     occupied: bool
     distance_m: float | None
     """Of what is nearest in its way."""
@@ -29,6 +30,8 @@ class Sight:
     latency_s: float
     clear_frames: int
     """In a row, up to this one."""
+    why: str = ""
+    """Its frames are not placed, or it has stopped: in its own words."""
 
     def is_fresh(self, now_s: float) -> bool:
         return self.counts and now_s - self.t_mono_s <= OLD_S
@@ -56,7 +59,8 @@ class Regions:
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
             counts=status.state == "running",
-            flows=status.state in ("running", "blind"),
+            flowed_t_mono_s=_flowed_t_s(status, before),
+            why=status.text,
             occupied=occupied,
             distance_m=found_m,
             depth_m=self._depth_m(status),
@@ -90,9 +94,9 @@ class Regions:
         return min(old, key=lambda sight: sight.t_mono_s, default=None)
 
     def silent(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
-        """Of the sensors that are counted on: one that sends no frames any more, or none that can be placed."""
+        """Of the sensors that are counted on: one that has sent no frame for too long, or none that can be placed."""
         sights = (self.sights[sensor] for sensor in engaged)
-        return next((sight for sight in sights if not sight.flows or now_s - sight.t_mono_s > OLD_S), None)
+        return next((sight for sight in sights if now_s - sight.flowed_t_mono_s > OLD_S), None)
 
     def _depth_m(self, status: PerceptionStatus) -> float:
         if status.region is not None:
@@ -120,3 +124,9 @@ class Regions:
         if near:
             return min(near)
         return depth_m if status.region is not None and status.region.occupied else None
+
+
+def _flowed_t_s(status: PerceptionStatus, before: Sight | None) -> float:
+    if status.state in ("running", "blind"):
+        return status.t_mono_s
+    return -math.inf if before is None else before.flowed_t_mono_s

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from telemetry.flight.regions import OLD_S, Regions
+from telemetry.flight.avoiding_words import SENSOR_WORDS
+from telemetry.flight.regions import OLD_S, Regions, Sight
 from telemetry.obstacles import Sensor
 from telemetry.vehicle import VehicleState
 
@@ -22,15 +23,25 @@ class Witnesses:
     def blind(self, state: VehicleState, now_s: float) -> str:
         """Why nothing can be told about what is ahead now; empty while all is well."""
         sight = self._regions.oldest(self.sensors, now_s)
-        return _old_position(state, now_s) or ("" if sight is None else f"Nothing new from {sight.sensor}.")
+        advice = "It climbs on by itself once something comes. Or return home."
+        missing = "" if sight is None else f"Nothing new from {SENSOR_WORDS[sight.sensor]}. {advice}"
+        return _old_position(state, now_s) or missing
 
     def silent(self, state: VehicleState, now_s: float) -> str:
         """The same where a camera may see nothing, as in the open sky, but must look."""
         sight = self._regions.silent(self.sensors, now_s)
-        missing = "" if sight is None else f"No frames from {sight.sensor}. Resume goes on without them."
-        return _old_position(state, now_s) or missing
+        return _old_position(state, now_s) or ("" if sight is None else _silence(sight, now_s))
+
+
+def _silence(sight: Sight, now_s: float) -> str:
+    """Its own words where it still speaks."""
+    if sight.why and now_s - sight.t_mono_s <= OLD_S:
+        return f"{sight.why} Resume goes on all the same."
+    return f"No frames from {SENSOR_WORDS[sight.sensor]}. Resume goes on without them."
 
 
 def _old_position(state: VehicleState, now_s: float) -> str:
     at_s = state.position_t_mono_s
-    return "The vehicle's position is too old." if at_s is None or now_s - at_s > OLD_S else ""
+    is_old = at_s is None or now_s - at_s > OLD_S
+    advice = "It goes on by itself with a new one. Or return home."
+    return f"The vehicle's position is too old. {advice}" if is_old else ""

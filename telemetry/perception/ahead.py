@@ -65,6 +65,7 @@ class Ahead:
             (seen.keys.astype(np.float64) + 0.5) * edge_m,
             resolution_m=edge_m,
             radius_m=flight.radius_m,
+            standing_from_enu_m=position if self._sensor == "radar" else None,
         )
         if found is None:
             return None
@@ -79,6 +80,7 @@ class Ahead:
             lat_deg=lat_deg,
             lon_deg=lon_deg,
             voxels=int(found.voxels),
+            top_unseen=found.top_unseen,
         )
 
     def alerts(
@@ -112,7 +114,8 @@ def _item(line: Line, s_m: float) -> int:
 
 def _words(sensor: Sensor, conflict: MissionConflict) -> str:
     when = "" if conflict.time_s is None else f", reached in {conflict.time_s:.0f} s"
+    what = "an obstacle whose top is not seen" if conflict.top_unseen else "an obstacle"
     return (
-        f"{sensor}: the mission comes within {conflict.distance_m:.1f} m of an obstacle, "
+        f"{sensor}: the mission comes within {conflict.distance_m:.1f} m of {what}, "
         f"{conflict.ahead_m:.0f} m ahead on the way to item {conflict.item}{when}"
     )

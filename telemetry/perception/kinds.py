@@ -38,7 +38,7 @@ class SensorKind:
     frames: Topic
     maps: Topic
     status: Topic
-    make: Callable[..., Any]
+    make: type[AnyPerception]
     scan: Callable[[Any], Any]
     """A frame as the perception takes it; ValueError when its arrays do not fit together."""
     settings: Callable[[PerceptionSettings], Settings]

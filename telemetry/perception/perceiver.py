@@ -88,9 +88,12 @@ class Perceiver:
             self._teller.notes["settings"] = f"The settings are refused: {error.what} {error.advice}"
             return
         self._teller.note("settings", "")
-        emptied = settings.clear_count != self.settings.clear_count and self.perception.frames > 0
-        self.settings = settings
-        if emptied:
+        old, self.settings = self.settings, settings
+        if self.perception.frames == 0:
+            return
+        if self.kind.settings(old).makes_another_map(wanted):
+            self._begin_afresh(f"The map begins anew, with voxels of {wanted.resolution_m:g} m.")
+        elif settings.clear_count != old.clear_count:
             self._begin_afresh("The map was emptied.")
 
     def on_plan(self, plan: PlanRecord) -> None:

@@ -1,7 +1,8 @@
-"""A recording's map, made once more from its frames and poses: exactly the one that was there in flight.
+"""A recording's map, made once more from its frames and poses: exactly the one that was there in flight, or another.
 
 Frames are worked on in the order in which the node worked on them, each with what the node knew by then: its status
 after each frame tells (``telemetry.obstacles.Basis``). Where no node ran, every frame is worked on as it came.
+``OtherMap`` asks for another resolution or memory limit than in flight.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapping.ground import GroundGrid
+from mapping.voxels.checks import checked_size
 from telemetry.errors import RecordingError
 from telemetry.messages import FlightStatus, PlanRecord, Published, Topic
 from telemetry.obstacles import Basis, GroundNotice, PerceptionSettings, PerceptionStatus
@@ -22,12 +24,40 @@ from telemetry.perception.ground import GroundError, ground_around, why_none
 from telemetry.perception.inbox import HOLD_S
 from telemetry.perception.kinds import AnyFrame, SensorKind
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.status import full_text
 from telemetry.recording.reader import Entry, Recording, open_recording
 from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose
 from telemetry.vehicle import VehicleState
 
 _PATIENCE_S = 5.0
 """A frame of which no status has told by then was not worked on."""
+
+
+@dataclass(frozen=True, slots=True)
+class OtherMap:
+    """None: as it was in flight."""
+
+    resolution_m: float | None = None
+    memory_limit_bytes: int | None = None
+
+    def applied(self, settings: PerceptionSettings) -> PerceptionSettings:
+        settings = replace(settings, memory_limit_bytes=self.memory_limit_bytes or settings.memory_limit_bytes)
+        if self.resolution_m is None:
+            return settings
+        # Nothing is searched for the map's sake: what is fine and large needs no fine and large region.
+        small_m = self.resolution_m
+        return replace(
+            settings,
+            radar_resolution_m=small_m,
+            vision_resolution_m=small_m,
+            radar_depth_m=small_m,
+            vision_depth_m=small_m,
+            ranges_depth_m=small_m,
+            height_m=small_m,
+        )
+
+
+AS_IN_FLIGHT = OtherMap()
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +73,30 @@ class Rebuilt:
     voxels_occupied: int
     extent_m: tuple[float, float, float]
     """East, north, up of all occupied voxels."""
+    resolution_m: float
+    left_out: int
+    """Updates that found no room in the memory."""
     notes: tuple[str, ...]
 
 
-def rebuild(path: Path, kind: SensorKind, *, progress: Callable[[float], None] | None = None) -> Rebuilt:
-    """Raises RecordingError for what is no recording, or holds no frame of that sensor."""
+def rebuild(
+    path: Path,
+    kind: SensorKind,
+    *,
+    other: OtherMap = AS_IN_FLIGHT,
+    progress: Callable[[float], None] | None = None,
+) -> Rebuilt:
+    """Raises RecordingError for what is no recording, or holds no frame of that sensor.
+
+    Raises ParameterError or CapacityError for another map that cannot be.
+    """
+    _check(kind, other.applied(PerceptionSettings()))
     with open_recording(path) as recording:
         if kind.frames not in recording.topics():
             what = f"The recording holds no frames of the {kind.sensor}."
             raise RecordingError(what, where=path.name, advice="Choose another sensor, or another recording.")
-        run = _Run(kind, has_bases=_has_bases(recording, kind), mono_minus_utc_s=recording.mono_minus_utc_s)
+        has_bases = _has_bases(recording, kind)
+        run = _Run(kind, other, has_bases=has_bases, mono_minus_utc_s=recording.mono_minus_utc_s)
         span_s = max(recording.end_utc_s - recording.start_utc_s, 1e-9)
         for entry in recording.entries(run.topics):
             run.take(entry)
@@ -64,8 +108,9 @@ def rebuild(path: Path, kind: SensorKind, *, progress: Callable[[float], None] |
 class _Run:
     """Frames, states and camera poses wait until the status of a frame says which of them it was made with."""
 
-    def __init__(self, kind: SensorKind, *, has_bases: bool, mono_minus_utc_s: float) -> None:
-        self._kind, self._has_bases, self._mono_minus_utc_s = kind, has_bases, mono_minus_utc_s
+    def __init__(self, kind: SensorKind, other: OtherMap, *, has_bases: bool, mono_minus_utc_s: float) -> None:
+        self._kind, self._other = kind, other
+        self._has_bases, self._mono_minus_utc_s = has_bases, mono_minus_utc_s
         self.topics = {kind.frames, kind.status, Topic.VEHICLE, Topic.SLAM_POSE, Topic.PLAN, Topic.FLIGHT}
         self.topics |= {Topic.PERCEPTION_SETTINGS, Topic.GROUND}
         self._frames: deque[tuple[float, AnyFrame]] = deque()
@@ -75,7 +120,7 @@ class _Run:
         self._newest_state_s = self._newest_camera_s = 0.0
         self._settled: dict[type[Published], Published] = {}
         self._run = ""
-        self._perceiver = Perceiver(kind, run="", utc_minus_mono_s=-mono_minus_utc_s)
+        self._perceiver = self._new_perceiver()
         self._asked = GroundWanted(None, None)
         self._ground: GroundGrid | None = None
         self._begun = self._frames_seen = self._points = 0
@@ -118,6 +163,8 @@ class _Run:
         perception, where = self._perceiver.perception, self._perceiver.where
         teller = ChangeTeller(self._kind, -self._mono_minus_utc_s)
         folded = FoldedMap().folded(teller.changes(perception.map, where.origin, 0.0))
+        if perception.map.is_full:
+            self._notes[full_text(perception.map)] = None
         return Rebuilt(
             folded=folded,
             frames=perception.frames,
@@ -125,18 +172,31 @@ class _Run:
             points=self._points,
             voxels_occupied=perception.map.occupied_count,
             extent_m=_extent_m(folded),
+            resolution_m=perception.map.resolution_m,
+            left_out=perception.map.refused_updates,
             notes=tuple(self._notes),
         )
 
     def _settle(self, message: Published) -> None:
         if isinstance(message, PerceptionSettings):
-            self._perceiver.on_settings(message)
+            self._perceiver.on_settings(self._wanted(message))
         elif isinstance(message, GroundNotice):
             self._perceiver.on_ground(message)
-        elif isinstance(message, PlanRecord):
+        elif isinstance(message, PlanRecord) and self._other.resolution_m is None:
             self._perceiver.on_plan(message)
         elif isinstance(message, FlightStatus):
             self._perceiver.flown.flight = message
+
+    def _wanted(self, settings: PerceptionSettings) -> PerceptionSettings:
+        wanted = self._other.applied(settings)
+        if wanted != settings:
+            _check(self._kind, wanted)
+        return wanted
+
+    def _new_perceiver(self, run: str = "") -> Perceiver:
+        perceiver = Perceiver(self._kind, run=run, utc_minus_mono_s=-self._mono_minus_utc_s)
+        perceiver.on_settings(self._other.applied(PerceptionSettings()))
+        return perceiver
 
     def _on_basis(self, t_mono_s: float, basis: Basis) -> None:
         """The frame of that time, with what was known when it was worked on."""
@@ -199,10 +259,15 @@ class _Run:
     def _start_again(self, run: str) -> None:
         """The node was started: its first frame, or one after it had died."""
         self._run = run
-        self._perceiver = Perceiver(self._kind, run=run, utc_minus_mono_s=-self._mono_minus_utc_s)
+        self._perceiver = self._new_perceiver(run)
         self._begun = self._frames_seen = self._points = 0
         for message in self._settled.values():
             self._settle(message)
+
+
+def _check(kind: SensorKind, wanted: PerceptionSettings) -> None:
+    settings = kind.settings(wanted)
+    checked_size(settings.resolution_m, kind.reach_m, settings.memory_limit_bytes)
 
 
 def _has_bases(recording: Recording, kind: SensorKind) -> bool:

@@ -62,7 +62,7 @@ class Teller:
             self._latencies.append(done_s - result.t_mono_s)
         frame, the_map = where.frame, perception.map
         t_mono_s = result.t_mono_s if abs(result.t_mono_s - done_s) < _FAR_S else done_s  # also when it is no number
-        self.note("memory", _full(the_map) if the_map.is_full else "")
+        self.note("memory", full_text(the_map) if the_map.is_full else "")
         status = PerceptionStatus(
             sensor=self._kind.sensor,
             state=result.state,
@@ -109,7 +109,8 @@ class Teller:
         return " ".join(text for text in (result.text, *self.notes.values(), self.begun) if text)
 
 
-def _full(the_map: Any) -> str:
+def full_text(the_map: Any) -> str:
+    """Of a map that takes nothing new."""
     return (
         f"The map has reached its memory limit ({the_map.size_bytes / 1e6:,.0f} MB): nothing new is taken into it "
         f"({the_map.refused_updates:,} left out). Empty it, or allow it more."

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from planning.model import Mission
 from telemetry.messages import CommandRecord, PlanRecord, VehicleText
-from telemetry.obstacles import ObstacleAlert
+from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
 from telemetry.recording.frame_facts import SentTarget, TruePosition
 from telemetry.vehicle import VehicleState
 
@@ -81,6 +81,8 @@ class FlightLog:
     """Damage and doubts, in sentences."""
     alerts: tuple[ObstacleAlert, ...] = ()
     """Obstacles as they were alerted, in the order of time: where each begins and where it ends."""
+    avoidance: tuple[tuple[float, AvoidanceStatus], ...] = ()
+    """(t_utc_s, what it said of itself) whenever its state changed."""
 
     @property
     def t_s(self) -> F64:

@@ -12,7 +12,7 @@ from planning.formats.wpl import read_wpl
 from planning.model import Mission
 from telemetry.errors import RecordingError
 from telemetry.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
-from telemetry.obstacles import ObstacleAlert
+from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
 from telemetry.recording.flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
 from telemetry.recording.reader import Recording
@@ -21,7 +21,7 @@ from telemetry.recording.tlog_flight import mission_flown
 from telemetry.reduce import reduce
 from telemetry.vehicle import VehicleState
 
-_READ = (Topic.VEHICLE, Topic.TEXT, Topic.RAW, Topic.PLAN, Topic.COMMAND, Topic.ALERT)
+_READ = (Topic.VEHICLE, Topic.TEXT, Topic.RAW, Topic.PLAN, Topic.COMMAND, Topic.ALERT, Topic.AVOIDANCE)
 _GLOBAL_POSITION = 33
 _DECODED = frozenset({_GLOBAL_POSITION, 39, 44, 46, 47, 73, 86, 108})
 """Message ids of positions, missions, reached items, sent targets and the simulator's truth."""
@@ -41,6 +41,7 @@ class _Parts:
         self.commands: list[CommandRecord] = []
         self.plans: list[PlanRecord] = []
         self.alerts: list[ObstacleAlert] = []
+        self.avoidance: list[tuple[float, AvoidanceStatus]] = []
         self._decoder = mavlink.MAVLink(None)
 
     def on_state(self, state: VehicleState, t_utc_s: float) -> None:
@@ -49,6 +50,10 @@ class _Parts:
             self.facts = FrameFacts(state.system_id, state.component_id)
             for frame in self.early:
                 self.on_frame(frame)
+
+    def on_avoidance(self, status: AvoidanceStatus, t_utc_s: float) -> None:
+        if not self.avoidance or self.avoidance[-1][1].state != status.state:
+            self.avoidance.append((t_utc_s, status))
 
     def _when(self, state: VehicleState, t_utc_s: float) -> float:
         """A new position counts from when it came, though the state may have been published a little later."""
@@ -96,6 +101,8 @@ def read_mcap_flight(path: Path, data: Data) -> FlightLog:
             parts.plans.append(message)
         elif isinstance(message, ObstacleAlert) and message.phase != "goes_on":
             parts.alerts.append(message)
+        elif isinstance(message, AvoidanceStatus):
+            parts.on_avoidance(message, entry.t_utc_s)
     return _flight_log(recording, parts)
 
 
@@ -129,6 +136,7 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
         plan=plan,
         faults=tuple(faults),
         alerts=tuple(parts.alerts),
+        avoidance=tuple(parts.avoidance),
     )
 
 

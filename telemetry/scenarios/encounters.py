@@ -53,13 +53,14 @@ class Encounters:
 def encounters(flown: Flown, world: World, settings: PerceptionSettings) -> Encounters:
     passed = passings(flown, world, settings)
     false = false_alarms(flown, world)
-    per_km = len(false) / max(flown.way_m / 1000, 1e-9)
+    per_km = len(false) / (flown.way_m / 1000) if flown.way_m else math.nan
     missed = sum(not one.in_time for one in passed)
+    in_time = 1 - missed / len(passed) if passed else math.nan
     figures = (
         Figure("false alarms per km", per_km, most=MOST_FALSE_PER_KM),
-        Figure("share of unknown objects alarmed in time", 1 - missed / max(len(passed), 1), least=LEAST_ALARMED),
+        Figure("share of unknown objects alarmed in time", in_time, least=LEAST_ALARMED),
     )
-    flew = f"{flown.way_m:.0f} m flown, {len(passed)} unknown objects in the way"
+    flew = f"{flown.way_m:.0f} m flown, through {len(passed)} unknown objects in the way"
     return Encounters(per_km, missed, figures, (flew, *_words(passed, false, flown, world)))
 
 

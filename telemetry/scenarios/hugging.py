@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.dsm import Dsm
+from planning.errors import ParameterError
 from planning.model import Mission, PathParams, Poi, SurfaceParams
 from planning.plan import plan_mission
 from planning.request import PlanRequest
@@ -21,6 +22,7 @@ HEIGHT_M, RADIUS_M = 5.0, 20.0
 SPEED_M_S, FASTEST_M_S = 3.0, 5.0
 RIM_M = 12.0
 """Points keep this far from the model's rim and from unknown cells."""
+LEAST_APART_M = 40.0
 TRIES = 2000
 
 
@@ -61,10 +63,32 @@ def hugging(dsm: Dsm, pois: tuple[Poi, ...]) -> Hugging:
 
 
 def random_route(dsm: Dsm, random: np.random.Generator, *, points: int, apart_m: float) -> tuple[Poi, ...]:
-    """Points on known ground, each ``apart_m`` or more from the one before."""
+    """Points on known ground, each ``apart_m`` or more from the one before, or less on a small model.
+
+    Raises ParameterError where not even ``LEAST_APART_M`` is to be had.
+    """
+    route = _places(dsm, random, points, apart_m)
+    while len(route) < points and apart_m > LEAST_APART_M:
+        apart_m = max(0.75 * apart_m, LEAST_APART_M)
+        route = _places(dsm, random, points, apart_m)
+    if len(route) < points:
+        raise ParameterError(
+            f"The surface model has no room for a route of {points} points {LEAST_APART_M:.0f} m apart, "
+            f"{RIM_M:.0f} m from its rim and from unknown cells.",
+            where="surface model",
+            advice="Give a larger one.",
+        )
+    lat_lon = dsm.lat_lon_from_xy(np.array(route))
+    return tuple(Poi(float(lat), float(lon), f"P{number}") for number, (lat, lon) in enumerate(lat_lon, start=1))
+
+
+def _places(dsm: Dsm, random: np.random.Generator, points: int, apart_m: float) -> list[F64]:
+    """(x, y) of as many as were found."""
     west, south, east, north = dsm.bounds_m
     low, high = np.array([west, south]) + RIM_M, np.array([east, north]) - RIM_M
     route: list[F64] = []
+    if (high <= low).any():
+        return route
     for _ in range(TRIES):
         place = random.uniform(low, high)
         far = not route or np.hypot(*(place - route[-1])) >= apart_m
@@ -72,8 +96,7 @@ def random_route(dsm: Dsm, random: np.random.Generator, *, points: int, apart_m:
             route.append(place)
         if len(route) == points:
             break
-    lat_lon = dsm.lat_lon_from_xy(np.array(route))
-    return tuple(Poi(float(lat), float(lon), f"P{number}") for number, (lat, lon) in enumerate(lat_lon, start=1))
+    return route
 
 
 def _all_known(dsm: Dsm, place: F64) -> bool:

@@ -98,7 +98,7 @@ def _flown(wanted: Wanted, seconds: float, tell: Tell, growth: Growth) -> Flight
     return FlightResult(
         title="an hour over the hillside" if seconds == HOUR_S else f"{seconds:.0f} s over the hillside",
         duration_s=flown.armed_s,
-        contact=False,
+        contact=flown.contact,
         min_true_distance_m=flown.nearest_m,
         alerts=flown.alerts_seen(),
         radar=radar_figures(flown, setup),

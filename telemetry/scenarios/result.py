@@ -18,9 +18,16 @@ class Figure:
 
     words: str
     value: float
+    """NaN where there was nothing to measure it on: no limit is reached by that."""
     least: float | None = None
     most: float | None = None
     unit: str = ""
+
+    @property
+    def verdict(self) -> str:
+        if math.isnan(self.value):
+            return "not measured"
+        return "reached" if self.reached else "NOT REACHED"
 
     @property
     def reached(self) -> bool:
@@ -30,7 +37,7 @@ class Figure:
     def line(self) -> str:
         limit = f"at least {_short(self.least)}" if self.least is not None else ""
         limit = f"at most {_short(self.most)}" if self.most is not None else limit
-        verdict = "" if not limit else f"  ({limit}{self.unit}: {'reached' if self.reached else 'NOT REACHED'})"
+        verdict = f"  ({limit}{self.unit}: {self.verdict})" if limit else ""
         return f"{self.words}: {_short(self.value)}{self.unit}{verdict}"
 
 
@@ -61,6 +68,7 @@ class FlightResult:
     title: str
     duration_s: float
     contact: bool
+    """Where the vehicle flies on through what it meets, too."""
     min_true_distance_m: float
     """From the vehicle's centre to the nearest object; infinite in a world without any."""
     alerts: tuple[AlertSeen, ...]
@@ -178,7 +186,7 @@ def _flight_lines(flight: FlightResult) -> list[str]:
         if figures.voxels or figures.within_m:
             out.append(f"  {name}: {_map_words(figures)}")
     if flight.false_alarms_per_km is not None:
-        out.append(f"  false alarms per km {flight.false_alarms_per_km:.2f}, missed {flight.missed}")
+        out.append(f"  false alarms per km {_short(flight.false_alarms_per_km)}, missed {flight.missed}")
     out += [f"  {figure.line()}" for figure in flight.figures]
     return out + [f"  {note}" for note in flight.notes]
 
@@ -221,7 +229,7 @@ def _tallied(results: Sequence[ScenarioResult]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     for words in dict.fromkeys(figure.words for result in results for figure in result.figures):
         found = [figure for result in results for figure in result.figures if figure.words == words]
-        values = [figure.value for figure in found]
+        values = [figure.value for figure in found if not math.isnan(figure.value)] or [math.nan]
         out.append(
             {
                 "words": words,
@@ -235,7 +243,7 @@ def _tallied(results: Sequence[ScenarioResult]) -> list[dict[str, Any]]:
 
 
 def _short(value: float | None) -> str:
-    return "none" if value is None else f"{value:.3g}"
+    return "none" if value is None or math.isnan(value) else f"{value:.3g}"
 
 
 def _number(value: float | None) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from telemetry.scenarios.setup import Setup
 from telemetry.scenarios.strewn import strewn
 from telemetry.scenarios.wanted import Wanted
 from telemetry.simulator.scene import SceneTerrain, World
+from telemetry.simulator.scene.world_file import read_world
 
 F64 = NDArray[np.float64]
 
@@ -53,7 +55,7 @@ def run_over(
     flight = FlightResult(
         title="terrain hugging",
         duration_s=flown.duration_s,
-        contact=False,
+        contact=flown.contact,
         min_true_distance_m=flown.nearest_m,
         alerts=flown.alerts_seen(),
         radar=radar_figures(flown, setup),
@@ -67,18 +69,27 @@ def run_over(
 
 
 def _setup(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator, most_m: float) -> Setup:
-    if wanted.world is not None:
-        world = World.load(wanted.world, frame=plan.frame, dsm=plan.dsm)
-    else:
-        terrain = SceneTerrain.from_dsm(plan.dsm, plan.frame)
-        objects = strewn(plan.line_enu_m, terrain, random)
-        world = World.parse(world_document(name, objects), frame=plan.frame, terrain=terrain)
     return Setup(
         title=name,
-        world=world,
+        world=world_of(plan, wanted, name, random),
         seed=wanted.seed,
         mission=plan.mission,
         ground=surveyed(plan.dsm, wanted.seed),
         solid=False,
         most_m=min(most_m, plan.length_m),
     )
+
+
+def world_of(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator) -> World:
+    """The wanted one, or things strewn over the plan's own ground. Raises FormatError for a broken file."""
+    if wanted.world is not None and not _is_bare(wanted.world):
+        return World.load(wanted.world, frame=plan.frame, dsm=plan.dsm)
+    terrain = SceneTerrain.from_dsm(plan.dsm, plan.frame)
+    objects = strewn(plan.line_enu_m, terrain, random)
+    return World.parse(world_document(name, objects), frame=plan.frame, terrain=terrain)
+
+
+def _is_bare(path: Path) -> bool:
+    """Ground and nothing on it: things are strewn there as on the scenario's own."""
+    file = read_world(path)
+    return file.dsm is not None and not file.shapes

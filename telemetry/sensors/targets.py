@@ -8,7 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mapping.radar.detections import Detections
+from telemetry.errors import RecordingError
 from telemetry.messages import Topic
+from telemetry.recording.sink import describe
 from telemetry.recording.writer import RecordingWriter
 from telemetry.sensing import RadarFrame, packed
 
@@ -31,9 +33,17 @@ def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_u
 
     Returns how many were written. A file of that name is replaced once the new one is whole. Raises RecordingError.
     """
+    try:
+        return _write_targets(path, frames, t_utc_s, source)
+    except RecordingError as error:
+        advice = f"Check that the folder {path.parent.absolute()} exists, may be written to and has space."
+        raise type(error)(error.what, where=str(path), advice=advice) from error
+
+
+def _write_targets(path: Path, frames: Iterable[tuple[float, Detections]], t_utc_s: float, source: str) -> int:
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     written = 0
-    with contextlib.suppress(FileNotFoundError):
+    with contextlib.suppress(OSError):
         part.unlink()
     writer = RecordingWriter(part, t_utc_s=t_utc_s, t_mono_s=0.0, name=source)
     try:
@@ -42,9 +52,16 @@ def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_u
             writer.write(Topic.RADAR_FRAME, frame, t_utc_s + t_s)
             written += 1
         writer.close()
-        part.replace(path)
+        _put(part, path)
     except BaseException:
         writer.abandon()
         part.unlink(missing_ok=True)
         raise
     return written
+
+
+def _put(part: Path, path: Path) -> None:
+    try:
+        part.replace(path)
+    except OSError as error:
+        raise describe(error, path) from error

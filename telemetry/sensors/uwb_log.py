@@ -20,6 +20,14 @@ FORMAT, VERSION = "hedgehop-uwb", 1
 MOST_BYTES = 512 * 1024**2
 """Unpacked: half an hour of 256 bins at 100 Hz as float64 is less."""
 MOST_BINS = 4096
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.5
+"""From scan to scan: a longer one is no time in view."""
+_WGS84 = "Give WGS84 degrees."
+ANGLES_DEG = (
+    ("lat_deg", (-90.0, 90.0), _WGS84),
+    ("lon_deg", (-180.0, 180.0), _WGS84),
+    ("heading_deg", (-360.0, 720.0), "Give degrees clockwise from true north."),
+)
 PER_SCAN = ("t_s", "lat_deg", "lon_deg", "heading_deg")
 ADVICE = "docs/uwb.md describes the file; numpy.savez_compressed writes one."
 
@@ -127,10 +135,28 @@ def _check_lengths(intensity: NDArray[Any], scans: Arrays, name: str) -> None:
     if (np.diff(scans["t_s"]) < 0).any():
         at = int(np.argmax(np.diff(scans["t_s"]) < 0)) + 1
         raise FormatError(f"The time of scan {at} is before the one of its predecessor.", where=f"{name}: t_s")
-    for field, most in (("lat_deg", 90.0), ("lon_deg", 180.0)):
-        worst = float(np.abs(scans[field]).max())
-        if worst > most:
-            raise FormatError(f"{worst:g} is no such angle.", where=f"{name}: {field}", advice="Give WGS84 degrees.")
+    _check_times(scans["t_s"], name)
+    for field, (least, most), advice in ANGLES_DEG:
+        wrong = scans[field][(scans[field] < least) | (scans[field] > most)]
+        if len(wrong):
+            raise FormatError(f"{wrong[0]:g} is no such angle.", where=f"{name}: {field}", advice=advice)
+
+
+def _check_times(t_s: NDArray[np.float64], name: str) -> None:
+    """What a cell is worth is told by the time that it was in view: in another unit all figures would be wrong."""
+    where, steps_s = f"{name}: t_s", np.diff(t_s)
+    steps_s = steps_s[steps_s > 0]
+    if len(t_s) < 2:
+        return
+    if not len(steps_s):
+        raise FormatError("No time passes: all scans have the same.", where=where, advice="Give each its own, in s.")
+    usual_s = float(np.median(steps_s))
+    if not SHORTEST_STEP_S <= usual_s <= LONGEST_STEP_S:
+        raise FormatError(
+            f"Scans usually follow each other after {usual_s:g} s; {SHORTEST_STEP_S:g} to {LONGEST_STEP_S:g} s can be.",
+            where=where,
+            advice="Give the times in seconds, not in milliseconds or ticks.",
+        )
 
 
 def _scalar(fields: Arrays, field: str, otherwise: float, name: str) -> float:

@@ -13,6 +13,7 @@ from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import Point, Station
 from tests.e2e.steps import (
     connect,
+    hold,
     open_recording,
     play,
     return_home,
@@ -143,6 +144,39 @@ def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page
     expect(polar).to_have_attribute("data-range", "20")
     page.get_by_test_id("polar-farther").click()
     expect(polar).to_have_attribute("data-range", "40")
+    _maps_begin_anew_when_held_for(page)
+
+
+def _maps_begin_anew_when_held_for(page: Page) -> None:
+    page.get_by_test_id("map-settings").locator("summary").click()
+    edge, memory = page.get_by_test_id("perception-radar_resolution_m"), page.get_by_test_id("perception-memory_mb")
+    anew = page.get_by_test_id("begins-anew")
+    expect(edge).to_have_value("1")
+    expect(anew).to_have_count(0)
+    edge.fill("0.1")
+    edge.press("Enter")
+    expect(anew).to_contain_text("The radar's map begins anew")
+    for _ in range(2):  # as assistive technology does: what is refused leaves the button where it is
+        page.get_by_test_id("begin-anew").evaluate("button => button.click()")
+    section = page.get_by_test_id("section-obstacles")
+    expect(section.get_by_test_id("error-box")).to_contain_text(re.compile(r"A corridor .* points"))
+    edge.fill("0.8")
+    edge.press("Enter")
+    memory.fill("500")
+    memory.press("Enter")
+    expect(anew).to_contain_text("The radar's, camera's and range finder's maps begin anew")
+    hold(page, "begin-anew")
+    expect(anew).to_have_count(0)
+    expect(section.get_by_test_id("error-box")).to_have_count(0)
+    expect(edge).to_have_value("0.8")
+    memory.fill("99999")
+    memory.press("Enter")
+    for _ in range(2):
+        page.get_by_test_id("begin-anew").evaluate("button => button.click()")
+    expect(section.get_by_test_id("error-box")).to_contain_text("this computer has")
+    page.get_by_test_id("keep-maps").click()
+    expect(memory).to_have_value("500")
+    expect(section.get_by_test_id("error-box")).to_have_count(0)
 
 
 def test_without_the_server_hold_and_return_are_disabled_and_say_why(own_station: Station, page: Page) -> None:

@@ -97,6 +97,35 @@ def test_a_new_place_is_believed_when_it_has_lasted() -> None:
     assert told.index(None) == pytest.approx(TrackParams().settle_s / 0.2, abs=2)
 
 
+def at_speed(speed_m_s: float) -> PoseTrack:
+    """Northward for 5 s, at 20 Hz."""
+    track = PoseTrack()
+    for k in range(101):
+        assert track.add_position(k / 20, (0.0, speed_m_s * k / 20, 10.0), (0.0, speed_m_s, 0.0)) is None
+    return track
+
+
+@pytest.mark.parametrize("speed_m_s", [3.0, 15.0])
+@pytest.mark.parametrize("jump_m", [(0.0, -100.0), (0.0, 100.0), (100.0, 0.0), (-30.0, -30.0)])
+def test_no_direction_of_a_jump_is_believed_sooner(jump_m: tuple[float, float], speed_m_s: float) -> None:
+    track = at_speed(speed_m_s)
+    for k in range(101, 300):
+        place = (jump_m[0], speed_m_s * k / 20 + jump_m[1], 10.0)
+        assert track.add_position(k / 20, place, (0.0, speed_m_s, 0.0)) == "position jumped"
+    true = (0.0, speed_m_s * 15.0, 10.0)
+    assert track.add_position(15.0, true, (0.0, speed_m_s, 0.0)) is None
+
+
+def test_where_a_vehicle_turned_and_braked_meanwhile_it_is_believed_at_once() -> None:
+    track, north_m, east_m = at_speed(15.0), 75.0, 0.0
+    for k in range(101, 201):
+        north_m_s, east_m_s = (max(0.0, 15.0 - 0.3 * (k - 100)), min(8.0, 0.2 * (k - 100)))
+        north_m, east_m = north_m + north_m_s / 20, east_m + east_m_s / 20
+        told = track.add_position(k / 20, (east_m, north_m - 100.0, 10.0), (east_m_s, north_m_s, 0.0))
+        assert told == "position jumped"
+    assert track.add_position(10.05, (east_m + 0.4, north_m, 10.0), (8.0, 0.0, 0.0)) is None
+
+
 @given(st.lists(st.tuples(st.floats(0, 100), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), max_size=40))
 def test_whatever_comes_the_believed_path_never_jumps(samples: list[tuple[float, float, float]]) -> None:
     params = TrackParams(settle_s=1e6)

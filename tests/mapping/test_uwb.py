@@ -231,6 +231,8 @@ def test_a_log_learns_first_and_says_when_it_cannot() -> None:
     assert found.cleared[BUSH]
     with pytest.raises(ParameterError, match="0 of 30 scans look at nothing but traversable ground"):
         clear(lawn(), scans[30:], poses[30:], geometry=GEOMETRY, north_m=20.0)
+    with pytest.raises(ParameterError, match="No time passes"):
+        clear(lawn(), scans, [replace(pose, t_s=7.0) for pose in poses], geometry=GEOMETRY, north_m=20.0)
 
 
 def test_time_is_counted_between_scans_and_not_across_pauses() -> None:

@@ -28,6 +28,11 @@ def alert(
     return ObstacleAlert(alert_id, sensor, kind, phase, **fields)
 
 
+def approach(**more: Any) -> ObstacleAlert:
+    """Of the track t7."""
+    return alert("t7", kind="approach", **more)
+
+
 def obstacle(distance_m: float = 12.0) -> Obstacle:
     return Obstacle(
         region="roi",

@@ -8,6 +8,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+QUICKLY_DOWN = ("--parameter=LAND_SPEED=150", "--parameter=LAND_ALT_LOW=200")
+"""Options of a vehicle that does not creep over its last ten metres."""
+
 
 @contextmanager
 def simulated_vehicle(home: str, *options: object) -> Iterator[str]:

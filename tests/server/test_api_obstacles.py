@@ -68,7 +68,12 @@ def test_the_one_in_charge_is_heard(
     [
         ("settings", {"radar_depth_m": 1.0}),
         ("settings", {"fov_deg": 500}),
-        ("settings", {"memory_limit_bytes": 1}),
+        ("settings", {"memory_limit_bytes": 999_999}),
+        ("settings", {"radar_resolution_m": 0.01}),
+        ("settings", {"vision_resolution_m": 6}),
+        ("settings", {"vehicle_radius_m": 0}),
+        ("settings", {"position_error_m": -0.1}),
+        ("settings", {"brake_m_s2": 0.1}),
         ("settings", {"radar_variant": "upside_down"}),
         ("avoidance", {}),
         ("seen", {"seen": True, "sensors": ["sonar"]}),
@@ -77,6 +82,19 @@ def test_the_one_in_charge_is_heard(
 def test_what_makes_no_sense_is_refused(served: Running, pilot: httpx.Client, path: str, body: dict[str, Any]) -> None:
     assert pilot.put(f"/api/obstacles/{path}", json=body).status_code == 422
     assert served.flying.asked == []
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"memory_limit_bytes": 20_000_000},
+        {"radar_resolution_m": 0.5, "vision_resolution_m": 0.25},
+        {"vehicle_radius_m": 1.2, "position_error_m": 0.0, "brake_m_s2": 4.0},
+    ],
+)
+def test_the_maps_memory_and_voxels_can_be_set(served: Running, pilot: httpx.Client, body: dict[str, Any]) -> None:
+    assert pilot.put("/api/obstacles/settings", json=body).is_success
+    assert served.flying.asked == [("change_settings", PerceptionSettingsBody(**body))]
 
 
 def test_a_map_is_a_file_by_its_sensor_and_kind(served: Running) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from server.sensor_token import sensor_token
@@ -20,7 +21,7 @@ from tests.server.cli_runs import hedgehop
 from tests.server.running import Running, running
 from tests.telemetry.test_ti_config import GOOD
 from tests.telemetry.ti_board import Board, plugged
-from tests.telemetry.ti_packets import sdk3
+from tests.telemetry.ti_packets import packet, sdk3, side_information, tlv
 
 pytestmark = pytest.mark.xdist_group("sensor-link")
 PATIENCE_S = 90.0
@@ -57,7 +58,9 @@ def radar_frames(server: Running) -> list[RadarFrame]:
 
 
 def test_a_capture_reaches_the_bus_and_its_lost_frames_are_gaps(server: Running, folder: Path) -> None:
-    (folder / "capture.bin").write_bytes(frame(1) + b"noise" + frame(2) + frame(5))
+    profile = tlv(2, bytes(2 * 128))
+    second = packet(2, 2, [tlv(1, np.array(POINTS, "<f4").tobytes()), side_information([20.0, 15.5]), profile])
+    (folder / "capture.bin").write_bytes(frame(1) + b"noise" + second + frame(5))
     arguments = ("--ti-capture", folder / "capture.bin", "--ti-config", folder / "radar.cfg")
     done = subprocess.run(
         command(server, folder, *arguments), capture_output=True, text=True, timeout=2 * PATIENCE_S, check=False
@@ -66,6 +69,7 @@ def test_a_capture_reaches_the_bus_and_its_lost_frames_are_gaps(server: Running,
     answer = json.loads(done.stdout)
     assert (answer["sent"], answer["received"], answer["lost"]) == (3, 3, 2)
     assert (answer["radar"]["bad_bytes"], answer["radar"]["lost_packets"], answer["radar"]["points"]) == (5, 2, 6)
+    assert done.stderr.count("128 range cells and radar.cfg makes 256") == 1
     frames = radar_frames(server)
     assert [one.number for one in frames] == [0, 1, 4]
     assert rows(frames[0].xyz_m, 3).tolist() == [[1.0, 20.0, 0.5], [-4.0, 60.0, 2.0]]
@@ -114,8 +118,12 @@ def send_until(server: Running, board: Board, *, wanted: int) -> None:
     [(("--ti-data", "/dev/ttyACM1"), "configuration is missing"),
      (("--ti-config", "radar.cfg"), "no radar for this configuration"),
      (("--ti-config-port", "/dev/ttyACM0"), "needs a data port"),
+     (("--ti-baud", "921600"), "A baud rate needs a data port"),
+     (("--ti-baud", "115200", "--ti-capture", "a.bin"), "A baud rate needs a data port"),
      (("--ti-capture", "a.bin", "--recording", "b.mcap"), "two sources"),
-     (("--ti-capture", "a.bin", "--ti-config", "none.cfg"), "No such file"),
+     (("--ti-capture", "token.txt", "--ti-config", "none.cfg"), "none.cfg: No such file"),
+     (("--ti-capture", "none.bin"), "none.bin: No such file"),
+     (("--recording", "none.mcap"), "none.mcap: No such file"),
      (("--ti-data", "/dev/nowhere", "--ti-config", "mute.cfg"), "sends no points"),
      (("--ti-data", "/dev/nowhere", "--ti-config", "broken.cfg"), "broken.cfg, line 8")],
 )  # fmt: skip
@@ -128,6 +136,7 @@ def test_what_does_not_go_together_is_said(
     run = hedgehop("agent", NOWHERE, "--token-file", "token.txt", *arguments)
     assert run.code == 2
     assert words in run.err
+    assert "ground station" not in run.err
 
 
 def test_a_port_that_is_not_there_is_said_before_anybody_is_called(folder: Path) -> None:

@@ -24,11 +24,15 @@ from server.errors import StorageError
 from telemetry.messages import OnboardMission, Rounded, UploadReport
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
-from tests.server.simulated import simulated_vehicle
+from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
+
+# On one worker: two would each fly the mission for themselves.
+pytestmark = pytest.mark.xdist_group("cli-flying")
 
 SHORT = mission([(50.0, 150.0, 12.0), (90.0, 150.0, 12.0), (90.0, 175.0, 14.0)])
 TO_AND_FRO = mission([(50.0, 150.0, 12.0), *8 * [(110.0, 150.0, 12.0), (60.0, 150.0, 12.0)]])
 """Still on its way when a busy machine has heard Ctrl+C twice."""
+VEHICLE = ("--boot-s", 1, "--parameter", "RTL_ALT=2000", *QUICKLY_DOWN)
 HOME = f"{SHORT.home.lat_deg:.7f},{SHORT.home.lon_deg:.7f},100"
 KEYS = [
     "completed", "cross_track_max_m", "cross_track_mean_m", "cross_track_p95_m", "height_error_max_m",
@@ -54,7 +58,7 @@ def write_mission(path: Path, flight: Mission) -> Path:
 def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
     folder = tmp_path_factory.mktemp("ground")
     write_dsm(folder / "plain.tif", PLAIN)
-    with simulated_vehicle(HOME, "--speedup", 15, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
+    with simulated_vehicle(HOME, "--speedup", 15, *VEHICLE) as link:
         yield Ground(folder / "plain.tif", write_mission(folder / "short.waypoints", SHORT), link)
 
 
@@ -211,7 +215,7 @@ def test_review_without_figures(shared_data: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_ctrl_c_in_the_air_asks_twice_before_it_commands_the_return(ground: Ground, tmp_path: Path) -> None:
     record, long = tmp_path / "cut.mcap", write_mission(tmp_path / "long.waypoints", TO_AND_FRO)
-    with simulated_vehicle(HOME, "--speedup", 8, "--boot-s", 1, "--parameter", "RTL_ALT=2000") as link:
+    with simulated_vehicle(HOME, "--speedup", 8, *VEHICLE) as link:
         command = [sys.executable, "-c", "from server.cli import main; main()", "fly", str(long)]
         command += ["--link", link, "--dsm", str(ground.dsm), "--profile", "mapper-rtk", "--record", str(record)]
         process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

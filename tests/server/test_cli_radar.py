@@ -120,9 +120,13 @@ def test_what_is_wrong_is_said_before_anything_is_written(tmp_path: Path) -> Non
         ((good, "--sensor", "position2go", "--cfg", tmp_path / "radar.cfg"), "no .cfg"),
         ((good, "--sensor", "position2go", "--out", tmp_path / "a.csv"), "no format of recordings"),
         ((good, "--sensor", "position2go", "--plot-frame", 5, "--plots", tmp_path), "Frame 5 is not in the file"),
+        ((good, "--sensor", "position2go", "--plot-frame", 5, "--plots", tmp_path / "p", "--out", tmp_path / "a.mcap"),
+         "Frame 5 is not in the file"),
         ((both, "--sensor", "position2go", "--out", tmp_path / "a.mcap"), "holed.npy, frame 1"),
+        ((both, "--sensor", "position2go", "--plots", tmp_path), "holed.npy, frame 1"),
+        ((good, "--sensor", "position2go", "--out", tmp_path / "nowhere" / "a.mcap"), f"{tmp_path}/nowhere/a.mcap"),
         ((tmp_path / "radar.cfg",), "no format of raw samples"),
-    ):
+    ):  # fmt: skip
         run = hedgehop("radar", "process", *arguments)
         assert run.code == 2, arguments
         assert words in run.err

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,9 @@ from telemetry.mavlink.verify import compare, digest
 from telemetry.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
 from telemetry.requests import Arm, Download, Operator, ReadParameters, StartAuto, StartGuided, Upload
 from telemetry.vehicle import VehicleState
+
+# On one worker: two would each make the plan and start their processes.
+pytestmark = pytest.mark.xdist_group("flying-desk")
 
 ME = Operator("Anna", 7)
 
@@ -156,205 +158,217 @@ class Bench:
         return state.onboard.digest
 
 
-@contextlib.asynccontextmanager
-async def lanes() -> AsyncIterator[tuple[Lane, Lane]]:
+@pytest.fixture(scope="module")
+def runner() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def both(runner: asyncio.Runner) -> Iterator[tuple[Lane, Lane]]:
+    """For planning and for flying: processes that take a while to start."""
     plan, flight = Lane("plan"), Lane("flight")
-    try:
-        yield plan, flight
-    finally:
-        await plan.close()
-        await flight.close()
+    yield plan, flight
+    runner.run(plan.close())
+    runner.run(flight.close())
 
 
-def test_a_flight_from_upload_to_start(made: Made, tmp_path: Path) -> None:
+def test_a_flight_from_upload_to_start(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            uploaded = (await bench.desk.upload(ME, 3)).onboard
-            assert (uploaded.state, uploaded.plan_name, uploaded.is_open_plan) == ("verified", "Demo flight", True)
-            assert uploaded.items == len(bench.vehicle.items) > 5
-            assert "whole centimetres" in uploaded.rounded_note
-            with pytest.raises(CheckNeededError, match="not been checked"):
-                await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
-            checked = (await bench.desk.check(ME)).preflight
-            assert checked is not None
-            assert checked.ok
-            assert [row.code for row in checked.rows if row.state != "good"] == []
-            assert checked.min_distance_m is not None
-            assert checked.min_distance_m > 3.3
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        uploaded = (await bench.desk.upload(ME, 3)).onboard
+        assert (uploaded.state, uploaded.plan_name, uploaded.is_open_plan) == ("verified", "Demo flight", True)
+        assert uploaded.items == len(bench.vehicle.items) > 5
+        assert "whole centimetres" in uploaded.rounded_note
+        with pytest.raises(CheckNeededError, match="not been checked"):
             await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
-            assert bench.vehicle.told == [StartAuto(ME, uploaded.digest or "")]
-            assert bench.records[-1].digest == uploaded.digest
-            assert '"certified": true' in bench.records[-1].certificate_json
-            assert read_wpl(bench.records[-1].mission_wpl).items
-            assert {state.busy for state in bench.told} >= {"Uploading", "Checking the start", "Starting", ""}
+        checked = (await bench.desk.check(ME)).preflight
+        assert checked is not None
+        assert checked.ok
+        assert [row.code for row in checked.rows if row.state != "good"] == []
+        assert checked.min_distance_m is not None
+        assert checked.min_distance_m > 3.3
+        await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
+        assert bench.vehicle.told == [StartAuto(ME, uploaded.digest or "")]
+        assert bench.records[-1].digest == uploaded.digest
+        assert '"certified": true' in bench.records[-1].certificate_json
+        assert read_wpl(bench.records[-1].mission_wpl).items
+        assert {state.busy for state in bench.told} >= {"Uploading", "Checking the start", "Starting", ""}
 
-            bench.desk.on_flight(FlightStatus(phase="interrupted", broke_off_at=9))
-            assert bench.desk.state.resume_from_item == 9
-            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", from_item=9))
-            resumed = bench.vehicle.told[-1]
-            assert isinstance(resumed, StartAuto)
-            assert resumed.from_item >= 9
-            assert resumed.climb_to_m is not None
-            assert resumed.climb_to_m > 5.0
+        bench.desk.on_flight(FlightStatus(phase="interrupted", broke_off_at=9))
+        assert bench.desk.state.resume_from_item == 9
+        await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", from_item=9))
+        resumed = bench.vehicle.told[-1]
+        assert isinstance(resumed, StartAuto)
+        assert resumed.from_item >= 9
+        assert resumed.climb_to_m is not None
+        assert resumed.climb_to_m > 5.0
 
-            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", way="guided"))
-            script = bench.vehicle.told[-1]
-            assert isinstance(script, StartGuided)
-            assert len(script.targets) > 5
-            assert script.targets[-1].t_s is not None
+        await bench.desk.start(ME, StartFlight(digest=uploaded.digest or "", way="guided"))
+        script = bench.vehicle.told[-1]
+        assert isinstance(script, StartGuided)
+        assert len(script.targets) > 5
+        assert script.targets[-1].t_s is not None
 
-            bench.desk.on_disarmed()
-            assert bench.desk.state.preflight is None
-            with pytest.raises(CheckNeededError, match="not been checked"):
-                await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
+        bench.desk.on_disarmed()
+        assert bench.desk.state.preflight is None
+        with pytest.raises(CheckNeededError, match="not been checked"):
+            await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
 
-            again = Bench(made, tmp_path / "onboard.json", both)
-            again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest=uploaded.digest))
-            assert again.desk.state.onboard.plan_name == "Demo flight"
-            again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest="another"))
-            assert (again.desk.state.onboard.plan_name, again.desk.state.onboard.state) == ("", "verified")
+        again = Bench(made, tmp_path / "onboard.json", both)
+        again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest=uploaded.digest))
+        assert again.desk.state.onboard.plan_name == "Demo flight"
+        again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest="another"))
+        assert (again.desk.state.onboard.plan_name, again.desk.state.onboard.state) == ("", "verified")
 
-    asyncio.run(scenario())
+    runner.run(scenario())
 
 
-def test_another_home_moves_the_heights(made: Made, tmp_path: Path) -> None:
+def test_another_home_moves_the_heights(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            before = (await bench.desk.upload(ME, 3)).onboard.digest
-            bench.state = made.standing(north_m=14.0)
-            state = await bench.desk.check(ME)
-            assert state.preflight is not None
-            assert state.preflight.rereferenced
-            assert state.preflight.home_shift_m is not None
-            assert abs(state.preflight.home_shift_m) > 0.3
-            assert state.onboard.digest != before
-            assert state.onboard.is_open_plan
-            moved, planned = read_wpl(bench.records[-1].mission_wpl), read_wpl(bench.records[0].mission_wpl)
-            lower_m = planned.items[-2].alt_m - moved.items[-2].alt_m
-            assert lower_m == pytest.approx(state.preflight.home_shift_m, abs=0.02)
-            row = next(row for row in state.preflight.rows if row.code == "home")
-            assert row.state == "good"
-            assert "heights were moved" in row.text
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        before = (await bench.desk.upload(ME, 3)).onboard.digest
+        bench.state = made.standing(north_m=14.0)
+        state = await bench.desk.check(ME)
+        assert state.preflight is not None
+        assert state.preflight.rereferenced
+        assert state.preflight.home_shift_m is not None
+        assert abs(state.preflight.home_shift_m) > 0.3
+        assert state.onboard.digest != before
+        assert state.onboard.is_open_plan
+        moved, planned = read_wpl(bench.records[-1].mission_wpl), read_wpl(bench.records[0].mission_wpl)
+        lower_m = planned.items[-2].alt_m - moved.items[-2].alt_m
+        assert lower_m == pytest.approx(state.preflight.home_shift_m, abs=0.02)
+        row = next(row for row in state.preflight.rows if row.code == "home")
+        assert row.state == "good"
+        assert "heights were moved" in row.text
+        await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
+        bench.state = made.standing(north_m=20.0)
+        with pytest.raises(CheckNeededError, match="was moved"):
             await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
-            bench.state = made.standing(north_m=20.0)
-            with pytest.raises(CheckNeededError, match="was moved"):
-                await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
 
-    asyncio.run(scenario())
+    runner.run(scenario())
 
 
-def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(made: Made, tmp_path: Path) -> None:
+def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     def status(digest_: str, **changes: Any) -> LinkStatus:
         now = LinkStatus(time.monotonic(), adopted=QUAD, mission_state="verified", mission_digest=digest_)
         return replace(now, **changes)
 
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            digest_ = await bench.ready()
-            bench.desk.on_link(status(digest_))
-            bench.desk.on_link(LinkStatus(0.0, mission_state="unknown"))
-            assert bench.desk.state.preflight is not None, "a status from before the check takes nothing back"
-            others: list[dict[str, Any]] = [
-                {"adopted": replace(QUAD, id="udp/2/1", system_id=2)},
-                {"mission_state": "unknown"},
-                {"mission_digest": "another"},
-            ]
-            for changes in others:
-                bench.desk.on_link(status(digest_))
-                await bench.desk.check(ME)
-                bench.desk.on_link(status(digest_, **changes))
-                assert bench.desk.state.preflight is None
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        digest_ = await bench.ready()
+        bench.desk.on_link(status(digest_))
+        bench.desk.on_link(LinkStatus(0.0, mission_state="unknown"))
+        assert bench.desk.state.preflight is not None, "a status from before the check takes nothing back"
+        others: list[dict[str, Any]] = [
+            {"adopted": replace(QUAD, id="udp/2/1", system_id=2)},
+            {"mission_state": "unknown"},
+            {"mission_digest": "another"},
+        ]
+        for changes in others:
             bench.desk.on_link(status(digest_))
             await bench.desk.check(ME)
-            # Its home is where it took off last; what counts is where it stands.
-            bench.state = replace(made.standing(), lat_deg=made.home[0] + 1e-4)
-            with pytest.raises(CheckNeededError, match="was moved"):
-                await bench.desk.start(ME, StartFlight(digest=digest_))
-            bench.state = replace(made.standing(), autopilot="px4")
-            with pytest.raises(NotAllowedError, match="made for ArduPilot"):
-                await bench.desk.check(ME)
-
-    asyncio.run(scenario())
-
-
-def test_what_must_be_accepted_is_not_flown_without(made: Made, tmp_path: Path) -> None:
-    async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            bench.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
-            digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
-            state = await bench.desk.check(ME)
-            assert state.preflight is not None
-            assert [row.code for row in state.preflight.rows if row.state == "accept"] == ["gnss"]
-            with pytest.raises(CheckNeededError, match="GNSS"):
-                await bench.desk.start(ME, StartFlight(digest=digest_))
-            await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss"]))
-            bench.state = replace(made.standing(), gnss_fix="no_fix")
+            bench.desk.on_link(status(digest_, **changes))
+            assert bench.desk.state.preflight is None
+        bench.desk.on_link(status(digest_))
+        await bench.desk.check(ME)
+        # Its home is where it took off last; what counts is where it stands.
+        bench.state = replace(made.standing(), lat_deg=made.home[0] + 1e-4)
+        with pytest.raises(CheckNeededError, match="was moved"):
+            await bench.desk.start(ME, StartFlight(digest=digest_))
+        bench.state = replace(made.standing(), autopilot="px4")
+        with pytest.raises(NotAllowedError, match="made for ArduPilot"):
             await bench.desk.check(ME)
-            with pytest.raises(CheckNeededError, match="no fix"):
-                await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))
 
-    asyncio.run(scenario())
+    runner.run(scenario())
 
 
-def test_what_is_not_ready_is_not_uploaded(made: Made, tmp_path: Path) -> None:
+def test_what_must_be_accepted_is_not_flown_without(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            with pytest.raises(StaleRevisionError):
-                await bench.desk.upload(ME, 2)
-            bench.plan = made.plan(state="running")
-            with pytest.raises(NotReadyError):
-                await bench.desk.upload(ME, 3)
-            result = made.computation.result
-            assert result is not None
-            bench.plan = made.plan(result=result.model_copy(update={"certified": False}))
-            with pytest.raises(NotCertifiedError):
-                await bench.desk.upload(ME, 3)
-            assert bench.vehicle.items == ()
-            assert bench.desk.state.busy == ""
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
+        digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
+        state = await bench.desk.check(ME)
+        assert state.preflight is not None
+        assert [row.code for row in state.preflight.rows if row.state == "accept"] == ["gnss"]
+        with pytest.raises(CheckNeededError, match="GNSS"):
+            await bench.desk.start(ME, StartFlight(digest=digest_))
+        await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss"]))
+        bench.state = replace(made.standing(), gnss_fix="no_fix")
+        await bench.desk.check(ME)
+        with pytest.raises(CheckNeededError, match="no fix"):
+            await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))
 
-    asyncio.run(scenario())
+    runner.run(scenario())
 
 
-def test_a_vehicle_that_keeps_another_mission_is_not_started(made: Made, tmp_path: Path) -> None:
+def test_what_is_not_ready_is_not_uploaded(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            bench.vehicle.swaps_two_items = True
-            with pytest.raises(TransferError, match="does not hold the mission"):
-                await bench.desk.upload(ME, 3)
-            with pytest.raises(MissionUnknownError):
-                await bench.desk.check(ME)
-            bench.vehicle.swaps_two_items = False
-            digest_ = await bench.ready()
-            bench.vehicle.items = bench.vehicle.items[:-1]
-            with pytest.raises(MissionUnknownError):
-                await bench.desk.check(ME)
-            with pytest.raises(CheckNeededError):
-                await bench.desk.start(ME, StartFlight(digest=digest_))
-            assert bench.vehicle.told == []
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        with pytest.raises(StaleRevisionError):
+            await bench.desk.upload(ME, 2)
+        bench.plan = made.plan(state="running")
+        with pytest.raises(NotReadyError):
+            await bench.desk.upload(ME, 3)
+        result = made.computation.result
+        assert result is not None
+        bench.plan = made.plan(result=result.model_copy(update={"certified": False}))
+        with pytest.raises(NotCertifiedError):
+            await bench.desk.upload(ME, 3)
+        assert bench.vehicle.items == ()
+        assert bench.desk.state.busy == ""
 
-    asyncio.run(scenario())
+    runner.run(scenario())
 
 
-def test_one_thing_at_a_time_but_commands_always(made: Made, tmp_path: Path) -> None:
+def test_a_vehicle_that_keeps_another_mission_is_not_started(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
     async def scenario() -> None:
-        async with lanes() as both:
-            bench = Bench(made, tmp_path / "onboard.json", both)
-            first = asyncio.create_task(bench.desk.upload(ME, 3))
-            while not bench.desk.state.busy:
-                await asyncio.sleep(0)
-            with pytest.raises(ConflictError, match="Uploading"):
-                await bench.desk.check(ME)
-            await bench.desk.command(Arm(ME))
-            assert bench.vehicle.told == [Arm(ME)]
-            await first
-            bench.state = None
-            with pytest.raises(NoVehicleError):
-                await bench.desk.check(ME)
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench.vehicle.swaps_two_items = True
+        with pytest.raises(TransferError, match="does not hold the mission"):
+            await bench.desk.upload(ME, 3)
+        with pytest.raises(MissionUnknownError):
+            await bench.desk.check(ME)
+        bench.vehicle.swaps_two_items = False
+        digest_ = await bench.ready()
+        bench.vehicle.items = bench.vehicle.items[:-1]
+        with pytest.raises(MissionUnknownError):
+            await bench.desk.check(ME)
+        with pytest.raises(CheckNeededError):
+            await bench.desk.start(ME, StartFlight(digest=digest_))
+        assert bench.vehicle.told == []
 
-    asyncio.run(scenario())
+    runner.run(scenario())
+
+
+def test_one_thing_at_a_time_but_commands_always(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        first = asyncio.create_task(bench.desk.upload(ME, 3))
+        while not bench.desk.state.busy:
+            await asyncio.sleep(0)
+        with pytest.raises(ConflictError, match="Uploading"):
+            await bench.desk.check(ME)
+        await bench.desk.command(Arm(ME))
+        assert bench.vehicle.told == [Arm(ME)]
+        await first
+        bench.state = None
+        with pytest.raises(NoVehicleError):
+            await bench.desk.check(ME)
+
+    runner.run(scenario())

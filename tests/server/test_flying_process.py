@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from telemetry.node_lock import running_nodes
-from tests.server.simulated import simulated_vehicle
+from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
 from tests.server.test_process import command, free_port
 
@@ -27,6 +27,8 @@ pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
 LONG_S = 3 * PATIENCE_S
 HOME = "37.729020492,14.992623645,1711.986"
 """Of the demo's plan."""
+SPEEDUP = 2
+"""It is still on its mission when the second server has started."""
 
 
 _started: list[Server] = []
@@ -96,7 +98,7 @@ def _flown(message: dict[str, Any], metres: float) -> bool:
 
 def test_a_flight_outlives_its_servers(data_dir: Path) -> None:
     port = free_port()
-    with simulated_vehicle(HOME, "--speedup", 1, "--parameter", "RTL_ALT=6000") as address:
+    with simulated_vehicle(HOME, "--speedup", SPEEDUP, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
         first = Server(data_dir, address, port=port)
         cookies = first.http.cookies
         first.post("/api/terrains/demo")

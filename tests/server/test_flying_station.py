@@ -10,13 +10,13 @@ import pytest
 
 from server.schemas import FlyState, ReviewDoc, Snapshot
 from tests.server.running import PASSWORD
-from tests.server.simulated import simulated_vehicle
+from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
 
 pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
 
 LONG_S = 3 * PATIENCE_S
-SPEEDUP = 8.0
+SPEEDUP = 12.0
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def vehicle(planned: Station) -> Iterator[str]:
     home = document.pois[0]
     place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{result.home_alt_dsm_m:.3f}"
     rtl = f"RTL_ALT={100 * document.profile.rtl_height_m:.0f}"
-    with simulated_vehicle(place, "--speedup", SPEEDUP, "--parameter", rtl) as address:
+    with simulated_vehicle(place, "--speedup", SPEEDUP, "--parameter", rtl, *QUICKLY_DOWN) as address:
         ok(planned.http.post("/api/link/connect", json={"address": address}))
         planned.until(lambda m: m.type == "vehicle" and _is_ready(m.state), LONG_S)
         yield address

@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from planning.dsm import Dsm
-from planning.formats.wpl import write_wpl
-from planning.model import Poi, VehicleProfile
-from planning.plan import plan_mission
-from planning.request import PlanRequest
-from planning.vehicle_profile import dump_profile
 from server.errors import NotFoundError
-from server.library.terrains import store_terrain
 from server.obstacles import manoeuvres
-from server.obstacles.manoeuvre_task import Prepared, Situation, prepare
+from server.obstacles.manoeuvre_task import Prepared
 from server.obstacles.manoeuvres import Manoeuvres
-from server.obstacles.mirror import MapMirror
 from server.obstacles.watch import Watch
 from server.schemas import ManoeuvreDoc
 from telemetry.errors import NotAllowedError
-from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
-from telemetry.obstacles import AvoidanceStatus, MapOrigin
-from telemetry.perception.mission_line import mission_line
+from telemetry.messages import GuidedTarget
+from telemetry.obstacles import AvoidanceStatus
 from telemetry.requests import Operator
-from telemetry.tracks import VelocityProposal
 from telemetry.vehicle import VehicleState
-from tests.server.obstacle_messages import alert, delta
-from tests.server.scene_fixtures import hill
-from tests.server.track_messages import track, tracks_status
+from tests.server.obstacle_messages import alert, approach
 
 ANNA = Operator("Anna", 3)
 
@@ -142,10 +127,6 @@ def side(east_m: float, text: str = "Turn.", *, possible: bool = True) -> Prepar
     return Prepared(doc, (GuidedTarget(4, 37.7, 15.0, 5.0, 3.0),), None, 0.0, way)
 
 
-def approach(**more: Any) -> Any:
-    return alert("t7", kind="approach", **more)
-
-
 def shown_with(*answers: Any) -> Desk:
     """The first answer is on show, the others come when it is flown."""
     desk = Desk(*answers)
@@ -217,123 +198,6 @@ def test_where_avoidance_stands_and_waits_ways_out_are_offered(state: str) -> No
     assert len(desk.watch.state.manoeuvres) == 1
 
 
-@pytest.fixture(scope="module")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Dsm, PlanRecord, Path]:
-    """A flight along the foot of the hill."""
-    root, dsm = tmp_path_factory.mktemp("data"), hill(hole=False)
-    xy = np.array([[500_008.0, 3_999_945.0], [500_072.0, 3_999_945.0]])
-    pois = tuple(Poi(lat, lon) for lat, lon in dsm.lat_lon_from_xy(xy).tolist())
-    plan = plan_mission(dsm, PlanRequest(pois=pois, profile=VehicleProfile("quad")))
-    (root / "terrains").mkdir()
-    doc = store_terrain(root, dsm, name="Hill")
-    record = PlanRecord(
-        t_utc_s=time.time(),
-        name="Foot",
-        mission_wpl=write_wpl(plan.mission),
-        digest="d",
-        firmware="ardupilot",
-        terrain_id=doc.id,
-        terrain_name="Hill",
-        terrain_sha256=dsm.sha256,
-        home_alt_dsm_m=plan.line.home_alt_dsm_m,
-        vertical_datum=None,
-        profile_toml=dump_profile(VehicleProfile("quad")),
-        certificate_json="",
-    )
-    return dsm, record, root / "terrains" / doc.id
-
-
-def situation(planned: tuple[Dsm, PlanRecord, Path], above_line_m: int) -> Situation:
-    """A wall from the ground to so much above the line."""
-    dsm, record, directory = planned
-    lat_deg, lon_deg = dsm.lat_lon_from_xy(np.array([[500_008.0, 3_999_945.0]]))[0].tolist()
-    origin = MapOrigin(lat_deg, lon_deg, 900.0)
-    mirror = MapMirror("radar")
-    line = mission_line(record, origin)
-    assert line is not None
-    up_m, top_m = np.interp([12.0, 30.0], line.points_enu[:, 0], line.points_enu[:, 2]).tolist()
-    wall = [(30, n, up) for n in range(-4, 5) for up in range(round(top_m) + above_line_m)]
-    mirror.fold(delta(wall, origin=origin, whole=True))
-    at = dsm.lat_lon_from_xy(np.array([[500_020.0, 3_999_945.0]]))[0].tolist()
-    state = replace(
-        VehicleState(system_id=1, component_id=1),
-        lat_deg=at[0],
-        lon_deg=at[1],
-        alt_rel_home_m=up_m,
-        armed=True,
-    )
-    flight = FlightStatus(way="auto", phase="flying", target=2)
-    return Situation(alert(), state, flight, 0.0, record, directory, origin, (mirror.voxels(),))
-
-
-def test_over_and_around_a_wall_on_the_mission(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    there = situation(planned, 4)
-    assert there.state.alt_rel_home_m is not None
-    ways = prepare(there, report=lambda step, share: None)
-    assert [way.doc.kind for way in ways] == ["over", "around"]
-    for way in ways:
-        assert way.doc.possible, way.doc.text
-        assert way.doc.clearance_m is not None
-        assert way.doc.clearance_m >= 1.9
-        assert way.rejoin_item is not None
-        ups = [up for _, _, up in way.points_enu_m]
-        assert min(ups) >= there.state.alt_rel_home_m - 1e-6
-        assert [t.alt_rel_home_m for t in way.targets] == pytest.approx(ups[1:])
-        assert all(t.speed_m_s > 0 for t in way.targets)
-    assert ways[0].height_offset_m > 4.0
-
-
-def test_on_the_way_to_where_the_mission_is_joined_again_what_stands_before_it_counts(
-    planned: tuple[Dsm, PlanRecord, Path],
-) -> None:
-    there = situation(planned, 4)
-    line = mission_line(there.record, there.origin)
-    assert line is not None
-    assert line.points_enu[-2, 0] > 35.0  # the last leg begins behind the wall
-    late = replace(there, flight=replace(there.flight, target=line.leg_item[-1]))
-    ways = prepare(late, report=lambda step, share: None)
-    assert [way.doc.possible for way in ways] == [True, True]
-    assert all(way.points_enu_m[-1][0] > 31.0 for way in ways)
-
-
-def test_a_mission_that_nothing_blocks_needs_no_manoeuvre(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    ways = prepare(situation(planned, -6), report=lambda step, share: None)
-    assert [way.doc.possible for way in ways] == [False, False]
-    assert all("keeps" in way.doc.text for way in ways)
-
-
-def test_without_a_position_there_is_none(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    here = situation(planned, 4)
-    lost = replace(here, state=replace(here.state, lat_deg=None))
-    assert prepare(lost, report=lambda step, share: None) == ()
-
-
-def test_the_ceiling_counts_from_the_plan_and_the_vehicle_is_as_large_as_it_is(
-    planned: tuple[Dsm, PlanRecord, Path],
-) -> None:
-    here = situation(planned, 4)
-    assert here.state.alt_rel_home_m is not None
-    higher = replace(here, state=replace(here.state, alt_rel_home_m=here.state.alt_rel_home_m + 28.0))
-    low_wall = replace(situation(planned, 40), state=higher.state, height_offset_m=28.0)
-    over = prepare(low_wall, report=lambda *_: None)[0]
-    assert not over.doc.possible
-    assert "up to 2 m" in over.doc.text
-    usual, large = (prepare(each, report=lambda *_: None)[0] for each in (here, replace(here, radius_m=1.5)))
-    assert usual.doc.climb_m is not None
-    assert large.doc.climb_m is not None
-    assert large.doc.climb_m > usual.doc.climb_m
-
-
-def test_a_map_with_a_slightly_different_home_counts_where_its_things_stand(
-    planned: tuple[Dsm, PlanRecord, Path],
-) -> None:
-    here = situation(planned, 4)
-    moved = replace(here, origin=replace(here.origin, lat_deg=here.origin.lat_deg + 0.5 / 111_195))
-    ways = [prepare(each, report=lambda *_: None) for each in (here, moved)]
-    assert all(way.doc.possible for way in (*ways[0], *ways[1]))
-    assert ways[0][0].targets[-1].lon_deg == pytest.approx(ways[1][0].targets[-1].lon_deg, abs=1e-6)
-
-
 def test_those_on_show_go_when_the_vehicle_begins_to_climb_by_itself() -> None:
     desk = Desk((prepared(),), (prepared(),))
     desk.watch.on_alert(alert("a"))
@@ -342,63 +206,3 @@ def test_those_on_show_go_when_the_vehicle_begins_to_climb_by_itself() -> None:
     desk.watch.on_alert(alert("b"))
     asyncio.run(desk.until(lambda: not desk.manoeuvres.prepared))
     assert desk.watch.state.manoeuvres == []
-
-
-def coming(planned: tuple[Dsm, PlanRecord, Path], **more: Any) -> Situation:
-    """Something flies towards the vehicle along the mission's line; nothing stands there."""
-    here = situation(planned, -6)
-    state = replace(here.state, position_t_mono_s=10.0)
-    at = planned[0].lat_lon_from_xy(np.array([[500_045.0, 3_999_945.0]]))[0].tolist()
-    other = track(lat_deg=at[0], lon_deg=at[1], velocity_enu_m_s=(-3.0, 0.0))
-    ahead = VelocityProposal((2.8, 0.8), 5.0, 3.3, "Turn 16 deg left, 2.9 m/s.")
-    status = tracks_status(tracks=(other,), proposal=ahead, origin=here.origin)
-    fields: dict[str, Any] = {"alert": None, "state": state, "approach": approach(), "tracks": status, **more}
-    return replace(here, **fields)
-
-
-def test_the_proposed_velocity_is_flown_level_and_then_back_to_the_mission(
-    planned: tuple[Dsm, PlanRecord, Path],
-) -> None:
-    there = coming(planned)
-    (way,) = prepare(there, report=lambda *_: None)
-    assert (way.doc.kind, way.doc.for_alert, way.doc.possible) == ("sidestep", "t7", True), way.doc.text
-    assert way.doc.text.startswith("Turn 16 deg left, 2.9 m/s for 5 s, passes")
-    assert way.doc.text.endswith("then back to the mission.")
-    a, b = np.array(way.points_enu_m[0]), np.array(way.points_enu_m[1])
-    assert b - a == pytest.approx([14.0, 4.0, 0.0], abs=0.01)
-    assert way.targets[0].speed_m_s == pytest.approx(np.hypot(2.8, 0.8))
-    assert way.rejoin_item is not None
-    assert min(t.alt_rel_home_m for t in way.targets) >= a[2] - 1e-6
-    assert way.doc.seconds is not None
-    assert way.doc.seconds > 5.0
-
-
-@pytest.mark.parametrize(
-    ("changes", "why"),
-    [
-        ({"tracks": None}, "not followed at the moment"),
-        ({"tracks": tracks_status(proposal=None)}, "leads into nothing"),
-        ({"tracks": tracks_status(proposal=None, no_proposal="Too slow.")}, "Too slow"),
-        ({"radius_m": 50.0}, "only"),
-    ],
-)
-def test_why_there_is_no_sidestep_is_said(
-    planned: tuple[Dsm, PlanRecord, Path], changes: dict[str, Any], why: str
-) -> None:
-    (way,) = prepare(coming(planned, **changes), report=lambda *_: None)
-    assert not way.doc.possible
-    assert why in way.doc.text
-
-
-def test_on_the_way_home_it_holds_after_the_sidestep(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    home = coming(planned, flight=FlightStatus(way="auto", phase="returning", target=2))
-    (way,) = prepare(home, report=lambda *_: None)
-    assert (way.rejoin_item, len(way.targets)) == (None, 1)
-    assert way.doc.text.endswith("then it holds there.")
-
-
-def test_where_the_object_is_by_now_counts(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    there = coming(planned)
-    late = replace(there, state=replace(there.state, position_t_mono_s=16.0))
-    (way,) = prepare(late, report=lambda *_: None)
-    assert way.doc.text != prepare(there, report=lambda *_: None)[0].doc.text

@@ -119,5 +119,15 @@ def test_a_killed_radar_leaves_the_camera_and_comes_back(flying: Station) -> Non
     assert again.pid != facts.pid
 
 
+def test_another_resolution_begins_the_radars_map_anew(flying: Station) -> None:
+    flying.until(lambda m: m.type == "perception" and m.sensor == "radar" and m.status.frames > 0, LONG_S)
+    refused = flying.http.put("/api/obstacles/settings", json={"radar_resolution_m": 0.05})
+    assert (refused.status_code, refused.json()["where"]) == (422, "radar map")
+    ok(flying.http.put("/api/obstacles/settings", json={"radar_resolution_m": 0.5}))
+    flying.until(
+        lambda m: m.type == "perception" and m.sensor == "radar" and "voxels of 0.5 m" in m.status.text, LONG_S
+    )
+
+
 def _runtime(page: Station) -> Path:
     return page.server.settings.data_dir / "run"

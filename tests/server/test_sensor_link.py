@@ -11,16 +11,29 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from server.api import sensors as sensors_door
 from server.sensor_token import FILE, sensor_token
 from telemetry.agent.client import Agent, CloudReading, RadarReading, SlamReading
-from telemetry.agent.wire import SUBPROTOCOL, Hello, Ping, Pong, Radar, Slam, Welcome, decode_from_server, encode
+from telemetry.agent.wire import (
+    SUBPROTOCOL,
+    Hello,
+    Ping,
+    Pong,
+    Radar,
+    Report,
+    Slam,
+    Welcome,
+    decode_from_server,
+    encode,
+)
 from telemetry.errors import SensorLinkError
-from telemetry.messages import Topic
+from telemetry.messages import Topic, VehicleText
 from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
 from tests.server.running import Running, running
 
@@ -127,6 +140,49 @@ def test_a_bad_frame_is_counted_and_the_next_one_passes(server: Running, token: 
     assert [m.number for _, m in server.flying.published] == [1]
 
 
+@pytest.mark.parametrize("wrong", [b"noise", msgspec.msgpack.encode({"type": "sonar", "range_m": 3.0}),
+                                   msgspec.msgpack.encode({"type": "ping", "t_s": 1.0, "more": 1}), "text"],
+                         ids=["noise", "unknown type", "unknown field", "text"])  # fmt: skip
+def test_what_is_not_understood_is_counted_with_its_reason_and_the_connection_stays(
+    server: Running, token: str, wrong: bytes | str
+) -> None:
+    with knock(server, token, subprotocols=[SUBPROTOCOL]) as socket:
+        socket.send(encode(Hello(1, "drone")))
+        assert isinstance(decode_from_server(_received(socket)), Welcome)
+        socket.send(wrong)
+        socket.send(encode(Ping(5.0)))
+        seen = [decode_from_server(_received(socket))]
+        while not (isinstance(report := seen[-1], Report) and report.refused):
+            seen.append(decode_from_server(_received(socket)))
+        assert any(isinstance(message, Pong) for message in seen)
+    assert (report.received, report.refused) == (0, 1)
+    assert "cannot be understood" in report.text
+
+
+def test_an_agent_goes_on_without_what_it_does_not_understand(server: Running, token: str) -> None:
+    """A newer ground station may say more than an older agent knows."""
+    encode_before = sensors_door.encode
+
+    def with_more(message: Any) -> bytes:
+        data = encode_before(message)
+        return (
+            msgspec.msgpack.encode(msgspec.msgpack.decode(data) | {"more": 1}) if isinstance(message, Report) else data
+        )
+
+    async def run() -> Agent:
+        agent = Agent(server.origin, token=token, name="drone")
+        async with asyncio.TaskGroup() as group:
+            task = group.create_task(agent.run())
+            await until(lambda: agent.counts.not_understood >= 2)
+            task.cancel()
+        return agent
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sensors_door, "encode", with_more)
+        agent = asyncio.run(run())
+    assert (agent.counts.connections, agent.counts.report) == (1, None)
+
+
 def test_no_more_agents_than_may_be(server: Running, token: str) -> None:
     sockets = [knock(server, token) for _ in range(4)]
     try:
@@ -146,18 +202,66 @@ def test_the_command_sends_what_a_driver_writes(server: Running, token: str, tmp
     file = tmp_path / "token.txt"
     file.write_text(f"{token}\n")
     lines = [json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]]}) for _ in range(5)]
-    done = subprocess.run(
-        [sys.executable, "-m", "server", "agent", server.origin, "--token-file", str(file), "--json"],
+    done = driven(server, file, lines, "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["sent"], answer["received"], answer["refused"]) == (5, 5, 0)
+    assert len(server.flying.published) == 5
+
+
+def driven(server: Running, token_file: Path, lines: list[str], *options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "server", "agent", server.origin, "--token-file", str(token_file), *options],
         input="\n".join(lines),
         capture_output=True,
         text=True,
         timeout=3 * PATIENCE_S,
         check=False,
     )
+
+
+def test_a_bad_line_silences_no_sensor(server: Running, token: str, tmp_path: Path) -> None:
+    file = tmp_path / "token.txt"
+    file.write_text(token)
+    good = json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]]})
+    far = json.dumps({"type": "cloud", "points": [[1, 2, 3], [float("nan"), 0, 0], [500, 0, 0], [0, 0, -900]]})
+    done = driven(server, file, [good, good[:-4], "[" * 10_000, good, far, good[:-4]], "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    assert (answer["sent"], answer["received"], answer["refused"]) == (5, 5, 0)
-    assert len(server.flying.published) == 5
+    assert (answer["received"], answer["refused"]) == (3, 0)
+    assert answer["lines"]["good"] == 3
+    assert answer["lines"]["reasons"] == {"no JSON": 3}
+    assert (answer["points_not_finite"], answer["points_out_of_reach"]) == (1, 2)
+    assert done.stderr.count("is left out") == 1
+    assert "Line 2 is left out, no JSON: " in done.stderr
+    texts = [m.text for topic, m in server.flying.published if topic == Topic.TEXT and isinstance(m, VehicleText)]
+    assert len(texts) == 1
+    assert "driver: A bad line was left out. The last: line 2, no JSON" in texts[0]
+
+
+def test_what_was_lost_is_told_to_people(server: Running, token: str, tmp_path: Path) -> None:
+    file = tmp_path / "token.txt"
+    file.write_text(token)
+    many = json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]] * 1001})
+    far = json.dumps({"type": "cloud", "points": [[1, 2, 3], [float("nan"), 0, 0], [500, 0, 0]]})
+    done = driven(server, file, [many, "{", far])
+    assert done.returncode == 0, done.stderr
+    assert "points left out of clouds: 1 without numbers, 1 beyond 164 m" in done.stderr
+    assert "refused by the ground station: 1; the last: radar: 20020 bytes are not 0 to 1000 rows" in done.stderr
+    assert "driver: good lines 2, bad ones 1 (1 no JSON); the last: line 2, no JSON" in done.stderr
+
+
+def test_a_driver_that_writes_nothing_else_than_bad_lines_is_wrong_input(
+    server: Running, token: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "token.txt"
+    file.write_text(token)
+    done = driven(server, file, ["x y z", "123"], "--json")
+    assert done.returncode == 2
+    error = json.loads(done.stdout)["error"]
+    assert error["where"] == "standard input"
+    assert "None of the first 2 lines is a reading" in error["what"]
+    assert "line 2, no JSON object" in error["what"]
 
 
 def test_the_token_is_made_once_and_for_this_user_alone(tmp_path: Path) -> None:

@@ -8,17 +8,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from telemetry.flight.avoiding import Avoiding
-from telemetry.flight.rest import Rest, rest_of_flight
+from telemetry.flight.rest import Rest, rest_from, rest_of_flight
 from telemetry.mavlink.actions import Send
-from telemetry.messages import Item, OnboardMission
+from telemetry.messages import GuidedTarget, Item, OnboardMission
 from telemetry.obstacles import Obstacle, PerceptionStatus, Region, Sensor
 from telemetry.reduce import reduce
+from telemetry.requests import Operator
 from telemetry.vehicle import VehicleState
 from tests.telemetry.simulator_bench import HOME, SLICE_S, Bench
 
 NONE = (0.0, 0.0, 0.0, 0.0)
 NORTH_PER_DEG = 111_195.0
 SPEED_M_S = 3.0
+AUTO, GUIDED, RTL, LOITER, BRAKE = 3, 4, 6, 5, 17
+ME = Operator("Ann", 1)
 
 
 def place(north_m: float, up_m: float, *, command: int = 16) -> Item:
@@ -28,6 +31,9 @@ def place(north_m: float, up_m: float, *, command: int = 16) -> Item:
 def mission(*places: Item) -> tuple[Item, ...]:
     up = Item(22, 3, NONE, 0.0, 0.0, places[0].alt_m)
     return (up, *places, Item(20, 0, NONE, 0.0, 0.0, 0.0))
+
+
+FLIGHT = mission(place(45, 8), place(60, 8))
 
 
 @dataclass
@@ -58,6 +64,7 @@ class Sense:
     period_s: float
     late_s: float = 0.05
     state: str = "running"
+    text: str = ""
     silent: bool = False
     due_s: float = 0.0
     waiting: list[tuple[float, PerceptionStatus]] = field(default_factory=list)
@@ -173,7 +180,7 @@ class Craft:
         return PerceptionStatus(
             sensor=sense.sensor,
             state=sense.state,  # type: ignore[arg-type]
-            text="",
+            text=sense.text,
             t_mono_s=self.now_s,
             t_utc_s=self.now_s,
             done_t_mono_s=self.now_s + sense.late_s,
@@ -205,3 +212,27 @@ def seen_at(distance_m: float, **changes: Any) -> Obstacle:
         size_m=(1.0, 1.0, 1.0),
     )
     return replace(plain, **changes)
+
+
+def craft(*walls: Wall, senses: list[Sense] | None = None, items: Any = FLIGHT) -> Craft:
+    made = Craft(items, list(walls), senses)
+    made.start()
+    return made
+
+
+def state(it: Craft) -> str:
+    return it.avoiding.status.state
+
+
+def targets(*places: tuple[float, float, float]) -> tuple[GuidedTarget, ...]:
+    """North, east and height above home of each."""
+    return tuple(
+        GuidedTarget(k, HOME.lat_deg + n / NORTH_PER_DEG, HOME.lon_deg + e / NORTH_PER_DEG * 1.2543, up_m, 3.0)
+        for k, (n, e, up_m) in enumerate(places, start=1)
+    )
+
+
+def rest_at(it: Craft, item: int) -> Rest:
+    rest = rest_from(it.onboard, item)
+    assert rest is not None
+    return rest

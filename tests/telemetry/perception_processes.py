@@ -18,8 +18,8 @@ from telemetry.obstacles import MapDelta, ObstacleAlert, PerceptionStatus
 from tests.telemetry import perception_flights as flights
 
 PATIENCE_S = 90.0
-FLOWN_S = 12.0
-"""After that the flight begins anew: the wall is reached."""
+FROM_S, FLOWN_S = 5.0, 12.0
+"""Of the way to the wall: a flight takes off in the middle of it, and begins anew when the wall is reached."""
 
 
 class Processes:
@@ -100,9 +100,9 @@ class Sky(Flight):
         self.frames = True
         self.again = True
         """Fly anew when the wall is reached: each flight begins its map afresh."""
-        self.t_s = -1.0
-        self._begin_mono_s, self._begin_utc_s = time.monotonic(), time.time()
+        self.t_s = 0.0
         self._number = 0
+        self.begin_anew(on_ground_s=0.0)
 
     async def live(self) -> None:
         """Until cancelled."""
@@ -113,9 +113,10 @@ class Sky(Flight):
                 group.create_task(self.hear(f"perception/{sensor}", self.statuses[sensor]))
             group.create_task(self.hear(Topic.ALERT, self.alerts))
 
-    def begin_anew(self) -> None:
-        """Back over home, on the ground for a moment."""
-        self._begin_mono_s, self._begin_utc_s = time.monotonic() + 1.0, time.time() + 1.0
+    def begin_anew(self, *, on_ground_s: float = 1.0) -> None:
+        """Back to where it takes off, on the ground for a moment."""
+        ahead_s = on_ground_s - FROM_S
+        self._begin_mono_s, self._begin_utc_s = time.monotonic() + ahead_s, time.time() + ahead_s
 
     async def _fly(self) -> None:
         """States at 20 Hz, radar frames and ranges at 10 Hz, clouds at 5 Hz, camera poses at 20 Hz."""
@@ -133,9 +134,9 @@ class Sky(Flight):
         t_s, t0_mono_s, t0_utc_s = self.t_s, self._begin_mono_s, self._begin_utc_s
         if tick % 10 == 0:
             self.bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), 1))
-        armed = self.armed and t_s >= 0.0
+        armed = self.armed and t_s >= FROM_S
         self.bus.publish(Topic.VEHICLE, flights.state_at(t_s, t0_mono_s, t0_utc_s, armed=armed))
-        if not self.frames or t_s < 0.0:
+        if not self.frames or t_s < FROM_S:
             return
         self._number += 1
         if "vision" in self.sensors:

@@ -118,6 +118,30 @@ def test_unsigned_samples_come_out_signed(tmp_path_factory: pytest.TempPathFacto
     assert any("stored unsigned" in note for note in opened.notes) == (min(values) < 0)
 
 
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_quiet_first_frame_does_not_hide_that_the_others_are_unsigned(tmp_path: Path, order: str) -> None:
+    signed = np.stack([np.zeros((16, 8, 64)), cube(1, (16, 8, 64)), cube(2, (16, 8, 64))])
+    real, imaginary = (np.where(part < 0, part + 65536, part) for part in (signed.real, signed.imag))
+    stored = np.asarray((real + 1j * imaginary).astype(np.complex64), order=order)  # type: ignore[call-overload]
+    opened = open_adc(save(tmp_path / "cube.npy", stored), AWR1843, None)
+    assert any("stored unsigned" in note for note in opened.notes)
+    assert np.array_equal(np.stack(cubes(opened)), signed)
+
+
+def test_frames_that_are_signed_after_all_are_left_alone(tmp_path: Path) -> None:
+    made = np.stack([np.full((16, 8, 64), 40000 + 0j), np.full((16, 8, 64), -1 + 0j)])
+    opened = open_adc(save(tmp_path / "cube.npy", made), AWR1843, None)
+    assert not any("unsigned" in note for note in opened.notes)
+    assert np.array_equal(np.stack(cubes(opened)), made)
+
+
+def test_a_hole_in_a_later_frame_does_not_make_unsigned_samples_signed(tmp_path: Path) -> None:
+    made = np.full((2, 16, 8, 64), 65535 + 0j)
+    made[1, 0, 0, 0] = np.nan
+    opened = open_adc(save(tmp_path / "cube.npy", made), AWR1843, None)
+    assert next(opened.frames()).cube[0, 0, 0] == -1
+
+
 def test_large_signed_samples_are_left_alone(tmp_path: Path) -> None:
     made = np.array([[40000 - 1j, -2 + 50000j] * 8] * 4)
     opened = open_adc(save(tmp_path / "a.npy", made), AWR1843, None)
@@ -147,6 +171,31 @@ def test_oda_rows_are_frames(tmp_path: Path, heading: str) -> None:
     opened = open_adc(path, POSITION2GO, None)
     assert [frame.t_s for frame in opened.frames()] == pytest.approx([0.0, 0.063694])
     assert np.array_equal(np.stack(cubes(opened)), np.stack(made))
+
+
+def test_a_byte_order_mark_is_no_heading(tmp_path: Path) -> None:
+    path = tmp_path / "radar.csv"
+    made = [cube(seed, POSITION2GO.shape) for seed in (1, 2)]
+    lines = [oda_line(k * 63_694_000, one) for k, one in enumerate(made)]
+    path.write_text("\ufeff" + "\n".join(lines), encoding="utf-8")
+    assert np.array_equal(np.stack(cubes(open_oda(path, POSITION2GO))), np.stack(made))
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [(("nan", "1"), "line 1: The frame's time is nan"),
+     (("0", "1e400"), "line 2: The frame's time is inf"),
+     (("0", "63694000", "63694000"), "line 3: .* 63694000 ns, is not after the one before, 63694000 ns"),
+     (("5e9", "4e9"), "line 2: .* not after"),
+     (("0", "1e300"), "line 2: .* more than a day after")],
+)  # fmt: skip
+def test_times_of_oda_rows_are_finite_and_rise(tmp_path: Path, times: tuple[str, ...], words: str) -> None:
+    path = tmp_path / "radar.csv"
+    row = oda_line(0, cube(1, POSITION2GO.shape)).split(",", 1)[1]
+    path.write_text("\n".join(f"{t},{row}" for t in times))
+    with pytest.raises(RadarDataError, match=words) as caught:
+        list(open_oda(path, POSITION2GO).frames())
+    assert "nanoseconds that rise" in caught.value.advice
 
 
 def test_a_cut_oda_row_is_named(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.agent.intake import Intake
+from telemetry.agent.intake import Intake, Taken
 from telemetry.agent.wire import (
     NOTICE_LONGEST,
     STEP_M,
@@ -146,3 +146,34 @@ def test_unknown_fields_and_types_are_told() -> None:
     for wrong in ({"type": "bomb"}, {"type": "ping", "t_s": 1.0, "more": 1}, {"t_s": 1.0}, [1]):
         with pytest.raises(SensorLinkError):
             decode_from_agent(msgspec.msgpack.encode(wrong))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [({"type": "bomb"}, "bomb"), ({"type": "ping", "t_s": 1.0, "more": 1}, "more"), ({"t_s": 1.0}, "type"),
+     ([1], "object"),
+     ({"type": "slam", "t_s": 1.0, "position_m": [0, 0, 0], "q_wxyz": [1, 0, 0, 0], "tracking": "fine"}, "fine")],
+    ids=str,
+)  # fmt: skip
+def test_what_is_not_known_after_hello_is_refused_and_the_next_frame_passes(wrong: object, words: str) -> None:
+    intake = greeted()
+    taken = intake.on_data(msgspec.msgpack.encode(wrong), now_mono_s=100.0, now_utc_s=1000.0)
+    assert taken == Taken()
+    assert give(intake, radar(0)).frame is not None
+    report = intake.report(100.0)
+    assert (report.received, report.refused) == (1, 1)
+    assert words in report.text
+
+
+@given(st.binary(max_size=200))
+def test_noise_after_hello_never_ends_the_connection(data: bytes) -> None:
+    intake = greeted()
+    intake.on_data(data, now_mono_s=100.0, now_utc_s=1000.0)
+    assert give(intake, radar(0)).frame is not None
+
+
+def test_what_is_not_known_before_hello_and_another_version_after_it_end_the_connection() -> None:
+    with pytest.raises(SensorLinkError):
+        Intake().on_data(msgspec.msgpack.encode({"type": "bomb"}), now_mono_s=0.0, now_utc_s=0.0)
+    with pytest.raises(SensorLinkError, match="version 2"):
+        greeted().on_data(encode(Hello(2, "drone")), now_mono_s=0.0, now_utc_s=0.0)

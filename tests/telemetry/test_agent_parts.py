@@ -1,6 +1,4 @@
-"""Thinning, bandwidth, clock and sources of the agent."""
-
-import io
+"""Thinning, bandwidth and clock of the agent."""
 
 import numpy as np
 import pytest
@@ -8,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.agent.bandwidth import Bandwidth
-from telemetry.agent.client import CloudReading, RadarReading, SlamReading, sensor_url
+from telemetry.agent.client import sensor_url
 from telemetry.agent.clock import RemoteClock
-from telemetry.agent.sources import readings_of_lines
-from telemetry.agent.thinning import thinned
-from telemetry.errors import AddressError, SensorLinkError
+from telemetry.agent.thinning import sendable, thinned
+from telemetry.agent.wire import REACH_M, cloud, points_of
+from telemetry.errors import AddressError
 
 
 @given(st.lists(st.tuples(*[st.floats(-50, 50, width=32)] * 3), max_size=60), st.sampled_from([0.1, 0.25, 1.0]))
@@ -25,9 +23,19 @@ def test_one_point_of_each_voxel_stays(points: list[tuple[float, float, float]],
     assert {tuple(p) for p in kept.tolist()} <= {tuple(p) for p in xyz_m.tolist()}
 
 
-def test_points_without_numbers_go() -> None:
-    xyz_m = np.array([[np.nan, 0, 0], [1, 2, 3], [np.inf, 0, 0]], np.float32)
-    assert thinned(xyz_m, 0.0).tolist() == [[1, 2, 3]]
+def test_points_that_cannot_be_sent_are_counted() -> None:
+    xyz_m = np.array([[np.nan, 0, 0], [1, 2, 3], [np.inf, 0, 0], [0, 164, 0], [0, 0, -163.8]], np.float32)
+    points, not_finite, out_of_reach = sendable(xyz_m, REACH_M)
+    assert (not_finite, out_of_reach) == (2, 1)
+    assert points == pytest.approx(np.array([[1, 2, 3], [0, 0, -163.8]]))
+
+
+@given(st.lists(st.tuples(*[st.floats(width=32)] * 3), max_size=50))
+def test_what_can_be_sent_is_sent(points: list[tuple[float, float, float]]) -> None:
+    """Nothing is left out by the wire format that was not counted."""
+    found = sendable(np.array(points, np.float32).reshape(-1, 3), REACH_M)
+    assert len(found.xyz_m) + found.not_finite + found.out_of_reach == len(points)
+    assert len(points_of(cloud(found.xyz_m, number=0, t_s=0.0, voxel_m=0.0))) == len(found.xyz_m)
 
 
 @given(st.lists(st.tuples(st.integers(1, 4000), st.floats(0, 0.5)), min_size=1, max_size=60))
@@ -54,35 +62,6 @@ def test_the_quickest_exchange_sets_the_clock() -> None:
         clock.on_answer(asked_s=asked_s, remote_s=500.0 + asked_s + there_s, now_s=asked_s + there_s + back_s)
     assert clock.remote_s(3.0) == pytest.approx(503.0)
     assert clock.round_trip_s == pytest.approx(0.02)
-
-
-def test_lines_become_readings() -> None:
-    lines = io.StringIO(
-        '{"type": "radar", "t_s": 1, "targets": [[1, 2, 3, 4, 5]]}\n\n{"type": "cloud", "t_s": 2, "points": []}\n'
-        '{"type": "slam", "position_m": [1, 2, 3], "q_wxyz": [1, 0, 0, 0]}\n'
-    )
-    radar, cloud, slam = readings_of_lines(lines)
-    assert isinstance(radar, RadarReading)
-    assert radar.targets.tolist() == [[1, 2, 3, 4, 5]]
-    assert isinstance(cloud, CloudReading)
-    assert cloud.xyz_m.shape == (0, 3)
-    assert isinstance(slam, SlamReading)
-    assert slam.slam.tracking == "good"
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["[]", "{", '{"type": "sonar"}', '{"type": "radar", "targets": [[1, 2]]}', '{"type": "cloud", "points": [1, 2]}',
-     '{"type": "slam", "position_m": [1], "q_wxyz": [1, 0, 0, 0]}', '{"type": "radar", "t_s": "x", "targets": []}',
-     '{"type": "slam", "position_m": [1, 2, 3], "q_wxyz": [1, 0, 0, 0], "tracking": "fine"}'],
-)  # fmt: skip
-def test_a_wrong_line_is_named(line: str) -> None:
-    lines = io.StringIO('{"type": "cloud", "points": [[1, 2, 3]]}\n' + line + "\n")
-    readings = readings_of_lines(lines)
-    assert isinstance(next(readings), CloudReading)
-    with pytest.raises(SensorLinkError) as caught:
-        next(readings)
-    assert caught.value.where == "line 2"
 
 
 def test_addresses() -> None:

@@ -11,26 +11,23 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from telemetry.errors import NotAllowedError, SilentError
-from telemetry.flight.rest import Rest, rest_from
-from telemetry.messages import GuidedTarget
-from telemetry.requests import FlyManoeuvre, Operator
-from tests.telemetry.avoiding_bench import NORTH_PER_DEG, Craft, Sense, Wall, mission, place
+from tests.telemetry.avoiding_bench import (
+    AUTO,
+    BRAKE,
+    GUIDED,
+    LOITER,
+    NORTH_PER_DEG,
+    RTL,
+    Craft,
+    Sense,
+    Wall,
+    craft,
+    place,
+    rest_at,
+    state,
+)
 from tests.telemetry.frames import heard
 from tests.telemetry.simulator_bench import HOME
-
-AUTO, GUIDED, RTL, LOITER, BRAKE = 3, 4, 6, 5, 17
-ME = Operator("Ann", 1)
-FLIGHT = mission(place(45, 8), place(60, 8))
-
-
-def craft(*walls: Wall, senses: list[Sense] | None = None, items: Any = FLIGHT) -> Craft:
-    made = Craft(items, list(walls), senses)
-    made.start()
-    return made
-
-
-def state(it: Craft) -> str:
-    return it.avoiding.status.state
 
 
 @lru_cache
@@ -273,83 +270,6 @@ def test_switched_off_nothing_is_sent() -> None:
     assert state(it) == "off"
 
 
-def targets(*places: tuple[float, float, float]) -> tuple[GuidedTarget, ...]:
-    """North, east and height above home of each."""
-    return tuple(
-        GuidedTarget(k, HOME.lat_deg + n / NORTH_PER_DEG, HOME.lon_deg + e / NORTH_PER_DEG * 1.2543, up_m, 3.0)
-        for k, (n, e, up_m) in enumerate(places, start=1)
-    )
-
-
-def rest_at(it: Craft, item: int) -> Rest:
-    rest = rest_from(it.onboard, item)
-    assert rest is not None
-    return rest
-
-
-def test_a_prepared_way_around_is_flown_and_the_mission_goes_on_at_its_height() -> None:
-    it = craft()
-    it.until(lambda: it.truth[0] > 8)
-    way = targets((14, 10, 8), (26, 10, 8), (30, 0, 8))
-    request = FlyManoeuvre(ME, "around", way, 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
-    assert state(it) == "manoeuvre"
-    it.until(lambda: it.bench.vehicle.truth.p_neu[1] > 9, 60)
-    it.until(lambda: it.avoiding.detour.phase == "going" and not it.avoiding.detour.is_manoeuvre)
-    it.until(lambda: it.state.mode == "RTL")
-    assert max(up_m for _, _, up_m in it.trail) < 8.6
-    assert max(n for _, n, _ in it.trail) > 59
-
-
-def test_a_prepared_way_around_that_leads_into_something_unseen_is_stopped_short_of_it() -> None:
-    it = craft(Wall(25, 30))
-    it.perform(it.avoiding.disable(it.now_s))
-    it.until(lambda: it.truth[0] > 8)
-    request = FlyManoeuvre(ME, "around", targets((12, 10, 8), (40, 10, 8), (44, 0, 8)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
-    it.until(lambda: state(it) == "holding", 60)
-    it.advance(10.0)
-    assert 15.0 < max(n for _, n, _ in it.trail) < 24.3
-    assert "way past" in it.avoiding.status.text
-    assert it.state.mode == "BRAKE"
-
-
-def test_from_the_ceiling_a_prepared_way_around_is_flown_and_the_mission_goes_on() -> None:
-    it = craft(Wall(25, 90, half_wide_m=8.0))
-    it.until(lambda: state(it) == "ceiling")
-    high_m = it.truth[2]
-    way = targets((it.truth[0], 12, high_m), (31, 12, high_m), (33, 0, high_m))
-    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "around", way, 1), rest_at(it, 1), it.now_s))
-    it.until(lambda: it.state.mode == "RTL")
-    assert max(n for _, n, _ in it.trail) > 59
-    assert all(u > high_m - 0.6 for _, n, u in it.trail if 24 < n < 30)
-
-
-def test_a_prepared_way_over_climbs_on_while_it_is_not_clear() -> None:
-    it = craft(Wall(25, 14))
-    it.avoiding.disable(it.now_s)
-    it.until(lambda: it.truth[0] > 12)
-    request = FlyManoeuvre(ME, "over", targets((16, 0, 10), (30, 0, 10)), None, 2.0)
-    it.perform(it.avoiding.fly(request, Rest((), "hold"), it.now_s))
-    it.until(lambda: it.truth[0] > 28)
-    assert max(n for _, n, u in it.trail if u < 14.5) < 24.5
-    it.until(lambda: state(it) == "holding")
-    assert it.truth[2] > 14.5
-
-
-def test_a_way_without_places_and_a_vehicle_on_the_ground_are_refused() -> None:
-    it = Craft(FLIGHT, [])
-    with pytest.raises(NotAllowedError, match="no places"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", (), None), Rest((), "hold"), 0.0)
-    nowhere = (replace(targets((1, 0, 5))[0], alt_rel_home_m=float("nan")),)
-    with pytest.raises(NotAllowedError, match="no number"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", nowhere, None), Rest((), "hold"), 0.0)
-    with pytest.raises(NotAllowedError, match="are the most"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None, 40.0), Rest((), "hold"), 0.0)
-    with pytest.raises(NotAllowedError, match="not in the air"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None), Rest((), "hold"), 0.0)
-
-
 def test_on_the_far_way_home_it_climbs_over_what_stands_there_and_returns() -> None:
     it = craft()
     it.until(lambda: it.truth[0] > 40)
@@ -362,33 +282,6 @@ def test_on_the_far_way_home_it_climbs_over_what_stands_there_and_returns() -> N
     it.walls.clear()
     it.until(lambda: it.state.mode == "RTL" and state(it) == "watching")
     assert it.modes() == [BRAKE, GUIDED, RTL]
-
-
-def test_what_somebody_did_before_a_prepared_way_is_ordered_does_not_end_it() -> None:
-    it = craft()
-    it.avoiding.disable(it.now_s)
-    it.bench.command(176, 1, LOITER)
-    it.until(lambda: it.state.mode == "LOITER")
-    request = FlyManoeuvre(ME, "around", targets((14, 10, 8), (30, 0, 8)), 2)
-    with pytest.raises(NotAllowedError, match="by hand"):
-        it.avoiding.fly(request, rest_at(it, 2), it.now_s)
-    it.bench.command(176, 1, AUTO)
-    it.until(lambda: it.state.mode == "AUTO" and it.truth[0] > 8)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
-    it.advance(2.0)
-    assert state(it) == "manoeuvre"
-
-
-def test_a_way_that_is_flown_after_a_pause_is_paused_no_more() -> None:
-    it = craft(Wall(25, 14))
-    it.until(lambda: state(it) == "offset" and it.truth[0] > 26)
-    it.perform(it.avoiding.pause(it.now_s))
-    it.advance(4.0)
-    request = FlyManoeuvre(ME, "around", targets((32, 10, 16), (40, 0, 16)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
-    it.until(lambda: it.avoiding.detour.phase == "going")
-    assert it.avoiding.resume(it.now_s) == []
-    assert it.avoiding.detour.phase == "going"
 
 
 def test_an_order_to_stop_that_nobody_answered_is_given_again_when_the_vehicle_is_heard() -> None:

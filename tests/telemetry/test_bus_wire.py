@@ -26,8 +26,7 @@ def same_after(encode: Callable[[Any], bytes], decode: Callable[[bytes], Any], v
 
 
 @pytest.mark.parametrize("topic", sorted(MESSAGE_TYPES))
-@pytest.mark.parametrize("prefix", ["", "replay/"])
-@given(data=st.data())
+@given(prefix=st.sampled_from(["", "replay/"]), data=st.data())
 def test_every_message_crosses_unharmed(topic: str, prefix: str, data: st.DataObject) -> None:
     message: Published = data.draw(st.from_type(MESSAGE_TYPES[topic]))
     name = prefix + topic
@@ -39,7 +38,15 @@ def test_every_request_to_the_link_crosses_unharmed(request: object) -> None:
     assert same_after(encode_request, lambda wire: decode_request(wire, LinkRequest), request)
 
 
-@given(st.binary(max_size=200))
+def is_map(data: bytes) -> bool:
+    """What a message without required fields may be read from: its names need not be known."""
+    try:
+        return isinstance(msgspec.msgpack.decode(data), dict)
+    except (msgspec.MsgspecError, TypeError, ValueError):
+        return False
+
+
+@given(st.binary(max_size=200).filter(lambda data: not is_map(data)))
 def test_noise_is_refused_in_words(noise: bytes) -> None:
     for topic in MESSAGE_TYPES:
         with pytest.raises(BusError):

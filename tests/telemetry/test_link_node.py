@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from telemetry.simulator.run import SimOptions, flying
 from telemetry.vehicle import VehicleState
 from tests.telemetry.bus_runs import ROOT, run
 from tests.telemetry.link_bench import free_port, until
-from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items
+from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, QUICKLY_DOWN, items
 
 ME = Operator("Ann", 7)
 
@@ -104,7 +105,8 @@ def test_it_is_asked_over_the_bus_and_its_errors_arrive_as_they_are(tmp_path: Pa
 
 def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flight(tmp_path: Path) -> None:
     async def whole() -> None:
-        options = SimOptions(LAT_DEG, LON_DEG, ALT_M, link="tcpin:127.0.0.1:0", speedup=4.0, boot_s=0.5)
+        where: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 4.0, "boot_s": 0.5}
+        options = SimOptions(LAT_DEG, LON_DEG, ALT_M, **where, parameters=QUICKLY_DOWN)
         async with flying(options) as simulator, station(tmp_path) as (node, client):
             process = node.start("--link", simulator.address.replace("tcpin", "tcp"))
             await until(lambda: node.status.state == "live" and node.state.ready_to_arm and node.state.estimator_ok)
@@ -129,6 +131,7 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             assert node.status.mission_digest == report.onboard.digest
             assert node.flight.since_utc_s == since
             assert (node.status.adopted and node.status.adopted.system_id) == 1
+            simulator.options = replace(simulator.options, speedup=15.0)
             await until(lambda: node.flight.phase == "landed")
             await until(lambda: (facts := running_node(node.runtime, "link")) is not None and facts.replaceable)
 

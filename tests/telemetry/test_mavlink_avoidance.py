@@ -7,6 +7,7 @@ import contextlib
 import math
 import time
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -30,7 +31,8 @@ from tests.telemetry.test_mavlink_flights import (
     upload,
 )
 
-SPEEDUP = 3.0
+SPEEDUP, HURRIED = 3.0, 15.0
+"""Frames come in real time: it takes off and goes home faster than it flies towards a wall."""
 WALL = Wall(14.0, 17.0, thick_m=3.0)
 FRAME_S = 0.05
 
@@ -63,7 +65,7 @@ def seen(simulator: Simulator, wall: Wall | None) -> PerceptionStatus:
 @contextlib.asynccontextmanager
 async def before_a_wall(wall: Wall | None = WALL) -> AsyncIterator[tuple[Console, Simulator]]:
     """A simulated vehicle whose camera sees this wall, and avoidance switched on."""
-    async with simulated(speedup=SPEEDUP) as (bench, simulator):
+    async with simulated(speedup=HURRIED) as (bench, simulator):
 
         async def look() -> None:
             while True:
@@ -77,6 +79,17 @@ async def before_a_wall(wall: Wall | None = WALL) -> AsyncIterator[tuple[Console
             eye.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await eye
+
+
+async def taken_off(bench: Console, simulator: Simulator) -> None:
+    await phase(bench, "flying")
+    simulator.options = replace(simulator.options, speedup=SPEEDUP)
+
+
+async def landed(bench: Console, simulator: Simulator) -> None:
+    await phase(bench, "returning")
+    simulator.options = replace(simulator.options, speedup=HURRIED)
+    await phase(bench, "landed")
 
 
 async def switch_on(bench: Console) -> None:
@@ -126,11 +139,11 @@ def test_in_auto_it_climbs_over_a_wall_and_the_flight_ends_as_planned() -> None:
             report = await upload(bench)
             await switch_on(bench)
             await start(bench, StartAuto(ME, report.onboard.digest))
+            await taken_off(bench, simulator)
             await until(lambda: avoidance(bench).state == "offset")
             assert simulator.vehicle.truth.p_neu[2] > 17.5
             assert avoidance(bench).height_offset_m > 3.0
-            await until(lambda: bench.flight.phase == "returning")
-            await phase(bench, "landed")
+            await landed(bench, simulator)
             assert bench.flight.broke_off_at is None
             assert bench.flight.way == "auto"
             assert [s for s in dict.fromkeys(states(bench)) if s != "holding"] == [
@@ -153,6 +166,7 @@ def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await switch_on(bench)
             await start(bench, StartGuided(ME, TARGETS, 10.0))
+            await taken_off(bench, simulator)
             await until(lambda: avoidance(bench).state in ("climbing", "holding"))
             assert bench.flight.way == "guided"
             await until(lambda: avoidance(bench).state == "offset")
@@ -175,7 +189,8 @@ def test_a_prepared_way_is_flown_and_the_mission_goes_on() -> None:
         async with before_a_wall(None) as (bench, simulator):
             report = await upload(bench)
             await start(bench, StartAuto(ME, report.onboard.digest))
-            await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 2)
+            await taken_off(bench, simulator)
+            await until(lambda: (bench.flight.target or 0) >= 2)
             aside = tuple(
                 GuidedTarget(k, LAT_DEG + north * STEP_DEG, LON_DEG + 1.3e-4, 14.0, 3.0)
                 for k, north in enumerate((1.0, 2.0), start=1)
@@ -183,7 +198,7 @@ def test_a_prepared_way_is_flown_and_the_mission_goes_on() -> None:
             await bench.link.handle(FlyManoeuvre(ME, "around", aside, 4))
             await until(lambda: avoidance(bench).state == "manoeuvre")
             await until(lambda: simulator.vehicle.truth.p_neu[1] > 9)
-            await phase(bench, "landed")
+            await landed(bench, simulator)
             assert bench.flight.broke_off_at is None
             assert "fly around an obstacle, 2 places" in bench.commands
             assert states(bench)[-1] == "off"

@@ -31,6 +31,7 @@ from tests.telemetry.link_bench import ME, Console, console, until
 
 LAT_DEG, LON_DEG, ALT_M = -37.0, 175.0, 800.0
 STEP_DEG = 8e-5
+QUICKLY_DOWN = (("LAND_SPEED", 150.0), ("LAND_ALT_LOW", 200.0))
 
 
 def items(waypoints: int = 3) -> tuple[Item, ...]:
@@ -52,7 +53,8 @@ TARGETS = tuple(
 
 @contextlib.asynccontextmanager
 async def simulated(**options: Any) -> AsyncIterator[tuple[Console, Simulator]]:
-    wanted: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 15.0, "boot_s": 0.5, **options}
+    wanted: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 15.0, "boot_s": 0.5, "parameters": QUICKLY_DOWN}
+    wanted |= options
     async with flying(SimOptions(LAT_DEG, LON_DEG, ALT_M, **wanted)) as simulator, console() as bench:
         await bench.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
         await bench.live()

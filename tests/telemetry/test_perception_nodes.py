@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,11 +35,6 @@ def obstacle_alerts(sky: Sky, sensor: str) -> int:
     return sum(a.sensor == sensor and a.kind == "obstacle" and a.phase == "begins" for a in sky.alerts)
 
 
-async def both_alert(sky: Sky) -> None:
-    for sensor in sky.sensors:
-        await sky.until(lambda sensor=sensor: obstacle_alerts(sky, sensor) > 0)
-
-
 def kill(processes: Processes, sky: Sky, sensor: str) -> None:
     processes.send(sensor, signal.SIGKILL)
 
@@ -58,30 +53,43 @@ def feed_garbage(processes: Processes, sky: Sky, sensor: str) -> None:
             sky.bus.publish(Topic.RADAR_FRAME, replace(frame, xyz_m=os.urandom(1 + number)))
 
 
-@pytest.mark.parametrize("harm", [kill, freeze, feed_garbage])
+async def alerts_on_time(sky: Sky, sensor: str) -> None:
+    """Within the second in which the wall comes into the region, whatever this machine does besides."""
+    before, done = obstacle_alerts(sky, sensor), len(sky.statuses[sensor])
+    sky.begin_anew()
+    await sky.until(lambda: obstacle_alerts(sky, sensor) > before)
+    accepted = [status for status in sky.statuses[sensor][done:] if status.points > 0]
+    assert len(accepted) > {"radar": 20, "vision": 12}[sensor]
+    late = sorted(status.done_t_mono_s - status.t_mono_s for status in accepted)
+    assert late[len(late) // 2] < 0.5
+    alert = next(a for a in reversed(sky.alerts) if a.sensor == sensor and a.phase == "begins")
+    assert alert.obstacle is not None
+    assert alert.obstacle.distance_m > 3.0
+
+
+async def works(sky: Sky, sensor: str) -> None:
+    told = len(sky.statuses[sensor])
+    await sky.until(lambda: any(status.points for status in sky.statuses[sensor][told:]))
+
+
 @pytest.mark.parametrize(("harmed", "other"), [("vision", "radar"), ("radar", "vision")])
-def test_harm_to_one_leaves_the_others_alerts_on_time(
-    processes: Processes, harm: Callable[[Processes, Sky, str], None], harmed: str, other: str
-) -> None:
-    """On time: within the second in which the wall comes into the region, whatever this machine does besides."""
+def test_harm_to_one_leaves_the_others_alerts_on_time(processes: Processes, harmed: str, other: str) -> None:
+    """One harm after another: each finds a node that works."""
     processes.start("radar")
     processes.start("vision")
 
     async def act(sky: Sky) -> None:
-        await both_alert(sky)
-        harm(processes, sky, harmed)
-        before = obstacle_alerts(sky, other)
-        done = len(sky.statuses[other])
-        sky.begin_anew()
-        await sky.until(lambda: obstacle_alerts(sky, other) > before)
-        latest = sky.statuses[other][done:]
-        accepted = [status for status in latest if status.points > 0]
-        assert len(accepted) > {"radar": 40, "vision": 20}[other]
-        late = sorted(status.done_t_mono_s - status.t_mono_s for status in accepted)
-        assert late[len(late) // 2] < 0.5
-        alert = next(a for a in reversed(sky.alerts) if a.sensor == other and a.phase == "begins")
-        assert alert.obstacle is not None
-        assert alert.obstacle.distance_m > 3.0
+        await works(sky, other)
+        for harm in (feed_garbage, kill, freeze):
+            try:
+                await works(sky, harmed)
+                harm(processes, sky, harmed)
+                await alerts_on_time(sky, other)
+            except BaseException as error:
+                error.add_note(f"{harm.__name__} {harmed}")
+                raise
+            if processes.nodes[harmed].poll() is not None:
+                processes.start(harmed)
 
     fly(processes, act)
 
@@ -191,6 +199,7 @@ def test_a_recording_gives_the_very_map_that_was_there_in_flight(processes: Proc
     )
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
-    assert list(found) == ["frames", "dropped", "points", "voxels_occupied", "extent_m", "seconds"]
+    names = ["frames", "dropped", "points", "voxels_occupied", "resolution_m", "left_out", "extent_m", "seconds"]
+    assert list(found) == names
     assert found["voxels_occupied"] == len(live["radar"].voxels.occupied().keys)
     assert (tmp_path / "radar.ply").read_bytes().startswith(b"ply")

@@ -134,6 +134,30 @@ def test_settings_that_cannot_be_are_refused_with_the_number(bad: PerceptionSett
     assert flight.perceiver.perception.map.resolution_m == 1.0
 
 
+@pytest.mark.parametrize("other", [{"radar_resolution_m": 0.5}, {"memory_limit_bytes": 50_000_000}], ids=str)
+def test_another_resolution_or_memory_limit_begins_the_map_anew_and_says_so(other: dict[str, Any]) -> None:
+    flight = Flight("radar")
+    flight.fly(0.0, 11.0)
+    flight.perceiver.on_settings(PerceptionSettings(radar_depth_m=20.0))
+    assert flight.perceiver.perception.map.occupied_count > 0
+    flight.perceiver.on_settings(PerceptionSettings(radar_depth_m=20.0, **other))
+    assert flight.perceiver.perception.map.occupied_count == 0
+    assert "The map begins anew, with voxels of" in flight.frame(11.0).status.text
+    assert ("obstacle", "ends") in flight.alerts
+
+
+def test_a_region_that_cannot_be_leaves_the_map_as_it_was() -> None:
+    flight = Flight("vision")
+    flight.fly(0.0, 1.0)
+    before = flight.perceiver.perception.map
+    flight.perceiver.on_settings(
+        PerceptionSettings(vision_depth_m=40, fov_deg=120, height_m=20, vision_resolution_m=0.1)
+    )
+    assert "refused: A region 40 m deep" in flight.frame(1.0).status.text
+    assert flight.perceiver.perception.map is before
+    assert flight.perceiver.perception.settings.depth_m == 7.0
+
+
 def garbage(t_s: float, number: int) -> RadarFrame:
     return flights.radar_frame(t_s, number, T0_MONO_S, T0_UTC_S)
 

@@ -12,6 +12,7 @@ import pytest
 from planning.formats.wpl import read_wpl
 from telemetry.errors import RecordingError
 from telemetry.messages import Topic, VehicleText
+from telemetry.obstacles import AvoidanceStatus
 from telemetry.recording.flight_log import FlightLog, read_flight_log
 from telemetry.recording.writer import RecordingWriter
 from tests.telemetry.recordings import (
@@ -230,3 +231,21 @@ def test_a_log_without_positions_opens(tmp_path: Path) -> None:
     assert log.home is None
     assert any("no position" in fault for fault in log.faults)
     assert math.isclose(log.end_utc_s - log.start_utc_s, 8.0)
+
+
+def test_what_avoidance_said_of_itself_is_kept_where_its_state_changed(tmp_path: Path) -> None:
+    clock = [0.0]
+    path = tmp_path / "avoided.mcap"
+    writer = RecordingWriter(path, t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name="by hand", now=lambda: clock[0])
+    said = (
+        (5.0, AvoidanceStatus(True, "climbing", "Braking.")),
+        (6.0, AvoidanceStatus(True, "climbing", "Climbing.")),
+        (9.0, AvoidanceStatus(True, "offset", height_offset_m=9.0)),
+    )
+    entries = [*flight(), *((t_s, Topic.AVOIDANCE, status) for t_s, status in said)]
+    for t_s, topic, message in sorted(entries, key=lambda entry: entry[0]):
+        clock[0] = t_s
+        writer.write(topic, message, T0_UTC_S + t_s)
+    writer.close()
+    kept = read_flight_log(path).avoidance
+    assert [(round(t - T0_UTC_S, 1), status.state) for t, status in kept] == [(5.0, "climbing"), (9.0, "offset")]

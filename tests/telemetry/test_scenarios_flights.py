@@ -21,17 +21,16 @@ def unreached(figures: tuple[Figure, ...]) -> list[str]:
     return [figure.line() for figure in figures if not figure.reached]
 
 
-@pytest.mark.parametrize("seed", [21, 22])
-def test_a_corner_reflector_is_one_compact_cluster_where_it_stands(seed: int) -> None:
-    result = run_scenario("corner-reflector", Wanted(seed))
+def test_a_corner_reflector_is_one_compact_cluster_where_it_stands() -> None:
+    result = run_scenario("corner-reflector", Wanted(21))
     assert unreached(result.figures) == []
     assert not result.flights[0].contact
 
 
 @pytest.mark.parametrize("number", range(len(CASES)), ids=[case.title.replace(" ", "-") for case in CASES])
-@pytest.mark.parametrize("seed", [31, 32])
-def test_each_sensor_alone_clears_a_building(number: int, seed: int) -> None:
-    result = fly_case(CASES[number], Wanted(seed), ahead_m=26.0)
+def test_each_sensor_alone_clears_a_building(number: int) -> None:
+    """Many more seeds are flown by the scenario itself."""
+    result = fly_case(CASES[number], Wanted(31 + number % 2), ahead_m=26.0)
     assert unreached(result.figures) == [], result.notes
     assert result.min_true_distance_m > 0.5
 

@@ -47,5 +47,16 @@ def test_a_file_of_that_name_is_replaced_only_by_a_whole_one(tmp_path: Path) -> 
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError):
-        write_targets(tmp_path / "none" / "targets.mcap", [], t_utc_s=1.6e9, source="awr1843")
+    path = tmp_path / "none" / "targets.mcap"
+    with pytest.raises(RecordingError) as caught:
+        write_targets(path, [], t_utc_s=1.6e9, source="awr1843")
+    assert caught.value.where == str(path)
+    assert str(path.parent) in caught.value.advice
+
+
+def test_a_folder_of_that_name_is_said_and_nothing_is_left(tmp_path: Path) -> None:
+    (tmp_path / "targets.mcap").mkdir()
+    with pytest.raises(RecordingError, match="Is a directory") as caught:
+        write_targets(tmp_path / "targets.mcap", [(0.0, detections(1))], t_utc_s=1.6e9, source="awr1843")
+    assert caught.value.where == str(tmp_path / "targets.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["targets.mcap"]

@@ -137,7 +137,7 @@ def test_what_is_too_much_for_a_frame_is_left_out_from_the_weakest() -> None:
     scene = in_the_air(reflector(30.0, 0.0), reflector(60.0, 10.0, 1.0))
     model = dataclasses.replace(quick(AWR1843_IQ), most_echoes=1)
     sensor = IqRadarSensor(scene, seed=1, model=model)
-    found = polar([frame for _ in range(8) if (frame := sensor.frame(truth()))])
+    found = polar([sensor.frame(truth()) for _ in range(8)])
     assert sensor.left_out == 1
     assert len(near(found, 30.0)) > len(near(found, 60.0))
 

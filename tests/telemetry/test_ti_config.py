@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from mapping.errors import RadarDataError
 from mapping.radar import AWR1843
+from telemetry.flight.regions import OLD_S
 from telemetry.sensors.ti_mmwave.commands import parse_commands, read_commands
 from telemetry.sensors.ti_mmwave.config import config_of, read_config
-from telemetry.sensors.ti_mmwave.differences import differences
+from telemetry.sensors.ti_mmwave.differences import SILENT_S, differences
 from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.waveform import fmcw_params
 
@@ -65,6 +66,26 @@ def test_the_recorded_configurations_come_out_as_their_comments_say(
     assert any("map counts on 120 m" in note for note in notes)
     assert any("map counts on 0.5 m" in note for note in notes)
     assert any("no elevation" in note for note in notes) is not elevation
+
+
+@pytest.mark.parametrize(("period_ms", "brakes"), [(300, False), (400, True), (1000, True)])
+def test_a_radar_so_slow_that_avoidance_takes_it_for_silent_is_said(period_ms: int, brakes: bool) -> None:
+    notes = differences(config(frameCfg=f"frameCfg 0 2 60 0 {period_ms} 1 0"))
+    (note,) = (note for note in notes if note.startswith("A frame comes every"))
+    assert ("Avoidance brakes and holds where frames are more than 0.5 s apart." in note) is brakes
+
+
+def test_silence_is_what_avoidance_takes_for_it() -> None:
+    assert SILENT_S == OLD_S
+
+
+@pytest.mark.parametrize(
+    ("samples", "adc", "cells"),
+    [(256, "adcbufCfg -1 0 1 1 1", 256), (240, "adcbufCfg -1 0 1 1 1", 256), (256, "adcbufCfg -1 1 1 1 1", 128)],
+)
+def test_range_cells_are_those_of_the_radars_own_transform(samples: int, adc: str, cells: int) -> None:
+    profile = f"profileCfg 0 77 3 3 31.5 0 0 11.71 1 {samples} 10000 0 0 30"
+    assert config(profileCfg=profile, adcbufCfg=adc).range_cells == cells
 
 
 def test_a_radar_as_the_map_counts_on_differs_in_nothing() -> None:

@@ -119,7 +119,7 @@ def test_flipped_bits_never_break_it(data: st.DataObject) -> None:
     stream = TiStream()
     frames = stream.feed(bytes(whole))
     assert all(np.isfinite(frame.xyz_m).all() for frame in frames)
-    stream.reset()
+    frames += stream.reset()
     used = sum(frame.packet_bytes for frame in frames)
     assert stream.counts.bad_bytes + used == stream.counts.bytes == len(whole)
     assert stream.feed(sdk3(9, POINTS, [20.0, 20.0]))[-1].number == 9
@@ -130,6 +130,40 @@ def test_gaps_in_the_numbers_are_lost_packets() -> None:
     frames = stream.feed(b"".join(sdk3(n, POINTS[:1], [20.0]) for n in (5, 6, 9, 10, 3, 4)))
     assert [frame.lost_before for frame in frames] == [0, 0, 2, 0, 0, 0]
     assert stream.counts.lost_packets == 2
+
+
+@pytest.mark.parametrize(
+    ("numbers", "lost"),
+    [((5, 6, 7 + 512, 8, 9), (0, 0, 0, 0, 0)),
+     ((1000, 1001, 1002 - 512, 1003, 1004), (0, 0, 0, 0, 0)),
+     ((5, 6, 7 + 512, 10, 11), (0, 0, 0, 2, 0)),
+     ((5, 6, 7 + 512, 8 + 2048, 9, 10), (0, 0, 0, 0, 0, 0)),
+     ((5, 6, 60, 61), (0, 0, 53, 0)),
+     ((5, 6, 60, 62), (0, 0, 53, 1)),
+     ((5, 6, 1, 2, 3), (0, 0, 0, 0, 0)),
+     ((5, 6, 90_000, 90_001), (0, 0, 0, 0)),
+     ((5, 6, 26, 27), (0, 0, 19, 0))],
+    ids=["flipped up", "flipped down", "flipped in a gap", "flipped twice", "gap", "gap in a gap", "begun anew",
+         "far away", "small gap"],
+)  # fmt: skip
+def test_a_far_jump_of_the_number_is_believed_once_the_next_goes_on(
+    numbers: tuple[int, ...], lost: tuple[int, ...]
+) -> None:
+    stream = TiStream()
+    one_by_one = [frame for n in numbers for frame in stream.feed(sdk3(n, POINTS, [20.0, 15.5]))]
+    assert [frame.number for frame in one_by_one] == list(numbers)
+    assert [frame.lost_before for frame in one_by_one] == list(lost)
+    assert (stream.counts.lost_packets, stream.counts.frames) == (sum(lost), len(numbers))
+
+
+def test_the_last_frame_is_not_kept_for_its_number() -> None:
+    stream = TiStream()
+    (first,) = stream.feed(sdk3(1, POINTS, [20.0, 15.5]) + sdk3(500, POINTS, [20.0, 15.5]))
+    assert first.number == 1
+    (last,) = stream.reset()
+    assert (last.number, last.lost_before) == (500, 0)
+    assert stream.reset() == []
+    assert [frame.number for frame in stream.feed(sdk3(3, POINTS, [20.0, 15.5]))] == [3]
 
 
 def test_sub_frames_share_a_number() -> None:

@@ -19,17 +19,18 @@ import serial
 from mapping.errors import RadarDataError
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.sources import at
-from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings, reading_of
+from telemetry.agent.ti_radar import LONGEST_PAUSE_S, TiRadar, TiStatus, captured_readings, reading_of
 from telemetry.errors import SensorError
 from telemetry.sensors.ti_mmwave import session
 from telemetry.sensors.ti_mmwave.commands import parse_commands
 from telemetry.sensors.ti_mmwave.config import config_of
+from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiStream
 from telemetry.sensors.ti_mmwave.ports import config_port_beside, open_port
 from telemetry.sensors.ti_mmwave.session import TiPorts
 from tests.telemetry.test_ti_config import GOOD
 from tests.telemetry.ti_board import Board, acknowledging, plugged
-from tests.telemetry.ti_packets import sdk2, sdk3
+from tests.telemetry.ti_packets import packet, sdk2, sdk3, tlv
 
 PATIENCE_S = 60.0
 CONFIG = config_of(parse_commands(GOOD, file="radar.cfg"))
@@ -38,6 +39,16 @@ POINTS = [(1.0, 20.0, 0.5, -3.0), (-4.0, 60.0, 2.0, 0.31)]
 
 def frame(number: int) -> bytes:
     return sdk3(number, POINTS, [20.0, 15.5])
+
+
+def captured(
+    path: Path,
+    config: TiConfig | None = CONFIG,
+    *,
+    status: TiStatus | None = None,
+    tell: Callable[[str], None] = pytest.fail,
+) -> list[tuple[float, RadarReading]]:
+    return list(captured_readings(path, config, status or TiStatus(), tell=tell))
 
 
 class Listener:
@@ -208,7 +219,19 @@ def test_frames_that_have_waited_are_as_old_as_their_numbers_say() -> None:
     found = session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
     sent_s = [next(found)[0] for _ in range(5)]
     own_s = len(frame(1)) * 10 / 921_600
-    assert sent_s == pytest.approx([100.0 - own_s - back for back in (0.0, 0.0, 0.0, 0.1, 0.0)], abs=1e-6)
+    assert sent_s == pytest.approx([100.0 - own_s - back for back in (0.6, 0.5, 0.2, 0.1, 0.0)], abs=1e-6)
+
+
+def test_a_flipped_bit_in_a_number_makes_no_frame_older() -> None:
+    class Port:
+        port, baudrate, in_waiting = "ttyACM1", 921_600, 1
+
+        def read(self, _: int) -> bytes:
+            return frame(5) + frame(6 + 64) + frame(7)
+
+    found = session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
+    own_s = len(frame(1)) * 10 / 921_600
+    assert [next(found)[0] for _ in range(3)] == pytest.approx([100.0 - own_s - back for back in (0.2, 0.1, 0.0)])
 
 
 def test_a_port_that_fails_while_it_is_emptied_is_one_that_has_gone(
@@ -302,7 +325,7 @@ def test_targets_of_unknown_strength_count_as_just_detected() -> None:
 def test_a_capture_plays_by_the_numbers_of_its_frames(tmp_path: Path) -> None:
     path, status = tmp_path / "radar.bin", TiStatus()
     path.write_bytes(frame(10) + sdk3(11, []) + b"noise" + frame(14) + frame(15)[:60])
-    readings = list(captured_readings(path, CONFIG, status))
+    readings = captured(path, status=status)
     assert [after_s for after_s, _ in readings] == pytest.approx([0.0, 0.1, 0.4])
     assert [len(reading.targets) for _, reading in readings] == [2, 0, 2]
     assert [reading.lost for _, reading in readings] == [0, 0, 2]
@@ -312,12 +335,64 @@ def test_a_capture_plays_by_the_numbers_of_its_frames(tmp_path: Path) -> None:
     assert (moved.t_s, moved.lost) == (9.0, 2)
 
 
+@pytest.mark.parametrize(
+    ("numbers", "after_s", "lost"),
+    [((10, 11, 12 + 8192, 13, 14), (0.0, 0.1, 0.2, 0.3, 0.4), 0),
+     ((10, 11, 42, 43), (0.0, 0.1, 3.2, 3.3), 30),
+     ((10, 11, 8012, 8013), (0.0, 0.1, 0.1 + LONGEST_PAUSE_S, 0.2 + LONGEST_PAUSE_S), 8000),
+     ((10, 11, 1, 2), (0.0, 0.1, 0.2, 0.3), 0),
+     ((10, 11, 500), (0.0, 0.1, 0.2), 0)],
+    ids=["flipped bit", "gap", "long gap", "begun anew", "flipped at the end"],
+)  # fmt: skip
+def test_a_capture_pauses_for_gaps_alone_and_never_for_long(
+    tmp_path: Path, numbers: tuple[int, ...], after_s: tuple[float, ...], lost: int
+) -> None:
+    path, status = tmp_path / "radar.bin", TiStatus()
+    path.write_bytes(b"".join(frame(n) for n in numbers))
+    assert [after for after, _ in captured(path, status=status)] == pytest.approx(after_s)
+    assert status.stream.lost_packets == lost
+
+
+def with_profile(number: int, cells: int) -> bytes:
+    points = tlv(1, np.array(POINTS, "<f4").tobytes())
+    return packet(number, len(POINTS), [points, tlv(2, np.arange(cells, dtype="<u2").tobytes())])
+
+
+@pytest.mark.parametrize(("cells", "told"), [(256, 0), (128, 1), (0, 0)])
+def test_a_capture_from_another_configuration_is_said_once(tmp_path: Path, cells: int, told: int) -> None:
+    path, said = tmp_path / "radar.bin", list[str]()
+    path.write_bytes(b"".join(with_profile(n, cells) for n in range(3)))
+    assert len(captured(path, tell=said.append)) == 3
+    assert len(said) == told
+    for text in said:
+        assert text.startswith("The radar sends 128 range cells and radar.cfg makes 256")
+        assert "--ti-config" in text
+
+
+def test_a_capture_without_a_configuration_contradicts_none(tmp_path: Path) -> None:
+    path, said = tmp_path / "radar.bin", list[str]()
+    path.write_bytes(with_profile(1, 128))
+    captured(path, None, tell=said.append)
+    assert said == []
+
+
+def test_a_running_radar_with_another_configuration_is_told_to_the_pilot(tmp_path: Path) -> None:
+    told: list[str] = []
+    with plugged(tmp_path) as board, listening(board, told, config=False) as listener:
+        until(lambda: board.send(with_profile(1, 64)) is None and not listener.readings.empty())
+        board.send(with_profile(2, 64))
+        listener.next()
+    assert [notice.warning for notice in listener.notices] == [True]
+    assert "64 range cells" in listener.notices[0].text
+    assert len(told) == 1
+
+
 def test_an_old_capture_needs_its_configuration(tmp_path: Path) -> None:
     path = tmp_path / "old.bin"
     path.write_bytes(sdk2(1, [(40, -10, -2.5, 19.75, 0.25)]))
     with pytest.raises(RadarDataError, match="--ti-config"):
-        list(captured_readings(path, None, TiStatus()))
-    ((_, reading),) = captured_readings(path, CONFIG, TiStatus())
+        captured(path, None)
+    ((_, reading),) = captured(path)
     assert reading.targets[0, 3] == pytest.approx(-10 * CONFIG.velocity_cell_m_s)
 
 
@@ -326,4 +401,4 @@ def test_a_file_without_a_frame_is_no_capture(tmp_path: Path, data: bytes) -> No
     path = tmp_path / "other.bin"
     path.write_bytes(data)
     with pytest.raises(RadarDataError, match=r"other\.bin: There is no frame"):
-        list(captured_readings(path, CONFIG, TiStatus()))
+        captured(path)

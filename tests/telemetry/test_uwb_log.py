@@ -72,6 +72,11 @@ def test_the_radars_own_numbers_may_be_left_out() -> None:
         ({"lat_deg": None}, "no lat_deg"),
         ({"t_s": np.zeros(4)}, "t_s: 4 values for 5 scans"),
         ({"t_s": np.array([0.0, 1, 2, 1.5, 3])}, "The time of scan 3"),
+        ({"t_s": np.full(5, 7.0)}, "t_s: No time passes"),
+        ({"t_s": np.arange(5) * 100.0}, "t_s: Scans usually follow each other after 100 s"),
+        ({"t_s": np.arange(5) * 1e-5}, "not in milliseconds or ticks"),
+        ({"heading_deg": np.array([0.0, 1e6, 0, 0, 0])}, "heading_deg: 1e+06 is no such angle"),
+        ({"heading_deg": np.array([0.0, -361, 0, 0, 0])}, "heading_deg: -361"),
         ({"lat_deg": np.full(5, 100.0)}, "lat_deg: 100"),
         ({"lon_deg": np.array([1.0, 2, np.nan, 3, 4])}, "lon_deg: The number at (2,)"),
         ({"intensity": np.zeros((5, 256), complex)}, "complex128"),
@@ -87,6 +92,16 @@ def test_wrong_fields_are_named(changes: dict[str, Any], words: str) -> None:
         read_uwb_log(packed(**changes), "drive.npz")
     assert words in str(caught.value)
     assert "drive.npz" in str(caught.value)
+
+
+def test_pauses_and_times_that_are_rounded_to_the_same_are_no_other_unit() -> None:
+    t_s = np.array([0.0, 0.0, 0.1, 60.0, 60.1])
+    np.testing.assert_array_equal(read_uwb_log(packed(t_s=t_s)).t_s, t_s)
+
+
+@pytest.mark.parametrize("heading_deg", [-360.0, 720.0])
+def test_headings_of_any_convention_are_taken(heading_deg: float) -> None:
+    assert read_uwb_log(packed(heading_deg=np.full(5, heading_deg))).heading_rad[0] == math.radians(heading_deg)
 
 
 def test_what_is_no_archive_is_refused() -> None:

@@ -23,6 +23,7 @@ import "./styles/fly.css";
 import "./styles/instruments.css";
 import "./styles/review.css";
 import "./styles/obstacles.css";
+import "./styles/evasion.css";
 import "./styles/polar.css";
 import "./styles/alerts.css";
 import "./styles/tracks.css";

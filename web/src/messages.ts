@@ -98,6 +98,7 @@ export interface MissionConflict {
   lat_deg: number;
   lon_deg: number;
   voxels: number;
+  top_unseen: boolean;
 }
 
 /** A cluster of occupied, unexplained voxels; ``distance_m`` and so on are those of its nearest voxel. */
@@ -840,6 +841,10 @@ export interface ReviewFigures {
   min_distance_way_home_m: number | null;
   /** That the figures count. */
   positions: number;
+  /** How much above the plan avoidance passed places of the mission, at most; null where it passed none higher. */
+  higher_m: number | null;
+  /** The first of these places, 1 is the mission's first item. */
+  higher_from_item: number | null;
 }
 
 /** Curves over time; null where unknown. All lists are equally long. */
@@ -908,6 +913,8 @@ export interface ManoeuvreDoc {
   length_m: number | null;
   seconds: number | null;
   climb_m: number | null;
+  /** It leads over something that may be higher than what was seen of it: the clearance counts from as far up as the radar looks. */
+  top_unseen: boolean;
 }
 
 /** What of one sensor's map the 3D view draws. */
@@ -959,12 +966,22 @@ export interface PerceptionSettingsBody {
   safety_radius_m?: number | null;
   approach_s?: number | null;
   radar_variant?: "heading_only" | "full_attitude" | "full_attitude_flat" | null;
+  vehicle_radius_m?: number | null;
+  position_error_m?: number | null;
+  brake_m_s2?: number | null;
+  radar_resolution_m?: number | null;
+  /** Of the range finder's map, too. */
+  vision_resolution_m?: number | null;
+  /** Per map. A new one, or another resolution, begins the map anew. */
+  memory_limit_bytes?: number | null;
 }
 
 /** Takes the maps into planning, or out of it again. */
 export interface PlanWithSeen {
   seen: boolean;
   sensors?: ("radar" | "vision" | "ranges")[];
+  /** The open plan as it is; or of the one that is flown, from where the vehicle is: the mission ahead, the way home. */
+  part?: "whole" | "ahead" | "home";
 }
 
 /** A place to land, best first. */

@@ -116,5 +116,6 @@ export const manoeuvre = (
   length_m: 34,
   seconds: 12,
   climb_m: 6,
+  top_unseen: false,
   ...fields,
 });

@@ -51,7 +51,17 @@ describe("an obstacle in words", () => {
 
   it("on the mission ahead says how far, when, and before which item", () => {
     const { lat_deg, lon_deg, enu_m, voxels } = obstacle();
-    const conflict = { ahead_m: 84, time_s: 28, item: 14, distance_m: 0.8, lat_deg, lon_deg, enu_m, voxels };
+    const conflict = {
+      ahead_m: 84,
+      time_s: 28,
+      item: 14,
+      distance_m: 0.8,
+      lat_deg,
+      lon_deg,
+      enu_m,
+      voxels,
+      top_unseen: false,
+    };
     expect(plain(conflictWhere(conflict))).toBe("in 84 m, 28 s, before item 14");
     expect(plain(conflictWhere({ ...conflict, time_s: null }))).toBe("in 84 m, before item 14");
   });

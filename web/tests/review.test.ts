@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
-import type { ReplayStatus, ReviewDoc, ReviewEvent, ReviewSeries } from "../src/messages";
+import type { ReplayStatus, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries } from "../src/messages";
 import { playhead, replay, review, seeking, takeReviewing } from "../src/store/review";
 import { flownLevel } from "../src/review/level";
+import { higherWords } from "../src/review/words";
 import { alertTimes, axisTime, columns, eventAt, momentAt, reachOf, roundStep } from "../src/review/time";
 
 const status = (fields: Partial<ReplayStatus> = {}): ReplayStatus => ({
@@ -140,5 +141,15 @@ describe("the distance flown", () => {
     expect(flownLevel(0, 4)).toBe("bad");
     expect(flownLevel(3, null)).toBe("neutral");
     expect(flownLevel(null, 4)).toBe("neutral");
+  });
+});
+
+describe("a flight that avoidance took higher", () => {
+  const figures = (fields: Partial<ReviewFigures>) =>
+    ({ higher_m: null, higher_from_item: null, ...fields }) as ReviewFigures;
+
+  it("says by how much and from where", () => {
+    expect(higherWords(figures({ higher_m: 9.4, higher_from_item: 3 }))).toBe("by 9\u00a0m from item 3");
+    expect(higherWords(figures({}))).toBeNull();
   });
 });

@@ -119,6 +119,7 @@ describe("the mission ahead", () => {
     lat_deg: 37,
     lon_deg: 14,
     voxels: 31,
+    top_unseen: false,
   });
 
   it("meets the first conflict of any sensor", () => {

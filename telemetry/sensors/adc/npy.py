@@ -17,6 +17,8 @@ from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, dimensions, refu
 
 USUAL_PERIOD_S = 0.1
 """Arrays do not tell it."""
+_CHUNK = 1 << 18
+"""Numbers that are looked at in one go."""
 _HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
 
 
@@ -38,7 +40,7 @@ def open_npy(path: Path, params: FmcwParams, *, exact: bool, period_s: float | N
     """
     layout = _layout(path)
     fitting, notes = _fit(layout, params, path.name, exact=exact)
-    unsigned = _is_unsigned(_frame(path, layout, 0))
+    unsigned = _is_unsigned(path, layout)
     if unsigned:
         notes += ("Its samples were stored unsigned: 65536 was taken off those above 32767.",)
     step_s = period_s or USUAL_PERIOD_S
@@ -139,11 +141,21 @@ def _fit(layout: _Layout, params: FmcwParams, name: str, *, exact: bool) -> tupl
     return fitting, (note,)
 
 
-def _is_unsigned(cube: NDArray[np.complexfloating]) -> bool:
-    """Two's complement that was read as unsigned: whole numbers from 0 to 65535, some of them above 32767."""
-    parts = np.stack((cube.real, cube.imag))
-    inside = bool((parts >= 0).all() and (parts <= 65535).all())
-    return inside and bool((parts > 32767).any()) and bool((parts == np.round(parts)).all())
+def _is_unsigned(path: Path, layout: _Layout) -> bool:
+    """Two's complement that was read as unsigned: whole numbers from 0 to 65535, some of them above 32767.
+
+    All frames are looked at until one proves the contrary: the first may be quiet. What is no number says nothing.
+    """
+    numbers = np.memmap(path, layout.dtype, "r", layout.offset, (prod(layout.shape),))
+    above = False
+    for begin in range(0, len(numbers), _CHUNK):
+        piece = numbers[begin : begin + _CHUNK]
+        parts = np.concatenate((piece.real, piece.imag))
+        parts = parts[np.isfinite(parts)]
+        if bool(((parts < 0) | (parts > 65535) | (parts != np.round(parts))).any()):
+            return False
+        above |= bool((parts > 32767).any())
+    return above
 
 
 def _signed(cube: NDArray[np.complexfloating]) -> C64:

@@ -6,6 +6,7 @@ one after the other.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from telemetry.sensors.adc.model import AdcFile, AdcFrame, refuse_empty
 
 RATE_HZ = 15.7
 _BLOCKS = 4
+_LONGEST_S = 86_400.0
+"""Of one recording: times farther apart are not in ns."""
 
 
 def open_oda(path: Path, params: FmcwParams) -> AdcFile:
@@ -30,19 +33,35 @@ def open_oda(path: Path, params: FmcwParams) -> AdcFile:
         )
 
     def frames() -> Iterator[AdcFrame]:
-        first_ns: float | None = None
-        with path.open(encoding="utf-8", errors="replace") as file:
+        first_ns = last_ns = None
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
             for number, line in enumerate(file, start=1):
                 if not line.strip() or (number == 1 and _is_heading(line)):
                     continue
-                values = _values(line, params, f"{path.name}, line {number}")
+                where = f"{path.name}, line {number}"
+                values = _values(line, params, where)
                 t_ns = float(values[0])
                 first_ns = t_ns if first_ns is None else first_ns
+                _check_time(t_ns, first_ns, last_ns, where)
+                last_ns = t_ns
                 yield AdcFrame((t_ns - first_ns) * 1e-9, _cube(values[1:], params))
         if first_ns is None:
             raise RadarDataError("There is no frame in it.", where=path.name, advice="Record it again.")
 
     return AdcFile(path.name, params, 1.0 / RATE_HZ, (), frames)
+
+
+def _check_time(t_ns: float, first_ns: float, last_ns: float | None, where: str) -> None:
+    """Raises RadarDataError."""
+    if not math.isfinite(t_ns):
+        what = f"The frame's time is {t_ns}."
+    elif last_ns is not None and t_ns <= last_ns:
+        what = f"The frame's time, {t_ns:.0f} ns, is not after the one before, {last_ns:.0f} ns."
+    elif (t_ns - first_ns) * 1e-9 > _LONGEST_S:
+        what = f"The frame's time, {t_ns:.4g} ns, is more than a day after the first frame's."
+    else:
+        return
+    raise RadarDataError(what, where=where, advice="The first column holds nanoseconds that rise from row to row.")
 
 
 def _is_heading(line: str) -> bool:

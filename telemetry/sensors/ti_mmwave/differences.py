@@ -1,4 +1,4 @@
-"""Where a radar's configuration differs from what the obstacle map counts on: an AWR1843 set to 120 m."""
+"""Where a radar's configuration differs from what the obstacle map counts on, and from what the radar then sends."""
 
 from __future__ import annotations
 
@@ -6,15 +6,21 @@ import math
 from dataclasses import dataclass
 
 from telemetry.sensors.ti_mmwave.commands import Command
+from telemetry.sensors.ti_mmwave.frame import TiFrame
 from telemetry.sensors.ti_mmwave.model import TiConfig
 
 ENOUGH = 1.2
 """Differences smaller than this factor are not worth a word."""
 
+SILENT_S, NEARLY_SILENT_S = 0.5, 0.4
+"""A radar without a frame for so long counts as silent where avoidance relies on it; the delays of the link come to
+the period."""
+
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """The radar of Miccinesi 2022, section 2.1, which known ground, noise and side lobes are judged by."""
+    """The radar of Miccinesi 2022, section 2.1, an AWR1843 set to 120 m: known ground, noise and side lobes are judged
+    by it."""
 
     range_cell_m: float = 0.5
     farthest_m: float = 120.0
@@ -33,7 +39,7 @@ def differences(config: TiConfig, assumed: Assumed | None = None) -> list[str]:
         _differs("It sees to", config.farthest_m, a.farthest_m, "m"),
         _differs("Speed cells are", config.velocity_cell_m_s, a.velocity_cell_m_s, "m/s"),
         _fastest(config, a),
-        _differs("A frame comes every", config.frame_period_s, a.frame_period_s, "s"),
+        _period(config, a),
         _azimuth(config, a),
         _field_of_view(config, a),
         _far_gate(config),
@@ -49,6 +55,17 @@ def differences(config: TiConfig, assumed: Assumed | None = None) -> list[str]:
     return [note for note in notes if note]
 
 
+def other_configuration(frame: TiFrame, config: TiConfig) -> str:
+    """Why this frame cannot come from a radar with that configuration, as far as it shows; empty where it may."""
+    cells = len(frame.range_profile)
+    if cells in (0, config.range_cells):
+        return ""
+    return (
+        f"The radar sends {cells} range cells and {config.file} makes {config.range_cells}: it runs with another "
+        "configuration. Speeds and times may be wrong."
+    )
+
+
 def _differs(what: str, value: float, assumed: float, unit: str) -> str:
     if 1 / ENOUGH <= value / assumed <= ENOUGH:
         return ""
@@ -59,6 +76,13 @@ def _fastest(config: TiConfig, a: Assumed) -> str:
     note = _differs("It tells speeds to", config.fastest_m_s, a.fastest_m_s, "m/s")
     if note and config.fastest_m_s < a.fastest_m_s:
         note += " Flown faster than it tells, it takes fixed things for moving ones."
+    return note
+
+
+def _period(config: TiConfig, a: Assumed) -> str:
+    note = _differs("A frame comes every", config.frame_period_s, a.frame_period_s, "s")
+    if config.frame_period_s >= NEARLY_SILENT_S:
+        note += f" Avoidance brakes and holds where frames are more than {SILENT_S:g} s apart."
     return note
 
 

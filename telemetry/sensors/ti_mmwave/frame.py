@@ -61,6 +61,11 @@ class TiFrame:
     lost_before: int = 0
     """Frames between the last one and this one that never came."""
 
+    @property
+    def periods(self) -> int:
+        """Since the frame before; none for a further sub-frame."""
+        return 0 if self.sub_frame else 1 + self.lost_before
+
 
 def packet_bytes(head: bytes | bytearray) -> int | None:
     """Length of the packet that begins with these 16 bytes; None where no packet begins like that."""

@@ -48,6 +48,12 @@ class TiConfig:
         return self.slope_hz_per_s * self.samples / self.sample_rate_hz
 
     @property
+    def range_cells(self) -> int:
+        """Of the radar's own range FFT, which is as long as the next power of two; real samples give half of it."""
+        length = 1 << (self.samples - 1).bit_length()
+        return length if self.is_complex else length // 2
+
+    @property
     def wavelength_m(self) -> float:
         """In the middle of the samples."""
         middle_s = self.adc_start_s + self.samples / self.sample_rate_hz / 2

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from telemetry.sensors.ti_mmwave.frame import MAGIC, DamagedPacketError, TiFrame, decode_packet, packet_bytes
+from telemetry.sensors.ti_mmwave.numbering import Numbering
 
 _START_BYTES = 16
 """Magic word, version and total length."""
-_RESTART_GAP = 10_000
-"""Frame numbers that jump farther have begun anew, or were damaged."""
 
 
 @dataclass(slots=True)
@@ -44,7 +43,7 @@ class TiStream:
         """Much of it without a frame: this is no such stream, or the baud rate is wrong."""
         self._velocity_cell_m_s = velocity_cell_m_s
         self._buffer = bytearray()
-        self._last: tuple[int, int] | None = None
+        self._numbering = Numbering()
 
     def feed(self, data: bytes) -> list[TiFrame]:
         self.counts.bytes += len(data)
@@ -54,12 +53,17 @@ class TiStream:
         while (packet := self._next_packet()) is not None:
             frame = self._decode(packet)
             if frame is not None:
-                frames.append(frame)
+                frames += self._numbering.take(frame)
+        self.counts.lost_packets += sum(frame.lost_before for frame in frames)
         return frames
 
-    def reset(self) -> None:
-        """The line was interrupted: what waits for its rest will not get it."""
+    def reset(self) -> list[TiFrame]:
+        """The line was interrupted, or has ended: what waits for its rest will not get it.
+
+        Returns the frame that was held back since its number was in doubt, if there is one.
+        """
         self._drop(len(self._buffer))
+        return self._numbering.end()
 
     def _next_packet(self) -> bytes | None:
         """A whole packet by its length, still at the buffer's head; None when more bytes are needed."""
@@ -103,15 +107,7 @@ class TiStream:
         self.bytes_since_frame = len(self._buffer)
         self.counts.frames += 1
         self.counts.implausible_points += left_out
-        self._count_gap(frame)
         return frame
-
-    def _count_gap(self, frame: TiFrame) -> None:
-        """Numbers count frames; several packets may share one, told apart by their sub-frames."""
-        if self._last is not None and 1 < frame.number - self._last[0] < _RESTART_GAP:
-            frame.lost_before = frame.number - self._last[0] - 1
-            self.counts.lost_packets += frame.lost_before
-        self._last = (frame.number, frame.sub_frame)
 
     def _drop(self, count: int) -> None:
         del self._buffer[:count]

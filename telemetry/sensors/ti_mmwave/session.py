@@ -19,7 +19,7 @@ from telemetry.sensors.ti_mmwave.sender import ConfigSender
 GARBLED_S, GARBLED_BYTES = 3.0, 200
 """So long and so much without a frame: what comes is no stream of frames."""
 MOST_WAITING = 100
-"""Frames between two numbers of one read; what is farther apart was counted anew."""
+"""Frames that one read is taken to span, at most."""
 SILENT_S = 5.0
 """A radar that sees nothing sends empty frames all the same."""
 
@@ -79,10 +79,9 @@ def frames(
             data = port.read(max(1, port.in_waiting))
         now_s = now()
         found = stream.feed(data)
-        for frame in found:
-            behind = found[-1].number - frame.number
-            waited_s = behind * period_s if 0 <= behind < MOST_WAITING else 0.0
-            yield now_s - waited_s - frame.packet_bytes * byte_s, frame
+        for k, frame in enumerate(found, start=1):
+            behind = min(sum(later.periods for later in found[k:]), MOST_WAITING)
+            yield now_s - behind * period_s - frame.packet_bytes * byte_s, frame
         heard_s, frame_s = now_s if data else heard_s, now_s if found else frame_s
         if now_s - frame_s > GARBLED_S and stream.bytes_since_frame > GARBLED_BYTES:
             yield now_s, None

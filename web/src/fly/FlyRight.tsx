@@ -1,5 +1,4 @@
 import { Avoidance } from "../obstacles/Avoidance";
-import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
 import { AheadLine, MissionAhead } from "../obstacles/MissionAhead";
 import { Sensors } from "../obstacles/Sensors";
 import { hasRoom } from "../tracks/Displays";
@@ -20,14 +19,13 @@ function Teaching() {
 
 /**
  * At the lower edge: the mission ahead and avoidance, always as tall, so that no instrument above is cut when something
- * appears. The ways past it stand here only where the left panel is a drawer.
+ * appears.
  */
 function Evasion() {
   if (!adopted.value || !hasSensors.live.value) return null;
   return (
     <footer class="evasion">
       <AheadLine />
-      {!standLeft.value && <Manoeuvres />}
       <Avoidance />
     </footer>
   );

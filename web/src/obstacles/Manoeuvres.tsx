@@ -51,8 +51,10 @@ function Facts({ doc }: { doc: ManoeuvreDoc }) {
   if (doc.kind === "sidestep") return <SidestepFacts doc={doc} />;
   return (
     <dl class="manoeuvre-facts">
-      <dt>Clear by</dt>
-      <dd data-testid={`clearance-${doc.kind}`}>{clearance(doc.clearance_m)}</dd>
+      <dt>{doc.top_unseen ? "Its top" : "Clear by"}</dt>
+      <dd data-testid={`clearance-${doc.kind}`}>
+        {doc.top_unseen ? "not seen" : clearance(doc.clearance_m)}
+      </dd>
       <dt>Climb</dt>
       <dd>{metres(doc.climb_m)}</dd>
       <dt>Takes</dt>

@@ -1,6 +1,6 @@
 import { latLon, metres, number } from "../format";
 import { CopyPlace } from "../plan/CopyPlace";
-import { lease, type Source } from "../store/flying";
+import { isInAir, lease, type Source } from "../store/flying";
 import { goTo } from "../shell/views";
 import { hasSensors, watching } from "../store/obstacles";
 import { pending } from "../store/outcomes";
@@ -10,7 +10,7 @@ import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
 import { SensorMark } from "./SensorMark";
 import { aheadOf, type Ahead } from "./ahead";
-import { SEEN, planWithSeen } from "./commands";
+import { SEEN, planWithSeen, type SeenPart } from "./commands";
 import { SENSOR_WORDS, conflictWhere } from "./words";
 
 function ConflictLine({ conflict }: { conflict: NonNullable<Ahead["conflict"]> }) {
@@ -24,6 +24,7 @@ function ConflictLine({ conflict }: { conflict: NonNullable<Ahead["conflict"]> }
         <p>
           <SensorMark sensor={conflict.sensor} /> {SENSOR_WORDS[conflict.sensor]}, {number(conflict.voxels)}{" "}
           voxels, {metres(conflict.distance_m)} from the line
+          {conflict.top_unseen && "; its top is not seen"}
         </p>
         <p class="row place">
           <span class="muted number">{latLon(conflict)}</span>
@@ -45,6 +46,19 @@ function Clear({ ahead, watches }: { ahead: Ahead; watches: boolean }) {
   );
 }
 
+const PARTS: readonly { part: SeenPart; label: string; title: string }[] = [
+  {
+    part: "ahead",
+    label: "Mission ahead",
+    title: "The points that are left, from where the vehicle is now: it replaces the points of the open plan",
+  },
+  {
+    part: "home",
+    label: "Way home",
+    title: "From where the vehicle is now to where it took off: it replaces the points of the open plan",
+  },
+];
+
 /** Takes the maps into planning: what was seen becomes columns on the surface model. */
 function PlanAgainstSeen() {
   const isIn = document_.value?.seen_id != null;
@@ -63,6 +77,19 @@ function PlanAgainstSeen() {
       >
         {isBusy ? "Planning…" : isIn ? "Plan again with what was seen" : "Plan against what was seen"}
       </Button>
+      <div class="row parts">
+        {PARTS.map(({ part, label, title }) => (
+          <Button
+            key={part}
+            disabled={isBusy || cannot !== null || !isInAir.value}
+            title={cannot ?? (isInAir.value ? title : "No mission is being flown")}
+            testid={`plan-with-seen-${part}`}
+            onClick={() => void planWithSeen(true, part)}
+          >
+            {label}
+          </Button>
+        ))}
+      </div>
       {isIn && (
         <p class="seen-columns" data-testid="seen-columns">
           What was seen is in the plan.{" "}

@@ -9,6 +9,7 @@ import { NumberField } from "../ui/NumberField";
 import { Section } from "../ui/Section";
 import { Check, SelectField } from "../ui/fields";
 import { MapExports } from "./MapExports";
+import { MapSettings } from "./MapSettings";
 import { MAPS, clearMaps, setPerception } from "./commands";
 
 const FIELDS = [
@@ -83,7 +84,7 @@ function Clear() {
   );
 }
 
-/** What the sensors search, and their maps: as files, or begun anew. */
+/** What the sensors search, and their maps: how fine and large, as files, or begun anew. */
 export function ObstaclesSection() {
   const { settings } = obstacles.live.value;
   const there = hasSensors.live.value;
@@ -93,6 +94,7 @@ export function ObstaclesSection() {
   return (
     <Section id={MAPS} title="Obstacles" icon="radar" summary={summary}>
       <Searched settings={settings} />
+      <MapSettings settings={settings} />
       <h3>Maps as files</h3>
       <MapExports source="live" />
       <div class="row wrap minor-actions">

@@ -17,6 +17,7 @@ export const ALERTS = "alerts";
 export const AVOIDANCE = "avoidance";
 export const MANOEUVRE = "manoeuvre";
 export const MAPS = "obstacles";
+export const MAP_SETTINGS = "map-settings";
 export const SEEN = "seen";
 
 /** One alert, or all of them. */
@@ -63,20 +64,26 @@ export const flyManoeuvre = (id: string, kind: ManoeuvreDoc["kind"]) =>
     done: FLOWN[kind],
   });
 
-export function setPerception(body: PerceptionSettingsBody): Promise<Response | null> {
-  return order({ place: MAPS, method: "PUT", path: "/api/obstacles/settings", body });
+export function setPerception(body: PerceptionSettingsBody, place = MAPS): Promise<Response | null> {
+  return order({ place, method: "PUT", path: "/api/obstacles/settings", body });
 }
 
 export const clearMaps = () =>
   order({ place: MAPS, path: "/api/obstacles/clear", done: "The maps begin anew." });
 
+export type SeenPart = NonNullable<PlanWithSeen["part"]>;
+
+const PLANNED: Record<SeenPart, string> = {
+  whole: "What was seen is in the plan's surface model.",
+  ahead: "Planned from where the vehicle was, past what was seen.",
+  home: "The way home is planned past what was seen.",
+};
+
 /** Takes what was seen into the open plan's surface model, or out of it again: an edit that can be undone. */
-export async function planWithSeen(seen: boolean): Promise<void> {
+export async function planWithSeen(seen: boolean, part: SeenPart = "whole"): Promise<void> {
   await allSent();
-  const body: PlanWithSeen = { seen };
-  const done = seen
-    ? "What was seen is in the plan's surface model."
-    : "The plan is on the surface model alone.";
+  const body: PlanWithSeen = { seen, part };
+  const done = seen ? PLANNED[part] : "The plan is on the surface model alone.";
   const answer = await order({ place: SEEN, method: "PUT", path: "/api/obstacles/seen", body, done });
   if (!answer) return;
   queue.takeAnswer((await answer.json()) as PlanState);

@@ -3,6 +3,7 @@ import type { ReviewDoc, ReviewFigures } from "../messages";
 import { Icon, type IconName } from "../ui/Icon";
 import { seek } from "./commands";
 import { flownLevel, type Level } from "./level";
+import { higherWords } from "./words";
 
 const MARKS: Record<Level, IconName | null> = { good: "check", near: "warning", bad: "cross", neutral: null };
 
@@ -97,6 +98,7 @@ export function Figures({ review }: { review: ReviewDoc }) {
     );
   }
   const words = { more: "high", less: "low" };
+  const higher = higherWords(figures);
   return (
     <section class="facts" data-testid="figures">
       <h2>Distance to the surface model</h2>
@@ -127,6 +129,7 @@ export function Figures({ review }: { review: ReviewDoc }) {
           level={figures.completed ? "good" : "near"}
           testid="completed"
         />
+        {higher && <Figure label="Flown higher" value={higher} testid="flown-higher" />}
         <Figure label="Duration" value={duration(figures.duration_s)} testid="flown-duration" />
         <Figure label="Predicted" value={duration(figures.predicted_s)} testid="predicted-duration" />
         <Figure label="Lag behind the timing" value={lagWord(figures.lag_s)} testid="lag" />

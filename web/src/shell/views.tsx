@@ -1,6 +1,7 @@
 import { effect, signal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { ProfilePane } from "../chart/ProfilePane";
+import { FlyBelow } from "../fly/FlyBelow";
 import { FlyLeft } from "../fly/FlyLeft";
 import { FlyRight } from "../fly/FlyRight";
 import { PlanLeft } from "../plan/PlanLeft";
@@ -39,7 +40,7 @@ export const views: readonly [View, ...View[]] = [
     label: "Fly",
     Left: FlyLeft,
     Right: FlyRight,
-    Below: ProfilePane,
+    Below: FlyBelow,
     sections: ["connection", "onboard", "preflight", "flight", "obstacles"],
   },
   {

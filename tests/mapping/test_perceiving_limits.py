@@ -1,0 +1,35 @@
+"""Settings that do not fit are refused before anything is made; the counts are those of what would be made."""
+
+import numpy as np
+import pytest
+
+from mapping.corridor import tube_points
+from mapping.errors import CapacityError
+from mapping.perceiving import RadarPerception, Settings
+from mapping.perceiving.base import LONGEST_CORRIDOR_M
+from mapping.perceiving.limits import check_settings, corridor_points
+
+LONGEST = np.array([[0.0, 0.0, 0.0], [0.0, LONGEST_CORRIDOR_M, 0.0]])
+
+
+@pytest.mark.parametrize("radius_m", [0.5, 0.8, 1.5])
+@pytest.mark.parametrize("resolution_m", [0.5, 1.0])
+@pytest.mark.parametrize("reach_down", [0.0, RadarPerception.reach_down])
+def test_the_corridor_is_never_larger_than_counted(radius_m: float, resolution_m: float, reach_down: float) -> None:
+    made = len(tube_points(LONGEST, radius_m=radius_m, step_m=resolution_m / 2, reach_down=reach_down))
+    assert made <= corridor_points(radius_m, resolution_m, reach_down) <= 3 * made
+
+
+def test_a_corridor_too_fine_is_refused_and_what_is_advised_is_not() -> None:
+    with pytest.raises(CapacityError, match="A corridor 120 m long") as caught:
+        check_settings(Settings(resolution_m=0.1), reach_m=None, reach_down=0.0)
+    advised_m = float(caught.value.advice.split()[1])
+    assert 0.1 < advised_m < 0.3
+    check_settings(Settings(resolution_m=advised_m), reach_m=None, reach_down=0.0)
+
+
+def test_memory_and_region_are_checked_as_the_map_checks_them() -> None:
+    with pytest.raises(CapacityError, match="One look out to 40 m"):
+        check_settings(Settings(resolution_m=0.05), reach_m=40.0, reach_down=0.0)
+    with pytest.raises(CapacityError, match="A region 120 m deep"):
+        check_settings(Settings(depth_m=120.0, fov_rad=3.0, height_m=100.0), reach_m=None, reach_down=0.0)

@@ -1,0 +1,104 @@
+import { useState } from "preact/hooks";
+import type { PerceptionSettings, PerceptionSettingsBody } from "../messages";
+import { lease } from "../store/flying";
+import { setError } from "../store/state";
+import { Button } from "../ui/Button";
+import { ErrorBox } from "../ui/ErrorBox";
+import { HoldButton } from "../ui/HoldButton";
+import { NumberField } from "../ui/NumberField";
+import { type AnotherMap, BYTES_PER_MB, beginsAnew, differing } from "./another_map";
+import { MAP_SETTINGS, setPerception } from "./commands";
+
+const VEHICLE = [
+  { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", min: 0.1, max: 5, step: 0.1 },
+  { key: "position_error_m", label: "Position error", unit: "m", min: 0, max: 10, step: 0.1 },
+  { key: "brake_m_s2", label: "Braking", unit: "m/s²", min: 0.5, max: 10, step: 0.5 },
+] as const;
+
+const VOXELS = [
+  { key: "radar_resolution_m", label: "Radar's voxels", unit: "m", min: 0.05, max: 5, step: 0.1 },
+  { key: "vision_resolution_m", label: "Camera's voxels", unit: "m", min: 0.05, max: 5, step: 0.05 },
+] as const;
+
+/** Nothing is asked for before it has been said which maps begin anew, and held for. */
+function Anew({ body, giveUp }: { body: PerceptionSettingsBody; giveUp: () => void }) {
+  const words = beginsAnew(body);
+  if (!words) return null;
+  const ask = async () => {
+    if (await setPerception(body, MAP_SETTINGS)) giveUp();
+  };
+  return (
+    <div class="callout wrap-row" data-testid="begins-anew">
+      <p>{words}</p>
+      <div class="row wrap minor-actions">
+        <HoldButton
+          label="Begin anew"
+          icon="check"
+          place={MAP_SETTINGS}
+          disabled={!lease.value.mine}
+          testid="begin-anew"
+          onHold={() => void ask()}
+        />
+        <Button kind="quiet" testid="keep-maps" onClick={giveUp}>
+          Keep
+        </Button>
+      </div>
+    </div>
+  );
+}
+
+/** The vehicle that obstacles are kept from, and the maps' voxels and memory. */
+export function MapSettings({ settings }: { settings: PerceptionSettings }) {
+  const [wanted, setWanted] = useState<AnotherMap>({});
+  const disabled = !lease.value.mine;
+  const memory_bytes = wanted.memory_limit_bytes ?? settings.memory_limit_bytes;
+  const want = (more: AnotherMap) => setWanted({ ...wanted, ...more });
+  const giveUp = () => {
+    setWanted({});
+    setError(MAP_SETTINGS, null);
+  };
+  return (
+    <details class="details" data-testid="map-settings">
+      <summary>Vehicle and maps</summary>
+      <div class="field-grid">
+        {VEHICLE.map(({ key, ...field }) => (
+          <NumberField
+            key={key}
+            {...field}
+            value={settings[key]}
+            disabled={disabled}
+            testid={`perception-${key}`}
+            onChange={(value) => void setPerception({ [key]: value }, MAP_SETTINGS)}
+          />
+        ))}
+        {VOXELS.map(({ key, ...field }) => (
+          <NumberField
+            key={key}
+            {...field}
+            value={wanted[key] ?? settings[key]}
+            disabled={disabled}
+            testid={`perception-${key}`}
+            onChange={(value) => want({ [key]: value })}
+          />
+        ))}
+        <NumberField
+          label="Memory per map"
+          unit="MB"
+          min={1}
+          max={100_000}
+          step={100}
+          value={memory_bytes / BYTES_PER_MB}
+          disabled={disabled}
+          testid="perception-memory_mb"
+          onChange={(mb) => want({ memory_limit_bytes: Math.round(mb * BYTES_PER_MB) })}
+        />
+      </div>
+      <p class="hint">
+        Other voxels, or another memory, begin a map anew. The range finder's map has the camera's voxels. A
+        full map takes nothing new, and says so.
+      </p>
+      <ErrorBox place={MAP_SETTINGS} />
+      <Anew body={differing(wanted, settings)} giveUp={giveUp} />
+    </details>
+  );
+}
