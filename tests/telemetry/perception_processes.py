@@ -118,6 +118,10 @@ class Sky(Flight):
         ahead_s = on_ground_s - FROM_S
         self._begin_mono_s, self._begin_utc_s = time.monotonic() + ahead_s, time.time() + ahead_s
 
+    def reaches_mono_s(self, north_m: float) -> float:
+        """When the vehicle comes to so far north on the present flight."""
+        return self._begin_mono_s + north_m / flights.SPEED_M_S
+
     async def _fly(self) -> None:
         """States at 20 Hz, radar frames and ranges at 10 Hz, clouds at 5 Hz, camera poses at 20 Hz."""
         tick = 0

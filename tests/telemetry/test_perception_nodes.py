@@ -64,7 +64,8 @@ async def alerts_on_time(sky: Sky, sensor: str) -> None:
     assert late[len(late) // 2] < 0.5
     alert = next(a for a in reversed(sky.alerts) if a.sensor == sensor and a.phase == "begins")
     assert alert.obstacle is not None
-    assert alert.obstacle.distance_m > 3.0
+    depth_m = {"radar": PerceptionSettings().radar_depth_m, "vision": PerceptionSettings().vision_depth_m}[sensor]
+    assert alert.done_t_mono_s <= sky.reaches_mono_s(flights.WALL_NORTH_M - depth_m) + 1.0
 
 
 async def works(sky: Sky, sensor: str) -> None:
