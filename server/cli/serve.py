@@ -27,7 +27,8 @@ def serve(
         RadarKind | None,
         typer.Option(
             "--radar",
-            help="How the demo's radar is simulated: its targets (model, the default) or its samples, processed (iq).",
+            help="How the demo's radar, an AWR1843, is simulated: its targets (model, the default) or its samples, "
+            "processed (iq).",
         ),
     ] = None,
     link: Annotated[

@@ -93,7 +93,7 @@ def _offset_m(placing: EnuPlacing, status: TracksStatus) -> F64:
 def _words(track: Track) -> str:
     speed_m_s = math.hypot(*track.velocity_enu_m_s)
     how = f"{speed_m_s:.1f} m/s" if track.moving else "still"
-    return f"{track.id}: {track.range_m:.0f} m, {how}"
+    return f"{track.id}: {track.range_m:.0f} m, {how}, for {track.age_s:.0f} s"
 
 
 def _closest_words(track: Track) -> str:

@@ -32,7 +32,7 @@ PLACE = re.compile(r"-?\d+\.\d{7}, -?\d+\.\d{7}")
 @pytest.fixture(scope="module")
 def demo(sighted: Station) -> Station:
     """The building stands on the first leg; the way home is less high than usual."""
-    sighted.open_demo(_past_the_building, {"rtl_height_m": 30.0})
+    sighted.open_demo(_past_the_building, {"rtl_height_m": 20.0})
     return sighted
 
 

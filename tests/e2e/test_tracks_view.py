@@ -31,7 +31,7 @@ def towards_another(sighted: Station) -> Station:
 
     When in its to and fro the vehicle meets it depends on when that takes off; hovering, it meets it again and again.
     """
-    sighted.open_demo(lambda points: [points["Ruin"], {**points["Gully"], "loiter_s": 600.0}], {"rtl_height_m": 30.0})
+    sighted.open_demo(lambda points: [points["Ruin"], {**points["Gully"], "loiter_s": 600.0}], {"rtl_height_m": 20.0})
     return sighted
 
 

@@ -24,7 +24,7 @@ def test_an_object_stands_at_its_place_and_its_arrow_ends_where_it_will_be() -> 
     assert np.array(nodes["/n/track/7/at"].props["position"]) == pytest.approx(expected[0])
     shaft = nodes["/n/track/7/arrow"].props["points"][0]
     assert shaft == pytest.approx(expected, abs=1e-3)
-    assert nodes["/n/track/7/words"].props["text"] == "7: 30 m, 2.2 m/s"
+    assert nodes["/n/track/7/words"].props["text"] == "7: 30 m, 2.2 m/s, for 2 s"
     assert nodes["/n/track/7/closest_words"].props["text"] == "7: passes 0.4 m away in 5 s"
 
 

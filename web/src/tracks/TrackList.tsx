@@ -1,4 +1,4 @@
-import { DASH, number } from "../format";
+import { DASH, number, withUnit } from "../format";
 import { degreesOf } from "../fly/attitude";
 import type { Track, TracksStatus } from "../messages";
 import { distance } from "../obstacles/words";
@@ -30,6 +30,7 @@ function Row({ track, heading_deg }: { track: Track; heading_deg: number | null 
       <th scope="row">
         {track.dangerous && <Icon name="warning" size={14} />}
         {trackName(track.id)}
+        <small class="muted">{withUnit(track.age_s, "s")}</small>
       </th>
       <td>
         <Bearing off_nose_deg={off_nose_deg} /> {distance(track.range_m)}
