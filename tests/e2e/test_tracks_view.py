@@ -40,8 +40,8 @@ def test_the_velocity_display_shares_its_place_and_keeps_its_size(towards_anothe
     start_simulator(page)
     expect(page.get_by_test_id("polar")).to_be_visible()
     # From the first sensor on both have their place, so that nothing moves when the first track comes.
-    expect(page.get_by_test_id("displays")).to_be_visible()
-    around = page.get_by_test_id("polar").bounding_box()
+    expect(page.get_by_test_id("display-velocity")).to_be_visible()
+    around = _below_the_tabs(page, "polar")
 
     page.get_by_test_id("display-velocity").click()
     velocity = page.get_by_test_id("velocity")
@@ -49,7 +49,7 @@ def test_the_velocity_display_shares_its_place_and_keeps_its_size(towards_anothe
     expect(velocity).to_have_attribute("aria-label", re.compile(r"^Velocities: (now \d|not watched)"))
     expect(page.get_by_test_id("polar")).to_have_count(0)
     # Nothing moves when one takes the other's place, nor when there is nothing to show.
-    assert velocity.bounding_box() == around
+    assert _below_the_tabs(page, "velocity") == around
     expect(page.get_by_test_id("tracks-live").locator("tbody tr")).to_have_count(3)
 
     toggle = page.get_by_test_id("layer-tracks")
@@ -58,6 +58,14 @@ def test_the_velocity_display_shares_its_place_and_keeps_its_size(towards_anothe
     expect(toggle).to_have_attribute("aria-pressed", "false")
     toggle.click()
     expect(toggle).to_have_attribute("aria-pressed", "true")
+
+
+def _below_the_tabs(page: Page, display: str) -> list[float]:
+    """Where and how large: wherever a click has scrolled the panel to."""
+    tabs, box = (page.get_by_test_id(testid).bounding_box() for testid in ("displays", display))
+    assert tabs is not None
+    assert box is not None
+    return [box["x"] - tabs["x"], box["y"] - tabs["y"], box["width"], box["height"]]
 
 
 def test_the_safety_radius_is_set_and_kept(towards_another: Station, page: Page) -> None:
