@@ -57,6 +57,7 @@ def test_an_obstacle_is_alerted_climbed_over_planned_around_and_reviewed(
     expect(page.get_by_test_id("avoidance")).to_have_attribute("data-state", "offset")
     _is_acknowledged(page)
     _is_planned_against(page)
+    _its_rest_is_planned(page, demo)
     return_home(page)
     _is_reviewed(page, tmp_path)
 
@@ -103,6 +104,23 @@ def _is_planned_against(page: Page) -> None:
     page.get_by_test_id("take-seen-out").click()
     expect(page.get_by_test_id("seen-in-plan")).to_have_count(0)
     expect(page.get_by_test_id("against-seen")).to_have_count(0)
+    page.get_by_test_id("tab-fly").click()
+
+
+def _its_rest_is_planned(page: Page, demo: Station) -> None:
+    """The mission ahead, and the way home, from where the vehicle is."""
+    for part, outcome, points in (
+        ("ahead", "Planned from where the vehicle was", ["here", "Ruin"]),
+        ("home", "The way home is planned", ["here", "home"]),
+    ):
+        page.get_by_test_id(f"plan-with-seen-{part}").click()
+        expect(page.get_by_test_id("outcome-seen")).to_contain_text(outcome)
+        document = demo.state["plan"]["document"]
+        assert [poi["id"] if poi["id"] in points else poi["name"] for poi in document["pois"]] == points
+        assert document["seen_id"] is not None
+    # Of a plan that is not the one on board nothing may be flown before the landing.
+    page.get_by_test_id("tab-plan").click()
+    expect(page.get_by_test_id("upload")).to_be_disabled()
     page.get_by_test_id("tab-fly").click()
 
 
