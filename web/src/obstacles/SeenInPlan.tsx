@@ -18,7 +18,7 @@ export function SeenInPlan() {
         {columns > 0
           ? `${count(columns, "seen column")} on the surface model`
           : "What was seen is on the surface model"}
-        : path and certificate keep clear of it.
+        : path and certificate keep clear of it. What only the radar has seen may be higher than that.
       </p>
       <Button
         disabled={pending.value.has(SEEN) || !lease.value.mine}
