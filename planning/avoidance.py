@@ -1,4 +1,4 @@
-"""Ways over and around what was seen, with the clearance of each, and the speed at which a region suffices to stop.
+"""Ways up, over and around what was seen, with the clearance of each, and the speed at which a region suffices to stop.
 
 Both papers avoid upwards or sideways and never downwards (Miccinesi 2022, fig. 9; Bigazzi 2022, figs 9-10).
 """
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planning.avoiding.around import way_around
+from planning.avoiding.climb import way_up
 from planning.avoiding.line import LineAhead
 from planning.avoiding.model import AvoidanceParams, Kind, Manoeuvre, NoWay
 from planning.avoiding.over import way_over
@@ -24,6 +25,7 @@ __all__ = [
     "Seen",
     "Surface",
     "around",
+    "climb",
     "largest_speed_m_s",
     "may_engage",
     "over",
@@ -78,6 +80,31 @@ def around(
 ) -> Manoeuvre | NoWay:
     """Sideways past what was seen and back onto the line behind it; arguments as for ``over``."""
     return _way("around", position_enu_m, line_enu_m, seen, surface, params or AvoidanceParams())
+
+
+def climb(
+    position_enu_m: ArrayLike,
+    heading_rad: float,
+    depth_m: float,
+    seen: Sequence[Seen],
+    surface: Surface | None = None,
+    params: AvoidanceParams | None = None,
+) -> Manoeuvre | NoWay:
+    """Straight up until the level region ahead is clear, ``depth_m`` deep along ``heading_rad`` (clockwise from north).
+
+    What avoidance does in flight with what it sees by and by, worked out from all that was seen. Where it is clear
+    already the climb is 0 m.
+    """
+    params = params or AvoidanceParams()
+    position = np.asarray(position_enu_m, np.float64).reshape(3)
+    if not (np.isfinite(position).all() and math.isfinite(heading_rad) and depth_m > 0.0):
+        return NoWay("over", "Where the vehicle is, or what is ahead of it, is not known.")
+    here = np.vstack([position, position])
+    room = Room(here, depth_m + params.keep_m + BEYOND_M, seen, surface)
+    here_m = min(room.seen_m(here), room.surface_m(here))
+    if here_m < params.radius_m + params.least_beside_m:
+        return NoWay("over", f"The vehicle is only {here_m:.1f} m from what was seen.")
+    return way_up(position, heading_rad, depth_m, room, min(params.keep_m, here_m), params)
 
 
 def _way(

@@ -12,6 +12,17 @@ NEAREST_M = 0.1
 
 
 @njit(cache=True, nogil=True)
+def carry(P, dt_s):
+    """A covariance (4, 4) of two coordinates and their rates, in place, ``dt_s`` later; without noise."""
+    for a in range(2):
+        for k in range(4):
+            P[a, k] += dt_s * P[a + 2, k]
+    for k in range(4):
+        for a in range(2):
+            P[k, a] += dt_s * P[k, a + 2]
+
+
+@njit(cache=True, nogil=True)
 def predict(x, P, dt_s, acceleration_m_s2):
     """States (N, 4) and covariances (N, 4, 4) in place, ``dt_s`` later; an acceleration that lasts as long is noise."""
     half = 0.5 * dt_s * dt_s
@@ -19,12 +30,7 @@ def predict(x, P, dt_s, acceleration_m_s2):
     for i in range(x.shape[0]):
         for a in range(2):
             x[i, a] += dt_s * x[i, a + 2]
-        for a in range(2):
-            for k in range(4):
-                P[i, a, k] += dt_s * P[i, a + 2, k]
-        for k in range(4):
-            for a in range(2):
-                P[i, k, a] += dt_s * P[i, k, a + 2]
+        carry(P[i], dt_s)
         for a in range(2):
             P[i, a, a] += noise * half * half
             P[i, a, a + 2] += noise * half * dt_s

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from mapping.tracker.cartesian import NEAREST_M
+from mapping.tracker.cartesian import NEAREST_M, carry
 from mapping.tracker.kalman import FULL_TURN, centred
 
 
@@ -31,12 +31,7 @@ def predict(x, P, dt_s, acceleration_m_s2, change):
         s, c = math.sin(x[i, 1]), math.cos(x[i, 1])
         x[i, 2] -= change[0] * s + change[1] * c
         x[i, 3] -= (change[0] * c - change[1] * s) / x[i, 0]
-        for a in range(2):
-            for k in range(4):
-                P[i, a, k] += dt_s * P[i, a + 2, k]
-        for k in range(4):
-            for a in range(2):
-                P[i, k, a] += dt_s * P[i, k, a + 2]
+        carry(P[i], dt_s)
         for a in range(2):
             size = acceleration_m_s2 if a == 0 else acceleration_m_s2 / x[i, 0]
             P[i, a, a] += size * size * half * half

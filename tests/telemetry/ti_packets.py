@@ -52,3 +52,15 @@ def sdk2(
     ]
     parts = [tlv(1, struct.pack("<2H", len(points), bits) + b"".join(rows))] if points else []
     return packet(number, len(points), parts, version=SDK2, sub_frame=sub_frame)
+
+
+POINTS = [(1.0, 20.0, 0.5, -3.0), (-4.0, 60.0, 2.0, 0.31)]
+
+
+def frame(number: int) -> bytes:
+    return sdk3(number, POINTS, [20.0, 15.5])
+
+
+def with_profile(number: int, cells: int) -> bytes:
+    points = tlv(1, np.array(POINTS, "<f4").tobytes())
+    return packet(number, len(POINTS), [points, tlv(2, np.arange(cells, dtype="<u2").tobytes())])
