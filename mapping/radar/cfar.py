@@ -1,8 +1,9 @@
 """CFAR detection: CASO along range, CA along Doppler; and both at once where the map has its peaks.
 
 Miccinesi 2022, fig. 7. The smallest-of rule along range keeps a target beside clutter; plain averaging along Doppler
-keeps what has a well-defined speed. Speeds are a ring: the cells before the first are the last. Ranges are not: where
-one side has not enough cells, the other decides alone, with the factor that fits one side.
+keeps what has a well-defined speed. Both axes are rings, as the transforms make them: the cells before the first are
+the last. In range that gives near targets two sides, as any other has, and what stands behind them does not hide them.
+A side that would reach the cells around range zero, where the transmitter is heard directly, is taken from beyond them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
-from mapping.radar.cfar_factors import ca_factor, caso_factor, worth
+from mapping.radar.cfar_factors import ca_factor, caso_factor, weights
 from mapping.radar.fft import Window, noise_correlation
 
 F32 = NDArray[np.float32]
@@ -35,32 +36,28 @@ class Cfar:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A stage made ready for a map: its steps and factors."""
+    """A stage made ready for a map: its steps and its factor on the neighbours' mean."""
 
     guard: int
     training: int
     stride: int
     """Cells of the map per resolution cell: only every so many are independent."""
-    both: float
-    """Factor where both sides have their cells."""
-    one: float
-    """Where only one has."""
+    factor: float
 
 
 def range_stage(cfar: Cfar, *, name: Window, samples: int, padding: int, looks: int) -> Stage:
     """CASO for a map whose range axis has ``samples * padding`` cells, ``looks`` antennas summed in each."""
-    _check(cfar, samples, 2 * (cfar.guard + cfar.training), "range")
-    cells = worth(noise_correlation(name, samples, cfar.training), cfar.training)
-    both, one = (factor(cells, cfar.false_alarm, looks) for factor in (caso_factor, ca_factor))
-    return Stage(cfar.guard, cfar.training, padding, both, one)
+    _check(cfar, samples, 4 * cfar.guard + 3 * cfar.training + 1, "range")
+    side = weights(noise_correlation(name, samples), range(cfar.training))
+    return Stage(cfar.guard, cfar.training, padding, caso_factor(side, cfar.false_alarm, looks))
 
 
 def doppler_stage(cfar: Cfar, *, name: Window, chirps: int, padding: int, looks: int) -> Stage:
     """CA for a map whose Doppler axis has ``chirps * padding`` cells."""
     _check(cfar, chirps, 2 * (cfar.guard + cfar.training) + 1, "Doppler")
-    cells = 2 * worth(noise_correlation(name, chirps, cfar.training), cfar.training)
-    factor = ca_factor(cells, cfar.false_alarm, looks)
-    return Stage(cfar.guard, cfar.training, padding, factor, factor)
+    side = range(cfar.guard + 1, cfar.guard + cfar.training + 1)
+    both = weights(noise_correlation(name, chirps), [*(-k for k in side), *side])
+    return Stage(cfar.guard, cfar.training, padding, ca_factor(both, cfar.false_alarm, looks))
 
 
 def caso_along_range(power: F32, stage: Stage) -> Bools:
@@ -73,7 +70,7 @@ def caso_along_range(power: F32, stage: Stage) -> Bools:
 def ca_along_doppler(power: F32, stage: Stage) -> Bools:
     """(Doppler, range) -> which cells exceed the threshold that their neighbours in speed set."""
     above = np.empty(power.shape, np.bool_)
-    _ca_all(np.ascontiguousarray(power, np.float32), stage.guard, stage.training, stage.stride, stage.both, above)
+    _ca_all(np.ascontiguousarray(power, np.float32), *_numbers(stage), above)
     return above
 
 
@@ -85,35 +82,25 @@ def peaks(power: F32, along_range: Stage, along_doppler: Stage, first: int, last
     """
     most = power.size // 2 + 1  # a peak's neighbours are none
     cells, noise = np.empty((most, 2), np.int64), np.empty(most, np.float32)
-    found = _peaks(power, *_numbers(along_range), *_numbers(along_doppler)[:4], first, last, cells, noise)
+    found = _peaks(power, *_numbers(along_range), *_numbers(along_doppler), first, last, cells, noise)
     return cells[:found], noise[:found]
 
 
-def _numbers(stage: Stage) -> tuple[int, int, int, float, float]:
-    return stage.guard, stage.training, stage.stride, stage.both, stage.one
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _side(row, start, step, count):
-    total = np.float32(0.0)
-    for k in range(count):
-        total += row[start + k * step]
-    return total / count
+def _numbers(stage: Stage) -> tuple[int, int, int, float]:
+    return stage.guard, stage.training, stage.stride, stage.factor
 
 
 @njit(cache=True, nogil=True)
-def _caso(row, c, guard, training, stride, both, one):
-    """The noise beside cell c of a row, and the threshold."""
-    near, far = (guard + 1) * stride, (guard + training) * stride
-    left, right = c - far >= 0, c + far < row.shape[0]
-    if left and right:
-        noise = min(_side(row, c - far, stride, training), _side(row, c + near, stride, training))
-        return noise, both * noise
-    if right:
-        noise = _side(row, c + near, stride, training)
-    else:
-        noise = _side(row, c - far, stride, training)
-    return noise, one * noise
+def _caso(row, c, guard, training, stride):
+    """The smaller mean of the cells on either side in range, around the ring and past the direct coupling."""
+    size, near, far, coupling = row.shape[0], (guard + 1) * stride, (guard + training) * stride, guard * stride
+    left = c - near if c - far > coupling else -near
+    right = c + near if c + far < size - coupling else near
+    nearer = farther = np.float32(0.0)
+    for k in range(0, training * stride, stride):
+        nearer += row[(left - k) % size]
+        farther += row[(right + k) % size]
+    return min(nearer, farther) / training
 
 
 @njit(cache=True, nogil=True)
@@ -127,10 +114,10 @@ def _ca(power, d, c, guard, training, stride):
 
 
 @njit(cache=True, nogil=True)
-def _caso_all(power, guard, training, stride, both, one, above):
+def _caso_all(power, guard, training, stride, factor, above):
     for d in range(power.shape[0]):
         for c in range(power.shape[1]):
-            above[d, c] = power[d, c] > _caso(power[d], c, guard, training, stride, both, one)[1]
+            above[d, c] = power[d, c] > factor * _caso(power[d], c, guard, training, stride)
 
 
 @njit(cache=True, nogil=True)
@@ -156,7 +143,7 @@ def _highest(power, d, c):
 
 
 @njit(cache=True, nogil=True)
-def _peaks(power, guard, training, stride, both, one, d_guard, d_training, d_stride, factor, first, last, cells, noise):
+def _peaks(power, guard, training, stride, factor, d_guard, d_training, d_stride, d_factor, first, last, cells, noise):
     found = 0
     for d in range(power.shape[0]):
         row = power[d]
@@ -166,14 +153,15 @@ def _peaks(power, guard, training, stride, both, one, d_guard, d_training, d_str
                 continue
             if not _highest(power, d, c):
                 continue
-            beside, threshold = _caso(row, c, guard, training, stride, both, one)
-            if here > threshold and here > factor * _ca(power, d, c, d_guard, d_training, d_stride):
+            beside = _caso(row, c, guard, training, stride)
+            if here > factor * beside and here > d_factor * _ca(power, d, c, d_guard, d_training, d_stride):
                 cells[found, 0], cells[found, 1], noise[found] = d, c, beside
                 found += 1
     return found
 
 
 def _check(cfar: Cfar, cells: int, least: int, axis: str) -> None:
+    """``least``: on a ring as small no cell is its own neighbour, nor on both sides of another."""
     if cfar.guard < 0 or cfar.training < 1 or cells < least:
         raise ParameterError(
             f"CFAR along {axis} needs {least} cells ({cfar.guard} guard, {cfar.training} training); there are {cells}.",

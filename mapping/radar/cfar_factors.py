@@ -1,4 +1,9 @@
-"""How far above the mean of its neighbours a cell must be: CFAR's factors from a false-alarm probability."""
+"""How far above the mean of its neighbours a cell must be: CFAR's factors from a false-alarm probability.
+
+Noise in neighbouring cells is alike where a window was applied. The sum of such cells' powers is distributed as that of
+as many independent ones with unequal weights, the eigenvalues of their correlation; ``weights`` are these, and sum to
+the number of cells. ``looks`` independent powers are summed in every cell (antennas).
+"""
 
 from __future__ import annotations
 
@@ -7,52 +12,61 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import betainccinv, gammaincc, gammaln
 
 from mapping.errors import ParameterError
 
+F64 = NDArray[np.float64]
+Weights = tuple[float, ...]
+
+_GRID = 1 << 15
+
+
+def independent(cells: int) -> Weights:
+    return (1.0,) * cells
+
+
+def weights(correlation: NDArray[np.complexfloating], cells: range | list[int]) -> Weights:
+    """Of cells at these places; ``correlation`` (lags,) of the complex amplitudes 0, 1, ... cells apart."""
+    lags = np.subtract.outer(np.array(cells), np.array(cells))
+    row = np.append(correlation, 0.0)[np.minimum(np.abs(lags), len(correlation))]
+    values = np.linalg.eigvalsh(np.where(lags < 0, row.conj(), row))
+    return tuple(float(x) for x in np.maximum(values, 0.0))
+
 
 @lru_cache(maxsize=256)
-def ca_factor(cells: float, false_alarm: float, looks: int = 1) -> float:
-    """Factor on the mean of ``cells`` training cells (cell averaging).
+def ca_factor(weights: Weights, false_alarm: float, looks: int = 1) -> float:
+    """Factor on the mean of the training cells (cell averaging).
 
-    ``looks`` independent powers are summed in every cell (antennas). The ratio of two gamma variables is a beta
-    prime's; with one look this is the well-known ``cells * (false_alarm ** (-1 / cells) - 1)``. ``cells`` may be
-    fractional: as many independent cells as correlated ones are worth.
+    With ``n`` independent cells and one look this is the well-known ``n * (false_alarm ** (-1 / n) - 1)``.
     """
-    _check(cells, false_alarm, looks)
-    share = float(betainccinv(looks, looks * cells, false_alarm))
-    return cells * share / (1.0 - share)
+    _check(weights, false_alarm, looks)
+    return _solved(ca_false_alarm, weights, false_alarm, looks)
 
 
 @lru_cache(maxsize=256)
-def caso_factor(cells: float, false_alarm: float, looks: int = 1) -> float:
-    """Factor on the smaller of two means of ``cells`` training cells each (smallest of; Rohling 1983)."""
-    _check(cells, false_alarm, looks)
-
-    def excess(log_factor: float) -> float:
-        return math.log(caso_false_alarm(cells, math.exp(log_factor), looks) / false_alarm)
-
-    one_side = math.log(ca_factor(cells, false_alarm, looks))  # at least this, and at most about twice as much
-    root: Any = brentq(excess, one_side - 0.01, one_side + 1.0, xtol=1e-10)
-    return math.exp(root)
+def caso_factor(weights: Weights, false_alarm: float, looks: int = 1) -> float:
+    """Factor on the smaller of two sides' means (smallest of; Rohling 1983); ``weights`` of one side."""
+    _check(weights, false_alarm, looks)
+    return _solved(caso_false_alarm, weights, false_alarm, looks)
 
 
-def caso_false_alarm(cells: float, factor: float, looks: int = 1) -> float:
-    """Probability that a noise cell exceeds ``factor`` times the smaller mean of two sides of ``cells`` cells.
+def ca_false_alarm(weights: Weights, factor: float, looks: int = 1) -> float:
+    """Probability that a noise cell exceeds ``factor`` times the mean of its training cells."""
+    y, mass, _ = _sum_of_powers(weights, looks)
+    return float(np.sum(mass * gammaincc(looks, factor / len(weights) * y)))
 
-    The smaller sum y of two gamma variables has the density 2 f(y) Q(y), Q being what lies above y; the cell exceeds
-    a y with the probability of a gamma variable of ``looks``. Summed over ln y, where the integrand is smooth and
-    falls off on both sides, so that the plain sum is as good as exact.
+
+def caso_false_alarm(weights: Weights, factor: float, looks: int = 1) -> float:
+    """Probability that a noise cell exceeds ``factor`` times the smaller of two sides' means.
+
+    The smaller sum y of two has the density 2 f(y) Q(y), Q being what lies above y; the cell exceeds a y with the
+    probability of a gamma variable of ``looks``.
     """
-    shape = cells * looks
-    low, high = math.log(shape) - 60.0 / shape - 3.0, math.log(shape + 12.0 * math.sqrt(shape) + 40.0)
-    log_y, step = np.linspace(low, high, 2000, retstep=True)
-    y = np.exp(log_y)
-    density = np.exp(shape * log_y - y - gammaln(shape))  # f(y) dy = density d(ln y)
-    above = gammaincc(looks, factor / cells * y)
-    return float(np.sum(2.0 * density * gammaincc(shape, y) * above) * step)
+    y, mass, above = _sum_of_powers(weights, looks)
+    return float(np.sum(2.0 * mass * above * gammaincc(looks, factor / len(weights) * y)))
 
 
 def ca_detection(cells: float, factor: float, snr: float) -> float:
@@ -60,16 +74,51 @@ def ca_detection(cells: float, factor: float, snr: float) -> float:
     return (1.0 + factor / (cells * (1.0 + snr))) ** -cells
 
 
-def worth(correlation: np.ndarray, cells: int) -> float:
-    """How many independent cells the mean of ``cells`` neighbours is worth, given their squared correlation by lag."""
-    lags = np.arange(1, cells)
-    return cells / (1.0 + 2.0 * float(np.sum((1.0 - lags / cells) * correlation[: cells - 1])))
+def _solved(false_alarms: Any, weights: Weights, wanted: float, looks: int) -> float:
+    """From the factor for the number of independent cells whose mean varies as much."""
+
+    def excess(log_factor: float) -> float:
+        return math.log(max(false_alarms(weights, math.exp(log_factor), looks), 1e-300) / wanted)
+
+    worth = sum(weights) ** 2 / sum(w * w for w in weights)
+    share = float(betainccinv(looks, looks * worth, wanted))
+    near = math.log(worth * share / (1.0 - share))
+    root: Any = brentq(excess, near - 1.0, near + 1.5, xtol=1e-10)
+    return math.exp(root)
 
 
-def _check(cells: float, false_alarm: float, looks: int) -> None:
-    if not (cells > 0 and looks >= 1 and 0.0 < false_alarm < 1.0):
+@lru_cache(maxsize=32)
+def _sum_of_powers(weights: Weights, looks: int) -> tuple[F64, F64, F64]:
+    """Places y, how probable a sum around each is, and how probable one above it."""
+    if max(weights) - min(weights) < 1e-9:
+        return _gamma(len(weights) * looks)
+    return _weighted(np.array(weights), looks)
+
+
+def _gamma(shape: float) -> tuple[F64, F64, F64]:
+    """Over ln y, where the density is smooth and falls off on both sides, so that a plain sum is as good as exact."""
+    low, high = math.log(shape) - 60.0 / shape - 3.0, math.log(shape + 12.0 * math.sqrt(shape) + 40.0)
+    log_y, step = np.linspace(low, high, 2000, retstep=True)
+    y = np.exp(log_y)
+    mass = np.exp(shape * log_y - y - gammaln(shape)) * step
+    return y, mass, gammaincc(shape, y)
+
+
+def _weighted(weights: F64, looks: int) -> tuple[F64, F64, F64]:
+    """Gamma variables with unequal weights: their characteristic function, transformed back."""
+    mean, spread = looks * weights.sum(), math.sqrt(looks * np.sum(weights**2))
+    step = (mean + 20.0 * spread + 40.0 * weights.max()) / _GRID
+    frequency = 2.0 * np.pi * np.fft.rfftfreq(_GRID, step)
+    characteristic = np.prod((1.0 + 1j * frequency[:, None] * weights) ** -float(looks), axis=1)
+    mass = np.maximum(np.fft.irfft(characteristic, _GRID), 0.0)
+    above = np.clip(1.0 - np.cumsum(mass) + 0.5 * mass, 0.0, 1.0)
+    return np.arange(_GRID) * step, mass, above
+
+
+def _check(weights: Weights, false_alarm: float, looks: int) -> None:
+    if not (weights and looks >= 1 and 0.0 < false_alarm < 1.0):
         raise ParameterError(
-            f"CFAR with {cells:g} training cells, {looks} looks and a false-alarm probability of {false_alarm:g}.",
+            f"CFAR with {len(weights)} training cells, {looks} looks and a false-alarm probability of {false_alarm:g}.",
             where="radar",
             advice="Give at least one training cell, and a probability between 0 and 1.",
         )

@@ -48,10 +48,10 @@ def doppler_fft(ranges: C64, size: int) -> C64:
     return np.asarray(scipy.fft.fft(ranges, n=size, axis=0))
 
 
-def noise_correlation(name: Window, count: int, lags: int) -> F64:
-    """(lags,) squared correlation of white noise between cells 1, 2, ... apart, after this window.
+def noise_correlation(name: Window, count: int) -> NDArray[np.complex128]:
+    """(count // 2,) correlation of white noise between cells 0, 1, 2, ... apart, after this window.
 
     Zero without a window: cells of an unwindowed transform are independent. A Hann window makes neighbours alike.
     """
     power = window(name, count).astype(np.float64) ** 2
-    return np.abs(np.fft.fft(power)[1 : lags + 1] / power.sum()) ** 2
+    return (np.fft.fft(power) / power.sum())[: max(1, count // 2)]

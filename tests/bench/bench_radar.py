@@ -19,12 +19,14 @@ from tests.mapping.radar.echoes import Echo, frame, noise
 
 SET = 1e-3
 CELLS = (1000, 1000)
+EDGE = 17
+"""Cells of range at either end whose sides do not lie beside them."""
 PAPER_S, PAPER_FFT_S = 0.78e-3, 0.694e-3
 """Wessendorp 2021 on its Intel UP Core: one frame, and the share of its transforms."""
 
 
 def main() -> None:
-    for line in (*false_alarms(), *detection_probabilities(), *frame_times()):
+    for line in (*false_alarms(), *near_false_alarms(), *near_detections(), *detection_probabilities(), *frame_times()):
         print(line)
 
 
@@ -58,6 +60,55 @@ def _stages(name: fft.Window, samples: int, chirps: int, *, looks: int) -> tuple
         range_stage(Cfar(4, 8, SET), name=name, samples=samples, padding=padding, looks=looks),
         doppler_stage(Cfar(2, 4, SET), name=name, chirps=chirps, padding=1, looks=looks),
     )
+
+
+def near_false_alarms() -> list[str]:
+    """CASO in the first and the last cells of range, whose sides run around the ring."""
+    lines = []
+    for name, params, padding in (("AWR1843", AWR1843, 2), ("Position2Go", POSITION2GO, 4)):
+        looks, samples, blocks = len(params.antennas), params.samples, 40
+        stage = range_stage(Cfar(4, 8, 10 * SET), name="hann", samples=samples, padding=padding, looks=looks)
+        ends, rates = EDGE * padding, np.zeros(2)
+        for seed in range(blocks):
+            white = noise((40_000_000 // (looks * samples * blocks), looks, samples), seed)
+            weighted = fft.windowed(white, fft.window("hann", samples), np.ones(len(white), np.float32))
+            power = np.mean(np.abs(fft.range_fft(weighted, samples * padding)) ** 2, axis=1).astype(np.float32)
+            above = caso_along_range(power, stage)
+            rates += above[:, :ends].mean() / blocks, above[:, -ends:].mean() / blocks
+        near, far = rates / (10 * SET)
+        good = max(abs(near - 1.0), abs(far - 1.0)) <= 0.1
+        lines.append(
+            f"false alarms of CASO set to {10 * SET:g}, {name}: {near:.2f} times in the first {EDGE} cells, "
+            f"{far:.2f} times in the last (0.9 to 1.1: {_yes(good)})"
+        )
+    return lines
+
+
+def near_detections() -> list[str]:
+    """A near target before a larger one of the same speed, 3 to 4 m behind it."""
+    lines = []
+    sensors = (
+        ("Position2Go", RadarChain(POSITION2GO, POSITION2GO_SETTINGS), 10.0),
+        ("AWR1843", RadarChain(AWR1843), 15.0),
+    )
+    for name, chain, more_db in sensors:
+        for range_m in (3.0, 4.0, 5.0, 6.0):
+            shares = [_seen(chain, range_m, more_db, direct) for direct in ((), (Echo(0.1, snr_db=50.0),))]
+            lines.append(
+                f"{name}, target of 25 dB at {range_m:g} m, another {more_db:+g} dB 3 to 4 m behind: seen in "
+                f"{shares[0]:.0%} of frames, in {shares[1]:.0%} with direct coupling of 50 dB "
+                f"(all: {_yes(min(shares) >= 0.99)})"
+            )
+    return lines
+
+
+def _seen(chain: RadarChain, range_m: float, more_db: float, direct: tuple[Echo, ...], frames: int = 60) -> float:
+    seen = 0
+    for k in range(frames):
+        larger = Echo(range_m + 3.0 + k / frames, snr_db=25.0 + more_db, phase_rad=2.3 * k)
+        found = chain.process(frame(chain.params, Echo(range_m, snr_db=25.0), larger, *direct, seed=k))
+        seen += bool(np.any(np.abs(found.range_m - range_m) < chain.params.range_resolution_m))
+    return seen / frames
 
 
 def detection_probabilities() -> list[str]:

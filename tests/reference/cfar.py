@@ -18,15 +18,19 @@ def caso_false_alarm(cells: int, factor: float) -> float:
     return 2.0 * sum(math.comb(cells + k - 1, k) * (2.0 + a) ** -(cells + k) for k in range(cells))
 
 
-def caso(row: Row, guard: int, training: int, stride: int, both: float, one: float) -> list[bool]:
-    """Which cells of a line with two ends exceed their threshold."""
+def caso(ring: Row, guard: int, training: int, stride: int, factor: float) -> list[bool]:
+    """Which cells of a ring exceed their threshold; a side that meets the cells around zero starts beyond them."""
+    n = len(ring)
+    around_zero = {k % n for k in range(-guard * stride, guard * stride + 1)}
     found = []
-    for c, here in enumerate(row):
-        offsets = [stride * k for k in range(guard + 1, guard + training + 1)]
-        sides = [[c - k for k in offsets], [c + k for k in offsets]]
-        whole = [side for side in sides if min(side) >= 0 and max(side) < len(row)]
-        means = [sum(row[i] for i in side) / training for side in whole]
-        found.append(here > (both if len(means) == 2 else one) * min(means))
+    for c, here in enumerate(ring):
+        means = []
+        for sign in (-1, 1):
+            reached = {(c + sign * k) % n for k in range((guard + 1) * stride, (guard + training) * stride + 1)}
+            start = 0 if reached & around_zero else c
+            side = [(start + sign * stride * k) % n for k in range(guard + 1, guard + training + 1)]
+            means.append(sum(ring[i] for i in side) / training)
+        found.append(here > factor * min(means))
     return found
 
 

@@ -23,17 +23,17 @@ def maps(rows: int, cols: int) -> st.SearchStrategy[np.ndarray]:
 
 
 @settings(max_examples=40, deadline=None)
-@given(maps(3, 24), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
+@given(maps(3, 40), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
 def test_smallest_of_is_the_slow_rule(power: np.ndarray, guard: int, training: int, stride: int) -> None:
-    stage = Stage(guard, training, stride, both=2.0, one=1.5)
-    expected = [slow.caso([float(x) for x in row], guard, training, stride, 2.0, 1.5) for row in power]
+    stage = Stage(guard, training, stride, 2.0)
+    expected = [slow.caso([float(x) for x in row], guard, training, stride, 2.0) for row in power]
     assert_alike(caso_along_range(power, stage), expected, power)
 
 
 @settings(max_examples=40, deadline=None)
 @given(maps(20, 2), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
 def test_cell_averaging_is_the_slow_rule(power: np.ndarray, guard: int, training: int, stride: int) -> None:
-    stage = Stage(guard, training, stride, both=2.0, one=2.0)
+    stage = Stage(guard, training, stride, 2.0)
     columns = [slow.ca([float(x) for x in column], guard, training, stride, 2.0) for column in power.T]
     assert_alike(ca_along_doppler(power, stage), np.array(columns).T, power)
 
@@ -50,11 +50,27 @@ def test_false_alarms_of_each_stage_alone_over_a_million_cells() -> None:
     assert ca_along_doppler(power, DOPPLER).mean() == pytest.approx(SET, rel=0.2)
 
 
-def test_the_ends_of_the_range_give_no_more_alarms_than_its_middle() -> None:
-    power = np.random.default_rng(6).exponential(size=(20_000, 40)).astype(np.float32)
-    above = caso_along_range(power, RANGE)
-    assert above[:, :12].mean() == pytest.approx(SET, rel=0.2)
-    assert above[:, -12:].mean() == pytest.approx(SET, rel=0.2)
+@pytest.mark.parametrize(("name", "looks"), [("rectangular", 1), ("hann", 2), ("hann", 12)])
+def test_false_alarms_at_both_ends_of_the_range_are_as_set(name: Window, looks: int) -> None:
+    """Of cells 0 to 16, whose nearer side begins beyond zero, and of as many at the far end."""
+    stage = range_stage(Cfar(4, 8, 1e-2), name=name, samples=64, padding=2, looks=looks)
+    near, far, blocks = 0.0, 0.0, 12
+    for seed in range(blocks):
+        white = noise((40_000 // looks, looks, 64), seed)
+        bins = range_fft(windowed(white, window(name, 64), np.ones(len(white), np.float32)), 128)
+        above = caso_along_range(np.mean(np.abs(bins) ** 2, axis=1).astype(np.float32), stage)
+        near, far = near + above[:, :34].mean() / blocks, far + above[:, -34:].mean() / blocks
+    assert near == pytest.approx(1e-2, rel=0.1)
+    assert far == pytest.approx(1e-2, rel=0.1)
+
+
+@pytest.mark.parametrize("cell", range(7, 15))
+def test_the_direct_coupling_is_in_nobodys_neighbourhood(cell: int) -> None:
+    power = np.ones((1, 60), np.float32)
+    power[0, [0, 1, 2, 3, 57, 58, 59]] = 1e6
+    power[0, cell + 5 : cell + 12] = 1e4
+    power[0, cell] = 30.0
+    assert caso_along_range(power, RANGE)[0, cell]
 
 
 @pytest.mark.parametrize("snr_db", [0.0, 10.0, 20.0])
@@ -62,7 +78,7 @@ def test_detections_are_as_likely_as_the_closed_form_says(snr_db: float) -> None
     rng, snr = np.random.default_rng(7), 10 ** (snr_db / 10)
     power = rng.exponential(size=(13, 20_000)).astype(np.float32)
     power[6] *= 1.0 + snr
-    assert ca_along_doppler(power, DOPPLER)[6].mean() == pytest.approx(ca_detection(8, DOPPLER.both, snr), abs=0.015)
+    assert ca_along_doppler(power, DOPPLER)[6].mean() == pytest.approx(ca_detection(8, DOPPLER.factor, snr), abs=0.015)
 
 
 def test_the_smaller_side_keeps_a_target_beside_clutter() -> None:
@@ -76,7 +92,7 @@ def test_the_smaller_side_keeps_a_target_beside_clutter() -> None:
 @settings(max_examples=40, deadline=None)
 @given(maps(12, 26), st.integers(0, 25), st.integers(0, 26))
 def test_peaks_are_those_of_both_maps(power: np.ndarray, first: int, last: int) -> None:
-    along, across = Stage(1, 3, 1, 1.5, 1.2), Stage(1, 2, 1, 1.4, 1.4)
+    along, across = Stage(1, 3, 1, 1.5), Stage(1, 2, 1, 1.4)
     cells, noise = peaks(power, along, across, first, last)
     above = caso_along_range(power, along) & ca_along_doppler(power, across)
     found = {(int(d), int(c)) for d, c in cells}
@@ -110,7 +126,7 @@ def test_windows_and_padding_leave_the_false_alarms_as_set(name: Window, looks: 
         bins = doppler_fft(range_fft(windowed(noise((32, looks, 64), seed), *w), 128), 64)
         power = np.mean(np.abs(bins) ** 2, axis=1).astype(np.float32)
         counts += caso_along_range(power, along).mean(), ca_along_doppler(power, across).mean()
-    np.testing.assert_allclose(counts / frames, 1e-2, rtol=0.2)
+    np.testing.assert_allclose(counts / frames, 1e-2, rtol=0.1)
 
 
 @pytest.mark.parametrize(("guard", "training"), [(-1, 4), (2, 0), (20, 20)])

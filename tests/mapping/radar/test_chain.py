@@ -94,6 +94,23 @@ def test_two_alike_side_by_side_are_two(name: str, cells: float) -> None:
     assert resolved >= 38
 
 
+@pytest.mark.parametrize("coupling_db", [None, 50.0])
+@pytest.mark.parametrize(
+    ("radar", "ranges_m", "stronger_db"),
+    [((POSITION2GO, POSITION2GO_SETTINGS), (4.0, 5.0, 7.0), 10.0), ((AWR1843, ChainSettings()), (2.5, 4.0, 5.0), 15.0)],
+)
+def test_a_near_target_before_a_larger_one_is_seen(
+    radar: tuple[FmcwParams, ChainSettings], ranges_m: tuple[float, ...], stronger_db: float, coupling_db: float | None
+) -> None:
+    """The larger one 3 to 4 m behind it, at the same speed; with and without the transmitter heard directly."""
+    params, chosen = radar
+    chain, direct = RadarChain(params, chosen), () if coupling_db is None else (Echo(0.1, snr_db=coupling_db),)
+    for k, range_m in enumerate(ranges_m):
+        behind = Echo(range_m + 3.0 + k / 2, snr_db=25.0 + stronger_db, phase_rad=2.0 * k)
+        found = chain.process(frame(params, Echo(range_m, snr_db=25.0), behind, *direct, seed=k))
+        assert np.min(np.abs(found.range_m - range_m)) < params.range_resolution_m, range_m
+
+
 def test_beyond_the_limit_a_speed_wraps_and_beyond_the_range_a_distance() -> None:
     fast = CHAIN.process(frame(SMALL, Echo(15.0, SMALL.max_velocity_m_s + 2.0)))
     assert fast.radial_speed_m_s[0] == pytest.approx(2.0 - SMALL.max_velocity_m_s, abs=0.1)
