@@ -120,7 +120,7 @@ def detection_probabilities() -> list[str]:
         power = rng.exponential(size=(13, 100_000)).astype(np.float32)
         power[6] *= 1.0 + snr
         seen = ca_along_doppler(power, stage)[6].mean()
-        lines.append(f"  {snr_db:2d} dB: {seen:.4f}, {ca_detection(8, stage.both, snr):.4f}")
+        lines.append(f"  {snr_db:2d} dB: {seen:.4f}, {ca_detection(8, stage.factor, snr):.4f}")
     return lines
 
 
