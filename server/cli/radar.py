@@ -25,6 +25,8 @@ SHOWN = 10
 """Detections of the first frame, in the answer for people."""
 
 Sensor = Literal["awr1843", "position2go"]
+SamplesAs = Literal["auto", "twos-complement", "offset-binary"]
+"""Of ``telemetry.sensors.adc.codes``, which the help need not load."""
 
 radar = typer.Typer(name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich")
 
@@ -39,10 +41,18 @@ class RadarOptionsError(DescribedError):
 class Processed:
     """What became of a file."""
 
+    keeps: bool
+    """Whether all detections are wanted, or only the first frame's and how many there are."""
     frames: int = 0
     detections: int = 0
     seconds: float = 0.0
-    first: Detections | None = field(default=None)
+    kept: list[tuple[int, float, Detections]] = field(default_factory=list)
+    """Number and time of each kept frame, and what was detected in it."""
+
+    def take(self, t_s: float, found: Detections) -> None:
+        if self.keeps or not self.frames:
+            self.kept.append((self.frames, t_s, found))
+        self.frames, self.detections = self.frames + 1, self.detections + len(found)
 
 
 def process(
@@ -61,6 +71,9 @@ def process(
     most: Annotated[
         int | None, typer.Option("--frames", metavar="N", min=1, help="Only the first N frames.", show_default=False)
     ] = None,
+    samples_as: Annotated[
+        SamplesAs, typer.Option("--samples", help="How 16-bit samples stand for numbers; auto: by how they fill them.")
+    ] = "auto",
     as_json: o.AsJson = False,
 ) -> None:
     """Turn raw samples into detections: range and Doppler FFT, CFAR, direction of arrival."""
@@ -69,10 +82,10 @@ def process(
             what = f"{out.suffix or 'No ending'} is no format of recordings."
             raise RadarOptionsError(what, where=out.name, advice="Choose .mcap.")
         chosen: Sensor = sensor or ("position2go" if file.suffix.lower() == ".csv" else "awr1843")
-        opened, chain, config = _opened(file, chosen, cfg, most)
+        opened, chain, config = _opened(file, chosen, cfg, most, samples_as)
         for note in (*opened.notes, *_differences(config)):
             say(f"Note: {note}")
-        done = Processed()
+        done = Processed(keeps=as_json)
         _run(_detections(opened, chain, done, most, plots, plot_frame), opened, out, file, chosen)
         end_progress()
         _answer(file, done, parameters(chosen, opened), as_json=as_json)
@@ -83,7 +96,7 @@ radar.command("process", epilog=examples.RADAR_PROCESS)(process)
 
 
 def _opened(
-    file: Path, sensor: Sensor, cfg: Path | None, most: int | None
+    file: Path, sensor: Sensor, cfg: Path | None, most: int | None, samples_as: SamplesAs
 ) -> tuple[AdcFile, RadarChain, TiConfig | None]:
     """Loaded only now: the help must not wait for compilers."""
     from mapping.radar import AWR1843, AWR1843_SETTINGS, POSITION2GO, POSITION2GO_SETTINGS, RadarChain
@@ -94,7 +107,7 @@ def _opened(
         raise RadarOptionsError("A Position2Go has no .cfg.", where="--cfg", advice="Leave it out, or the sensor.")
     config = read_config(cfg) if cfg is not None else None
     usual, settings = (AWR1843, AWR1843_SETTINGS) if sensor == "awr1843" else (POSITION2GO, POSITION2GO_SETTINGS)
-    opened = open_adc(file, usual, config, most=most)
+    opened = open_adc(file, usual, config, most=most, samples_as=samples_as)
     return opened, RadarChain(opened.params, settings), config
 
 
@@ -118,8 +131,7 @@ def _detections(
         began_s = time.perf_counter()
         spectra, found = _processed(chain, frame, opened.name, number)
         done.seconds += time.perf_counter() - began_s
-        done.frames, done.detections = number + 1, done.detections + len(found)
-        done.first = found if number == 0 else done.first
+        done.take(frame.t_s, found)
         if plots is not None and number == plot_frame:
             chosen = spectra, found
         progress(f"Frame {number}", None)
@@ -189,7 +201,7 @@ def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool)
         print_json(
             {
                 "frames": done.frames,
-                "detections": done.detections,
+                "detections": [row for kept in done.kept for row in _rows(*kept)],
                 "seconds_per_frame": round(per_frame_s, 6),
                 "parameters": used,
             }
@@ -201,10 +213,35 @@ def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool)
         f"  range cells {used['range_resolution_m']:.3g} m to {used['max_range_m']:.4g} m, speed cells "
         f"{used['velocity_resolution_m_s']:.3g} m/s to {used['max_velocity_m_s']:.3g} m/s"
     )
-    if done.first is not None and len(done.first):
+    first = done.kept[0][2] if done.kept else None
+    if first is not None and len(first):
         typer.echo("  the strongest of the first frame:")
-        for line in _table(done.first):
+        for line in _table(first):
             typer.echo(f"    {line}")
+
+
+def _rows(frame: int, t_s: float, found: Detections) -> list[dict[str, Any]]:
+    """All that is known of each detection, the strongest first."""
+    import numpy as np
+
+    azimuth_deg, elevation_deg, xyz_m = np.degrees(found.azimuth_rad), np.degrees(found.elevation_rad), found.xyz_m
+    return [
+        {
+            "frame": frame,
+            "t_s": round(t_s, 6),
+            "range_m": round(float(found.range_m[k]), 4),
+            "radial_speed_m_s": round(float(found.radial_speed_m_s[k]), 4),
+            "azimuth_deg": round(float(azimuth_deg[k]), 3),
+            "elevation_deg": round(float(elevation_deg[k]), 3),
+            "x_right_m": round(float(xyz_m[k, 0]), 4),
+            "y_forward_m": round(float(xyz_m[k, 1]), 4),
+            "z_up_m": round(float(xyz_m[k, 2]), 4),
+            "snr_db": round(float(found.snr_db[k]), 2),
+            "doppler_cell": int(found.cells[k, 0]),
+            "range_cell": int(found.cells[k, 1]),
+        }
+        for k in np.argsort(-found.snr_db, kind="stable")
+    ]
 
 
 def _table(found: Detections) -> list[str]:

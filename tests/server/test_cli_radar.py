@@ -11,10 +11,15 @@ from PIL import Image
 from mapping.radar import AWR1843, POSITION2GO, FmcwParams
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import recorded_readings
+from telemetry.sensors.ti_mmwave.waveform import fmcw_params
 from tests.server.cli_runs import hedgehop
 from tests.telemetry.test_adc_files import dca1000_bytes, oda_line, save
 from tests.telemetry.test_ti_config import GOOD, config
 
+DETECTION = [
+    "frame", "t_s", "range_m", "radial_speed_m_s", "azimuth_deg", "elevation_deg", "x_right_m", "y_forward_m", "z_up_m",
+    "snr_db", "doppler_cell", "range_cell",
+]  # fmt: skip
 KEYS = ["frames", "detections", "seconds_per_frame", "parameters"]
 FIGURES = {"range-profile.png", "range-doppler.png", "azimuth-spectrum.png"}
 
@@ -46,8 +51,9 @@ def test_a_recorded_cube_gives_detections_and_figures(shared_data: Path, tmp_pat
                    "--out", tmp_path / "targets.mcap", "--json")  # fmt: skip
     assert run.code == 0, run.err
     assert list(run.json) == KEYS
+    assert all(list(row) == DETECTION for row in run.json["detections"])
     assert run.json["frames"] == 1
-    assert run.json["detections"] == len(targets(tmp_path / "targets.mcap")) >= 10
+    assert len(run.json["detections"]) == len(targets(tmp_path / "targets.mcap")) >= 10
     assert run.json["seconds_per_frame"] > 0
     assert run.json["parameters"]["antennas"] == 8
     assert "stored unsigned" in run.err
@@ -77,6 +83,18 @@ def test_a_capture_with_its_configuration_puts_the_target_where_it_is(tmp_path: 
     assert run.json["frames"] == 2
     x, y, _, speed, _ = targets(tmp_path / "targets.mcap")[0]
     assert np.hypot(x, y) == pytest.approx(40.0, abs=0.2)
+    strongest = [next(row for row in run.json["detections"] if row["frame"] == frame) for frame in (0, 1)]
+    for row, range_m in zip(strongest, (40.0, 39.7), strict=True):
+        assert row["range_m"] == pytest.approx(range_m, abs=0.2)
+        assert row["azimuth_deg"] == pytest.approx(np.degrees(np.arcsin(0.3)), abs=1.0)
+        assert row["radial_speed_m_s"] == pytest.approx(-3.0, abs=0.1)
+        assert np.hypot(row["x_right_m"], row["y_forward_m"]) == pytest.approx(
+            row["range_m"] * np.cos(np.radians(row["elevation_deg"])), abs=1e-3
+        )
+        assert row["z_up_m"] == pytest.approx(row["range_m"] * np.sin(np.radians(row["elevation_deg"])), abs=1e-3)
+        assert row["snr_db"] > 30.0
+        assert min(row["doppler_cell"], row["range_cell"]) >= 0
+    assert [row["t_s"] for row in strongest] == [0.0, 0.1]
     assert np.degrees(np.arctan2(x, y)) == pytest.approx(np.degrees(np.arcsin(0.3)), abs=1.0)
     assert speed == pytest.approx(-3.0, abs=0.1)
     plain = hedgehop("radar", "process", tmp_path / "adc.bin", "--cfg", tmp_path / "radar.cfg", "--frames", 1)
@@ -96,6 +114,25 @@ def test_oda_rows_are_those_of_a_position2go(tmp_path: Path) -> None:
     assert np.degrees(np.arctan2(x, y)) == pytest.approx(-11.5, abs=1.5)
     assert speed == pytest.approx(1.0, abs=0.2)
     assert {path.name for path in tmp_path.glob("*.png")} == FIGURES
+
+
+def test_offset_binary_is_told_and_may_be_said(tmp_path: Path) -> None:
+    (tmp_path / "radar.cfg").write_text(GOOD)
+    setup = fmcw_params(config())
+    stored = dca1000_bytes([echo(setup, 40.0, -3.0, 0.3)], q_first=True)
+    offset = (np.frombuffer(stored, "<i2").astype(np.int64) + 32768).astype("<u2").tobytes()
+    (tmp_path / "offset.bin").write_bytes(offset)
+    (tmp_path / "noise.bin").write_bytes(np.random.default_rng(1).bytes(len(stored)))
+    arguments = ("--cfg", tmp_path / "radar.cfg", "--json")
+    run = hedgehop("radar", "process", tmp_path / "offset.bin", *arguments)
+    assert run.json["detections"][0]["range_m"] == pytest.approx(40.0, abs=0.2)
+    assert "offset binary of 16 bits" in run.err
+    asked = hedgehop("radar", "process", tmp_path / "offset.bin", "--samples", "offset-binary", *arguments)
+    assert asked.json["detections"] == run.json["detections"]
+    for name, samples_as in (("offset.bin", "twos-complement"), ("noise.bin", "auto")):
+        wrong = hedgehop("radar", "process", tmp_path / name, "--samples", samples_as, *arguments)
+        assert wrong.code == 2
+        assert "no unclipped signal" in wrong.json["error"]["what"]
 
 
 def test_noise_alone_is_drawn_too(tmp_path: Path) -> None:

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, refuse_empty
+from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
+from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, refuse_clipped, refuse_empty
 from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.waveform import fmcw_params
 
@@ -16,7 +18,7 @@ SAMPLE_BYTES = 4
 """I and Q."""
 
 
-def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None) -> AdcFile:
+def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None, samples_as: SampleCode = "auto") -> AdcFile:
     """``most``: of a longer file only so many frames are looked at.
 
     A chirp holds all samples of its first receiver, then those of the next; in each, two I are followed by their two Q
@@ -40,18 +42,30 @@ def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None) -> Ad
             advice=_advice(count),
         )
 
+    code = told(_counts(path, frame_bytes, count), samples_as, path.name)
+
     def frames() -> Iterator[AdcFrame]:
         with path.open("rb") as file:
             for number in range(count):
-                data = file.read(frame_bytes)
-                yield AdcFrame(number * config.frame_period_s, _cube(data, config, params.shape))
+                cube = _cube(file.read(frame_bytes), code, config, params.shape)
+                refuse_clipped(cube, f"{path.name}, frame {number}")
+                yield AdcFrame(number * config.frame_period_s, cube)
 
-    return AdcFile(path.name, params, config.frame_period_s, (), frames)
+    return AdcFile(path.name, params, config.frame_period_s, (code.note,) if code.note else (), frames)
 
 
-def _cube(data: bytes, config: TiConfig, shape: tuple[int, int, int]) -> C64:
+def _counts(path: Path, frame_bytes: int, frames: int) -> NDArray[np.int64]:
+    """How often each word occurs in all frames: the first may be quiet."""
+    counts = np.zeros(1 << 16, np.int64)
+    with path.open("rb") as file:
+        for _ in range(frames):
+            counts += histogram(np.frombuffer(file.read(frame_bytes), "<u2"))
+    return counts
+
+
+def _cube(data: bytes, code: Code, config: TiConfig, shape: tuple[int, int, int]) -> C64:
     """Chirps of all transmitters in turn become virtual antennas."""
-    lanes = np.frombuffer(data, "<i2").reshape(-1, 2, 2).astype(np.float32)
+    lanes = code.numbers(np.frombuffer(data, "<u2")).reshape(-1, 2, 2)
     first, second = lanes[:, 0].ravel(), lanes[:, 1].ravel()
     real, imaginary = (second, first) if config.q_first else (first, second)
     cube = np.empty(len(real), np.complex64)

@@ -35,6 +35,29 @@ class AdcFile:
     frames: Callable[[], Iterator[AdcFrame]]
 
 
+CLIPPED = 0.01
+"""Share of a frame's samples at one and the same end of its values that no unclipped signal comes to."""
+_VALUES = 64
+"""Cubes of fewer different values are made by hand: nothing is said of them."""
+
+
+def refuse_clipped(cube: C64, where: str) -> None:
+    """Raises RadarDataError where many samples have the very highest or lowest value, and few come near it."""
+    parts = np.ascontiguousarray(cube).view(np.float32).ravel()
+    high, low = float(parts.max()), float(parts.min())
+    if not (np.isfinite(high) and np.isfinite(low) and high > low):
+        return
+    step = (high - low) / 64
+    for end, beside in ((high, parts > high - step), (low, parts < low + step)):
+        at_end = float(np.mean(parts == end))
+        if at_end > CLIPPED and np.mean(beside) - at_end < at_end / 5 and len(np.unique(parts)) > _VALUES:
+            raise RadarDataError(
+                f"{at_end:.1%} of its samples have the value {end:,.6g}, and hardly any come near it: clipped.",
+                where=where,
+                advice="Record again with less gain, or farther from what echoes so strongly.",
+            )
+
+
 def dimensions(shape: tuple[int, ...]) -> str:
     """For messages: ``64 x 12 x 256``."""
     return " x ".join(str(n) for n in shape)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, dimensions, refuse_empty
+from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
+from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, dimensions, refuse_clipped, refuse_empty
 
 USUAL_PERIOD_S = 0.1
 """Arrays do not tell it."""
@@ -33,22 +34,31 @@ class _Layout:
     offset: int
 
 
-def open_npy(path: Path, params: FmcwParams, *, exact: bool, period_s: float | None = None) -> AdcFile:
+def open_npy(
+    path: Path,
+    params: FmcwParams,
+    *,
+    exact: bool,
+    period_s: float | None = None,
+    samples_as: SampleCode = "auto",
+) -> AdcFile:
     """``exact``: the array must fit ``params``; otherwise they are cut or stretched to it, with a note.
 
     Raises RadarDataError for other arrays, and OSError.
     """
     layout = _layout(path)
     fitting, notes = _fit(layout, params, path.name, exact=exact)
-    unsigned = _is_unsigned(path, layout)
-    if unsigned:
-        notes += ("Its samples were stored unsigned: 65536 was taken off those above 32767.",)
+    code = _code(path, layout, samples_as)
+    if code is not None:
+        notes += (code.note or "Its samples were stored unsigned: 65536 was taken off those above 32767.",)
     step_s = period_s or USUAL_PERIOD_S
 
     def frames() -> Iterator[AdcFrame]:
         for number in range(layout.shape[0]):
-            cube = _frame(path, layout, number)
-            yield AdcFrame(number * step_s, _signed(cube) if unsigned else cube.astype(np.complex64))
+            stored = _frame(path, layout, number)
+            cube = stored.astype(np.complex64) if code is None else _decoded(stored, code)
+            refuse_clipped(cube, f"{path.name}, frame {number}")
+            yield AdcFrame(number * step_s, cube)
 
     return AdcFile(path.name, fitting, step_s, notes, frames)
 
@@ -141,23 +151,46 @@ def _fit(layout: _Layout, params: FmcwParams, name: str, *, exact: bool) -> tupl
     return fitting, (note,)
 
 
-def _is_unsigned(path: Path, layout: _Layout) -> bool:
-    """Two's complement that was read as unsigned: whole numbers from 0 to 65535, some of them above 32767.
+def _code(path: Path, layout: _Layout, asked: SampleCode) -> Code | None:
+    """How 16-bit words whose sign was lost stand for numbers; None: the numbers are what they are.
 
-    All frames are looked at until one proves the contrary: the first may be quiet. What is no number says nothing.
+    Raises RadarDataError where words are no signal in any code, or the one that was asked for needs words.
+    """
+    counts = _words(path, layout)
+    if counts is None:
+        if asked == "offset-binary":
+            raise RadarDataError(
+                "Its samples are not whole numbers from 0 to 65535.",
+                where=path.name,
+                advice="Leave --samples out: the numbers are taken as they are.",
+            )
+        return None
+    code = told(counts, asked, path.name)
+    below = not counts[1 << 15 :].any()
+    return None if code.zero is None and below else code
+
+
+def _words(path: Path, layout: _Layout) -> NDArray[np.int64] | None:
+    """How often each whole number from 0 to 65535 occurs, if there are no others; what is no number says nothing.
+
+    All frames are looked at until one proves the contrary: the first may be quiet.
     """
     numbers = np.memmap(path, layout.dtype, "r", layout.offset, (prod(layout.shape),))
-    above = False
+    counts = np.zeros(1 << 16, np.int64)
     for begin in range(0, len(numbers), _CHUNK):
         piece = numbers[begin : begin + _CHUNK]
         parts = np.concatenate((piece.real, piece.imag))
         parts = parts[np.isfinite(parts)]
         if bool(((parts < 0) | (parts > 65535) | (parts != np.round(parts))).any()):
-            return False
-        above |= bool((parts > 32767).any())
-    return above
+            return None
+        counts += histogram(parts.astype(np.uint16))
+    return counts
 
 
-def _signed(cube: NDArray[np.complexfloating]) -> C64:
-    real, imaginary = (np.where(part > 32767, part - 65536, part) for part in (cube.real, cube.imag))
-    return (real + 1j * imaginary).astype(np.complex64)
+def _decoded(stored: NDArray[np.complexfloating], code: Code) -> C64:
+    """What is no number stays none."""
+    cube = np.empty(stored.shape, np.complex64)
+    for ours, part in ((cube.real, stored.real), (cube.imag, stored.imag)):
+        known = np.isfinite(part)
+        ours[...] = np.where(known, code.numbers(np.where(known, part, 0).astype(np.uint16)), part)
+    return cube

@@ -14,7 +14,7 @@ import numpy as np
 
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
-from telemetry.sensors.adc.model import AdcFile, AdcFrame, refuse_empty
+from telemetry.sensors.adc.model import AdcFile, AdcFrame, refuse_clipped, refuse_empty
 
 RATE_HZ = 15.7
 _BLOCKS = 4
@@ -44,7 +44,9 @@ def open_oda(path: Path, params: FmcwParams) -> AdcFile:
                 first_ns = t_ns if first_ns is None else first_ns
                 _check_time(t_ns, first_ns, last_ns, where)
                 last_ns = t_ns
-                yield AdcFrame((t_ns - first_ns) * 1e-9, _cube(values[1:], params))
+                cube = _cube(values[1:], params)
+                refuse_clipped(cube, where)
+                yield AdcFrame((t_ns - first_ns) * 1e-9, cube)
         if first_ns is None:
             raise RadarDataError("There is no frame in it.", where=path.name, advice="Record it again.")
 
