@@ -70,6 +70,7 @@ def report_input(plan: Plan, *, title: str, created_utc: str, seconds: dict[str,
         max_items=request.mission.max_items,
         created_utc=created_utc,
         gsd_cm=None if camera is None else gsd_cm(camera, float(np.nanmax(above_m))),
+        coverage=plan.coverage,
         trade=[
             TradeRow(
                 waypoints=choice.waypoints,

@@ -37,6 +37,7 @@ from planning.path import sampled_path
 from planning.poi import check_pois
 from planning.request import PlanRequest, check_request, check_size
 from planning.surface import safe_surface, safe_surface_at
+from planning.survey_coverage import SurveyCoverage, survey_coverage
 from planning.timing import path_timing
 
 Progress = Callable[[str, float | None], None]
@@ -63,6 +64,8 @@ class Plan:
     line: FlownLine
     certificate: Certificate
     predicted: PredictedTime
+    coverage: SurveyCoverage | None
+    """What a survey's photos really see; None where the plan is no survey, or takes no photos."""
     warnings: tuple[str, ...]
 
     @property
@@ -103,6 +106,7 @@ def plan_mission(
     assumed = {**_assumptions(request, surfaces, holes), **(assumptions or {})}
     certificate = certify(filled, line, request.clearance(), assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
+    coverage = _coverage(filled, request, line)
     return Plan(
         request=request,
         dsm=filled,
@@ -113,6 +117,7 @@ def plan_mission(
         line=line,
         certificate=certificate,
         predicted=predicted,
+        coverage=coverage,
         warnings=(*built.warnings, *_warnings(request, predicted)),
     )
 
@@ -215,6 +220,13 @@ def _assumptions(request: PlanRequest, surfaces: Surfaces, holes: HoleReport) ->
         **hole_assumptions(holes, request.surface.fill_hole_area_m2),
         "vehicle_profile": request.profile.name,
     }
+
+
+def _coverage(dsm: Dsm, request: PlanRequest, line: FlownLine) -> SurveyCoverage | None:
+    camera = request.profile.camera
+    if request.survey is None or camera is None:
+        return None
+    return survey_coverage(dsm, line, request.survey, camera, request.mission)
 
 
 def _warnings(request: PlanRequest, predicted: PredictedTime) -> list[str]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from planning.dsm import Dsm
 from planning.errors import ParameterError
 from planning.model import ClearanceParams, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.survey import SurveyPlan
 
 LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
 FEWEST_ITEMS = 4
 """Take-off, two waypoints and the return."""
+LOOKS_DOWN_DEG = -90.0
+"""Gimbal pitch of a survey's camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,8 @@ class PlanRequest:
     required_clearance_m: float | None = None
     """None: position error + downwash + vehicle radius."""
     max_height_above_ground_m: float | None = None
+    survey: SurveyPlan | None = None
+    """The area and the pattern that the points come from; None: they are points of interest."""
 
     def clearance(self) -> ClearanceParams:
         required = self.required_clearance_m
@@ -42,6 +47,26 @@ class PlanRequest:
             rtl_height_m=self.profile.rtl_height_m,
             max_height_above_ground_m=self.max_height_above_ground_m,
         )
+
+
+def survey_request(request: PlanRequest, survey: SurveyPlan) -> PlanRequest:
+    """The request along a survey's lines, at the height that their spacing and photo distance are meant for.
+
+    Height H becomes the survey's (Melita 2020, eq. 1); a photo distance or gimbal angle of the request's own stays.
+    """
+    mission = request.mission
+    trigger_m, pitch_deg = mission.camera_trigger_m, mission.gimbal_pitch_deg
+    return replace(
+        request,
+        pois=survey.pois,
+        survey=survey,
+        surface=replace(request.surface, height_m=survey.height_m),
+        mission=replace(
+            mission,
+            camera_trigger_m=survey.trigger_distance_m if trigger_m is None else trigger_m,
+            gimbal_pitch_deg=LOOKS_DOWN_DEG if pitch_deg is None else pitch_deg,
+        ),
+    )
 
 
 def check_request(request: PlanRequest) -> None:

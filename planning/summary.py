@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from planning.clearance import certificate_json
 from planning.dsm import Dsm
-from planning.model import Certificate
+from planning.model import Certificate, finite_or_none
 from planning.plan import Plan
+from planning.survey_coverage import SurveyCoverage
 
 _CERTIFICATE_KEYS = (
     "certified",
@@ -61,8 +63,17 @@ def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
         "max_items": request.mission.max_items,
         "excess_height_m": plan.built.excess_height_m,
         "dsm": dsm_summary(source, holes_filled=plan.surfaces.holes_filled),
+        "survey": None if plan.coverage is None else survey_summary(plan.coverage),
         "warnings": list(plan.warnings),
     }
+
+
+def survey_summary(coverage: SurveyCoverage) -> dict[str, Any]:
+    """What a survey's photos see, and what is wrong with it; an overlap below every image is null."""
+    figures = {
+        key: finite_or_none(value) if isinstance(value, float) else value for key, value in asdict(coverage).items()
+    }
+    return {**figures, "faults": list(coverage.faults())}
 
 
 def crs_name(dsm: Dsm) -> str:

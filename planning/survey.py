@@ -35,6 +35,12 @@ class SurveyPlan:
     angle_deg: float
     """Direction of the lines, clockwise from grid north, in [0, 180)."""
     lines: int
+    polygon_lat_lon_deg: tuple[tuple[float, float], ...]
+    """The area, as it was given."""
+    side_overlap: float
+    """Asked for, between neighbouring lines."""
+    front_overlap: float
+    """Asked for, between photos of a line."""
 
 
 def survey_lines(
@@ -79,6 +85,9 @@ def survey_lines(
         gsd_cm=gsd_at_height_cm(camera, height),
         angle_deg=angle,
         lines=count,
+        polygon_lat_lon_deg=tuple((float(lat), float(lon)) for lat, lon in np.reshape(polygon_lat_lon, (-1, 2))),
+        side_overlap=side_overlap,
+        front_overlap=front_overlap,
     )
 
 

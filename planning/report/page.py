@@ -29,6 +29,7 @@ from planning.model import (
 from planning.report.figures.curves import altitude_profile, clearance_trend, speed_chart, time_chart
 from planning.report.figures.plan_view import plan_view
 from planning.report.words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up
+from planning.survey_coverage import SurveyCoverage
 
 TIGHTEST_LEGS = 8
 
@@ -65,6 +66,8 @@ class ReportInput:
     """As it shall be printed."""
     gsd_cm: float | None = None
     """Achieved ground sampling distance; None without a camera."""
+    coverage: SurveyCoverage | None = None
+    """What a survey's photos see."""
     trade: Sequence[TradeRow] = ()
     warnings: Sequence[str] = ()
     seconds: dict[str, float] = field(default_factory=dict)
@@ -151,7 +154,31 @@ def _tiles(plan: ReportInput) -> list[tuple[str, str, str, bool]]:
     ]
     if plan.gsd_cm is not None:
         tiles.append(("Ground sampling", f"{plan.gsd_cm:.2f} cm", "per pixel", False))
-    return tiles
+    return tiles + ([] if plan.coverage is None else _photo_tiles(plan.coverage))
+
+
+def _photo_tiles(coverage: SurveyCoverage) -> list[tuple[str, str, str, bool]]:
+    """Shares are rounded down, as clearances are."""
+
+    def least(share: float) -> str:
+        return f"{math.floor(max(0.0, share) * 100 + 1e-6)} %"
+
+    faulty = bool(coverage.faults())
+    asked = f"{coverage.asked_front_overlap:.0%} and {coverage.asked_side_overlap:.0%} asked"
+    return [
+        (
+            "Photographed twice",
+            least(coverage.twice_share),
+            f"of {coverage.area_m2:,.0f} m², {coverage.photos} photos",
+            faulty,
+        ),
+        (
+            "Overlap",
+            f"{least(coverage.front_overlap)}, {least(coverage.side_overlap)}",
+            f"front, side; {asked}",
+            faulty,
+        ),
+    ]
 
 
 def _certificate_rows(plan: ReportInput) -> list[tuple[str, str, bool | None]]:

@@ -9,6 +9,7 @@ import pytest
 from planning.model import Certificate, FlownLine, LegClearance, Reason, SurfaceParams, VehicleProfile, WorstPoint
 from planning.report import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
+from planning.survey_coverage import SurveyCoverage
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing
 
 
@@ -101,6 +102,15 @@ def test_a_failing_plan_gives_reasons_mends_and_words_for_the_infinite():
     assert "Watch &lt;out&gt;." in page
     assert "inside terrain" in page
     assert not re.search(r"\b(nan|inf)\b", re.sub(r"base64,[^\"]*", "", page))
+
+
+def test_a_survey_shows_what_its_photos_see():
+    coverage = SurveyCoverage(51.0, 12_345.0, 99, 1.0, 0.955, 0.8, 0.7, 0.8, 0.7, 1.1, 1.0, -90.0)
+    page = render_report(replace(example(), coverage=coverage))
+    assert "95 %" in page
+    assert "of 12,345 m², 99 photos" in page
+    assert "80 %, 70 %" in page
+    assert "Photographed" not in render_report(example())
 
 
 def test_the_page_runs_no_script_and_loads_nothing():
