@@ -7,8 +7,8 @@ from dataclasses import asdict
 from planning.dsm import Dsm
 from planning.model import Camera, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.poi_files import PoiFile
-from planning.request import PlanRequest
-from planning.survey import survey_lines
+from planning.request import PlanRequest, survey_request
+from planning.survey import SurveyPlan, survey_lines
 from server.edits import new_poi_id
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
 
@@ -25,10 +25,9 @@ def doc_from_profile(profile: VehicleProfile) -> ProfileDoc:
 def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
     """Raises PlanningError when the survey polygon or camera cannot be flown."""
     mission, profile = document.mission, document.profile
-    pois, trigger_m = _points(document, dsm)
     place = mission.look_at
-    return PlanRequest(
-        pois=pois,
+    request = PlanRequest(
+        pois=tuple(Poi(p.lat_deg, p.lon_deg, p.name, p.loiter_s) for p in document.pois),
         profile=profile_from_doc(profile),
         surface=SurfaceParams(**document.surface.model_dump()),
         path=PathParams(
@@ -48,20 +47,18 @@ def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
             heading_deg=mission.heading_deg,
             look_at=None if place is None else (place.lat_deg, place.lon_deg),
             gimbal_pitch_deg=mission.gimbal_pitch_deg,
-            camera_trigger_m=mission.camera_trigger_m if mission.camera_trigger_m is not None else trigger_m,
+            camera_trigger_m=mission.camera_trigger_m,
         ),
         home_lat_lon_deg=None if document.home is None else (document.home.lat_deg, document.home.lon_deg),
         required_clearance_m=document.clearance.required_clearance_m,
         max_height_above_ground_m=document.clearance.max_height_above_ground_m,
     )
+    return request if document.source == "pois" else survey_request(request, _survey(document, dsm))
 
 
-def _points(document: PlanDoc, dsm: Dsm) -> tuple[tuple[Poi, ...], float | None]:
-    """The points to fly over, and the photo distance that a survey implies."""
-    if document.source == "pois":
-        return tuple(Poi(p.lat_deg, p.lon_deg, p.name, p.loiter_s) for p in document.pois), None
+def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:
     survey = document.survey
-    planned = survey_lines(
+    return survey_lines(
         [(corner.lat_deg, corner.lon_deg) for corner in survey.polygon],
         dsm,
         camera=profile_from_doc(document.profile).camera,
@@ -70,7 +67,6 @@ def _points(document: PlanDoc, dsm: Dsm) -> tuple[tuple[Poi, ...], float | None]
         front_overlap=survey.front_overlap,
         angle_deg=survey.angle_deg,
     )
-    return planned.pois, planned.trigger_distance_m
 
 
 def with_points(document: PlanDoc, points: PoiFile) -> PlanDoc:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +13,7 @@ from planning.errors import ParameterError, PoiError
 from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, SurfaceParams
 from planning.poi_files import read_pois
-from planning.request import PlanRequest, check_request
+from planning.request import PlanRequest, check_request, survey_request
 from planning.survey import SurveyPlan, survey_lines
 from planning.vehicle_profile import path_params
 from server.cli import options as o
@@ -109,7 +108,6 @@ def survey(
             excess_height_m=excess_height_m,
             end=end,
             altitude_reference=altitude_reference,
-            gimbal_pitch_deg=-90.0,
         )
         request = PlanRequest(
             pois=(),
@@ -136,12 +134,7 @@ def survey(
                 angle_deg=angle_deg,
             )
             _say_pattern(lines)
-            return replace(
-                request,
-                pois=lines.pois,
-                surface=replace(request.surface, height_m=lines.height_m),
-                mission=replace(mission, camera_trigger_m=lines.trigger_distance_m),
-            )
+            return survey_request(request, lines)
 
         model = ModelOptions(crs, z_scale, vertical_datum, remove_spikes)
         run(dsm, out, request_for, title=polygon.stem, as_json=as_json, model=model)

@@ -19,8 +19,24 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
         f"  way home: {_way_home(summary)}",
         f"  column over home: {'clear' if summary['home_column_clear'] else 'NOT clear'}",
     ]
+    if (survey := summary.get("survey")) is not None:
+        lines.append(f"  photos: {_photos(survey)}")
     lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
     return lines
+
+
+def _photos(survey: dict[str, Any]) -> str:
+    """Shares are rounded down, as clearances are."""
+    return (
+        f"{survey['photos']}, {_percent(survey['photographed_share'])} of {survey['area_m2']:,.0f} m² photographed, "
+        f"{_percent(survey['twice_share'])} at least twice; overlap over the surface "
+        f"{_percent(survey['front_overlap'])} front, {_percent(survey['side_overlap'])} side "
+        f"({_percent(survey['asked_front_overlap'])}, {_percent(survey['asked_side_overlap'])} asked)"
+    )
+
+
+def _percent(share: float | None) -> str:
+    return f"{math.floor(max(0.0, share or 0.0) * 100 + 1e-6)} %"
 
 
 def leg_lines(legs: list[dict[str, Any]]) -> list[str]:

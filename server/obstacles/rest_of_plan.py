@@ -56,7 +56,30 @@ def rest_of_plan(part: Part, underway: Underway | None, *, terrain_id: str) -> d
         raise NotReadyError("Nothing is left of the mission.", advice="Plan the way home.")
     if _apart_m(here, left[0]) > SAME_PLACE_M:
         left.insert(0, _poi("here", "From here", here))
-    return {"source": "pois", "pois": _numbered(left), "home": home}
+    return {"source": "pois", "pois": _numbered(left), "home": home, **_survey_fields(_flown(record), part)}
+
+
+def _survey_fields(flown: PlanDoc, part: Part) -> dict[str, Any]:
+    """What a survey brings beside its lines: their height, and on the mission ahead the photos."""
+    from planning.camera import footprint_m, height_from_gsd_m
+    from planning.model import Camera
+    from planning.request import LOOKS_DOWN_DEG
+
+    if flown.source != "survey" or flown.profile.camera is None:
+        return {}
+    camera = Camera(**flown.profile.camera.model_dump())
+    height_m = height_from_gsd_m(camera, flown.survey.gsd_cm)
+    trigger_m = footprint_m(camera, height_m)[1] * (1 - flown.survey.front_overlap)
+    photos = {
+        "camera_trigger_m": flown.mission.camera_trigger_m or trigger_m,
+        "gimbal_pitch_deg": LOOKS_DOWN_DEG
+        if flown.mission.gimbal_pitch_deg is None
+        else flown.mission.gimbal_pitch_deg,
+    }
+    return {
+        "surface": flown.surface.model_copy(update={"height_m": height_m}),
+        "mission": flown.mission.model_copy(update=photos if part == "ahead" else {"camera_trigger_m": None}),
+    }
 
 
 def _left(underway: Underway, mission: Mission, here: PlaceDoc) -> list[PoiDoc]:
@@ -78,16 +101,21 @@ def _left(underway: Underway, mission: Mission, here: PlaceDoc) -> list[PoiDoc]:
 def _points(record: PlanRecord, mission: Mission) -> list[PoiDoc]:
     from planning.formats.commands import has_position
 
-    try:
-        flown = PlanDoc.model_validate_json(record.plan_json)
-    except ValidationError:
-        flown = PlanDoc()
+    flown = _flown(record)
     if flown.source == "pois" and flown.pois:
         return list(flown.pois)
     turns = [item for item in mission.items if has_position(item)]
     return [
         PoiDoc(id=f"item-{number}", lat_deg=item.lat_deg, lon_deg=item.lon_deg) for number, item in enumerate(turns, 1)
     ]
+
+
+def _flown(record: PlanRecord) -> PlanDoc:
+    """The document of the flown plan; an empty one where the record has none."""
+    try:
+        return PlanDoc.model_validate_json(record.plan_json)
+    except ValidationError:
+        return PlanDoc()
 
 
 def _along_m(line: Line) -> F64:

@@ -8,6 +8,12 @@ from pathlib import Path
 import pytest
 
 from planning.demo import demo_survey_polygon
+from planning.formats.qgc_plan import read_plan
+from planning.geotiff import read_dsm
+from planning.plan import plan_mission
+from planning.vehicle_profile import load_profile
+from server.documents import doc_from_profile, request_from_doc
+from server.schemas import PlaceDoc, PlanDoc, SurveyDoc
 from tests.server.cli_runs import hedgehop, write_demo
 
 
@@ -35,6 +41,29 @@ def test_survey_is_certified(model: Path, area: Path, tmp_path: Path) -> None:
     assert photos[0] > 0
     assert photos[-1] == 0
     assert [item["params"][0] for item in items if item["command"] == 205] == [-90]
+
+
+def test_survey_says_what_its_photos_see(model: Path, area: Path, tmp_path: Path) -> None:
+    run = hedgehop("survey", model, area, "--out", tmp_path / "out")
+    assert "100 % at least twice; overlap over the surface 79 % front, 74 % side (80 %, 70 % asked)" in run.out
+    certificate = json.loads((tmp_path / "out" / "certificate.json").read_text())
+    assert certificate["survey"]["faults"] == []
+    assert certificate["survey"]["height_m"] == pytest.approx(51.06, abs=0.01)
+
+
+def test_the_browser_s_survey_is_the_command_line_s(model: Path, area: Path, tmp_path: Path) -> None:
+    """One document and one command line ask for the same flight."""
+    hedgehop("survey", model, area, "--out", tmp_path / "out")
+    corners = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]
+    profile = doc_from_profile(load_profile("mapper-rtk"))
+    dsm = read_dsm(model)
+    plan = plan_mission(
+        dsm, request_from_doc(PlanDoc(source="survey", survey=SurveyDoc(polygon=corners), profile=profile), dsm)
+    )
+    written = read_plan((tmp_path / "out" / "mission.plan").read_text())
+    assert [(i.command, i.lat_deg, i.lon_deg, round(i.alt_m, 6)) for i in written.items] == [
+        (i.command, i.lat_deg, i.lon_deg, round(i.alt_m, 6)) for i in plan.mission.items
+    ]
 
 
 def test_lower_flight_takes_more_lines(model: Path, area: Path, tmp_path: Path) -> None:

@@ -59,7 +59,11 @@ def test_a_survey_brings_its_lines_and_photo_distance() -> None:
     document = PlanDoc(terrain_id="t", source="survey", survey=SurveyDoc(polygon=CORNERS), profile=profile)
     request = request_from_doc(document, DSM)
     assert len(request.pois) >= 2
-    assert request.mission.camera_trigger_m is not None
+    assert request.survey is not None
+    assert request.pois == request.survey.pois
+    assert request.surface.height_m == request.survey.height_m == pytest.approx(4000 * 1.0 * 8.8 / (13.2 * 100))
+    assert request.mission.camera_trigger_m == request.survey.trigger_distance_m
+    assert request.mission.gimbal_pitch_deg == -90.0
     own = document.model_copy(update={"mission": MissionDoc(camera_trigger_m=7.0)})
     assert request_from_doc(own, DSM).mission.camera_trigger_m == 7.0
 

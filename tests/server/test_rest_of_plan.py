@@ -17,7 +17,7 @@ from planning.request import PlanRequest
 from planning.vehicle_profile import dump_profile
 from server.errors import NotReadyError
 from server.obstacles.rest_of_plan import Part, Underway, rest_of_plan
-from server.schemas import PlanDoc, PoiDoc
+from server.schemas import CameraDoc, PlanDoc, PoiDoc, ProfileDoc, SurveyDoc
 from telemetry.messages import FlightStatus, PlanRecord
 from telemetry.vehicle import VehicleState
 from tests.server.scene_fixtures import hill
@@ -140,6 +140,20 @@ def test_of_a_survey_the_turns_that_are_left_are_the_points(dsm: Dsm, record: Pl
     assert east[-1] == pytest.approx(30.0, abs=0.1)
     assert east[0] == pytest.approx(40.0, abs=2.0)
     assert east.min() > 29.0
+
+
+def test_the_rest_of_a_survey_keeps_its_height_and_takes_photos_only_ahead(dsm: Dsm, record: PlanRecord) -> None:
+    camera = CameraDoc(
+        image_width_px=4000, image_height_px=3000, focal_mm=8.8, sensor_width_mm=13.2, sensor_height_mm=8.8
+    )
+    flown = PlanDoc(source="survey", profile=ProfileDoc(name="P", camera=camera), survey=SurveyDoc(gsd_cm=0.5))
+    there = underway(dsm, replace(record, plan_json=flown.model_dump_json()), 40.0)
+    ahead, home = (PlanDoc(**rest_of_plan(part, there, terrain_id="t1")) for part in ("ahead", "home"))
+    height_m = 4000 * 0.5 * 8.8 / (13.2 * 100)
+    assert ahead.surface.height_m == home.surface.height_m == pytest.approx(height_m)
+    assert ahead.mission.camera_trigger_m == pytest.approx(height_m * 8.8 / 8.8 * (1 - flown.survey.front_overlap))
+    assert ahead.mission.gimbal_pitch_deg == -90.0
+    assert home.mission.camera_trigger_m is None
 
 
 def test_without_a_flight_or_with_another_plan_open_it_is_refused(dsm: Dsm, record: PlanRecord) -> None:
