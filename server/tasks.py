@@ -31,7 +31,7 @@ from server.library.terrains import load_terrain
 from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
 from server.scene.terrain_payload import Shading, build_terrain_scene
-from server.schemas import PlanDoc, ReasonDoc, ResultDoc, TradeRow, WorstDoc
+from server.schemas import PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
 from server.stopwatch import READ_STEP, StepTimer
 
 PRODUCT_VERSION = __version__
@@ -164,6 +164,7 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns:
         worst=None if worst is None else WorstDoc(**worst, s_m=certificate.worst.s_m),
         max_height_above_ground_m=finite_or_none(certificate.max_height_above_ground_m),
         reasons=[ReasonDoc(code=r.code, text=r.text, mend=r.mend) for r in certificate.reasons],
+        survey=None if summary["survey"] is None else SurveyResult(**summary["survey"]),
         gsd_min_cm=gsd_min,
         gsd_max_cm=gsd_max,
         home_alt_dsm_m=plan.line.home_alt_dsm_m,

@@ -75,6 +75,7 @@ from server.schemas.results import (
     PlanState,
     ReasonDoc,
     ResultDoc,
+    SurveyResult,
     TradeRow,
     WorstDoc,
 )
@@ -224,6 +225,7 @@ __all__ = [
     "Strict",
     "SurfaceDoc",
     "SurveyDoc",
+    "SurveyResult",
     "TakeLease",
     "TerrainDoc",
     "TextMessage",

@@ -54,6 +54,26 @@ class Chart(Strict):
     poi_names: list[str]
 
 
+class SurveyResult(Strict):
+    """What a survey's photos see over the surface; the fields of ``planning.survey_coverage.SurveyCoverage``."""
+
+    height_m: float
+    """Above the surface: height H of this plan."""
+    area_m2: float
+    photos: int
+    photographed_share: float
+    twice_share: float
+    front_overlap: float | None
+    """Of 95 % of the area at least; null: none of it is seen."""
+    side_overlap: float | None
+    asked_front_overlap: float
+    asked_side_overlap: float
+    gsd_cm: float | None
+    asked_gsd_cm: float
+    gimbal_pitch_deg: float | None
+    faults: list[str]
+
+
 class ResultDoc(Strict):
     certified: bool
     min_distance_m: float | None
@@ -78,6 +98,7 @@ class ResultDoc(Strict):
     items: int
     max_items: int
     excess_height_m: float
+    survey: SurveyResult | None = None
     gsd_min_cm: float | None
     gsd_max_cm: float | None
     home_alt_dsm_m: float

@@ -482,6 +482,25 @@ export interface Chart {
   poi_names: string[];
 }
 
+/** What a survey's photos see over the surface; the fields of ``planning.survey_coverage.SurveyCoverage``. */
+export interface SurveyResult {
+  /** Above the surface: height H of this plan. */
+  height_m: number;
+  area_m2: number;
+  photos: number;
+  photographed_share: number;
+  twice_share: number;
+  /** Of 95 % of the area at least; null: none of it is seen. */
+  front_overlap: number | null;
+  side_overlap: number | null;
+  asked_front_overlap: number;
+  asked_side_overlap: number;
+  gsd_cm: number | null;
+  asked_gsd_cm: number;
+  gimbal_pitch_deg: number | null;
+  faults: string[];
+}
+
 export interface ResultDoc {
   certified: boolean;
   min_distance_m: number | null;
@@ -506,6 +525,7 @@ export interface ResultDoc {
   items: number;
   max_items: number;
   excess_height_m: number;
+  survey: SurveyResult | null;
   gsd_min_cm: number | null;
   gsd_max_cm: number | null;
   home_alt_dsm_m: number;

@@ -6,6 +6,7 @@ import { ErrorPanel } from "../ui/ErrorBox";
 import { Icon } from "../ui/Icon";
 import { computation, isFresh, known, result } from "../store/state";
 import { Clearance } from "./Clearance";
+import { Photos } from "./Photos";
 import { verdict, VerdictShape, verdictWord } from "./Verdict";
 
 /** "Computed 12 s ago", counting by itself. */
@@ -97,7 +98,7 @@ function Flight({ result }: { result: ResultDoc }) {
       <p class="bar-note">
         {count(result.waypoints, "waypoint")} · {metres(result.excess_height_m)} excess height
       </p>
-      {result.gsd_min_cm !== null && (
+      {result.gsd_min_cm !== null && !result.survey && (
         <dl>
           <dt>Ground sampling</dt>
           <dd data-testid="gsd">
@@ -140,6 +141,7 @@ export function PlanRight() {
           <Reasons result={shown} />
           <Clearance result={shown} />
           <Flight result={shown} />
+          <Photos survey={shown.survey} />
           <Warnings result={shown} />
         </div>
       ) : (

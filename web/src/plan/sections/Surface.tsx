@@ -3,12 +3,27 @@ import type { PlanDoc, SurfaceDoc } from "../../messages";
 import { Section } from "../../ui/Section";
 import { AutoField, Check, SliderField } from "../../ui/fields";
 import { editGroup } from "../../store/plan";
+import { result } from "../../store/state";
 
 const set = (label: string, fields: Partial<SurfaceDoc>, dragging = false) =>
   editGroup("surface", "surface", label, fields, dragging);
 
-export function SurfaceSection({ plan: { surface } }: { plan: PlanDoc }) {
-  const { radius_m, height_m } = surface;
+/** Of a survey, H follows from ground sampling and camera. */
+function SurveyHeight({ gsd_cm, height_m }: { gsd_cm: number; height_m: number | undefined }) {
+  return (
+    <dl class="figures-list" data-testid="survey-height">
+      <dt>H, upwards</dt>
+      <dd>
+        {metres(height_m)} <span class="muted">from {gsd_cm} cm ground sampling</span>
+      </dd>
+    </dl>
+  );
+}
+
+export function SurfaceSection({ plan: { surface, source, survey } }: { plan: PlanDoc }) {
+  const { radius_m } = surface;
+  const isSurvey = source === "survey";
+  const height_m = isSurvey ? result.value?.survey?.height_m : surface.height_m;
   return (
     <Section
       id="surface"
@@ -29,18 +44,22 @@ export function SurfaceSection({ plan: { surface } }: { plan: PlanDoc }) {
         testid="radius"
         onChange={(value, dragging) => set("Radius R", { radius_m: value }, dragging)}
       />
-      <SliderField
-        label="H, upwards"
-        hint="How high it runs above the ground."
-        unit="m"
-        min={0.1}
-        max={500}
-        sliderMax={30}
-        step={0.1}
-        value={height_m}
-        testid="height"
-        onChange={(value, dragging) => set("Height H", { height_m: value }, dragging)}
-      />
+      {isSurvey ? (
+        <SurveyHeight gsd_cm={survey.gsd_cm} height_m={height_m} />
+      ) : (
+        <SliderField
+          label="H, upwards"
+          hint="How high it runs above the ground."
+          unit="m"
+          min={0.1}
+          max={500}
+          sliderMax={30}
+          step={0.1}
+          value={surface.height_m}
+          testid="height"
+          onChange={(value, dragging) => set("Height H", { height_m: value }, dragging)}
+        />
+      )}
       <AutoField
         label="Own smoothing"
         auto={`(R / 10 = ${metres(radius_m / 10, 2)})`}

@@ -123,7 +123,7 @@ export function SurveyFields({ plan }: { plan: PlanDoc }) {
       </div>
       <AutoField
         label="Own angle of the lines"
-        auto="(along the longest side)"
+        auto="(fewest turns)"
         unit="°"
         min={0}
         max={179}
