@@ -118,7 +118,12 @@ def test_a_survey_under_an_orthophoto(station: Station, page_3d: Page, shared_da
     page.get_by_test_id("tool-polygon").click()
     _click_corners(page, [(0.40, 0.45), (0.55, 0.43), (0.57, 0.58), (0.42, 0.60)])
     page.get_by_test_id("camera-add").click()
-    expect(page.get_by_test_id("gsd")).to_contain_text("cm")
+    # 1 cm with the added camera: eq. 1 gives 26.7 m, at which the photos overlap as asked.
+    expect(page.get_by_test_id("survey-height")).to_contain_text("26.7 m")
+    expect(page.get_by_test_id("height")).to_have_count(0)
+    expect(page.get_by_test_id("photographed")).to_contain_text("of ")
+    expect(page.get_by_test_id("front-overlap")).to_contain_text("of 80 % asked")
+    expect(page.get_by_test_id("survey-faults")).to_have_count(0)
     before = page.get_by_test_id("length").inner_text()
     overlap = page.get_by_test_id("side-overlap-input")
     overlap.fill("85")
