@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mapping.braking import Braking
+
 F64 = NDArray[np.float64]
 
 OFF_LINE_M = 15.0
@@ -20,9 +22,9 @@ LOST_M = 3.0
 SECONDS_AHEAD = 5.0
 
 
-def length_m(speed_m_s: float, brake_m_s2: float) -> float:
-    """Stopping distance and five seconds of flight: v^2 / 2a + 5 v."""
-    return speed_m_s * speed_m_s / (2 * brake_m_s2) + SECONDS_AHEAD * speed_m_s
+def length_m(speed_m_s: float, braking: Braking) -> float:
+    """Stopping distance and five seconds of flight."""
+    return braking.distance_m(speed_m_s) + SECONDS_AHEAD * speed_m_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Ways up, over and around what was seen, with the clearance of each, and the speed at which a region suffices to stop.
+"""Ways up, over and around what was seen, with the clearance of each.
 
 Both papers avoid upwards or sideways and never downwards (Miccinesi 2022, fig. 9; Bigazzi 2022, figs 9-10).
 """
@@ -26,34 +26,12 @@ __all__ = [
     "Surface",
     "around",
     "climb",
-    "largest_speed_m_s",
-    "may_engage",
     "over",
-    "stopping_distance_m",
 ]
 
 F64 = NDArray[np.float64]
 BEYOND_M = 20.0
 """Distances are exact up to so much beyond what must be kept."""
-
-
-def stopping_distance_m(speed_m_s: float, *, latency_s: float, decel_m_s2: float, radius_m: float) -> float:
-    """Between first sight and standstill, and the vehicle's own half: v t + v^2 / 2a + r."""
-    return speed_m_s * latency_s + speed_m_s**2 / (2 * decel_m_s2) + radius_m
-
-
-def may_engage(depth_m: float, speed_m_s: float, *, latency_s: float, decel_m_s2: float, radius_m: float) -> bool:
-    """Whether a region this deep is enough to stop in."""
-    return depth_m >= stopping_distance_m(speed_m_s, latency_s=latency_s, decel_m_s2=decel_m_s2, radius_m=radius_m)
-
-
-def largest_speed_m_s(depth_m: float, *, latency_s: float, decel_m_s2: float, radius_m: float) -> float:
-    """The largest speed from which a region this deep is enough to stop in; 0 where it is no deeper than the radius."""
-    room_m = depth_m - radius_m
-    if room_m <= 0:
-        return 0.0
-    lag_m_s = decel_m_s2 * latency_s
-    return math.sqrt(lag_m_s**2 + 2 * decel_m_s2 * room_m) - lag_m_s
 
 
 def over(

@@ -58,6 +58,10 @@ class VehicleProfile:
     max_accel_m_s2: float = 2.5
     max_jerk_m_s3: float = 1.0
     """The autopilot's corner and start smoothness (ArduCopter WPNAV_JERK)."""
+    brake_decel_m_s2: float = 7.5
+    """Of a stop at once (ArduCopter's BRAKE_MODE_DECEL_RATE)."""
+    brake_jerk_m_s3: float = 5.0
+    """And how fast that comes and goes (ArduCopter's PSC_JERK_XY)."""
     endurance_s: float = 1200.0
     reserve_share: float = 0.25
     """Part of the endurance that must be left on landing."""

@@ -235,8 +235,9 @@ class PerceptionSettings:
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] = "heading_only"
     vehicle_radius_m: float = 0.5
     position_error_m: float = 0.3
-    brake_m_s2: float = 2.5
-    """Deceleration that the stopping distance counts on."""
+    brake_decel_m_s2: float = 7.5
+    brake_jerk_m_s3: float = 5.0
+    """Both of the vehicle's profile: ``mapping.braking.Braking``."""
     clear_count: int = 0
     """Raised by one to have all maps emptied."""
     radar_resolution_m: float = 1.0

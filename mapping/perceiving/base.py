@@ -245,7 +245,7 @@ class Perception:
         if place is None:
             return 0.0, np.empty((0, 3))
         speed = float(np.linalg.norm(pose.velocity_enu_m_s))
-        ahead_m = min(length_m(speed, s.brake_m_s2) + s.vehicle_radius_m, LONGEST_CORRIDOR_M)
+        ahead_m = min(length_m(speed, s.braking) + s.vehicle_radius_m, LONGEST_CORRIDOR_M)
         line = self._line.ahead(place.s_m, ahead_m) + self.offset_enu_m
         tube = tube_points(
             line,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.alerts import AlertEvent
+from mapping.braking import Braking
 from mapping.obstacles import Found
 from mapping.poses import Pose
 from mapping.radar_targets import Variant
@@ -30,7 +31,7 @@ class Settings:
     radar_variant: Variant = "heading_only"
     vehicle_radius_m: float = 0.5
     position_error_m: float = 0.3
-    brake_m_s2: float = 2.5
+    braking: Braking = field(default_factory=Braking)
     memory_limit_bytes: int = 1_000_000_000
 
     def makes_another_map(self, other: Settings) -> bool:

@@ -105,7 +105,6 @@ class PerceptionSettingsBody(Strict):
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] | None = None
     vehicle_radius_m: Annotated[float, Field(ge=0.1, le=5)] | None = None
     position_error_m: Annotated[float, Field(ge=0, le=10)] | None = None
-    brake_m_s2: Annotated[float, Field(ge=0.5, le=10)] | None = None
     radar_resolution_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
     vision_resolution_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
     """Of the range finder's map, too."""

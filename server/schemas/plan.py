@@ -50,6 +50,8 @@ class ProfileDoc(Strict):
     max_descent_m_s: Metres = 1.5
     max_accel_m_s2: Metres = 2.5
     max_jerk_m_s3: Metres = 1.0
+    brake_decel_m_s2: Metres = 7.5
+    brake_jerk_m_s3: Metres = 5.0
     endurance_s: Metres = 1200.0
     reserve_share: Metres = 0.25
     max_items: int = 650

@@ -1,7 +1,8 @@
 """Avoidance in flight, sans-IO: watches the regions ahead, stops and climbs when one is occupied, and lets go for good
 when a person takes over (Bigazzi 2022, figs 9-10).
 
-It engages only where the region is deep enough to stop in. The link node and simulated scenarios drive the same object.
+A flight that is too fast for the regions to stop in is slowed, on its way home, too. The link node and simulated
+scenarios drive the same object.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from planning.avoidance import largest_speed_m_s, may_engage, stopping_distance_m
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoiding_words import status_of
 from telemetry.flight.detour import Detour, DetourParams
@@ -17,15 +17,14 @@ from telemetry.flight.helm import GUIDED, STOP_MODES, Helm
 from telemetry.flight.pilot_watch import PilotWatch
 from telemetry.flight.regions import Regions, Sight
 from telemetry.flight.rest import RETURNS, Rest
+from telemetry.flight.slowing import Slowing, largest_speed
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.ends import GROUND_STATION
 from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Sensor
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
 from telemetry.requests import FlyManoeuvre
 from telemetry.vehicle import VehicleState
 
-REACTION_S = 0.2
-"""From the region's word to the vehicle's first braking."""
 LOW_M = 1.0
 SHORT_M = 1.0
 """Left between the vehicle's hull and what it stops short of."""
@@ -62,7 +61,7 @@ class Avoiding:
         self.enabled = False
         self.released = ""
         """Who has taken over; it stays off for this flight."""
-        self._too_fast: Sight | None = None
+        self._slowing = Slowing(self._helm)
         self.cannot = False
         """Something is in the way of a flight that it could not go on with."""
         self._now_s = 0.0
@@ -81,9 +80,9 @@ class Avoiding:
         return self._state
 
     @property
-    def too_fast(self) -> Sight | None:
-        """The region that is not deep enough to stop in at the present speed."""
-        return self._too_fast
+    def slowed_to_m_s(self) -> float | None:
+        """The speed that was asked of a flight which was too fast to stop within what is seen."""
+        return self._slowing.asked_m_s
 
     @property
     def failed(self) -> str:
@@ -180,6 +179,7 @@ class Avoiding:
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         self._state = state
+        self._slowing.on_state(state)
         if self.released and state.mode != GUIDED:
             self._helm.let_go()
         if _is_flying(state):
@@ -205,6 +205,7 @@ class Avoiding:
 
     def _look(self, now_s: float) -> list[Action]:
         state, self._now_s = self._state, now_s
+        self._helm.most_m_s = self._most_m_s(now_s)
         if state is None or self.released:
             return []
         if self._watch.words and (self.enabled or self.is_engaged):
@@ -233,22 +234,16 @@ class Avoiding:
         )
 
     def _stopping_m(self, sight: Sight, speed_m_s: float) -> float:
-        settings = self.regions.settings
-        radius_m = settings.vehicle_radius_m + settings.position_error_m + SHORT_M
-        return stopping_distance_m(
-            speed_m_s, latency_s=self._latency_s(sight), decel_m_s2=settings.brake_m_s2, radius_m=radius_m
-        )
+        return self.regions.stopping(sight).distance_m(speed_m_s) + SHORT_M
 
     def _look_ahead(self, state: VehicleState, now_s: float) -> list[Action]:
         going, self.cannot = self.detour.phase == "going" and not self.detour.is_manoeuvre, False
         if self.is_engaged and not going:
-            self._too_fast = None
             return []
-        self._too_fast = next((s for s in self._fresh(now_s) if not self._may_engage(s, state)), None)
-        seen = [sight for sight in self.regions.occupied(now_s) if self._may_engage(sight, state)]
-        if not seen:
-            return self.detour.hold_if_silent(state, now_s) if going else []
-        seen_by: frozenset[Sensor] = frozenset(sight.sensor for sight in seen)
+        seen_by = self.regions.seen_by(now_s)
+        if not seen_by:
+            actions = self.detour.hold_if_silent(state, now_s) if going else []
+            return actions or self._slow_down(state, now_s)
         if going:
             return self.detour.avoid_again(seen_by, now_s)
         rest = self._rest(state) if _is_flying(state) else None
@@ -258,35 +253,22 @@ class Avoiding:
         self._on_engage()
         return self.detour.avoid(rest, seen_by, now_s)
 
-    def _fresh(self, now_s: float) -> list[Sight]:
-        return [sight for sight in self.regions.sights.values() if sight.is_fresh(now_s)]
+    def _slow_down(self, state: VehicleState, now_s: float) -> list[Action]:
+        """What is flown by no pilot: the mission, the script, the way home."""
+        largest_m_s = self.largest_speed_m_s(now_s)
+        if largest_m_s is None or not _is_flying(state) or state.mode not in (GUIDED, *FLOWN_FROM):
+            return []
+        return self._slowing.look(state, largest_m_s, now_s)
 
-    def _may_engage(self, sight: Sight, state: VehicleState) -> bool:
-        settings = self.regions.settings
-        return may_engage(
-            sight.depth_m,
-            state.ground_speed_m_s or 0.0,
-            latency_s=self._latency_s(sight),
-            decel_m_s2=settings.brake_m_s2,
-            radius_m=settings.vehicle_radius_m,
-        )
+    def _most_m_s(self, now_s: float) -> float:
+        """Of what is ordered here. Who flies without avoidance flies as fast as planned."""
+        largest_m_s = self.largest_speed_m_s(now_s) if self.enabled else None
+        return math.inf if largest_m_s is None else largest_speed(largest_m_s)
 
     def largest_speed_m_s(self, now_s: float) -> float | None:
         """At which every region that counts now still suffices to stop in."""
-        settings = self.regions.settings
-        speeds = [
-            largest_speed_m_s(
-                sight.depth_m,
-                latency_s=self._latency_s(sight),
-                decel_m_s2=settings.brake_m_s2,
-                radius_m=settings.vehicle_radius_m,
-            )
-            for sight in self._fresh(now_s)
-        ]
-        return min(speeds, default=None)
-
-    def _latency_s(self, sight: Sight) -> float:
-        return max(self._params.latency_s, sight.latency_s + REACTION_S)
+        slowest = self.regions.slowest(now_s)
+        return None if slowest is None else slowest[1]
 
     def _release(self, state: VehicleState, now_s: float) -> list[Action]:
         """Where a stick was moved and the mode still is ours the vehicle is stopped once; then nothing more is sent."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from telemetry.flight.slowing import FASTER_M_S
 from telemetry.obstacles import AvoidanceStatus
 
 if TYPE_CHECKING:
     from telemetry.flight.avoiding import Avoiding
+    from telemetry.flight.regions import Sight
 
 State = AvoidanceStatus.__annotations__["state"]
 SENSOR_WORDS = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
@@ -46,16 +48,23 @@ def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
         return _engaged_text(avoiding, now_s)
     if not avoiding.enabled:
         return ""
-    if avoiding.too_fast is not None and largest_m_s is not None:
-        speed_m_s = avoiding.state.ground_speed_m_s if avoiding.state else None
-        return (
-            f"Too fast to stop within {avoiding.too_fast.depth_m:g} m: {speed_m_s or 0.0:.1f} m/s,"
-            f" at most {largest_m_s:.1f} m/s."
-        )
     if avoiding.cannot:
         return "Something is in the way, but what is flown now is nothing that avoidance can go on with."
-    counted = avoiding.regions.counted(now_s)
-    return "" if counted else "No sensor sees ahead at the moment."
+    slowest = avoiding.regions.slowest(now_s)
+    if slowest is None:
+        return "No sensor sees ahead at the moment."
+    return _speed_words(avoiding, *slowest)
+
+
+def _speed_words(avoiding: Avoiding, sight: Sight, largest_m_s: float) -> str:
+    """Why it is, or was made, no faster than its sensors see."""
+    speed_m_s = avoiding.state.ground_speed_m_s or 0.0 if avoiding.state else 0.0
+    sees = f"the {SENSOR_WORDS[sight.sensor]} sees {sight.depth_m:g} m ahead"
+    if speed_m_s > largest_m_s + FASTER_M_S:
+        return f"Too fast to stop, {sees}: {speed_m_s:.1f} m/s, at most {largest_m_s:.1f} m/s."
+    if avoiding.slowed_to_m_s is not None:
+        return f"Slowed to {avoiding.slowed_to_m_s:.1f} m/s: {sees}."
+    return ""
 
 
 def _engaged_text(avoiding: Avoiding, now_s: float) -> str:

@@ -245,7 +245,7 @@ class Detour:
         if self.is_manoeuvre:
             extra_m = max(0.0, reached_m - self._way_from_m)
             self.offset_m = max(self._wanted_offset_m, climbed_m if self._over else 0.0)
-            self._legs = Legs(self._helm, _raised(self._way, extra_m))
+            self._legs = Legs(self._helm, _raised(self._way, extra_m), turns_first=not self._over)
             self._witnesses.sensors |= self._lookouts
         else:
             self.offset_m = max(self.offset_m, climbed_m)

@@ -40,6 +40,8 @@ class Helm:
         self._state: VehicleState | None = None
         self._speed: tuple[float, float] | None = None
         self.failed = ""
+        self.most_m_s = math.inf
+        """Over ground, whatever is asked for."""
 
     @property
     def place(self) -> Place | None:
@@ -94,10 +96,19 @@ class Helm:
 
     def set_speed(self, speed_m_s: float, now_s: float, kind: float = GROUND_SPEED) -> list[Action]:
         """Once per speed; ``kind``: SPEED_TYPE."""
+        if kind == GROUND_SPEED:
+            speed_m_s = min(speed_m_s, self.most_m_s)
         if self._speed == (kind, speed_m_s):
             return []
         self._speed = (kind, speed_m_s)
         return self._errand.begin(self.orders.change_speed(speed_m_s, kind), now_s)
+
+    def slow_down(self, speed_m_s: float, now_s: float) -> list[Action]:
+        """As often as it is asked: a mission's own items change it back. Waits while another order is under way."""
+        if self._errand.is_under_way:
+            return []
+        self._speed = None
+        return self.set_speed(speed_m_s, now_s)
 
     # What the vehicle's state shows.
 

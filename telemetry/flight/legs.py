@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from telemetry.flight.handover import METRES_PER_DEG, is_fresh
-from telemetry.flight.helm import Helm
+from telemetry.flight.helm import Helm, here_of
 from telemetry.flight.orders import Place
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
@@ -13,17 +14,24 @@ from telemetry.vehicle import VehicleState
 
 RADIUS_M = 0.7
 """Corners are cut by less than this."""
+TURNED_RAD, TURN_S = math.radians(20.0), 8.0
+"""The nose points where it will fly; and how long that is waited for."""
 LEVEL_LEG_M = 1.0
 """A shorter leg over ground has no direction that the nose should turn to."""
 
 
 class Legs:
-    """``go`` hands over the present target; ``on_look`` goes on to the next ones and says when all are flown."""
+    """``go`` hands over the present target; ``on_look`` goes on to the next ones and says when all are flown.
 
-    def __init__(self, helm: Helm, targets: tuple[GuidedTarget, ...]) -> None:
-        self._helm, self.targets = helm, targets
+    ``turns_first``: the nose turns before it goes anywhere, for who looks ahead has not looked there yet.
+    """
+
+    def __init__(self, helm: Helm, targets: tuple[GuidedTarget, ...], *, turns_first: bool = False) -> None:
+        self._helm, self.targets, self._turns_first = helm, targets, turns_first
         self._index = 0
         self._reached_s: float | None = None
+        self._turning: tuple[float, float] | None = None
+        """To which heading, and since when."""
 
     @property
     def is_over(self) -> bool:
@@ -44,12 +52,22 @@ class Legs:
         if self.is_over:
             return []
         target = self.targets[self._index]
+        place = _place(target, state)
+        if self._turns_first and self._turning is None and _is_aside(state, place.heading_rad):
+            assert place.heading_rad is not None
+            self._turning = place.heading_rad, now_s
+            return self._helm.go_to(replace(here_of(state), heading_rad=place.heading_rad), now_s, radius_m=RADIUS_M)
+        self._turning = None
         speed = self._helm.set_speed(target.speed_m_s, now_s)
-        return [*speed, *self._helm.go_to(_place(target, state), now_s, radius_m=RADIUS_M)]
+        return [*speed, *self._helm.go_to(place, now_s, radius_m=RADIUS_M)]
 
     def on_look(self, state: VehicleState, now_s: float) -> list[Action]:
         if self.is_over:
             return []
+        if self._turning is not None:
+            heading_rad, since_s = self._turning
+            turns = _is_aside(state, heading_rad) and now_s - since_s < TURN_S
+            return [] if turns else self.go(state, now_s)
         if self._reached_s is None and self._helm.has_arrived(state, now_s):
             self._reached_s = now_s
         waited = self._reached_s is not None and now_s - self._reached_s >= self.targets[self._index].loiter_s
@@ -57,6 +75,12 @@ class Legs:
             return []
         self._index += 1
         return self.go(state, now_s)
+
+
+def _is_aside(state: VehicleState, heading_rad: float | None) -> bool:
+    if heading_rad is None or state.heading_rad is None:
+        return False
+    return abs(math.remainder(heading_rad - state.heading_rad, math.tau)) > TURNED_RAD
 
 
 def _place(target: GuidedTarget, state: VehicleState) -> Place:

@@ -1,16 +1,25 @@
-"""What the sensors say about the region ahead, put together: is it occupied, whose word counts, is it clear again?"""
+"""What the sensors say about the region ahead, put together: is it occupied, whose word counts, is it clear again?
+
+And how fast that allows to fly: a region must be deep enough to stop in."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from mapping.braking import Braking, Stopping
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
 
 OLD_S = 0.5
 """A frame or pose older than this says nothing about what is ahead now."""
 CLEAR_FRAMES = 3
 """One empty frame may be a drop-out."""
+LEAST_LATENCY_S = 0.3
+"""From seeing to braking."""
+REACTION_S = 0.2
+"""From the region's word to the vehicle's first braking."""
+PERIOD_FADES = 0.95
+"""A longer time between two frames counts on, less and less: what came late once may again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +41,10 @@ class Sight:
     """In a row, up to this one."""
     why: str = ""
     """Its frames are not placed, or it has stopped: in its own words."""
+    period_s: float = 0.0
+    """Between its frames: so late may what enters the region be seen."""
+    since_s: float = 0.0
+    """It has worked without a break since then."""
 
     def is_fresh(self, now_s: float) -> bool:
         return self.counts and now_s - self.t_mono_s <= OLD_S
@@ -66,15 +79,17 @@ class Regions:
             depth_m=self._depth_m(status),
             latency_s=status.latency_s or 0.0,
             clear_frames=0 if occupied or status.state != "running" else counted + (not again),
+            period_s=_period_s(status, before),
+            since_s=_since_s(status, before),
         )
 
     def counted(self, now_s: float) -> tuple[Sensor, ...]:
         """Sensors whose word counts at present."""
-        return tuple(sight.sensor for sight in self.sights.values() if sight.is_fresh(now_s))
+        return tuple(sight.sensor for sight in self.fresh(now_s))
 
     def occupied(self, now_s: float) -> tuple[Sight, ...]:
         """Fresh sights with something in the way, nearest first."""
-        found = [sight for sight in self.sights.values() if sight.occupied and sight.is_fresh(now_s)]
+        found = [sight for sight in self.fresh(now_s) if sight.occupied]
         return tuple(sorted(found, key=lambda sight: sight.distance_m or 0.0))
 
     def seen_by(self, now_s: float) -> frozenset[Sensor]:
@@ -97,6 +112,25 @@ class Regions:
         """Of the sensors that are counted on: one that has sent no frame for too long, or none that can be placed."""
         sights = (self.sights[sensor] for sensor in engaged)
         return next((sight for sight in sights if now_s - sight.flowed_t_mono_s > OLD_S), None)
+
+    def stopping(self, sight: Sight) -> Stopping:
+        """Before what this sensor sees."""
+        s = self.settings
+        voxel_m = s.radar_resolution_m if sight.sensor == "radar" else s.vision_resolution_m
+        return Stopping(
+            Braking(s.brake_decel_m_s2, s.brake_jerk_m_s3),
+            max(LEAST_LATENCY_S, sight.latency_s + REACTION_S) + sight.period_s,
+            s.vehicle_radius_m + s.position_error_m + voxel_m / 2,
+        )
+
+    def fresh(self, now_s: float) -> list[Sight]:
+        """Those whose word counts at present."""
+        return [sight for sight in self.sights.values() if sight.is_fresh(now_s)]
+
+    def slowest(self, now_s: float) -> tuple[Sight, float] | None:
+        """The sensor whose region allows least speed, and that speed: what only it sees must be stopped for, too."""
+        speeds = [(sight, self.stopping(sight).largest_speed_m_s(sight.depth_m)) for sight in self.fresh(now_s)]
+        return min(speeds, key=lambda pair: pair[1], default=None)
 
     def _depth_m(self, status: PerceptionStatus) -> float:
         if status.region is not None:
@@ -130,3 +164,14 @@ def _flowed_t_s(status: PerceptionStatus, before: Sight | None) -> float:
     if status.state in ("running", "blind"):
         return status.t_mono_s
     return -math.inf if before is None else before.flowed_t_mono_s
+
+
+def _period_s(status: PerceptionStatus, before: Sight | None) -> float:
+    if before is None or not before.counts or status.state != "running":
+        return 0.0 if before is None else before.period_s
+    return max(min(status.t_mono_s - before.t_mono_s, OLD_S), PERIOD_FADES * before.period_s)
+
+
+def _since_s(status: PerceptionStatus, before: Sight | None) -> float:
+    goes_on = before is not None and before.counts and status.t_mono_s - before.t_mono_s <= OLD_S
+    return before.since_s if before is not None and goes_on else status.t_mono_s

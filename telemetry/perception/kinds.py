@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mapping.braking import Braking
 from mapping.perceiving import (
     CameraPose,
     Cloud,
@@ -91,7 +92,7 @@ def _settings(s: PerceptionSettings, depth_m: float, resolution_m: float) -> Set
         radar_variant=s.radar_variant,
         vehicle_radius_m=s.vehicle_radius_m,
         position_error_m=s.position_error_m,
-        brake_m_s2=s.brake_m_s2,
+        braking=Braking(s.brake_decel_m_s2, s.brake_jerk_m_s3),
         memory_limit_bytes=s.memory_limit_bytes,
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.braking import Braking
 from telemetry.obstacles import PerceptionSettings, Sensor
 from telemetry.scenarios.flown import Flown, Told
 from telemetry.scenarios.nearness import away_m, level_away_m, objects_of
@@ -70,6 +71,7 @@ def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[P
     times = np.array([truth.t_mono_s for truth in flown.track])
     speeds = np.array([math.hypot(*truth.velocity_enu_m_s) for truth in flown.track])
     out = []
+    braking = Braking(settings.brake_decel_m_s2, settings.brake_jerk_m_s3)
     for name, rows in objects_of(world).items():
         far_m = away_m(rows, track)
         if far_m.min() > IN_THE_WAY_M:
@@ -77,7 +79,7 @@ def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[P
         met = int(np.argmax(far_m <= IN_THE_WAY_M))
         told: dict[Sensor, float] = {sensor: _told_s(flown, rows, sensor) + ORDER_S for sensor in flown.perceivers}
         at = min(int(np.searchsorted(times, min(told.values()))), met)
-        needed_m = speeds[at] ** 2 / (2 * settings.brake_m_s2) + settings.vehicle_radius_m
+        needed_m = braking.distance_m(float(speeds[at])) + settings.vehicle_radius_m
         seen_by: tuple[Sensor, ...] = tuple(sensor for sensor, t_s in told.items() if t_s < times[met])
         out.append(Passed(name, float(far_m[at]), float(needed_m), seen_by))
     return out

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Literal, Protocol
 
+from planning.flight_time.scurve import Axes
 from telemetry.simulator.frame import Vec3
 from telemetry.simulator.legs import Motion, Track
 from telemetry.simulator.pilot import Pilot
@@ -207,7 +208,7 @@ class Path:
         self._arriving = True
         self._flow = 1.0
         self.paused = False
-        self.go_on = self._track.go_on
+        self._axes = pilot.axes()
 
     @property
     def passed(self) -> bool:
@@ -215,7 +216,7 @@ class Path:
 
     def update(self, pilot: Pilot, dt_s: float) -> Motion:
         p, v, a = self._track.target()
-        change = self._change_flow(math.hypot(*v), pilot.axes().accel_m_s2, dt_s)
+        change = self._change_flow(math.hypot(*v), self._wanted_flow(pilot), pilot.axes().accel_m_s2, dt_s)
         self._track.advance(dt_s * self._flow * _scale(p, v, pilot.p_neu))
         p, v, a = self._track.target()
         (op, ov, oa), f = self._fade(pilot, dt_s), self._flow
@@ -229,11 +230,22 @@ class Path:
             ),
         )
 
-    def _change_flow(self, speed_m_s: float, accel_m_s2: float, dt_s: float) -> float:
+    def go_on(self, goal_neu: Vec3, axes: Axes, following: tuple[Vec3, Axes] | None) -> None:
+        """As ``Track.go_on``."""
+        self._axes = axes
+        self._track.go_on(goal_neu, axes, following)
+
+    def _wanted_flow(self, pilot: Pilot) -> float:
+        """Its time runs slower when its speed is lowered on the way; a higher one counts from the next leg on."""
+        if self.paused:
+            return 0.0
+        return 1.0 if pilot.speed_m_s is None else min(1.0, pilot.speed_m_s / self._axes.speed_m_s)
+
+    def _change_flow(self, speed_m_s: float, wanted: float, accel_m_s2: float, dt_s: float) -> float:
         """A paused track's time runs slower until it stands still. Returns the change per second."""
         before = self._flow
         step = dt_s * PAUSE_SHARE * accel_m_s2 / max(speed_m_s, SLOWEST_PAUSED_M_S)
-        self._flow = max(0.0, min(1.0, before - step if self.paused else before + step))
+        self._flow = max(wanted, before - step) if before > wanted else min(wanted, before + step)
         return (self._flow - before) / dt_s
 
     def _fade(self, pilot: Pilot, dt_s: float) -> Motion:

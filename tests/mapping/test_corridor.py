@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapping.braking import Braking
 from mapping.corridor import MissionLine, length_m, tube_points
 
 places = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(0, 20))
@@ -24,8 +25,8 @@ def distance_to_line(line: np.ndarray, p: np.ndarray) -> float:
 
 
 def test_length() -> None:
-    assert length_m(5.0, 2.5) == pytest.approx(5.0 + 25.0)
-    assert length_m(0.0, 2.5) == 0.0
+    assert length_m(5.0, Braking()) == pytest.approx(Braking().distance_m(5.0) + 25.0)
+    assert length_m(0.0, Braking()) == 0.0
 
 
 @given(lines, places)

@@ -17,17 +17,13 @@ from planning.avoidance import (
     NoWay,
     Seen,
     around,
-    largest_speed_m_s,
-    may_engage,
     over,
-    stopping_distance_m,
 )
 from tests.reference.box_distance import polyline_boxes_m
 
 F64 = NDArray[np.float64]
 HERE = np.array([0.0, 0.0, 10.0])
 LINE = np.array([[0.0, 0.0, 10.0], [0.0, 45.0, 12.0], [30.0, 80.0, 8.0]])
-LIMITS = {"latency_s": 0.3, "decel_m_s2": 2.5, "radius_m": 0.5}
 
 
 def block(east_m: float, north_m: float, width_m: float, top_m: float, *, edge_m: float = 1.0) -> Seen:
@@ -67,23 +63,6 @@ def plan_height_m(points: F64, line: F64) -> F64:
             best = min(best, (float(np.hypot(*(p[:2] - q[:2]))), float(q[2])))
         out.append(best[1])
     return np.array(out)
-
-
-@given(depth=st.floats(0.6, 60), radius=st.floats(0.1, 0.5), latency=st.floats(0, 1), decel=st.floats(0.5, 8))
-def test_at_the_largest_speed_a_region_just_suffices_to_stop(
-    depth: float, radius: float, latency: float, decel: float
-) -> None:
-    limits = {"latency_s": latency, "decel_m_s2": decel, "radius_m": radius}
-    speed = largest_speed_m_s(depth, **limits)
-    assert stopping_distance_m(speed, **limits) == pytest.approx(depth, abs=1e-6)
-    assert may_engage(depth, 0.999 * speed, **limits)
-    assert not may_engage(depth, 1.001 * speed + 0.001, **limits)
-
-
-def test_a_region_no_deeper_than_the_vehicle_allows_no_speed() -> None:
-    assert largest_speed_m_s(0.4, **LIMITS) == 0.0
-    assert largest_speed_m_s(7.0, **LIMITS) == pytest.approx(5.0, abs=0.01)
-    assert may_engage(7.0, 3.0, **LIMITS)
 
 
 def test_over_climbs_no_higher_than_it_must_and_joins_the_line_behind() -> None:

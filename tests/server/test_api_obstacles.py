@@ -73,7 +73,7 @@ def test_the_one_in_charge_is_heard(
         ("settings", {"vision_resolution_m": 6}),
         ("settings", {"vehicle_radius_m": 0}),
         ("settings", {"position_error_m": -0.1}),
-        ("settings", {"brake_m_s2": 0.1}),
+        ("settings", {"brake_m_s2": 2.5}),
         ("settings", {"radar_variant": "upside_down"}),
         ("avoidance", {}),
         ("seen", {"seen": True, "sensors": ["sonar"]}),
@@ -89,7 +89,7 @@ def test_what_makes_no_sense_is_refused(served: Running, pilot: httpx.Client, pa
     [
         {"memory_limit_bytes": 20_000_000},
         {"radar_resolution_m": 0.5, "vision_resolution_m": 0.25},
-        {"vehicle_radius_m": 1.2, "position_error_m": 0.0, "brake_m_s2": 4.0},
+        {"vehicle_radius_m": 1.2, "position_error_m": 0.0},
     ],
 )
 def test_the_maps_memory_and_voxels_can_be_set(served: Running, pilot: httpx.Client, body: dict[str, Any]) -> None:

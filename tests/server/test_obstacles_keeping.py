@@ -11,16 +11,18 @@ from telemetry.obstacles import PerceptionSettings
 
 
 def test_what_was_set_is_there_again(tmp_path: Path) -> None:
-    body = PerceptionSettingsBody(radar_depth_m=12.0, paper_bare=True, memory_limit_bytes=50_000_000, brake_m_s2=4.0)
+    body = PerceptionSettingsBody(
+        radar_depth_m=12.0, paper_bare=True, memory_limit_bytes=50_000_000, position_error_m=0.4
+    )
     write_settings(tmp_path, changed(PerceptionSettings(), body))
     assert read_settings(tmp_path) == replace(
-        PerceptionSettings(), radar_depth_m=12.0, paper_bare=True, memory_limit_bytes=50_000_000, brake_m_s2=4.0
+        PerceptionSettings(), radar_depth_m=12.0, paper_bare=True, memory_limit_bytes=50_000_000, position_error_m=0.4
     )
 
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", '{"brake_m_s2": 0}', '{"vision_depth_m": -1}', '{"fov_deg": 400}', '{"radar_resolution_m": 0}',
+    ["", "{", "[]", '{"brake_jerk_m_s3": 0}', '{"vision_depth_m": -1}', '{"fov_deg": 400}', '{"radar_resolution_m": 0}',
      '{"memory_limit_bytes": 0}', '{"height_m": "high"}', '{"safety_radius_m": 0}', '{"approach_s": -1}',
      '{"vision_resolution_m": 0.01}', '{"position_error_m": 1e300}', '{"clear_count": -1}'],
 )  # fmt: skip

@@ -58,7 +58,6 @@ def test_map_and_vehicle_are_published_and_kept(desk: Desk) -> None:
         "vision_resolution_m": 0.4,
         "vehicle_radius_m": 0.6,
         "position_error_m": 0.0,
-        "brake_m_s2": 4.0,
     }
     state = desk.change(**fields)
     wanted = PerceptionSettings(**fields)

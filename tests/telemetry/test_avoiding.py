@@ -67,7 +67,8 @@ def test_targets_after_the_climb_are_the_missions_raised_by_the_offset() -> None
     assert all(m.alt == pytest.approx(8.0 + offset_m, abs=0.01) for m in last)
     assert 8.0 < offset_m < 12.0
     speeds = [(m.param1, m.param2) for m in it.sent("COMMAND_LONG") if m.command == 178]
-    assert speeds == [(2.0, 1.5), (1.0, 3.0)]
+    slowed = [(1.0, 2.7)]  # a region of 7 m
+    assert speeds == [*slowed, (2.0, 1.5), *slowed, *slowed]  # mission, climb, rest, way home
     assert any("Climbing" in text for text in it.texts)
     assert any("higher than planned" in text for text in it.texts)
 
@@ -169,16 +170,43 @@ def test_above_the_ceiling_it_does_not_climb() -> None:
     assert max(n for _, n, _ in it.trail) < 24.0
 
 
-def test_too_fast_for_the_region_it_does_not_engage_and_says_how_fast_it_may_be() -> None:
-    it = craft(Wall(30, 15), senses=[Sense("vision", 2.0, 0.2)])
+def test_too_fast_for_the_region_it_is_slowed_and_stops_before_the_wall() -> None:
+    it = craft(Wall(40, 15), senses=[Sense("vision", 4.5, 0.2)])
     it.until(lambda: it.truth[0] > 20.0)
-    status = it.avoiding.status
-    assert status.largest_speed_m_s is not None
-    assert status.largest_speed_m_s < 2.2
-    assert status.text == f"Too fast to stop within 2 m: 3.0 m/s, at most {status.largest_speed_m_s:.1f} m/s."
-    it.until(lambda: it.truth[0] > 29.0)
-    assert it.orders == []
-    assert state(it) == "watching"
+    largest_m_s = it.avoiding.status.largest_speed_m_s
+    assert largest_m_s is not None
+    assert 1.3 < largest_m_s < 1.7
+    assert any(text.startswith("Too fast to stop, the vision sees 4.5 m ahead: ") for text in it.texts)
+    assert it.avoiding.status.text == f"Slowed to {it.avoiding.slowed_to_m_s:.1f} m/s: the vision sees 4.5 m ahead."
+    it.until(lambda: it.truth[0] > 32.0)
+    assert it.state.ground_speed_m_s == pytest.approx(largest_m_s, abs=0.15)
+    assert it.state.mode == "AUTO"
+    it.until(lambda: state(it) == "offset")
+    assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 0.6
+
+
+def test_however_short_it_sees_it_brakes_for_what_it_sees() -> None:
+    it = craft(Wall(30, 15), senses=[Sense("vision", 1.0, 0.2)])
+    it.until(lambda: it.truth[0] > 20.0)
+    assert it.avoiding.status.largest_speed_m_s == 0.0
+    it.until(lambda: BRAKE in it.modes(), 120)
+
+
+def test_a_way_home_that_is_too_fast_is_slowed() -> None:
+    """RTL_SPEED 0: as fast as WPNAV_SPEED says, whatever the mission's own speed was."""
+    it = craft(senses=[Sense("radar", 10.0, 0.1)])
+    it.until(lambda: it.truth[0] > 55)
+    it.bench.set_parameters(WPNAV_SPEED=1000)
+    it.avoiding.commanded("RTL", it.now_s)
+    it.bench.command(176, 1, RTL)
+    it.until(lambda: it.state.mode == "RTL")
+    it.advance(1.0)
+    fastest_m_s = 0.0
+    while it.truth[0] > 8:
+        it.step()
+        fastest_m_s = max(fastest_m_s, it.state.ground_speed_m_s or 0.0)
+    assert 3.5 < fastest_m_s < 5.0
+    assert "Slowed to 4.0 m/s: the radar sees 10 m ahead." in it.texts
 
 
 @pytest.mark.parametrize(("depth_m", "sensor"), [(7.0, "vision"), (10.0, "radar")])
@@ -300,7 +328,7 @@ def test_what_cannot_be_gone_on_with_is_not_taken_over_and_that_is_said() -> Non
     it = craft(Wall(25, 15))
     it.onboard = replace(it.onboard, items=(*it.onboard.items[:-1], place(60, 8, command=17)))  # waits without end
     it.until(lambda: it.truth[0] > 20)
-    assert it.orders == []
+    assert it.modes() == []
     assert "in the way" in it.avoiding.status.text
 
 

@@ -141,7 +141,8 @@ export interface PerceptionSettings {
   radar_variant: "heading_only" | "full_attitude" | "full_attitude_flat";
   vehicle_radius_m: number;
   position_error_m: number;
-  brake_m_s2: number;
+  brake_decel_m_s2: number;
+  brake_jerk_m_s3: number;
   clear_count: number;
   radar_resolution_m: number;
   vision_resolution_m: number;
@@ -383,6 +384,8 @@ export interface ProfileDoc {
   max_descent_m_s: number;
   max_accel_m_s2: number;
   max_jerk_m_s3: number;
+  brake_decel_m_s2: number;
+  brake_jerk_m_s3: number;
   endurance_s: number;
   reserve_share: number;
   max_items: number;
@@ -988,7 +991,6 @@ export interface PerceptionSettingsBody {
   radar_variant?: "heading_only" | "full_attitude" | "full_attitude_flat" | null;
   vehicle_radius_m?: number | null;
   position_error_m?: number | null;
-  brake_m_s2?: number | null;
   radar_resolution_m?: number | null;
   /** Of the range finder's map, too. */
   vision_resolution_m?: number | null;

@@ -15,7 +15,7 @@ describe("another map", () => {
 
   it("says before which maps begin anew", () => {
     expect(beginsAnew({})).toBe("");
-    expect(beginsAnew({ brake_m_s2: 3 })).toBe("");
+    expect(beginsAnew({ position_error_m: 3 })).toBe("");
     expect(beginsAnew({ radar_resolution_m: 0.5 })).toMatch(/^The radar's map begins anew/);
     expect(beginsAnew({ vision_resolution_m: 0.3 })).toMatch(
       /^The camera's and range finder's maps begin anew/,

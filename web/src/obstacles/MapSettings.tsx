@@ -12,7 +12,6 @@ import { MAP_SETTINGS, setPerception } from "./commands";
 const VEHICLE = [
   { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", min: 0.1, max: 5, step: 0.1 },
   { key: "position_error_m", label: "Position error", unit: "m", min: 0, max: 10, step: 0.1 },
-  { key: "brake_m_s2", label: "Braking", unit: "m/s²", min: 0.5, max: 10, step: 0.5 },
 ] as const;
 
 const VOXELS = [

@@ -118,6 +118,16 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
           testid="jerk-input"
           onChange={(max_jerk_m_s3) => set("Corner jerk", { max_jerk_m_s3 })}
         />
+        <NumberField
+          label="Braking jerk"
+          unit="m/s³"
+          min={0.5}
+          max={50}
+          step={0.5}
+          value={profile.brake_jerk_m_s3}
+          testid="brake-jerk-input"
+          onChange={(brake_jerk_m_s3) => set("Braking jerk", { brake_jerk_m_s3 })}
+        />
       </div>
       <p class="hint">
         Usable: {duration(profile.endurance_s * (1 - profile.reserve_share))} of{" "}

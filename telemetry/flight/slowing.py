@@ -1,0 +1,47 @@
+"""Slows a flight that is faster than its sensors see far enough to stop for."""
+
+from __future__ import annotations
+
+import math
+
+from telemetry.flight.helm import Helm
+from telemetry.mavlink.actions import Action
+from telemetry.vehicle import VehicleState
+
+FASTER_M_S = 0.1
+"""Than allowed, before it is slowed: a vehicle does not keep a speed any better."""
+AGAIN_S = 2.0
+"""A vehicle that is still too fast, or again because its mission says so, is told once more."""
+SLOWEST_M_S = 0.3
+"""No vehicle is told to fly slower than this: its sensors see nothing that it could stop for."""
+
+
+def largest_speed(sees_enough_for_m_s: float) -> float:
+    """As it is ordered."""
+    return max(SLOWEST_M_S, math.floor(10 * sees_enough_for_m_s) / 10)
+
+
+class Slowing:
+    """``look`` is called whenever anything is new. A flight that was slowed stays so, whatever is seen later."""
+
+    def __init__(self, helm: Helm) -> None:
+        self._helm = helm
+        self.asked_m_s: float | None = None
+        self._asked_s = -math.inf
+        self._mode = ""
+
+    def on_state(self, state: VehicleState) -> None:
+        """Another mode has speeds of its own."""
+        if state.mode != self._mode:
+            self._mode, self.asked_m_s, self._asked_s = state.mode, None, -math.inf
+
+    def look(self, state: VehicleState, largest_m_s: float, now_s: float) -> list[Action]:
+        """In a mode that is flown by no pilot."""
+        speed_m_s = state.ground_speed_m_s or 0.0
+        wanted_m_s = largest_speed(largest_m_s)
+        if speed_m_s <= wanted_m_s + FASTER_M_S or now_s - self._asked_s < AGAIN_S:
+            return []
+        actions = self._helm.slow_down(wanted_m_s, now_s)
+        if actions:
+            self.asked_m_s, self._asked_s = wanted_m_s, now_s
+        return actions
