@@ -36,10 +36,12 @@ VIEW_POLICY = (
     "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; connect-src 'self' {sockets} data: blob:; "
     "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
 )
-# viser has no switch for its control panel and its own notices; the console has both. Its white page would flash
-# before the first picture: a quiet gradient lies behind all, dark enough for white labels in either theme.
+# viser has no switch for its control panel and its own notices; the console has both. The panel floats in a window of
+# its own, and is a sheet of paper at the lower edge where the view is narrower than 576 px; its lists hang in portals.
+# Its white page would flash before the first picture: a quiet gradient lies behind all, dark enough for white labels
+# in either theme.
 VIEW_STYLE = b"""<style>
-[data-floating-window], .mantine-Notifications-root { display: none !important; }
+[data-floating-window], .mantine-Paper-root, [data-portal], .mantine-Notifications-root { display: none !important; }
 html, body { height: 100%; background: linear-gradient(#3a4454, #181c24) !important; }
 #root div:has(canvas) { background: transparent !important; }
 </style>"""

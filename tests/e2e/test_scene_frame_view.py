@@ -1,0 +1,48 @@
+"""The 3D view's frame holds the picture and nothing of viser's own page, however narrow it is."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Frame, Page
+
+from tests.e2e.stations import Station
+from tests.e2e.steps import drawn, open_demo
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+SIZES = ((1440, 900), (1180, 820), (1100, 768), (1024, 768), (820, 1180), (390, 844))
+NARROW_PX = 576
+"""Below it viser shows its panel in another form."""
+
+IN_FRONT = """() => {
+  const steps = [...Array(12).keys()].map((step) => (step + 0.5) / 12);
+  const hit = steps.flatMap((x) => steps.map((y) => document.elementFromPoint(x * innerWidth, y * innerHeight)));
+  return [...new Set(hit.filter((one) => one && one.tagName !== "CANVAS" && !one.querySelector("canvas"))
+    .map((one) => one.outerHTML.slice(0, 120)))];
+}"""
+"""What of the frame's page takes clicks before its canvas does."""
+
+
+def test_nothing_lies_over_the_picture(station: Station, page_3d: Page) -> None:
+    open_demo(page_3d, station)
+    drawn(page_3d)
+    view = _view(page_3d)
+    widths_px = []
+    for width, height in SIZES:
+        page_3d.set_viewport_size({"width": width, "height": height})
+        page_3d.wait_for_timeout(1500)
+        widths_px.append(view.evaluate("innerWidth"))
+        assert view.evaluate(IN_FRONT) == [], f"{width} px: something covers the picture"
+        assert not view.locator(".mantine-Paper-root:visible, [data-floating-window]:visible").count()
+    assert min(widths_px) < NARROW_PX < max(widths_px)
+
+
+def _view(page: Page) -> Frame:
+    handle = page.get_by_test_id("view-frame").element_handle()
+    assert handle is not None
+    frame = handle.content_frame()
+    assert frame is not None
+    frame.wait_for_selector("canvas")
+    # viser's own page comes up in pieces: its panel after the canvas.
+    frame.wait_for_selector(".mantine-Notifications-root", state="attached")
+    return frame
