@@ -29,10 +29,12 @@ import "./styles/alerts.css";
 import "./styles/tracks.css";
 import "./styles/traversability.css";
 import { App } from "./shell/App";
+import { startKeyboard } from "./shell/keyboard";
 import { startSound } from "./obstacles/sound";
 import { startClock } from "./store/clock";
 import { connect } from "./store/stream";
 
+startKeyboard();
 const root = document.getElementById("app");
 if (root) render(<App />, root);
 startClock();

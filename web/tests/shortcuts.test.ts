@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { shortcutOf } from "../src/shell/shortcuts";
+import { afterG, pressedAt_ms, shortcutOf } from "../src/shell/shortcuts";
 
 const press = (key: string, mod = false, shift = false) => ({ key, mod, shift });
 
@@ -76,5 +76,22 @@ describe("keys of the views", () => {
     expect(shortcutOf(press("ArrowRight"), false, at("review"))).toEqual({ id: "seek", by_s: 10 });
     expect(shortcutOf(press(" "), false, at("fly"))).toBeNull();
     expect(shortcutOf(press(" "), true, at("review"))).toBeNull();
+  });
+});
+
+describe("G and the key after it", () => {
+  const onPage = (opened_ms: number, timeStamp: number) =>
+    ({ timeStamp, view: { performance: { timeOrigin: opened_ms } } }) as unknown as UIEvent;
+
+  it("count on one clock, whichever of the two pages has the focus", () => {
+    const g = pressedAt_ms(onPage(9000, 1000));
+    expect(afterG(g, pressedAt_ms(onPage(2000, 8400)))).toBe(true);
+    expect(afterG(g, pressedAt_ms(onPage(2000, 9600)))).toBe(false);
+    // Long ago on our page, by the younger clock of the 3D view's page.
+    expect(afterG(pressedAt_ms(onPage(2000, 5000)), pressedAt_ms(onPage(9000, 1000)))).toBe(false);
+  });
+
+  it("are none without G", () => {
+    expect(afterG(-Infinity, 5)).toBe(false);
   });
 });

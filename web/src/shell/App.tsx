@@ -4,12 +4,10 @@ import { FileDrop } from "./FileDrop";
 import { HelpSheet } from "./HelpSheet";
 import { StatusBar } from "./StatusBar";
 import { VehicleStrip } from "./VehicleStrip";
-import { useKeyboard } from "./keyboard";
 import { drawer, openDialog } from "./ui_state";
 import { activeView } from "./views";
 
 export function App() {
-  useKeyboard();
   const { id, Left, Right, Below } = activeView.value;
   const open = drawer.value;
   return (

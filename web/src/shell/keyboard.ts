@@ -1,4 +1,3 @@
-import { useEffect } from "preact/hooks";
 import { setSection } from "../ui/Section";
 import { redo, removeSelectedPoi, undo } from "../plan/commands";
 import { acknowledgeFirst } from "../obstacles/commands";
@@ -9,11 +8,9 @@ import { sound } from "../store/prefs";
 import { document_, selection } from "../store/state";
 import { frame, setSelection } from "../store/stream";
 import { drawer, openDialog } from "./ui_state";
-import { shortcutOf, type Hit, type ViewId } from "./shortcuts";
+import { afterG, pressedAt_ms, shortcutOf, type Hit, type ViewId } from "./shortcuts";
 import { activeView, goTo } from "./views";
 
-/** How long after G its second key may come. */
-const SEQUENCE_MS = 1500;
 let pressedG_ms = -Infinity;
 
 /** Asks for files of this computer. */
@@ -94,22 +91,22 @@ function isControl(event: KeyboardEvent): boolean {
   return event.key === " " && /^(BUTTON|A|SUMMARY)$/.test(element?.tagName ?? "");
 }
 
+/** Held down on the way to another key, they are none themselves. */
+const isModifier = (key: string) => /^(Shift|Control|Alt|Meta|CapsLock)$/.test(key);
+
 /** Listens on our page, and through the 3D view on its page as well. */
 export function onKey(event: KeyboardEvent): void {
-  if (openDialog.value !== null || event.altKey || event.defaultPrevented) return;
+  if (openDialog.value !== null || event.altKey || event.defaultPrevented || isModifier(event.key)) return;
   const key = { key: event.key, mod: event.ctrlKey || event.metaKey, shift: event.shiftKey };
   const inInput = isInput(event.target);
-  const afterG = event.timeStamp - pressedG_ms < SEQUENCE_MS;
-  pressedG_ms = event.key.toLowerCase() === "g" && !key.mod && !inInput ? event.timeStamp : -Infinity;
-  const hit = shortcutOf(key, inInput, { view: activeView.value.id as ViewId, afterG });
+  const at_ms = pressedAt_ms(event);
+  const follows = afterG(pressedG_ms, at_ms);
+  pressedG_ms = event.key.toLowerCase() === "g" && !key.mod && !inInput ? at_ms : -Infinity;
+  const hit = shortcutOf(key, inInput, { view: activeView.value.id as ViewId, afterG: follows });
   if (!hit || isControl(event)) return;
   event.preventDefault();
   act(hit);
 }
 
-export function useKeyboard(): void {
-  useEffect(() => {
-    document.addEventListener("keydown", onKey);
-    return () => document.removeEventListener("keydown", onKey);
-  }, []);
-}
+/** From the page's first moment on: what is pressed before its first picture counts as well. */
+export const startKeyboard = () => document.addEventListener("keydown", onKey);

@@ -48,6 +48,19 @@ export interface Where {
   afterG: boolean;
 }
 
+/** How long after G its second key may come. */
+const SEQUENCE_MS = 1500;
+
+/** Times of key presses count from when their own page was opened, and the 3D view is a page of its own. */
+export function pressedAt_ms({ timeStamp, view }: Pick<UIEvent, "timeStamp" | "view">): number {
+  return timeStamp + (view ?? window).performance.timeOrigin;
+}
+
+export const afterG = (pressedG_ms: number, at_ms: number) => {
+  const since_ms = at_ms - pressedG_ms;
+  return since_ms >= 0 && since_ms < SEQUENCE_MS;
+};
+
 const VIEW_KEYS: Readonly<Record<string, ViewId>> = { p: "plan", f: "fly", r: "review" };
 /** What would change the plan has no meaning where it is flown or reviewed. */
 const PLANNING: ReadonlySet<ShortcutId> = new Set(["undo", "redo", "add", "delete"]);
