@@ -27,11 +27,15 @@ def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATI
     raise AssertionError("not within the time allowed")
 
 
-def visit(page: Page, station: Station) -> None:
+def enter(page: Page, station: Station) -> None:
     """As the operator who is signed in and in charge."""
     for name, value in station.cookies.items():
         page.context.add_cookies([{"name": name, "value": value, "url": station.origin}])
     page.goto(station.origin)
+
+
+def visit(page: Page, station: Station) -> None:
+    enter(page, station)
     expect(page.get_by_test_id("verdict")).to_be_visible()
 
 

@@ -1,4 +1,6 @@
+import { useRef, useState } from "preact/hooks";
 import type { AlertDoc } from "../messages";
+import { now_ms } from "../store/clock";
 import { alerts } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { isReplaying } from "../store/review";
@@ -11,6 +13,7 @@ import { Announcer } from "./Announcer";
 import { SensorMark } from "./SensorMark";
 import { ALERTS, acknowledge } from "./commands";
 import { hasWays } from "./manoeuvres";
+import { endingsOf, parted, type Endings } from "./over";
 import { alertTitle, bearingWord, distance, heightDifference } from "./words";
 
 /** Further alerts, one line each. */
@@ -55,7 +58,14 @@ function Actions({ first, others }: { first: AlertDoc; others: readonly AlertDoc
   );
 }
 
-function Head({ entry, isReplay }: { entry: AlertDoc; isReplay: boolean }) {
+interface HeadProps {
+  entry: AlertDoc;
+  isReplay: boolean;
+  /** Back to a chip. */
+  onShrink: (() => void) | null;
+}
+
+function Head({ entry, isReplay, onShrink }: HeadProps) {
   return (
     <header>
       <Icon name={entry.over ? "check" : "warning"} size={24} />
@@ -64,6 +74,15 @@ function Head({ entry, isReplay }: { entry: AlertDoc; isReplay: boolean }) {
       {isReplay && <span class="replay-word small">REPLAY</span>}
       {!isReplay && isReplaying.value && <span class="live-tag">LIVE</span>}
       <State entry={entry} />
+      {onShrink && (
+        <Button
+          kind="quiet"
+          icon="cross"
+          title="Back to a chip; it stays unacknowledged"
+          testid="alert-shrink"
+          onClick={onShrink}
+        />
+      )}
     </header>
   );
 }
@@ -110,7 +129,12 @@ function shownAlerts(): { all: readonly AlertDoc[]; isReplay: boolean } {
   return { all: alerts.replay.value.filter((entry) => !entry.over), isReplay: true };
 }
 
-function Banner({ first, others, isReplay }: { first: AlertDoc; others: AlertDoc[]; isReplay: boolean }) {
+interface BannerProps extends Omit<HeadProps, "entry"> {
+  first: AlertDoc;
+  others: readonly AlertDoc[];
+}
+
+function Banner({ first, others, isReplay, onShrink }: BannerProps) {
   const { alert } = first;
   return (
     <section
@@ -120,7 +144,7 @@ function Banner({ first, others, isReplay }: { first: AlertDoc; others: AlertDoc
       data-stage={stageOf(first)}
       data-sensor={alert.sensor}
     >
-      <Head entry={first} isReplay={isReplay} />
+      <Head entry={first} isReplay={isReplay} onShrink={onShrink} />
       {alert.obstacle ? (
         <Figures obstacle={alert.obstacle} isOver={first.over} />
       ) : (
@@ -139,14 +163,45 @@ function Banner({ first, others, isReplay }: { first: AlertDoc; others: AlertDoc
   );
 }
 
+/** Nobody has acknowledged them, and nothing is there any more. */
+function Chip({ over, onOpen }: { over: readonly AlertDoc[]; onOpen: () => void }) {
+  return (
+    <button
+      type="button"
+      class="alert-chip"
+      title="Show what was alerted and is over; K acknowledges it"
+      data-testid="alert-chip"
+      onClick={onOpen}
+    >
+      <Icon name="check" size={16} />
+      <b class="number">{over.length}</b> {over.length === 1 ? "alert" : "alerts"} over
+    </button>
+  );
+}
+
 /** Over the 3D view, in every view: nothing moves when an alert begins, and no action lies beneath. */
 export function AlertBanner() {
   const { all, isReplay } = shownAlerts();
-  const [first, ...others] = all;
+  const endings = useRef<Endings>(new Map());
+  const [isOpen, setOpen] = useState(false);
+  const at_ms = all.some((entry) => entry.over) ? now_ms.value : now_ms.peek();
+  endings.current = endingsOf(endings.current, all, at_ms);
+  const { banner, chip } = parted(all, endings.current, at_ms);
+  const isUnfolded = isOpen && banner.length === 0;
+  if (isOpen && (banner.length > 0 || chip.length === 0)) setOpen(false);
+  const [first, ...others] = isUnfolded ? chip : banner;
   return (
     <>
       <Announcer />
-      {first && <Banner first={first} others={others} isReplay={isReplay} />}
+      {first && (
+        <Banner
+          first={first}
+          others={isUnfolded ? others : [...others, ...chip]}
+          isReplay={isReplay}
+          onShrink={isUnfolded ? () => setOpen(false) : null}
+        />
+      )}
+      {chip.length > 0 && !isUnfolded && <Chip over={chip} onOpen={() => setOpen(true)} />}
     </>
   );
 }
