@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { followsPlan, markerShare, tolerance_m, verdictOf } from "../src/fly/deviation";
+import { againstFlown, followsPlan, markerShare, tolerance_m, verdictOf } from "../src/fly/deviation";
 
 describe("a plan", () => {
   const state = (armed: boolean, landed: "on_ground" | "in_air" | "landing" | null, mode: string) => ({
@@ -45,5 +45,31 @@ describe("a deviation", () => {
     expect(markerShare(0.6, 0.6)).toBeCloseTo(0.5 + 1 / 6);
     expect(markerShare(-99, 0.6)).toBe(0);
     expect(markerShare(99, 0.6)).toBe(1);
+  });
+});
+
+describe("a flight that avoidance has raised", () => {
+  it("is held against the plan and what it was raised by", () => {
+    const { height_error_m, raised_m, isOnLine } = againstFlown(14.3, {
+      state: "offset",
+      height_offset_m: 14,
+    });
+    expect(height_error_m).toBeCloseTo(0.3);
+    expect(verdictOf(height_error_m, 0.6)).toBe("within");
+    expect([raised_m, isOnLine]).toEqual([14, true]);
+  });
+
+  it("is not judged on its way up or past something", () => {
+    for (const state of ["holding", "climbing", "manoeuvre", "ceiling"] as const)
+      expect(againstFlown(6, { state, height_offset_m: 0 }).isOnLine).toBe(false);
+    for (const state of ["off", "watching", "released"] as const)
+      expect(againstFlown(6, { state, height_offset_m: 0 })).toMatchObject({
+        isOnLine: true,
+        height_error_m: 6,
+      });
+  });
+
+  it("without a position has no error", () => {
+    expect(againstFlown(null, { state: "offset", height_offset_m: 3 }).height_error_m).toBeNull();
   });
 });

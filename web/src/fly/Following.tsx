@@ -1,9 +1,11 @@
 import { DASH, deviation, duration, metres, percent } from "../format";
 import type { FollowDoc, VehicleState } from "../messages";
+import type { Source } from "../store/flying";
+import { obstacles } from "../store/obstacles";
 import { document_ } from "../store/state";
 import { Bar } from "../ui/Bar";
 import { Icon } from "../ui/Icon";
-import { REACH, followsPlan, markerShare, tolerance_m, verdictOf } from "./deviation";
+import { REACH, againstFlown, followsPlan, markerShare, tolerance_m, verdictOf } from "./deviation";
 
 interface ErrorProps {
   label: string;
@@ -47,16 +49,21 @@ function behindWords(behind_s: number | null): string {
   return `${duration(size)} ${behind_s > 0 ? "behind plan" : "ahead of plan"}`;
 }
 
+/** A smaller one is none to speak of. */
+const LEAST_RAISED_M = 0.05;
+
 interface Props {
+  source: Source;
   state: VehicleState | null;
   follow: FollowDoc | null;
   isOld: boolean;
 }
 
 /** How well the plan is being followed, how far it is flown, and how long it will take. */
-export function Following({ state, follow, isOld }: Props) {
+export function Following({ source, state, follow, isOld }: Props) {
   const profile = document_.value?.profile;
-  const judged = followsPlan(state);
+  const flown = againstFlown(follow?.height_error_m ?? null, obstacles[source].value.avoidance);
+  const judged = followsPlan(state) && flown.isOnLine;
   const allowed_m = profile ? tolerance_m(profile) : 1;
   const progress = follow?.progress ?? null;
   return (
@@ -70,8 +77,8 @@ export function Following({ state, follow, isOld }: Props) {
         testid="cross-track"
       />
       <SignedBar
-        label="Height error"
-        value_m={follow?.height_error_m ?? null}
+        label={flown.raised_m >= LEAST_RAISED_M ? `Height, plan +${metres(flown.raised_m)}` : "Height error"}
+        value_m={flown.height_error_m}
         allowed_m={allowed_m}
         judged={judged}
         words={{ more: "high", less: "low" }}

@@ -52,7 +52,7 @@ export function Instruments({ source }: { source: Source }) {
         <Displays source={source} state={state} />
       </div>
       <Tiles state={state} follow={follow} isOld={position.isOld} />
-      <Following state={state} follow={follow} isOld={position.isOld} />
+      <Following source={source} state={state} follow={follow} isOld={position.isOld} />
       <Supplies state={state} battery={ageOf(source, "battery")} gnss={ageOf(source, "gnss")} />
     </div>
   );

@@ -1,4 +1,4 @@
-import type { ProfileDoc, VehicleState } from "../messages";
+import type { AvoidanceStatus, ProfileDoc, VehicleState } from "../messages";
 
 /** How far beside the planned line the vehicle may be, and where that is on a bar. */
 
@@ -20,6 +20,30 @@ export function verdictOf(error_m: number | null | undefined, allowed_m: number)
 export function followsPlan(state: Pick<VehicleState, "armed" | "landed" | "mode"> | null): boolean {
   if (!state?.armed || (state.landed !== "in_air" && state.landed !== null)) return false;
   return /AUTO|GUIDED|MISSION|OFFBOARD/i.test(state.mode);
+}
+
+export interface Flown {
+  height_error_m: number | null;
+  /** How much higher than the plan it is meant to fly. */
+  raised_m: number;
+  /** On the way up or past something, nothing is amiss off the line. */
+  isOnLine: boolean;
+}
+
+const NOT_ON_LINE: ReadonlySet<AvoidanceStatus["state"]> = new Set([
+  "holding",
+  "climbing",
+  "manoeuvre",
+  "ceiling",
+]);
+
+/** The error against what is flown, the plan and what avoidance flies above it, from the one against the plan. */
+export function againstFlown(
+  height_error_m: number | null,
+  { state, height_offset_m: raised_m }: Pick<AvoidanceStatus, "state" | "height_offset_m">,
+): Flown {
+  const error_m = height_error_m === null ? null : height_error_m - raised_m;
+  return { height_error_m: error_m, raised_m, isOnLine: !NOT_ON_LINE.has(state) };
 }
 
 /** The bar reaches this many tolerances to either side. */
