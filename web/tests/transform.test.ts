@@ -1,10 +1,13 @@
 import { describe, expect, it } from "vitest";
+import type { Chart } from "../src/messages";
 import {
+  flownSpan,
   gaps,
   heightRange,
   labelsThatFit,
   levelOf,
   levelSpans,
+  profileRange,
   tickDecimals,
   valueAt,
 } from "../src/chart/transform";
@@ -108,5 +111,29 @@ describe("labels", () => {
 describe("ticks", () => {
   it("have the decimals that their step needs, and no more", () => {
     expect([50, 5, 2.5, 1, 0.5, 0.25, 0.1, 0.05].map(tickDecimals)).toEqual([0, 0, 1, 0, 1, 2, 1, 2]);
+  });
+});
+
+describe("the altitude chart's axis", () => {
+  const chart = {
+    s_m: [0, 100],
+    ground_rel_home_m: [0, 10],
+    surface_rel_home_m: [5, 15],
+    path_rel_home_m: [5, 15],
+    flown_rel_home_m: [5, 15],
+  } as unknown as Chart;
+
+  it("follows what was flown above and below the plan", () => {
+    const [low, high] = profileRange(chart, flownSpan([0, 50, 100], [-12, 31.2, null]));
+    expect(low).toBeLessThanOrEqual(-15);
+    expect(high).toBeGreaterThanOrEqual(35);
+    expect(profileRange(chart, null)).toEqual(profileRange(chart));
+  });
+
+  it("changes in steps, and only for what lies along the path", () => {
+    expect(flownSpan([0, 50], [3, 31.2])).toEqual([0, 35]);
+    expect(flownSpan([0, 50], [3, 33.9])).toEqual([0, 35]);
+    expect(flownSpan([0, null], [3, 60])).toEqual([0, 5]);
+    expect(flownSpan([], [])).toBeNull();
   });
 });

@@ -1,11 +1,14 @@
-import { useCallback, useRef } from "preact/hooks";
+import { useCallback, useMemo, useRef } from "preact/hooks";
+import { useComputed } from "@preact/signals";
 import type uPlot from "uplot";
 import type { ResultDoc } from "../messages";
+import { trackVersion, tracks } from "../store/flying";
 import { cursor } from "../store/state";
 import { ChartBox, VerticalLine } from "./ChartBox";
 import { FlownLayer } from "./FlownLayer";
 import { altitudeChart, altitudeData, type Size } from "./altitude";
 import type { Palette } from "./palette";
+import { flownSpan, type Span } from "./transform";
 import { trendChart, trendData } from "./trend";
 
 export type ChartKind = "altitude" | "distance";
@@ -28,16 +31,30 @@ function CursorLine({ plot }: { plot: uPlot }) {
   return <VerticalLine plot={plot} at={cursor.value?.s_m ?? null} kind="" testid="cursor-line" />;
 }
 
+/** What was flown, as far as the axis must follow it: the same object until that changes. */
+function useFlownSpan(flown: boolean): Span | null {
+  const ends = useComputed(() => {
+    void trackVersion.live.value;
+    return flownSpan(tracks.live.s_m, tracks.live.alt_rel_home_m)?.join() ?? "";
+  });
+  const text = flown ? ends.value : "";
+  return useMemo(() => {
+    const [low, high] = text.split(",").map(Number);
+    return text === "" || low === undefined || high === undefined ? null : [low, high];
+  }, [text]);
+}
+
 /** The profile along the path. */
 export function Plot({ kind, result, flown, onHover }: Props) {
   const hover = useRef(onHover);
   hover.current = onHover;
+  const span = useFlownSpan(flown && kind === "altitude");
   const make = useCallback(
     (size: Size, palette: Palette) => ({
-      options: CHARTS[kind].options(result, size, palette, (s_m) => hover.current(s_m)),
+      options: CHARTS[kind].options(result, size, palette, (s_m) => hover.current(s_m), span),
       data: CHARTS[kind].data(result),
     }),
-    [kind, result],
+    [kind, result, span],
   );
   const over = (plot: uPlot) => (
     <>

@@ -3,7 +3,7 @@ import type { ResultDoc } from "../messages";
 import { drawFlown, drawPois, drawStrip, drawUnknown, drawWorst } from "./draw";
 import { chartOptions } from "./options";
 import type { Palette } from "./palette";
-import { gaps, levelOf, levelSpans, profileRange } from "./transform";
+import { gaps, levelOf, levelSpans, profileRange, type Span } from "./transform";
 
 export interface Size {
   width: number;
@@ -18,6 +18,7 @@ export function altitudeChart(
   size: Size,
   palette: Palette,
   onHover: Hover,
+  flown: Span | null = null,
 ): uPlot.Options {
   const { chart, worst, required_clearance_m: required_m } = result;
   const spans = levelSpans(chart.trend_s_m, chart.trend_distance_m, required_m);
@@ -27,7 +28,7 @@ export function altitudeChart(
     ...size,
     palette,
     yLabel: "m above home",
-    range: profileRange(chart),
+    range: profileRange(chart, flown),
     series: [
       {
         stroke: palette.groundLine,

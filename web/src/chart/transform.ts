@@ -99,14 +99,31 @@ export function labelsThatFit(x_px: readonly number[], width_px: readonly number
   });
 }
 
-/** All that the altitude chart's vertical axis must show. */
-export const profileRange = (chart: Chart): Span =>
+/** All that the altitude chart's vertical axis must show; `flown` is what was flown along the path. */
+export const profileRange = (chart: Chart, flown: Span | null = null): Span =>
   heightRange([
     chart.ground_rel_home_m,
     chart.surface_rel_home_m,
     chart.path_rel_home_m,
     chart.flown_rel_home_m,
+    flown ?? [],
   ]);
+
+/** In so coarse steps that the axis changes seldom while a vehicle climbs. */
+const FLOWN_STEP_M = 5;
+
+/** The heights flown along the path, whatever is planned there, outwards to the next step; null before any. */
+export function flownSpan(s_m: Curve, alt_m: Curve): Span | null {
+  let [low, high] = [Infinity, -Infinity];
+  for (let index = 0; index < alt_m.length; index++) {
+    const value = alt_m[index];
+    if (value == null || s_m[index] == null || !Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  if (low > high) return null;
+  return [Math.floor(low / FLOWN_STEP_M) * FLOWN_STEP_M, Math.ceil(high / FLOWN_STEP_M) * FLOWN_STEP_M];
+}
 
 const MOST_DECIMALS = 4;
 
