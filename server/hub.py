@@ -121,6 +121,11 @@ class Hub:
     def page_ids(self) -> list[str]:
         return list(self._pages)
 
+    @property
+    def session_keys(self) -> list[str]:
+        """Of the pages that are open, the one that has been open longest first."""
+        return [page.session_key for page in self._pages.values()]
+
     def publish(self, message: schemas.ServerMessage) -> None:
         """To every page; never waits."""
         outgoing = _Outgoing(message)

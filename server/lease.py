@@ -1,5 +1,8 @@
 """Who is in charge: one session at a time may command the vehicle, and every command carries a fencing token.
 
+Whoever has no page any more, and commands nothing either, loses it to a page that is there, but never in flight: a
+browser that comes back must not find another one in charge.
+
 The token only ever grows, across restarts too: it counts milliseconds since 1970, or one more than the last one if
 the clock went back. Whoever held the lease before has a lower token, and the link node refuses it.
 """
@@ -8,7 +11,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +24,10 @@ SERVER_NAME = "Hedgehop"
 """What the server calls itself when it opens the connections it was started with."""
 
 
+GONE_S = 8.0
+"""Without a page for so long, nobody comes back to it: a page that lost its server tries again every 5 s."""
+
+
 @dataclass(frozen=True, slots=True)
 class Holder:
     session_key: str
@@ -30,9 +37,16 @@ class Holder:
 class Lease:
     """Every method belongs to the event loop's thread, but for ``save``, which may block."""
 
-    def __init__(self, file: Path, *, clock_utc_s: Callable[[], float] = time.time) -> None:
-        self._file, self._clock_utc_s = file, clock_utc_s
+    def __init__(
+        self,
+        file: Path,
+        *,
+        clock_utc_s: Callable[[], float] = time.time,
+        now_mono_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._file, self._clock_utc_s, self._now_mono_s = file, clock_utc_s, now_mono_s
         self._token, self._holder = self._read()
+        self._seen_mono_s = now_mono_s()
 
     @property
     def holder(self) -> Holder | None:
@@ -56,8 +70,21 @@ class Lease:
         """Takes charge; the one who was in charge before, unless it was this session."""
         before = self._holder
         self._holder = Holder(session_key, name or default_name(session_key))
+        self._seen_mono_s = self._now_mono_s()
         self._next_token()
         return before if before is not None and before.session_key != session_key else None
+
+    def pass_on(self, present: Sequence[str], *, in_flight: bool) -> bool:
+        """To be told regularly whose pages are open: whether the first of ``present`` has taken charge just now."""
+        holder, now_mono_s = self._holder, self._now_mono_s()
+        if holder is None:
+            return False  # let go on purpose
+        if in_flight or holder.session_key in present:
+            self._seen_mono_s = now_mono_s
+        if not present or now_mono_s - self._seen_mono_s < GONE_S:
+            return False
+        self.take(present[0])
+        return True
 
     def release(self, session_key: str) -> bool:
         """Lets go, if this session was in charge."""
@@ -73,6 +100,7 @@ class Lease:
         if holder is None or holder.session_key != session_key:
             who = "Nobody is" if holder is None else f"{holder.name} is"
             raise NotInChargeError(f"{who} in charge of the vehicle.", advice="Press Take control first.")
+        self._seen_mono_s = self._now_mono_s()
         return Operator(holder.name, self._token)
 
     def server_operator(self) -> Operator:

@@ -200,6 +200,8 @@ class Flying:
             self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
             self.live.tick()
             self._obstacles.tick()
+            if self.lease.pass_on(self._hub.session_keys, in_flight=self.armed):
+                await self._lease_changed()
             await asyncio.sleep(ALIVE_EVERY_S)
 
     # What is heard

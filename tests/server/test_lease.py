@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.errors import NotInChargeError, status_of
-from server.lease import Lease
+from server.lease import GONE_S, Lease
 
 ANNA, BEN = "a" * 64, "b" * 64
 
@@ -46,6 +46,52 @@ def test_letting_go_frees_it_and_takes_the_token_away(tmp_path: Path) -> None:
     assert lease.release(ANNA)
     assert lease.doc_for(ANNA).holder is None
     assert lease.server_operator().token > held
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def test_a_page_that_is_gone_loses_it_to_one_that_is_there(tmp_path: Path) -> None:
+    clock, file = Clock(), tmp_path / "lease.json"
+    lease = Lease(file, now_mono_s=clock)
+    lease.take(ANNA, "Anna")
+    held = lease.operator(ANNA).token
+    lease.save()
+
+    lease = Lease(file, now_mono_s=clock)  # after a restart
+    clock.now_s += GONE_S - 0.1
+    assert not lease.pass_on([BEN], in_flight=False)
+    clock.now_s += 0.2
+    assert not lease.pass_on([], in_flight=False)
+    assert lease.pass_on([BEN], in_flight=False)
+    assert lease.operator(BEN).token > held
+
+
+def test_who_has_a_page_or_commands_or_flies_keeps_it(tmp_path: Path) -> None:
+    clock = Clock()
+    lease = Lease(tmp_path / "lease.json", now_mono_s=clock)
+    lease.take(ANNA)
+    for present, in_flight in (([BEN, ANNA], False), ([BEN], True)):
+        clock.now_s += 2 * GONE_S
+        assert not lease.pass_on(present, in_flight=in_flight)
+    clock.now_s += 2 * GONE_S
+    lease.operator(ANNA)
+    assert not lease.pass_on([BEN], in_flight=False)
+    assert lease.doc_for(ANNA).mine
+
+
+def test_who_lets_go_on_purpose_does_not_get_it_back(tmp_path: Path) -> None:
+    clock = Clock()
+    lease = Lease(tmp_path / "lease.json", now_mono_s=clock)
+    lease.take(ANNA)
+    lease.release(ANNA)
+    clock.now_s += 2 * GONE_S
+    assert not lease.pass_on([ANNA, BEN], in_flight=False)
 
 
 def test_a_restart_keeps_the_holder_and_never_lowers_the_token(tmp_path: Path) -> None:
