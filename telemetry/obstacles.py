@@ -6,11 +6,13 @@ height of the vehicle's home, as ``alt_rel_home_m`` does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from telemetry.track_settings import TrackerSettings, VelocitySettings
 
 Sensor = Literal["radar", "vision", "ranges"]
 SENSORS: tuple[Sensor, ...] = ("radar", "vision", "ranges")
@@ -249,6 +251,8 @@ class PerceptionSettings:
     """Kept from moving objects, between middles."""
     approach_s: float = 8.0
     """A closest approach later than this is not alerted yet."""
+    tracker: TrackerSettings = field(default_factory=TrackerSettings)
+    velocities: VelocitySettings = field(default_factory=VelocitySettings)
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,8 @@ class Track:
     """The closest approach is inside the safety radius, soon enough to matter."""
     lat_deg: float
     lon_deg: float
+    remembered: bool = False
+    """It stands where the radar cannot see it now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,9 @@ class TracksStatus:
     """Of the tracks that are dangerous or near, nearest first, at most 8."""
     proposal: VelocityProposal | None = None
     """None while the present velocity leads into nothing."""
+    room_m: tuple[float, ...] = ()
+    """How far the vehicle may fly level until known ground, in even directions clockwise from north, at most 40 m;
+    empty: no surface model is known."""
     no_proposal: str = ""
     """Why there is none although one is needed."""
     origin: MapOrigin | None = None

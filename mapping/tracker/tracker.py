@@ -38,6 +38,11 @@ class Tracker:
         self._last_id = 0
         self.clear()
 
+    def tune(self, params: TrackerParams) -> None:
+        """Go on with other parameters, from nothing: what was followed by the old ones is forgotten, but the ids."""
+        self.params, self._noise = params, params.noise()
+        self.clear()
+
     def clear(self) -> None:
         """Forget everything but the ids that were given."""
         self._t_s = -math.inf

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import msgspec
+from pydantic import ValidationError
 
 from mapping.errors import MappingError
 from server.library.files import write_atomically
-from server.schemas import PerceptionSettingsBody
+from server.schemas import PerceptionSettingsBody, VelocitySettingsBody
 from telemetry.obstacles import PerceptionSettings
 from telemetry.perception.limits import check_perception
+from telemetry.track_settings import VelocitySettings
 
 FILE = "perception.json"
 WIDEST_M = 100.0
@@ -32,11 +34,20 @@ def _makes_sense(settings: PerceptionSettings) -> bool:
     around = (settings.vehicle_radius_m, settings.position_error_m)
     if not (all(value > 0 for value in lengths) and all(0 <= value <= WIDEST_M for value in around)):
         return False
-    if settings.clear_count < 0:
+    if settings.clear_count < 0 or not _are_limits(settings.velocities):
         return False
     try:
         check_perception(settings)
     except MappingError:
+        return False
+    return True
+
+
+def _are_limits(velocities: VelocitySettings) -> bool:
+    """The longest and widest are those that a page may ask for."""
+    try:
+        VelocitySettingsBody(**asdict(velocities))
+    except ValidationError:
         return False
     return True
 
@@ -46,5 +57,9 @@ def write_settings(root: Path, settings: PerceptionSettings) -> None:
 
 
 def changed(settings: PerceptionSettings, body: PerceptionSettingsBody) -> PerceptionSettings:
-    """What the body leaves out stays."""
-    return replace(settings, **body.model_dump(exclude_none=True))
+    """What the body leaves out stays, of its parts as well."""
+    wanted = body.model_dump(exclude_none=True)
+    for part in ("tracker", "velocities"):
+        if part in wanted:
+            wanted[part] = replace(getattr(settings, part), **wanted[part])
+    return replace(settings, **wanted)

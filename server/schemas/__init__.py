@@ -55,6 +55,8 @@ from server.schemas.obstacles import (
     PlanWithSeen,
     SensorName,
     SetAvoidanceBody,
+    TrackerSettingsBody,
+    VelocitySettingsBody,
 )
 from server.schemas.plan import (
     CameraDoc,
@@ -231,6 +233,7 @@ __all__ = [
     "TextMessage",
     "TrackDoc",
     "TrackMessage",
+    "TrackerSettingsBody",
     "TracksMessage",
     "TradeRow",
     "TransferMessage",
@@ -239,6 +242,7 @@ __all__ = [
     "TraversabilityState",
     "UploadPlan",
     "VehicleMessage",
+    "VelocitySettingsBody",
     "ViewDoc",
     "ViewMessage",
     "WorstDoc",

@@ -91,6 +91,40 @@ class AcknowledgeBody(Strict):
     alert_id: str | None = None
 
 
+class TrackerSettingsBody(Strict):
+    """How objects are followed; what is left out stays. Anything else makes the tracker begin anew."""
+
+    coordinates: Literal["cartesian", "polar"] | None = None
+    range_sigma_m: Annotated[float, Field(ge=0.01, le=10)] | None = None
+    bearing_sigma_deg: Annotated[float, Field(ge=0.05, le=30)] | None = None
+    bearing_edge_deg: Annotated[float, Field(ge=0, le=180)] | None = None
+    bearing_edge_sigma_deg: Annotated[float, Field(ge=0.05, le=45)] | None = None
+    radial_speed_sigma_m_s: Annotated[float, Field(ge=0.01, le=10)] | None = None
+    radial_speed_folded_m_s: Annotated[float, Field(ge=0, le=1000)] | None = None
+    """0: no two radial speeds look the same."""
+    extent_m: Annotated[float, Field(ge=0, le=10)] | None = None
+    acceleration_m_s2: Annotated[float, Field(ge=0, le=50)] | None = None
+    speed_m_s: Annotated[float, Field(ge=0.1, le=100)] | None = None
+    detection_probability: Annotated[float, Field(gt=0, lt=1)] | None = None
+    gate: Annotated[float, Field(ge=0.1, le=1000)] | None = None
+    birth: Annotated[float, Field(ge=0.01, le=100)] | None = None
+    birth_updates: Annotated[int, Field(ge=1, le=100)] | None = None
+    death: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+    apart_m: Annotated[float, Field(ge=0, le=20)] | None = None
+
+
+class VelocitySettingsBody(Strict):
+    """What proposed and flown velocities keep to; what is left out stays."""
+
+    max_speed_m_s: Annotated[float, Field(ge=0, le=50)] | None = None
+    """0: that of the plan's vehicle."""
+    max_turn_deg: Annotated[float, Field(ge=5, le=180)] | None = None
+    leave_m_s: Annotated[float, Field(ge=0, le=5)] | None = None
+    nearest_only: bool | None = None
+    stands_m: Annotated[float, Field(ge=0.3, le=30)] | None = None
+    stands_s: Annotated[float, Field(ge=1, le=30)] | None = None
+
+
 class PerceptionSettingsBody(Strict):
     """What an operator may change; the rest stays."""
 
@@ -110,6 +144,8 @@ class PerceptionSettingsBody(Strict):
     """Of the range finder's map, too."""
     memory_limit_bytes: Annotated[int, Field(ge=1_000_000, le=100_000_000_000)] | None = None
     """Per map. A new one, or another resolution, begins the map anew."""
+    tracker: TrackerSettingsBody | None = None
+    velocities: VelocitySettingsBody | None = None
 
 
 class PlanWithSeen(Strict):

@@ -17,6 +17,7 @@ def check_perception(settings: PerceptionSettings) -> None:
             check_settings(kind.settings(settings), reach_m=kind.reach_m, reach_down=kind.make.reach_down)
         except MappingError as error:
             raise type(error)(error.what, where=f"{kind.sensor} map", advice=error.advice) from None
+    settings.tracker.params()
 
 
 def check_memory(limit_bytes: int, *, maps: int) -> None:

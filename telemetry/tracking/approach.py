@@ -1,4 +1,4 @@
-"""Approach alerts: a moving object whose closest approach will be inside the safety radius, soon."""
+"""Approach alerts: an object, moving or not, whose closest approach will be inside its safety radius, soon."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from telemetry.obstacles import ObstacleAlert
-from telemetry.tracking.followed import UNSEEN_S, Followed
+from telemetry.tracking.followed import UNSEEN_S, Followed, Keep
 
 BEGIN_FRAMES = 3
 """So many frames in a row: a single estimate may be off."""
 KEEP_RADII, KEEP_TIMES = 1.5, 1.25
 """An approach goes on until it will stay out of so many radii, or lies so many times the alerted time ahead."""
 OUT_S = 1.5
-FOLLOWED_AFRESH = "Moving objects are followed afresh: look out"
-LANDED = "On the ground: moving objects are not alerted"
+FOLLOWED_AFRESH = "Objects are followed afresh: look out"
+LANDED = "On the ground: nothing on a collision course is alerted"
 TELL_AGAIN_S = 1.0
 
 
@@ -31,6 +31,7 @@ class _Approach:
     """When its last echo came."""
     sighted: str = ""
     """Where that was."""
+    what: str = ""
     told_s: float = 0.0
     text: str = ""
 
@@ -52,17 +53,16 @@ class ApproachBook:
         followed: Sequence[Followed],
         *,
         heading_rad: float,
-        radius_m: float,
-        within_s: float,
+        keep: Keep,
         t_mono_s: float,
         done_t_mono_s: float,
     ) -> list[ObstacleAlert]:
-        """After a frame; ``within_s`` is how soon an approach must be."""
+        """After a frame, of what moves and of what stands still."""
         out: list[ObstacleAlert] = []
         for one in followed:
             known = self._of.get(one.id)
-            begins = one.moving and one.is_dangerous(radius_m, within_s)
-            goes_on = known is not None and bool(known.id) and _goes_on(one, radius_m, within_s)
+            begins = one.is_dangerous(keep)
+            goes_on = known is not None and bool(known.id) and _goes_on(one, keep)
             if not begins and not goes_on:
                 if known is not None:
                     known.look(one, heading_rad, t_mono_s)
@@ -73,6 +73,7 @@ class ApproachBook:
             known = self._of.setdefault(one.id, _Approach())
             known.look(one, heading_rad, t_mono_s)
             known.frames, known.coming_s, known.text = known.frames + 1, t_mono_s, words(one, heading_rad)
+            known.what = what(one)
             out += self._tell(known, t_mono_s, done_t_mono_s)
         for gone in self._of.keys() - {one.id for one in followed}:
             self._drop_candidate(gone)
@@ -114,7 +115,8 @@ class ApproachBook:
         return ObstacleAlert(one.id, "radar", "approach", phase, t_s, t_utc_s, done_s, text)
 
 
-def _goes_on(one: Followed, radius_m: float, within_s: float) -> bool:
+def _goes_on(one: Followed, keep: Keep) -> bool:
+    radius_m, within_s = keep.of(moving=one.moving)
     near = one.closest_m < KEEP_RADII * radius_m and 0.0 < one.closest_in_s <= KEEP_TIMES * within_s
     return near and one.unseen_s <= UNSEEN_S
 
@@ -122,14 +124,18 @@ def _goes_on(one: Followed, radius_m: float, within_s: float) -> bool:
 def _last_words(one: _Approach, t_s: float) -> str:
     """Only what was seen to be off the course just now is no danger: what nobody sees may still be coming."""
     if one.sighted_s > one.coming_s and t_s - one.sighted_s <= UNSEEN_S:
-        return "Moving object: not on a collision course any more"
-    return f"Moving object no longer in sight: look out, last {one.sighted}"
+        return f"{one.what}: not on a collision course any more"
+    return f"{one.what} no longer in sight: look out, last {one.sighted}"
 
 
 def words(one: Followed, heading_rad: float) -> str:
     """One line for the pilot."""
     where = _where(one, heading_rad)
-    return f"Moving object {where}, closest {one.closest_m:.1f} m in {one.closest_in_s:.1f} s"
+    return f"{what(one)} {where}, closest {one.closest_m:.1f} m in {one.closest_in_s:.1f} s"
+
+
+def what(one: Followed) -> str:
+    return "Moving object" if one.moving else "Standing object"
 
 
 def _where(one: Followed, heading_rad: float) -> str:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.poses import Pose
+from planning.steering import with_ground
 from planning.velocity_obstacles import Limits, Obstacles, Proposal, cones, propose
-from telemetry.tracking.followed import Followed
+from telemetry.tracking.followed import Followed, Keep
 from telemetry.tracks import VelocityCone, VelocityProposal
 
 MOST_CONES, MOST_EVADED = 8, 24
@@ -18,6 +19,7 @@ NEAR_RADII = 5.0
 """Objects nearer than so many safety radii are shown with their cones, whether they come nearer or not."""
 SPARE = 1.25
 """A proposal keeps so many safety radii: the next frame's estimate is a little different."""
+SIGMAS = 2.0
 LEAST_HOLD_S = 1.0
 _STOPPED_M_S, _STRAIGHT_RAD = 0.2, math.radians(2.5)
 _FORBIDDEN = "Every velocity within the vehicle's limits leads into something: stop or climb."
@@ -30,32 +32,53 @@ class Evasion:
     why_none: str = ""
 
 
-def evasion(followed: Sequence[Followed], pose: Pose, limits: Limits, *, radius_m: float, within_s: float) -> Evasion:
-    """``followed`` are the nearest first. Something is proposed while an object that moves is dangerous."""
-    dangerous = [one for one in followed if one.is_dangerous(radius_m, within_s)]
-    near = [one for one in followed if one.range_m < NEAR_RADII * radius_m or one in dangerous][:MOST_CONES]
-    shown = tuple(_cones(near, pose, radius_m))
-    if not any(one.moving for one in dangerous):
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What a proposal keeps to."""
+
+    keep: Keep
+    limits: Limits
+    nearest_only: bool = False
+    """As the paper's vehicle, which knew of no second obstacle."""
+    room_m: tuple[float, ...] = ()
+    """In even directions from north, clockwise, until known ground; empty: nothing is known of it."""
+
+
+def evasion(followed: Sequence[Followed], pose: Pose, rules: Rules) -> Evasion:
+    """``followed`` are the nearest first. Something is proposed while one of them is dangerous, moving or not."""
+    keep, limits = rules.keep, rules.limits
+    dangerous = [one for one in followed if one.is_dangerous(keep)]
+    near = [one for one in followed if one.range_m < NEAR_RADII * _radius_m(one, keep) or one in dangerous]
+    shown = tuple(_cones(near[:MOST_CONES], pose, keep))
+    if not dangerous:
         return Evasion(shown)
-    reach_m = limits.max_speed_m_s * within_s
+    reach_m = limits.max_speed_m_s * keep.stands_s + keep.stands_m
     matter = [one for one in followed if one.moving or one.range_m < reach_m][:MOST_EVADED]
-    found = propose(_obstacles(matter, pose, SPARE * radius_m), pose.velocity_enu_m_s[:2], limits)
+    obstacles = _obstacles(matter, pose, [SPARE * _radius_m(one, keep) for one in matter])
+    everything = with_ground(obstacles, rules.room_m, farthest_m=reach_m)
+    found = propose(everything, pose.velocity_enu_m_s[:2], limits, nearest_only=rules.nearest_only)
     if found is None:
         return Evasion(shown, None, _FORBIDDEN)
     return Evasion(shown, _proposed(found, pose))
 
 
-def _obstacles(followed: Sequence[Followed], pose: Pose, radius_m: float) -> Obstacles:
+def _radius_m(one: Followed, keep: Keep) -> float:
+    """Of what stands still: with the uncertainty of its place, which of what moves lies in its velocity."""
+    radius_m, _ = keep.of(moving=one.moving)
+    return radius_m if one.moving else radius_m + min(SIGMAS * one.sigma_m, radius_m / 2)
+
+
+def _obstacles(followed: Sequence[Followed], pose: Pose, radius_m: Sequence[float]) -> Obstacles:
     return Obstacles.of(
         pose.position_enu_m[:2],
         np.array([one.state.position_enu_m for one in followed]).reshape(-1, 2),
-        np.array([one.state.velocity_enu_m_s for one in followed]).reshape(-1, 2),
-        radius_m=radius_m,
+        np.array([one.velocity_enu_m_s for one in followed]).reshape(-1, 2),
+        radius_m=np.array(radius_m),
     )
 
 
-def _cones(followed: Sequence[Followed], pose: Pose, radius_m: float) -> list[VelocityCone]:
-    found = cones(_obstacles(followed, pose, radius_m))
+def _cones(followed: Sequence[Followed], pose: Pose, keep: Keep) -> list[VelocityCone]:
+    found = cones(_obstacles(followed, pose, [_radius_m(one, keep) for one in followed]))
     return [
         VelocityCone(one.id, cone.apex_enu_m_s, math.degrees(cone.axis_rad) % 360.0, math.degrees(cone.half_angle_rad))
         for one, cone in zip(followed, found, strict=True)

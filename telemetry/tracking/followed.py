@@ -28,6 +28,20 @@ _ECHO_M = 3.0
 
 
 @dataclass(frozen=True, slots=True)
+class Keep:
+    """How near things may come, and how soon that counts."""
+
+    moving_m: float
+    """Between middles, as the next one is."""
+    moving_s: float
+    stands_m: float
+    stands_s: float
+
+    def of(self, *, moving: bool) -> tuple[float, float]:
+        return (self.moving_m, self.moving_s) if moving else (self.stands_m, self.stands_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Followed:
     """One track at the time of the newest frame."""
 
@@ -41,6 +55,8 @@ class Followed:
     """0: it is not getting nearer."""
     unseen_s: float = 0.0
     """Since its last echo."""
+    remembered: bool = False
+    """It stands where nothing can see it now."""
 
     @property
     def id(self) -> int:
@@ -55,10 +71,21 @@ class Followed:
         """Clockwise from north."""
         return math.atan2(self.offset_m[0], self.offset_m[1])
 
-    def is_dangerous(self, radius_m: float, within_s: float) -> bool:
-        """Told of tracks that have been seen often enough and just now, moving or not: what has turned away sharply is
-        followed anew, and its old track goes on for a while where nothing is."""
-        known = self.state.updates >= ENOUGH_UPDATES and self.unseen_s <= UNSEEN_S
+    @property
+    def velocity_enu_m_s(self) -> F64:
+        """(2,) Zero where what was measured is not told from standing still: five seconds of it would be metres."""
+        return velocity_of(self.state)
+
+    @property
+    def sigma_m(self) -> float:
+        """Of its place, in the direction where it is known worst."""
+        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(self.state.covariance[:2, :2])[-1])))
+
+    def is_dangerous(self, keep: Keep) -> bool:
+        """Told of tracks that have been seen often enough. What moves must have been seen just now: what has turned
+        away sharply is followed anew, and its old track goes on for a while where nothing is."""
+        known = self.state.updates >= ENOUGH_UPDATES and (not self.moving or self.unseen_s <= UNSEEN_S)
+        radius_m, within_s = keep.of(moving=self.moving)
         return known and self.closest_m < radius_m and self.closest_in_s <= within_s
 
 
@@ -97,7 +124,7 @@ class Memory:
 
     def _followed(self, states: list[TrackState], pose: Pose) -> list[Followed]:
         places = np.array([s.position_enu_m for s in states]).reshape(-1, 2)
-        velocities = np.array([s.velocity_enu_m_s for s in states]).reshape(-1, 2)
+        velocities = np.array([velocity_of(s) for s in states]).reshape(-1, 2)
         coming = approaches(
             Obstacles.of(pose.position_enu_m[:2], places, velocities, radius_m=0.0), pose.velocity_enu_m_s[:2]
         )
@@ -122,12 +149,26 @@ def _places(blobs: Blobs, pose: Pose) -> F64:
 
 def _moves(state: TrackState, memory: _Memory) -> bool:
     """Its speed is more than its uncertainty accounts for, and its echoes or its way bear it out."""
-    v, spread = np.asarray(state.velocity_enu_m_s, np.float64), np.asarray(state.covariance, np.float64)
-    if math.hypot(*v) < LEAST_M_S or float(v @ np.linalg.solve(spread[2:, 2:], v)) < SIGNIFICANT:
+    if not _shows_speed(state):
         return False
     if memory.doppler >= DOPPLER_SHARE:
         return True
     if state.age_s < PLACE_S or state.updates < PLACE_HZ * state.age_s:
         return False
     way_m = math.hypot(*(np.asarray(state.position_enu_m) - memory.born_m))
+    spread = np.asarray(state.covariance, np.float64)
     return way_m > max(PLACE_M, PLACE_SIGMAS * math.sqrt(np.trace(spread[:2, :2])))
+
+
+def velocity_of(state: TrackState) -> F64:
+    """(2,) Over ground; zero where it is not told from standing still."""
+    return np.asarray(state.velocity_enu_m_s, np.float64) if _shows_speed(state) else np.zeros(2)
+
+
+def _shows_speed(state: TrackState) -> bool:
+    """Whether the track's speed is more than chance."""
+    east, north = float(state.velocity_enu_m_s[0]), float(state.velocity_enu_m_s[1])
+    if math.hypot(east, north) < LEAST_M_S:
+        return False
+    ee, en, nn = (float(state.covariance[at]) for at in ((2, 2), (2, 3), (3, 3)))
+    return nn * east * east - 2 * en * east * north + ee * north * north >= SIGNIFICANT * (ee * nn - en * en)

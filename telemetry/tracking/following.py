@@ -10,22 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.perceiving.base import SILENT_S
+from mapping.tracker import Tracker
 from telemetry.messages import PlanRecord
-from telemetry.obstacles import ObstacleAlert
+from telemetry.obstacles import ObstacleAlert, PerceptionSettings
 from telemetry.perception.perceiver import Perceiver
 from telemetry.perception.status import Outcome
 from telemetry.sensing import RadarFrame
+from telemetry.track_settings import TrackerSettings
 from telemetry.tracking.approach import FOLLOWED_AFRESH, LANDED, ApproachBook
-from telemetry.tracking.evasion import Evasion, evasion
-from telemetry.tracking.followed import UNSEEN_S, Followed, Memory
+from telemetry.tracking.evasion import Evasion, Rules, evasion
+from telemetry.tracking.followed import UNSEEN_S, Followed, Keep, Memory
+from telemetry.tracking.ground_room import GroundRoom
 from telemetry.tracking.kind import tracks_kind
 from telemetry.tracking.limits import USUAL, limits_of
 from telemetry.tracking.movers import Movers
+from telemetry.tracking.remembered import Remembered
 from telemetry.tracks import Track, TracksState, TracksStatus
 
 F64 = NDArray[np.float64]
 
 MOST_TRACKS = 64
+DOWNWASH_M = 0.5
+"""Over the ground below it; beside it nothing is added."""
 KEEP_S = UNSEEN_S
 """After the newest frame that could be followed: then its objects are somewhere else, and what it proposed is wrong."""
 
@@ -41,14 +47,25 @@ class Following:
     """A perceiver whose perception follows what moves; ``perceiver`` takes states, settings and ground."""
 
     def __init__(self, *, run: str, utc_minus_mono_s: float) -> None:
-        self.perceiver = _Quiet(tracks_kind(), run=run, utc_minus_mono_s=utc_minus_mono_s)
+        self._tracker = Tracker(TrackerSettings().params())
+        self.perceiver = _Quiet(tracks_kind(self._tracker), run=run, utc_minus_mono_s=utc_minus_mono_s)
         self.limits = USUAL
-        self._memory = Memory()
+        self._memory, self._remembered, self._room = Memory(), Remembered(), GroundRoom()
+        self._room_m: tuple[float, ...] = ()
         self._followed: list[Followed] = []
         self._followed_t_s = -math.inf
         self._evasion = Evasion()
         self._approaches = ApproachBook(f"approach-{run}", utc_minus_mono_s)
         self._begun = 0
+
+    def on_settings(self, settings: PerceptionSettings) -> None:
+        """Other parameters of the tracker take effect at once: everything is followed afresh by them."""
+        before = self.perceiver.settings.tracker
+        self.perceiver.on_settings(settings)
+        after = self.perceiver.settings.tracker
+        if after != before:
+            self._tracker.tune(after.params())
+            self._memory, self._remembered = Memory(), Remembered()
 
     def on_plan(self, plan: PlanRecord) -> None:
         """Of the vehicle's profile in it come the limits that a proposal keeps to."""
@@ -81,33 +98,31 @@ class Following:
         if self._begun == self.perceiver.begun:
             return []
         self._begun = self.perceiver.begun
-        self._memory, self._followed, self._evasion = Memory(), [], Evasion()
+        self._memory, self._remembered = Memory(), Remembered()
+        self._followed, self._evasion = [], Evasion()
         return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, FOLLOWED_AFRESH)
 
     def _follow(self) -> None:
         movers: Movers = self.perceiver.perception
         assert movers.pose is not None
         assert movers.blobs is not None
-        settings = self.perceiver.settings
-        self._followed = self._memory.observe(movers.states, movers.blobs, movers.pose)
-        self._followed_t_s = movers.pose.t_mono_s
-        self._evasion = evasion(
-            self._followed,
-            movers.pose,
-            self.limits,
-            radius_m=settings.safety_radius_m,
-            within_s=settings.approach_s,
-        )
+        settings, pose = self.perceiver.settings, movers.pose
+        self._followed = self._remembered.observe(self._memory.observe(movers.states, movers.blobs, pose), pose)
+        self._followed_t_s = pose.t_mono_s
+        below_m = settings.vehicle_radius_m + settings.position_error_m + DOWNWASH_M
+        self._room_m = self._room.around(movers.ground, pose.position_enu_m, below_m)
+        velocities = settings.velocities
+        rules = Rules(keep_of(settings), velocities.limits(self.limits), velocities.nearest_only, self._room_m)
+        self._evasion = evasion(self._followed, pose, rules)
 
     def _alerts(self, outcome: Outcome) -> list[ObstacleAlert]:
-        settings, movers = self.perceiver.settings, self.perceiver.perception
+        movers = self.perceiver.perception
         if not movers.is_flying:
             return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, LANDED)
         return self._approaches.observe(
             self._followed,
             heading_rad=movers.pose.heading_rad,
-            radius_m=settings.safety_radius_m,
-            within_s=settings.approach_s,
+            keep=keep_of(self.perceiver.settings),
             t_mono_s=outcome.status.t_mono_s,
             done_t_mono_s=outcome.status.done_t_mono_s,
         )
@@ -132,8 +147,9 @@ class Following:
             velocity_enu_m_s=None
             if pose is None
             else (float(pose.velocity_enu_m_s[0]), float(pose.velocity_enu_m_s[1])),
-            max_speed_m_s=self.limits.max_speed_m_s,
+            max_speed_m_s=settings.velocities.limits(self.limits).max_speed_m_s,
             safety_radius_m=settings.safety_radius_m,
+            room_m=self._room_m,
             cones=evading.cones,
             proposal=evading.proposal,
             no_proposal=evading.why_none,
@@ -169,7 +185,7 @@ class Following:
         return Track(
             id=state.id,
             enu_m=(place[0], place[1], place[2]),
-            velocity_enu_m_s=_flat(state.velocity_enu_m_s),
+            velocity_enu_m_s=_flat(one.velocity_enu_m_s),
             covariance_m2=(float(spread[0, 0]), float(spread[0, 1]), float(spread[1, 1])),
             age_s=state.age_s,
             updates=state.updates,
@@ -178,10 +194,16 @@ class Following:
             bearing_deg=math.degrees(one.bearing_rad) % 360.0,
             closest_m=one.closest_m,
             closest_in_s=one.closest_in_s,
-            dangerous=one.is_dangerous(settings.safety_radius_m, settings.approach_s),
+            dangerous=one.is_dangerous(keep_of(settings)),
             lat_deg=lat_lon[0],
             lon_deg=lat_lon[1],
+            remembered=one.remembered,
         )
+
+
+def keep_of(settings: PerceptionSettings) -> Keep:
+    velocities = settings.velocities
+    return Keep(settings.safety_radius_m, settings.approach_s, velocities.stands_m, velocities.stands_s)
 
 
 def _flat(vector: F64) -> tuple[float, float]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mapping.tracker import Tracker
 from telemetry.messages import Topic
 from telemetry.perception.kinds import RADAR, SensorKind
-from telemetry.tracking.movers import Movers, tracker
+from telemetry.tracking.movers import Movers
 
 NAME = "tracks"
 
 
-def tracks_kind() -> SensorKind:
+def tracks_kind(followed: Tracker) -> SensorKind:
     """With a tracker of its own."""
-    followed = tracker()
 
     def make(settings, *, alert_prefix: str = "") -> Movers:
         return Movers(settings, followed, alert_prefix=alert_prefix)

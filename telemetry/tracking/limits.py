@@ -6,9 +6,9 @@ from planning.errors import DescribedError
 from planning.vehicle_profile import parse_profile
 from planning.velocity_obstacles import Limits
 from telemetry.messages import PlanRecord
+from telemetry.track_settings import USUAL_MAX_SPEED_M_S
 
-USUAL = Limits(max_speed_m_s=5.0)
-"""Of a vehicle of which nothing is known."""
+USUAL = Limits(max_speed_m_s=USUAL_MAX_SPEED_M_S)
 
 
 def limits_of(plan: PlanRecord) -> Limits:

@@ -7,12 +7,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapping.ground import GroundGrid
 from mapping.perceiving import FrameResult, RadarPerception, RadarScan, Settings
 from mapping.perceiving.model import State
 from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence
 from mapping.poses import Pose
 from mapping.radar_targets import Gate, polar, to_enu
-from mapping.tracker import Tracker, TrackerParams, TrackState
+from mapping.tracker import Tracker, TrackState
 from telemetry.tracking.blobs import Blobs, blobs
 
 F64 = NDArray[np.float64]
@@ -24,13 +25,8 @@ EVIDENCE = EvidenceParams(most_aside_m=2.5)
 """A track knows how uncertain its place is; a map's voxel does not, which is why maps take nothing that far off."""
 LOW_M = 2.0
 """Above known ground: lower, while it takes off and lands, every echo grazes it."""
-MOST_TARGETS, MOST_TRACKS = 250, 400
+MOST_TARGETS = 250
 """A thousand objects in a frame must not hold up the next one: what moves counts first, then what is nearest."""
-
-
-def tracker() -> Tracker:
-    """As this radar's echoes of this kind of objects want it."""
-    return Tracker(TrackerParams(radial_speed_folded_m_s=EVIDENCE.folded_m_s, extent_m=0.6, most=MOST_TRACKS))
 
 
 class Movers(RadarPerception):
@@ -47,6 +43,11 @@ class Movers(RadarPerception):
         self.states: list[TrackState] = []
         self.blobs: Blobs | None = None
         self.pose: Pose | None = None
+
+    @property
+    def ground(self) -> GroundGrid | None:
+        """The surface model under the vehicle, whether it explains echoes or, as in the papers, nothing does."""
+        return self._ground
 
     @property
     def is_flying(self) -> bool:

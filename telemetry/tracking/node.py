@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
+from mapping.tracker import Tracker
 from telemetry.bus import Bus
 from telemetry.node import NodeContext
 from telemetry.perception.shell import NodeShell
@@ -16,7 +17,7 @@ class TracksNode(NodeShell):
     """A process of its own: neither the radar's map nor anything else waits for it, or it for them."""
 
     def __init__(self, bus: Bus, context: NodeContext) -> None:
-        super().__init__(bus, context, tracks_kind())
+        super().__init__(bus, context, tracks_kind(Tracker()))
         self._worker = TracksWorker(
             self._inbox,
             give=self._from_thread(self._publish),

@@ -40,7 +40,7 @@ class TracksWorker:
         perceiver = self.following.perceiver
         self._handlers: dict[str, Callable[[Any], None]] = {
             STATE: perceiver.on_state,
-            SETTINGS: perceiver.on_settings,
+            SETTINGS: self.following.on_settings,
             PLAN: self.following.on_plan,
             NOTICE: perceiver.on_ground,
             GROUND: self._on_ground,

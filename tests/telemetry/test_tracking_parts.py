@@ -18,13 +18,16 @@ from planning.velocity_obstacles import Limits, Obstacles, approaches
 from telemetry.obstacles import ObstacleAlert
 from telemetry.tracking.approach import BEGIN_FRAMES, OUT_S, ApproachBook, words
 from telemetry.tracking.blobs import MOST_BLOBS, SAME_M, Blobs, blobs
-from telemetry.tracking.evasion import MOST_CONES, evasion
-from telemetry.tracking.followed import ENOUGH_UPDATES, Followed, Memory
+from telemetry.tracking.evasion import MOST_CONES, Rules, evasion
+from telemetry.tracking.followed import ENOUGH_UPDATES, Followed, Keep, Memory
 from telemetry.tracking.limits import USUAL, limits_of
 from tests.telemetry import perception_flights as flights
 
 NORTHWARDS = Pose(100.0, np.array([0.0, 0.0, 10.0]), np.array([0.0, 3.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 RADIUS_M, WITHIN_S = 3.0, 8.0
+STANDS_M, STANDS_S = 2.0, 5.0
+KEEP = Keep(RADIUS_M, WITHIN_S, STANDS_M, STANDS_S)
+RULES = Rules(KEEP, USUAL)
 
 
 def state(
@@ -80,12 +83,12 @@ def test_blobs_are_apart_bounded_and_inside_of_what_was_seen(count: int, seed: i
 
 
 def test_what_is_seen_too_seldom_or_comes_too_late_or_passes_is_not_dangerous() -> None:
-    assert followed((0.0, 40.0), (0.0, -4.0)).is_dangerous(RADIUS_M, WITHIN_S)
-    assert not followed((0.0, 40.0), (0.0, -4.0), updates=ENOUGH_UPDATES - 1).is_dangerous(RADIUS_M, WITHIN_S)
-    assert not followed((0.0, 60.0), (0.0, -4.0)).is_dangerous(RADIUS_M, WITHIN_S)
-    assert not followed((4.0, 40.0), (0.0, -4.0)).is_dangerous(RADIUS_M, WITHIN_S)
-    assert not replace(followed((0.0, 40.0), (0.0, -4.0)), unseen_s=1.0).is_dangerous(RADIUS_M, WITHIN_S)
-    assert followed((1.0, -1.0), (0.0, 0.0)).is_dangerous(RADIUS_M, WITHIN_S)
+    assert followed((0.0, 40.0), (0.0, -4.0)).is_dangerous(KEEP)
+    assert not followed((0.0, 40.0), (0.0, -4.0), updates=ENOUGH_UPDATES - 1).is_dangerous(KEEP)
+    assert not followed((0.0, 60.0), (0.0, -4.0)).is_dangerous(KEEP)
+    assert not followed((4.0, 40.0), (0.0, -4.0)).is_dangerous(KEEP)
+    assert not replace(followed((0.0, 40.0), (0.0, -4.0)), unseen_s=1.0).is_dangerous(KEEP)
+    assert followed((1.0, -1.0), (0.0, 0.0)).is_dangerous(KEEP)
 
 
 @pytest.mark.parametrize(
@@ -116,8 +119,7 @@ class Book:
         return self.book.observe(
             seen,
             heading_rad=0.0,
-            radius_m=RADIUS_M,
-            within_s=WITHIN_S,
+            keep=KEEP,
             t_mono_s=self.t_s,
             done_t_mono_s=self.t_s + 0.02,
         )
@@ -140,7 +142,6 @@ def test_an_approach_begins_after_a_few_frames_and_is_told_once_a_second() -> No
 def test_a_single_estimate_begins_nothing() -> None:
     book = Book()
     assert [e for k in range(30) for e in book.frame(COMING if k % 3 else PASSING)] == []
-    assert [e for _ in range(5) for e in book.frame(replace(COMING, moving=False))] == []
     unseen = replace(COMING, state=replace(COMING.state, seen=False))
     assert [e for _ in range(9) for e in book.frame(unseen)] == []
 
@@ -206,7 +207,7 @@ def test_its_words(place: tuple[float, float], where: str) -> None:
 
 def test_cones_are_of_the_nearest_and_bounded() -> None:
     many = [followed((0.0, 5.0 + k), (0.0, -4.0), number=k) for k in range(30)]
-    found = evasion(many, NORTHWARDS, USUAL, radius_m=RADIUS_M, within_s=WITHIN_S)
+    found = evasion(many, NORTHWARDS, RULES)
     assert [cone.track_id for cone in found.cones] == list(range(MOST_CONES))
     first = found.cones[0]
     assert first.apex_enu_m_s == (0.0, -4.0)
@@ -215,7 +216,7 @@ def test_cones_are_of_the_nearest_and_bounded() -> None:
 
 
 def test_inside_the_radius_every_velocity_that_comes_nearer_is_forbidden() -> None:
-    found = evasion([followed((0.0, 2.0), (0.0, 0.0))], NORTHWARDS, USUAL, radius_m=RADIUS_M, within_s=WITHIN_S)
+    found = evasion([followed((0.0, 2.0), (0.0, 0.0))], NORTHWARDS, RULES)
     assert found.cones[0].half_angle_deg == 90.0
     assert found.proposal is not None
     assert found.proposal.velocity_enu_m_s[1] < 0.0
@@ -223,7 +224,7 @@ def test_inside_the_radius_every_velocity_that_comes_nearer_is_forbidden() -> No
 
 def test_what_is_proposed_keeps_clear_of_everything_and_is_said_in_words() -> None:
     things = [followed((0.0, 40.0), (0.0, -4.0)), followed((4.5, 15.0), (0.0, 0.0), moving=False, number=2)]
-    found = evasion(things, NORTHWARDS, Limits(max_speed_m_s=5.0), radius_m=RADIUS_M, within_s=WITHIN_S).proposal
+    found = evasion(things, NORTHWARDS, Rules(KEEP, Limits(max_speed_m_s=5.0))).proposal
     assert found is not None
     places, velocities = [(0.0, 40.0), (4.5, 15.0)], [(0.0, -4.0), (0.0, 0.0)]
     coming = approaches(Obstacles.of([0.0, 0.0], places, velocities, radius_m=0.0), found.velocity_enu_m_s)
@@ -233,12 +234,44 @@ def test_what_is_proposed_keeps_clear_of_everything_and_is_said_in_words() -> No
     assert found.hold_s >= 1.0
 
 
-def test_nothing_is_proposed_for_what_stands_still_or_goes_past() -> None:
-    standing = followed((0.0, 10.0), (0.0, 0.0), moving=False)
-    for one in (standing, PASSING):
-        found = evasion([one], NORTHWARDS, USUAL, radius_m=RADIUS_M, within_s=WITHIN_S)
-        assert found.proposal is None
-        assert found.why_none == ""
+def test_a_pole_dead_ahead_is_alerted_and_gives_a_way_past_it() -> None:
+    pole = followed((0.2, 10.0), (0.0, 0.0), moving=False)
+    book = Book()
+    events = [event for _ in range(5) for event in book.frame(pole)]
+    assert [event.phase for event in events] == ["begins"]
+    assert events[0].text.startswith("Standing object 10 m ahead, closest 0.2 m in 3.3 s")
+    found = evasion([pole], NORTHWARDS, RULES).proposal
+    assert found is not None
+    coming = approaches(Obstacles.of([0.0, 0.0], [(0.2, 10.0)], [(0.0, 0.0)], radius_m=0.0), found.velocity_enu_m_s)
+    assert coming.closest_m[0] >= STANDS_M
+    assert "left" in found.text  # its nearer edge: the pole is a little to the right
+
+
+def test_a_speed_that_chance_accounts_for_does_not_move_a_pole_out_of_the_way() -> None:
+    pole = followed((0.0, 10.0), (0.6, 0.0), moving=False, sigma_m_s=0.5)
+    assert pole.velocity_enu_m_s.tolist() == [0.0, 0.0]
+    assert followed((0.0, 10.0), (0.6, 0.0), sigma_m_s=0.1).velocity_enu_m_s.tolist() == [0.6, 0.0]
+
+
+@pytest.mark.parametrize("place", [(0.0, 40.0), (4.0, 10.0), (0.0, -10.0)])
+def test_nothing_is_proposed_for_what_stands_far_away_or_beside_or_behind(place: tuple[float, float]) -> None:
+    found = evasion([followed(place, (0.0, 0.0), moving=False)], NORTHWARDS, RULES)
+    assert found.proposal is None
+    assert found.why_none == ""
+
+
+def test_nothing_is_proposed_for_what_goes_past() -> None:
+    found = evasion([PASSING], NORTHWARDS, RULES)
+    assert found.proposal is None
+    assert found.why_none == ""
+
+
+def test_a_proposal_does_not_lead_into_rising_ground() -> None:
+    pole = followed((0.2, 10.0), (0.0, 0.0), moving=False)
+    west = tuple(6.0 if 90 <= k <= 119 else 40.0 for k in range(120))
+    found = evasion([pole], NORTHWARDS, replace(RULES, room_m=west)).proposal
+    assert found is not None
+    assert "right" in found.text
 
 
 def test_why_there_is_no_proposal_is_said() -> None:
@@ -246,7 +279,7 @@ def test_why_there_is_no_proposal_is_said() -> None:
         followed((2.0 * math.sin(a), 2.0 * math.cos(a)), (0.0, 0.0), number=k)
         for k, a in enumerate(np.linspace(0.0, 2 * math.pi, 12, endpoint=False).tolist())
     ]
-    found = evasion(around, NORTHWARDS, USUAL, radius_m=RADIUS_M, within_s=WITHIN_S)
+    found = evasion(around, NORTHWARDS, RULES)
     assert found.proposal is None
     assert "Every velocity" in found.why_none
 

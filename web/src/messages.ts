@@ -149,6 +149,8 @@ export interface PerceptionSettings {
   memory_limit_bytes: number;
   safety_radius_m: number;
   approach_s: number;
+  tracker: TrackerSettings;
+  velocities: VelocitySettings;
 }
 
 /** One sensor's node after each frame, and once a second when none comes. */
@@ -235,6 +237,27 @@ export interface Track {
   dangerous: boolean;
   lat_deg: number;
   lon_deg: number;
+  remembered: boolean;
+}
+
+/** As ``mapping.tracker.TrackerParams``, of which ``params`` makes them; the defaults are an AWR1843's. */
+export interface TrackerSettings {
+  coordinates: "cartesian" | "polar";
+  range_sigma_m: number;
+  bearing_sigma_deg: number;
+  bearing_edge_deg: number;
+  bearing_edge_sigma_deg: number;
+  radial_speed_sigma_m_s: number;
+  radial_speed_folded_m_s: number;
+  extent_m: number;
+  acceleration_m_s2: number;
+  speed_m_s: number;
+  detection_probability: number;
+  gate: number;
+  birth: number;
+  birth_updates: number;
+  death: number;
+  apart_m: number;
 }
 
 /** The tracks node after each radar frame, and once a second when none comes. */
@@ -255,6 +278,7 @@ export interface TracksStatus {
   safety_radius_m: number;
   cones: VelocityCone[];
   proposal: VelocityProposal | null;
+  room_m: number[];
   no_proposal: string;
   origin: MapOrigin | null;
   latency_s: number | null;
@@ -342,6 +366,16 @@ export interface VelocityProposal {
   hold_s: number;
   closest_m: number;
   text: string;
+}
+
+/** What a proposed or flown velocity keeps to (Wessendorp 2021, III-C, which prints no values). */
+export interface VelocitySettings {
+  max_speed_m_s: number;
+  max_turn_deg: number;
+  leave_m_s: number;
+  nearest_only: boolean;
+  stands_m: number;
+  stands_s: number;
 }
 
 export interface PoiDoc {
@@ -978,6 +1012,38 @@ export interface AcknowledgeBody {
   alert_id?: string | null;
 }
 
+/** How objects are followed; what is left out stays. Anything else makes the tracker begin anew. */
+export interface TrackerSettingsBody {
+  coordinates?: "cartesian" | "polar" | null;
+  range_sigma_m?: number | null;
+  bearing_sigma_deg?: number | null;
+  bearing_edge_deg?: number | null;
+  bearing_edge_sigma_deg?: number | null;
+  radial_speed_sigma_m_s?: number | null;
+  /** 0: no two radial speeds look the same. */
+  radial_speed_folded_m_s?: number | null;
+  extent_m?: number | null;
+  acceleration_m_s2?: number | null;
+  speed_m_s?: number | null;
+  detection_probability?: number | null;
+  gate?: number | null;
+  birth?: number | null;
+  birth_updates?: number | null;
+  death?: number | null;
+  apart_m?: number | null;
+}
+
+/** What proposed and flown velocities keep to; what is left out stays. */
+export interface VelocitySettingsBody {
+  /** 0: that of the plan's vehicle. */
+  max_speed_m_s?: number | null;
+  max_turn_deg?: number | null;
+  leave_m_s?: number | null;
+  nearest_only?: boolean | null;
+  stands_m?: number | null;
+  stands_s?: number | null;
+}
+
 /** What an operator may change; the rest stays. */
 export interface PerceptionSettingsBody {
   radar_depth_m?: number | null;
@@ -996,6 +1062,8 @@ export interface PerceptionSettingsBody {
   vision_resolution_m?: number | null;
   /** Per map. A new one, or another resolution, begins the map anew. */
   memory_limit_bytes?: number | null;
+  tracker?: TrackerSettingsBody | null;
+  velocities?: VelocitySettingsBody | null;
 }
 
 /** Takes the maps into planning, or out of it again. */

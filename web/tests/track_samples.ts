@@ -18,6 +18,7 @@ export function track(fields: Partial<Track> = {}): Track {
     dangerous: true,
     lat_deg: 37.7290205,
     lon_deg: 14.9926236,
+    remembered: false,
     ...fields,
   };
 }
@@ -47,6 +48,7 @@ export function tracksStatus(fields: Partial<TracksStatus> = {}): TracksStatus {
     max_speed_m_s: 8,
     safety_radius_m: 3,
     cones: [],
+    room_m: [],
     proposal: null,
     no_proposal: "",
     origin: null,

@@ -8,6 +8,7 @@ import { HoldButton } from "../ui/HoldButton";
 import { NumberField } from "../ui/NumberField";
 import { Section } from "../ui/Section";
 import { Check, SelectField } from "../ui/fields";
+import { TrackSettings } from "../tracks/TrackSettings";
 import { MapExports } from "./MapExports";
 import { MapSettings } from "./MapSettings";
 import { MAPS, clearMaps, setPerception } from "./commands";
@@ -94,6 +95,7 @@ export function ObstaclesSection() {
   return (
     <Section id={MAPS} title="Obstacles" icon="radar" summary={summary}>
       <Searched settings={settings} />
+      <TrackSettings settings={settings} />
       <MapSettings settings={settings} />
       <h3>Maps as files</h3>
       <MapExports source="live" />

@@ -14,7 +14,7 @@ export const SENSOR_WORDS: Record<SensorName, string> = {
 const KIND_WORDS: Record<ObstacleAlert["kind"], string> = {
   obstacle: "obstacle",
   conflict: "conflict on the mission ahead",
-  approach: "moving object comes too near",
+  approach: "on a collision course",
   divergence: "positions disagree",
   sensor: "sensor trouble",
 };

@@ -31,7 +31,8 @@ export function trackWords(track: Track, off_nose_deg: number | null): string {
   const where = off_nose_deg === null ? "" : `, ${offNose(off_nose_deg)}`;
   const closest = isComing(track) ? `closest ${closestWords(track)}` : "not getting nearer";
   const age = `followed for ${withUnit(track.age_s, "s")}, ${number(track.updates)} times seen`;
-  return `${trackName(track.id)}: ${distance(track.range_m)}${where}, ${trackSpeed(track)}, ${closest}; ${age}`;
+  const pace = track.remembered ? "out of the radar's sight, where it stood" : trackSpeed(track);
+  return `${trackName(track.id)}: ${distance(track.range_m)}${where}, ${pace}, ${closest}; ${age}`;
 }
 
 /** From -180 to 180, clockwise from the nose. */

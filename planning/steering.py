@@ -1,0 +1,69 @@
+"""The velocity to fly now: the wanted one while it leads into nothing, else the nearest that does not.
+
+Velocity obstacles (Wessendorp 2021, III-C; Fiorini and Shiller 1998) at every frame anew. Ground that rises to the
+vehicle's height is an obstacle that stands still, like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.velocity_obstacles import Limits, Obstacles, Proposal, propose
+
+F64 = NDArray[np.float64]
+
+SHARES = (1.0, 0.85, 0.7)
+"""Of what is to be kept: where the whole of it leaves no velocity, somewhat less is better than nothing."""
+ONWARD_SHARE = 0.25
+"""Slower than so much of the wanted speed there is no direction of its own to stay near to."""
+DISC_WIDER = 1.3
+"""Discs of neighbouring directions overlap."""
+LEAST_DISC_M = 0.5
+
+
+def steer(
+    obstacles: Obstacles, wanted_enu_m_s: F64, velocity_enu_m_s: F64, limits: Limits, *, nearest_only: bool = False
+) -> Proposal | None:
+    """Raises ParameterError for what is no number.
+
+    It stays near to the present velocity, not to the wanted one: else it would change sides with every frame. None:
+    every velocity within the limits leads into something.
+    """
+    straight = propose(obstacles, wanted_enu_m_s, replace(limits, max_turn_rad=math.pi), nearest_only=nearest_only)
+    if straight is not None and not straight.evades:
+        return straight
+    speed, cruise = math.hypot(*velocity_enu_m_s), math.hypot(*wanted_enu_m_s)
+    goes = speed > ONWARD_SHARE * cruise and speed > 0.0
+    onward = velocity_enu_m_s * (cruise / speed) if goes else wanted_enu_m_s
+    for share in SHARES:
+        smaller = replace(obstacles, radius_m=share * obstacles.radius_m)
+        found = propose(smaller, onward, limits, nearest_only=nearest_only)
+        if found is not None:
+            return found
+    return None
+
+
+def with_ground(obstacles: Obstacles, room_m: Sequence[float], *, farthest_m: float) -> Obstacles:
+    """And ground that rises to the vehicle's height: a disc in each direction in which it ends the room.
+
+    ``room_m`` are even directions clockwise from north; nothing is added farther than ``farthest_m``.
+    """
+    room = np.asarray(room_m, np.float64)
+    near = room < farthest_m
+    if not near.any():
+        return obstacles
+    bearing = np.arange(len(room))[near] * (2 * math.pi / len(room))
+    radius = np.maximum(LEAST_DISC_M, DISC_WIDER * math.pi / len(room) * room[near])
+    towards = np.column_stack([np.sin(bearing), np.cos(bearing)])
+    places = obstacles.position_enu_m + towards * (room[near] + radius)[:, None]
+    return Obstacles(
+        obstacles.position_enu_m,
+        np.concatenate([obstacles.obstacles_enu_m, places]),
+        np.concatenate([obstacles.velocities_enu_m_s, np.zeros_like(places)]),
+        np.concatenate([obstacles.radius_m, radius]),
+    )

@@ -1,0 +1,88 @@
+"""What an operator sets about moving and standing objects: how they are followed, and what velocities keep to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from mapping.perceiving.radar_evidence import EvidenceParams
+from mapping.tracker import TrackerParams
+from planning.velocity_obstacles import Limits
+
+MOST_TRACKS = 400
+USUAL_MAX_SPEED_M_S = 5.0
+"""Of a vehicle of which nothing is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerSettings:
+    """As ``mapping.tracker.TrackerParams``, of which ``params`` makes them; the defaults are an AWR1843's."""
+
+    coordinates: Literal["cartesian", "polar"] = "cartesian"
+    """polar: range, bearing and their rates, as in Wessendorp 2021; cartesian: place and velocity over ground."""
+    range_sigma_m: float = 0.15
+    bearing_sigma_deg: float = 1.0
+    bearing_edge_deg: float = 45.0
+    """Farther off the nose the bearing's error is the next one."""
+    bearing_edge_sigma_deg: float = 2.0
+    radial_speed_sigma_m_s: float = 0.2
+    radial_speed_folded_m_s: float = round(EvidenceParams().folded_m_s, 2)
+    """Radial speeds that differ by this look the same; 0: none do."""
+    extent_m: float = 0.6
+    acceleration_m_s2: float = 2.0
+    speed_m_s: float = 5.0
+    detection_probability: float = 0.997
+    gate: float = 11.345
+    birth: float = 0.7
+    birth_updates: int = 3
+    death: float = 9.0
+    apart_m: float = 0.75
+
+    def params(self) -> TrackerParams:
+        """Raises ParameterError for what no tracker can work with."""
+        return TrackerParams(
+            coordinates=self.coordinates,
+            range_sigma_m=self.range_sigma_m,
+            bearing_sigma_rad=math.radians(self.bearing_sigma_deg),
+            bearing_edge_rad=math.radians(self.bearing_edge_deg),
+            bearing_edge_sigma_rad=math.radians(self.bearing_edge_sigma_deg),
+            radial_speed_sigma_m_s=self.radial_speed_sigma_m_s,
+            radial_speed_folded_m_s=self.radial_speed_folded_m_s or math.inf,
+            extent_m=self.extent_m,
+            acceleration_m_s2=self.acceleration_m_s2,
+            speed_m_s=self.speed_m_s,
+            detection_probability=self.detection_probability,
+            gate=self.gate,
+            birth=self.birth,
+            birth_updates=self.birth_updates,
+            death=self.death,
+            apart_m=self.apart_m,
+            most=MOST_TRACKS,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class VelocitySettings:
+    """What a proposed or flown velocity keeps to (Wessendorp 2021, III-C, which prints no values)."""
+
+    max_speed_m_s: float = 0.0
+    """0: that of the vehicle whose plan is on board."""
+    max_turn_deg: float = 180.0
+    """From the present direction, to either side."""
+    leave_m_s: float = 0.3
+    """At which it goes away, at least, from what is nearer than it should be."""
+    nearest_only: bool = False
+    """As in the paper: only the nearest obstacle is looked at."""
+    stands_m: float = 2.0
+    """Kept from what stands still, between middles."""
+    stands_s: float = 5.0
+    """What stands still counts when it would be met within so long."""
+
+    def limits(self, vehicle: Limits) -> Limits:
+        """Those of the vehicle where nothing else is set."""
+        return Limits(
+            max_speed_m_s=self.max_speed_m_s or vehicle.max_speed_m_s,
+            max_turn_rad=math.radians(self.max_turn_deg),
+            leave_m_s=self.leave_m_s,
+        )
