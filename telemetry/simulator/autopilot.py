@@ -79,6 +79,7 @@ class Autopilot(Pilot):
             return "failed"
         if self.armed:
             self._stop_motors()
+            self.tell(StateChanged())
             self.say(6, "Disarming motors")
         return "accepted"
 
@@ -181,6 +182,7 @@ class Autopilot(Pilot):
         """The world's word that the vehicle has hit something."""
         self.crashed = True
         self._stop_motors()
+        self.tell(StateChanged())
         self.say(0, reason)
 
     def repeat_prearm(self) -> None:
@@ -263,8 +265,8 @@ class Autopilot(Pilot):
         return True
 
     def _stop_motors(self) -> None:
+        """After a landing only the next heartbeat says so; the mission is back at its beginning by then."""
         self.armed = self.flying = False
-        self.tell(StateChanged())
         self._start_s = -math.inf
         self._touched_s = -math.inf
         if self.auto.state != "not_started":
