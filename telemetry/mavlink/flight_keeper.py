@@ -83,6 +83,8 @@ class FlightKeeper:
 
     def _on_mission(self, state: VehicleState, onboard: OnboardMission | None) -> None:
         target = item_of(state)
+        if self._completed and (target is None or state.landed == "on_ground"):
+            return  # on the ground it goes back to its first item before it says that it is disarmed
         command = _command(onboard, target)
         targets = _count(state, onboard) or self.status.targets
         status = replace(self.status, target=target or self.status.target, targets=targets, broke_off_at=None)
@@ -120,10 +122,10 @@ class FlightKeeper:
 
 
 def item_of(state: VehicleState) -> int | None:
-    """Number of the mission's item that is flown to: ArduPilot counts home as 0, PX4 begins with 0."""
+    """Number of the mission's item that is flown to: ArduPilot counts home as 0, which is none; PX4 begins with 0."""
     if state.mission_item is None:
         return None
-    return state.mission_item if state.autopilot == "ardupilot" else state.mission_item + 1
+    return (state.mission_item or None) if state.autopilot == "ardupilot" else state.mission_item + 1
 
 
 def sequence_of(item: int, autopilot: str) -> int:

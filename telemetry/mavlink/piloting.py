@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
@@ -90,7 +91,10 @@ class Pilot:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
 
     def _follow_avoidance(self) -> None:
-        status = self.avoidance.flight_status(self.flight.status.since_utc_s)
+        before = self.flight.status
+        status = self.avoidance.flight_status(before.since_utc_s)
+        if status.way == before.way:  # it knows only those that are left
+            status = replace(status, targets=before.targets)
         self.flight.script(status, armed=self.vehicle.state.armed)
 
     def _follow_script(self, script: GuidedScript) -> None:

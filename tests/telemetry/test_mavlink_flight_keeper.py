@@ -56,6 +56,22 @@ def test_a_mission_without_a_way_home_is_over_at_its_last_waypoint() -> None:
     assert follow(keeper, at(2, mission_reached=2), LANDED, onboard=WAYPOINTS) == ["returning", "landed"]
 
 
+@pytest.mark.parametrize(("autopilot", "mode"), [("ardupilot", "AUTO"), ("px4", "MISSION")])
+def test_a_vehicle_that_forgets_its_mission_before_it_says_that_it_is_disarmed(autopilot: str, mode: str) -> None:
+    keeper, last = started(), 5 if autopilot == "ardupilot" else 4
+    home = at(last, autopilot=autopilot, mode=mode)
+    down = replace(home, landed="on_ground", mission_item=0)
+    assert follow(keeper, home, down, replace(down, armed=False)) == ["returning", "returning", "landed"]
+    assert (keeper.status.target, keeper.status.broke_off_at) == (5, None)
+
+
+def test_home_is_no_item_to_fly_to() -> None:
+    keeper = started()
+    assert follow(keeper, at(5), at(0), at(3)) == ["returning", "returning", "flying"]
+    assert follow(keeper, at(0), replace(at(0), armed=False)) == ["flying", "interrupted"]
+    assert keeper.status.broke_off_at == 3
+
+
 def test_a_flight_that_returns_early_knows_where_it_broke_off() -> None:
     keeper = started()
     rtl = at(3, mode="RTL")
