@@ -41,6 +41,13 @@ _NO_VEHICLE_TYPES = frozenset({5, 6, 18, 26, 27, 30, 36})
 """MAV_TYPE of antenna tracker, ground station, onboard computer, gimbal, ADSB, camera and battery."""
 _LANDED: dict[int, Landed] = {1: "on_ground", 2: "in_air", 3: "taking_off", 4: "landing"}
 _FIXES: tuple[GnssFix, ...] = ("none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed", "rtk_fixed", "dgps")
+_PREARM_WORDS = ("PreArm: ", "Preflight Fail: ")
+"""How ArduPilot and PX4 begin what is in the way of arming."""
+_TEXT_BYTES = 50
+"""Of a STATUSTEXT; longer texts come in parts of so many."""
+_ONE_BURST_S = 5.0
+"""Reasons that come farther apart are of another look at the vehicle."""
+_MOST_REASONS = 5
 _RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 
 
@@ -134,15 +141,38 @@ def _gps_raw(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     }
 
 
-def _sys_status(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+def _sys_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    """PX4 tells whether it is ready by the bit of health alone: it never counts the check as present or enabled."""
     checked = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled & _PRE_ARM
+    is_told = checked or state.autopilot == "px4"
+    ready = bool(message.onboard_control_sensors_health & _PRE_ARM) if is_told else None
     return {
-        "ready_to_arm": bool(message.onboard_control_sensors_health & _PRE_ARM) if checked else None,
+        "ready_to_arm": ready,
+        "not_ready_words": () if ready else state.not_ready_words,
         "battery_t_mono_s": t_mono_s,
         "battery_v": scaled(message.voltage_battery, 1000, UINT16_MAX),
         "battery_a": scaled(message.current_battery, 100, -1),
         "battery_share": share(message.battery_remaining),
     }
+
+
+def _statustext(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    """Keeps what is in the way of arming; the parts of a long text follow each other."""
+    text, words = message.text.strip("\0"), state.not_ready_words
+    if message.chunk_seq and message.id:
+        if not words or len(words[-1]) != _TEXT_BYTES * message.chunk_seq:
+            return {}
+        return {"not_ready_words": _with_reason(words[:-1], words[-1] + text)}
+    if not text.startswith(_PREARM_WORDS):
+        return {}
+    if state.not_ready_t_mono_s is None or t_mono_s - state.not_ready_t_mono_s > _ONE_BURST_S:
+        words = ()
+    return {"not_ready_words": _with_reason(words, text), "not_ready_t_mono_s": t_mono_s}
+
+
+def _with_reason(words: tuple[str, ...], text: str) -> tuple[str, ...]:
+    reason = text if len(text) % _TEXT_BYTES == 0 else text.rstrip()  # a whole part may go on with the next
+    return (*(word for word in words if word != reason), reason)[-_MOST_REASONS:]
 
 
 def _battery_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
@@ -195,8 +225,11 @@ def _ekf_status(_: VehicleState, message: Any, __: float) -> Changes:
     return {"estimator_ok": _estimator_ok(message.flags, bad)}
 
 
-def _estimator_status(_: VehicleState, message: Any, __: float) -> Changes:
-    bad = mavlink.ESTIMATOR_CONST_POS_MODE | mavlink.ESTIMATOR_GPS_GLITCH | mavlink.ESTIMATOR_ACCEL_ERROR
+def _estimator_status(state: VehicleState, message: Any, __: float) -> Changes:
+    """A constant position is what PX4 1.16 and newer take for granted of a vehicle that stands on the ground."""
+    bad = mavlink.ESTIMATOR_GPS_GLITCH | mavlink.ESTIMATOR_ACCEL_ERROR
+    if state.armed and state.landed != "on_ground":
+        bad |= mavlink.ESTIMATOR_CONST_POS_MODE
     return {"estimator_ok": _estimator_ok(message.flags, bad)}
 
 
@@ -237,6 +270,7 @@ _HANDLERS: dict[str, Handler] = {
     "VFR_HUD": _vfr_hud,
     "GPS_RAW_INT": _gps_raw,
     "SYS_STATUS": _sys_status,
+    "STATUSTEXT": _statustext,
     "BATTERY_STATUS": _battery_status,
     "HOME_POSITION": _home_position,
     "MISSION_CURRENT": _mission_current,

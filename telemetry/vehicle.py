@@ -36,6 +36,9 @@ class VehicleState:
     landed: Landed | None = None
     ready_to_arm: bool | None = None
     """The pre-arm bit of SYS_STATUS; the vehicle's own words count more."""
+    not_ready_words: tuple[str, ...] = ()
+    """What is in the way of arming, as the vehicle said last; nothing once it is ready."""
+    not_ready_t_mono_s: float | None = None
 
     position_t_mono_s: float | None = None
     lat_deg: float | None = None

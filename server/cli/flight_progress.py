@@ -19,7 +19,7 @@ class FlightProgress:
     """Knows whether the vehicle is in the air, and where it is against the plan."""
 
     def __init__(self, options: FlyOptions) -> None:
-        self.in_flight = False
+        self.in_flight = self.has_flown = False
         self._options = options
         self._placer = Placer(options.dsm) if options.dsm is not None else None
         self._reference: Reference | None = None
@@ -30,9 +30,12 @@ class FlightProgress:
         say(text)
 
     def on_start(self, prepared: Prepared) -> None:
-        self.in_flight = True
+        self.in_flight = self.has_flown = True
         if self._options.dsm is not None:
             self._reference = reference_line(prepared.mission, self._options.dsm, self._options.profile)
+
+    def on_refused(self) -> None:
+        self.in_flight = self.has_flown = False
 
     def on_state(self, state: VehicleState, flight: FlightStatus) -> None:
         self.in_flight = flight.phase in FLYING or state.armed

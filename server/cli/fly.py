@@ -165,12 +165,12 @@ class _Conductor:
         return result, await asyncio.to_thread(_judge, recording, options.dsm)
 
     async def _end_recording(self, station: Station, recording: Path) -> None:
-        """What was recorded is kept also when the recorder does not answer or the place for it is full by now."""
+        """What was recorded of a flight is kept also when the recorder does not answer or the place for it is full."""
         try:
             await station.bus.call("recorder", StopRecording(), result=type(None), timeout_s=NODE_TIMEOUT_S)
         except TelemetryError as error:
             say(f"Note: {error}")
-        if self._record is not None:
+        if self._record is not None and self._progress.has_flown:
             await asyncio.to_thread(keep_recording, recording, self._record)
 
     def _on_interrupt(self) -> None:

@@ -23,6 +23,8 @@ LARGEST_AMSL_OFFSET_M = 0.3
 RETURN_REASONS = ("return_height", "return_near_home", "return_unknown")
 TYPICAL_ACCURACY_M: dict[GnssFix, float] = {"3d": 2.5, "dgps": 1.0, "rtk_float": 0.5, "rtk_fixed": 0.1}
 """Of receivers that do not say how accurate they are."""
+HEIGHT_OVER_PLACE = 1.5
+"""Error of a receiver's height over that of its place, where it tells only the latter: satellites stand above only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,13 +107,25 @@ def gnss_row(state: VehicleState, profile: VehicleProfile) -> Row:
     if state.estimator_ok is False:
         return Row("gnss", "bad", "The autopilot's position estimate cannot be used yet.", "Wait.")
     fix = state.gnss_fix.replace("_", " ").upper()
-    claimed_m = state.horizontal_accuracy_m
-    accuracy_m = TYPICAL_ACCURACY_M[state.gnss_fix] if claimed_m is None else claimed_m
-    said = "typically" if claimed_m is None else "as it says"
-    text = f"GNSS is accurate to {accuracy_m:.2f} m, {said} ({fix}); the plan assumes {assumed_m:.2f} m."
-    if accuracy_m > assumed_m:
+    place_m, height_m, said = _accuracy_m(state)
+    text = (
+        f"GNSS is accurate to {place_m:.2f} m in place and {height_m:.2f} m in height, {said} ({fix});"
+        f" the plan assumes {assumed_m:.2f} m."
+    )
+    if max(place_m, height_m) > assumed_m:
         return Row("gnss", "accept", text, "Wait for a better fix, or accept that the vehicle may come nearer by that.")
     return Row("gnss", "good", text)
+
+
+def _accuracy_m(state: VehicleState) -> tuple[float, float, str]:
+    """Of place and height, and who says so."""
+    place_m, height_m = state.horizontal_accuracy_m, state.vertical_accuracy_m
+    typical_m = TYPICAL_ACCURACY_M[state.gnss_fix]
+    if place_m is None:
+        return typical_m, typical_m if height_m is None else height_m, "typically"
+    if height_m is None:
+        return place_m, HEIGHT_OVER_PLACE * place_m, "as it says of its place"
+    return place_m, height_m, "as it says"
 
 
 def return_row(certificate: Certificate | None, settings: ReturnSettings, clearance: ClearanceParams) -> Row:
@@ -157,7 +171,11 @@ def ready_row(state: VehicleState) -> Row:
     if state.armed and state.landed not in (None, "on_ground"):
         return Row("ready", "bad", "The vehicle is in the air.", "Land first.")
     if state.ready_to_arm is False:
-        return Row("ready", "bad", "The vehicle's own checks have not passed.", "Read its messages.")
+        quoted = " ".join(f'"{words}"' for words in state.not_ready_words)
+        text = "The vehicle's own checks have not passed."
+        if not quoted:
+            return Row("ready", "bad", text, "Read its messages.")
+        return Row("ready", "bad", f"{text} It says: {quoted}.", "Mend that.")
     if state.ready_to_arm is None:
         return Row("ready", "good", "The vehicle does not say whether it is ready: arming will tell.")
     return Row("ready", "good", "The vehicle says that it is ready.")

@@ -53,6 +53,10 @@ class Observer(Protocol):
         """From here on the vehicle may be in the air."""
         ...
 
+    def on_refused(self) -> None:
+        """The start was refused, and the vehicle stands on the ground, not armed."""
+        ...
+
     def on_state(self, state: VehicleState, flight: FlightStatus) -> None:
         """About once a second while it flies."""
         ...
@@ -133,6 +137,7 @@ class _Watcher:
     async def down_after(self, error: TelemetryError) -> None:
         """A start may fail after the vehicle has armed: it is not left alone before its motors stand still."""
         if not await self._is_armed():
+            self._observer.on_refused()
             return
         self._observer.tell(f"The start went wrong, and the vehicle is armed: {error}")
         await self._until(lambda seen: True if seen.vehicle is None or not seen.vehicle.armed else None)

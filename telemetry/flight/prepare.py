@@ -27,6 +27,8 @@ from telemetry.vehicle import VehicleState
 Report = Callable[[str], None]
 
 CONNECT_S = 30.0
+VERSION_S = 2.0
+"""A vehicle that does not say which firmware it runs is not waited for any longer."""
 FAILED_PATIENCE_S = 5.0
 """A connection that cannot be opened is tried again for so long."""
 HOME_ATTEMPTS = 3
@@ -90,8 +92,15 @@ async def connect(
         what = f"No vehicle was heard within {timeout_s:.0f} s."
         advice = "Check the link string, and that the vehicle is switched on."
         raise NoVehicleError(what, where=address, advice=advice)
-    report(f"Vehicle {answer.system_id}: {answer.autopilot} {answer.firmware_version or ''}".rstrip())
-    return answer
+    told = await watch.until(lambda seen: _with_version(seen.vehicle, answer), timeout_s=VERSION_S) or answer
+    report(f"Vehicle {told.system_id}: {told.autopilot} {told.firmware_version or ''}".rstrip())
+    return told
+
+
+def _with_version(seen: VehicleState | None, answer: VehicleState) -> VehicleState | None:
+    """The same vehicle, once it has said what it runs: it is asked when it is adopted."""
+    known = seen is not None and seen.system_id == answer.system_id and seen.firmware_version is not None
+    return seen if known else None
 
 
 async def prepare(client: Asks, watch: Watch, mission: Mission, options: FlyOptions, report: Report) -> Prepared:

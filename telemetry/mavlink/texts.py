@@ -20,7 +20,7 @@ class Texts:
         if message.get_type() != "STATUSTEXT":
             return []
         if message.id == 0:
-            return [(message.severity, message.text.strip("\0 "))]
+            return [(message.severity, clean(message.text))]
         parts = self._parts.setdefault(message.id, {})
         parts[message.chunk_seq] = message.text
         self._severity[message.id] = message.severity
@@ -35,4 +35,9 @@ class Texts:
     def _whole(self, number: int) -> tuple[int, str]:
         del self._since_s[number]
         parts = self._parts.pop(number)
-        return self._severity.pop(number), "".join(text for _, text in sorted(parts.items())).strip("\0 ")
+        return self._severity.pop(number), clean("".join(text for _, text in sorted(parts.items())))
+
+
+def clean(text: str) -> str:
+    """Without what vehicles add to it: PX4 ends with a tab what it says by an event, too."""
+    return text.strip("\0").strip()

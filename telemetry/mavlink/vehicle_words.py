@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.texts import clean
 
 WARNING = 4
 """MAV_SEVERITY; what is less urgent is no reason for a refusal."""
@@ -29,13 +30,13 @@ class VehicleWords:
             self._parts.setdefault(message.id, {})[message.chunk_seq] = message.text
 
     def _add(self, text: str) -> None:
-        text = text.strip("\0 ")
+        text = clean(text)
         if text and text not in self._texts:
             self._texts = [*self._texts, text][-MOST:]
 
     @property
     def texts(self) -> tuple[str, ...]:
-        joined = ("".join(text for _, text in sorted(parts.items())).strip("\0 ") for parts in self._parts.values())
+        joined = (clean("".join(text for _, text in sorted(parts.items()))) for parts in self._parts.values())
         return (*self._texts, *(text for text in joined if text))
 
     def sentence(self) -> str:

@@ -209,6 +209,9 @@ class _Quiet:
 
     def on_start(self, prepared: Prepared) -> None: ...
 
+    def on_refused(self) -> None:
+        pass
+
     def on_state(self, state: VehicleState, flight: FlightStatus) -> None: ...
 
 

@@ -135,12 +135,15 @@ def test_waypoints_one_at_a_time(ground: Ground) -> None:
 
 def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:
     low = write_mission(tmp_path / "low.waypoints", mission([(50.0, 150.0, 3.0), (90.0, 150.0, 3.0)]))
-    run = hedgehop("fly", low, "--link", ground.link, "--dsm", ground.dsm, "--json")
+    record = tmp_path / "refused.mcap"
+    run = hedgehop("fly", low, "--link", ground.link, "--dsm", ground.dsm, "--json", "--record", record)
     assert run.code == 1
+    assert not record.exists()
     assert run.json["error"]["code"] == "not_allowed"
     assert run.json["error"]["where"] == "the check before the start"
     assert "required" in run.json["error"]["what"]
     assert "Starting" not in run.err
+    assert "Vehicle 1: ardupilot 4.7.0-dev" in run.err
 
 
 def test_poor_gnss_must_be_accepted(ground: Ground, tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ class RecordedLine:
         return []
 
     def _rows(self, items: tuple[Item, ...]) -> tuple[Item, ...]:
-        return (Item(16, 0, (0.0,) * 4, 0.0, 0.0, 0.0), *items) if self.has_home_row and items else items
+        return (Item(16, 0, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0), *items) if self.has_home_row and items else items
 
     has_home_row = True
 

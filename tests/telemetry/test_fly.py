@@ -58,7 +58,7 @@ class Pilot:
     """Plays the link node: keeps what it is asked, answers as told, and flies as soon as it is started."""
 
     def __init__(self, bus: SmallBus, state: VehicleState | None = None) -> None:
-        self.bus, self.state = bus, state or state_at()
+        self.bus, self.state = bus, replace(state or state_at(), firmware_version="4.7.0")
         self.asked: list[Any] = []
         self.differences: tuple[str, ...] = ()
         self.refusals: list[Exception] = []
@@ -96,12 +96,16 @@ class Heard:
         self.lines: list[str] = []
         self.prepared: Prepared | None = None
         self.states = 0
+        self.refused = False
 
     def tell(self, text: str) -> None:
         self.lines.append(text)
 
     def on_start(self, prepared: Prepared) -> None:
         self.prepared = prepared
+
+    def on_refused(self) -> None:
+        self.refused = True
 
     def on_state(self, state: VehicleState, flight: FlightStatus) -> None:
         self.states += 1
@@ -122,6 +126,17 @@ def test_the_order_of_things() -> None:
     assert result.text == "The mission was flown and the vehicle has landed."
     assert heard.prepared is not None
     assert any("clearance: At least 12.00 m" in line for line in heard.lines)
+
+
+def test_the_firmware_is_told_though_it_is_known_only_after_the_vehicle_was_heard() -> None:
+    class Late(Pilot):
+        def _tell(self) -> None:
+            self.bus.publish(Topic.VEHICLE, replace(self.state, firmware_version=None))
+            self.bus.publish(Topic.LINK, LinkStatus(0.0, adopted=VEHICLE, state="live"))
+            asyncio.get_running_loop().call_later(0.05, self.bus.publish, Topic.VEHICLE, self.state)
+
+    _, heard = flown(Late(SmallBus()))
+    assert "Vehicle 1: ardupilot 4.7.0" in heard.lines
 
 
 def test_what_is_flown_is_put_on_record() -> None:
@@ -185,7 +200,7 @@ def test_a_vehicle_that_is_not_ready_is_waited_for() -> None:
     async def later() -> FlyResult:
         async def becomes_ready() -> None:
             await asyncio.sleep(0.2)
-            pilot.bus.publish(Topic.VEHICLE, state_at())
+            pilot.bus.publish(Topic.VEHICLE, replace(state_at(), firmware_version="4.7.0"))
 
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(becomes_ready())
@@ -207,8 +222,10 @@ def test_refused_arming_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_refused_for_good() -> None:
     pilot = Pilot(SmallBus())
     pilot.refusals = [RefusedError("The vehicle refused to arm.")] * 100
+    heard = Heard()
     with pytest.raises(RefusedError):
-        flown(pilot, replace(OPTIONS, ready_s=0.0))
+        asyncio.run(fly(pilot, pilot.bus, PLANNED, replace(OPTIONS, ready_s=0.0), heard))
+    assert heard.refused
 
 
 def test_silence_is_not_tried_again() -> None:

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from planning.model import VehicleProfile
+from telemetry.flight import checks
 from telemetry.messages import FlightStatus
 from tests.telemetry.replayed_link import ReplayedLink, received, replayed
 
@@ -83,6 +85,17 @@ def test_a_flight_that_was_lost_from_sight_on_its_way_down_is_not_over(flown: An
     assert disarmed_s(path) is None
     assert phases(link) == WHOLE[:-1]
     assert (link.flight.broke_off_at, link.told[-1][1].target, link.told[-1][1].targets) == (None, 4, 5)
+
+
+@pytest.mark.parametrize(("name", "version"), [("px4-1.17_auto_rtk", None), ("arducopter-4.7_auto", "4.7.0-dev")])
+def test_a_vehicle_that_was_started_then_may_be_started_now(flown: Any, name: str, version: str | None) -> None:
+    """PX4 says that its position is constant as long as it stands on the ground."""
+    _, link = flown(name)
+    arming_s = next(t_s for t_s, status in link.told if status.phase in ("arming", "taking_off"))
+    state = [state for t_s, state in link.states if t_s < arming_s][-1]
+    assert (state.ready_to_arm, state.estimator_ok, state.firmware_version) == (True, True, version)
+    profile = VehicleProfile("quad", position_error_m=0.5)
+    assert [checks.gnss_row(state, profile).state, checks.ready_row(state).state] == ["good", "good"]
 
 
 def current_items(path: Path, first: int) -> Iterator[tuple[float, int]]:

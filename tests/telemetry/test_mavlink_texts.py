@@ -23,6 +23,13 @@ def test_a_short_text_comes_at_once() -> None:
     assert Texts().on_message(heard(attitude()), 0.0) == []
 
 
+def test_the_tab_with_which_px4_ends_is_left_out() -> None:
+    assert Texts().on_message(part("Armed by external command\t"), 0.0) == [(4, "Armed by external command")]
+    texts = Texts()
+    assert texts.on_message(part("RTL: start return at 842 m (39 m above destination", 8, 0), 0.0) == []
+    assert texts.on_message(part(")\t", 8, 1), 0.0) == [(4, "RTL: start return at 842 m (39 m above destination)")]
+
+
 def test_parts_are_put_together_in_any_order() -> None:
     texts = Texts()
     first, middle, last = parts(7)

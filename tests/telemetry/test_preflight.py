@@ -165,9 +165,11 @@ def test_home_off_the_model() -> None:
 @pytest.mark.parametrize(
     ("changes", "state"),
     [
-        ({"horizontal_accuracy_m": 0.9}, "good"),
+        ({"horizontal_accuracy_m": 0.9, "vertical_accuracy_m": 0.9}, "good"),
         ({"horizontal_accuracy_m": 2.5, "gnss_fix": "3d"}, "accept"),
         ({"horizontal_accuracy_m": None, "gnss_fix": "3d"}, "accept"),
+        ({"vertical_accuracy_m": 1.78}, "accept"),
+        ({"horizontal_accuracy_m": 0.8}, "accept"),
         ({"horizontal_accuracy_m": None}, "good"),
         ({"gnss_fix": "2d"}, "bad"),
         ({"gnss_fix": "no_fix"}, "bad"),
@@ -231,6 +233,12 @@ def test_battery(share, state) -> None:
 )
 def test_ready(changes, state) -> None:
     assert row(checked(state_at(**changes)), "ready").state == state
+
+
+def test_a_vehicle_that_is_not_ready_is_quoted() -> None:
+    words = ("PreArm: Compass not healthy", "PreArm: Battery 1 low voltage failsafe")
+    found = row(checked(state_at(ready_to_arm=False, not_ready_words=words)), "ready")
+    assert f'It says: "{words[0]}" "{words[1]}".' in found.text
 
 
 def test_without_a_surface_model_all_that_needs_one_can_only_be_accepted() -> None:

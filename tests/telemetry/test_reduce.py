@@ -160,6 +160,42 @@ def test_the_pre_arm_bit_counts_where_it_is_checked(health: int, ready: bool) ->
     unchecked = mavlink.MAVLink_sys_status_message(0, bit, health, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     assert known(checked).ready_to_arm is ready
     assert known(unchecked).ready_to_arm is None
+    px4 = after(heartbeat(autopilot=mavlink.MAV_AUTOPILOT_PX4), unchecked)
+    assert px4 is not None
+    assert px4.ready_to_arm is ready
+
+
+def text(words: str, number: int = 0, chunk: int = 0) -> Any:
+    return mavlink.MAVLink_statustext_message(2, words.encode(), number, chunk)
+
+
+def test_what_is_in_the_way_of_arming_is_kept_in_the_vehicles_words_until_it_is_ready() -> None:
+    long = "PreArm: Compass 1 is not calibrated, and the vehicle has been moved since"
+    spoken = (text(long[:50], 7, 0), text(long[50:], 7, 1), text("PreArm: Battery low"), text("GPS 1: detected u-blox"))
+    assert known(*spoken).not_ready_words == (long, "PreArm: Battery low")
+    assert known(*spoken, *spoken).not_ready_words == (long, "PreArm: Battery low")
+    assert known(text("Preflight Fail: No GPS\t")).not_ready_words == ("Preflight Fail: No GPS",)
+    bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    ready = mavlink.MAVLink_sys_status_message(bit, bit, bit, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert known(*spoken, ready).not_ready_words == ()
+
+
+def test_reasons_of_an_earlier_look_are_forgotten() -> None:
+    state = reduce(known(), heard(text("PreArm: Compass")), t_mono_s=10.0, t_utc_s=0.0)
+    for t_mono_s, words in ((40.0, "PreArm: Battery low"), (40.1, "PreArm: Fence")):
+        state = reduce(state, heard(text(words)), t_mono_s=t_mono_s, t_utc_s=0.0)
+    assert state is not None
+    assert state.not_ready_words == ("PreArm: Battery low", "PreArm: Fence")
+
+
+def test_a_constant_position_is_bad_in_the_air_only() -> None:
+    px4 = mavlink.MAV_AUTOPILOT_PX4
+    standing = mavlink.MAVLink_estimator_status_message(0, 1023, 0, 0, 0, 0, 0, 0, 0, 0)
+    on_ground, in_air = (mavlink.MAVLink_extended_sys_state_message(0, landed) for landed in (1, 2))
+    for armed, landed, ok in ((False, on_ground, True), (True, on_ground, True), (True, in_air, False)):
+        state = after(heartbeat(px4, base_mode=1 | 128 * armed), landed, standing)
+        assert state is not None
+        assert state.estimator_ok is ok
 
 
 def test_gnss_quality() -> None:
