@@ -307,6 +307,8 @@ export interface VehicleState {
   critical: boolean;
   landed: "on_ground" | "taking_off" | "in_air" | "landing" | null;
   ready_to_arm: boolean | null;
+  not_ready_words: string[];
+  not_ready_t_mono_s: number | null;
   position_t_mono_s: number | null;
   lat_deg: number | null;
   lon_deg: number | null;
