@@ -29,10 +29,10 @@ from planning.certificate.reasons import (
     near_return_reason,
     return_reason,
     scale_reason,
-    unjudged_reasons,
 )
 from planning.certificate.returns import return_altitude
 from planning.certificate.threads import threads_for
+from planning.certificate.unjudged import unjudged_reasons
 from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
 from planning.model import (

@@ -13,10 +13,19 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.certificate.commands import BENT, LAND, OTHER_UNJUDGED, RETURN_TO_LAUNCH, STRAIGHT, TAKEOFFS, stays
+from planning.certificate.commands import (
+    BENT,
+    LAND,
+    OTHER_UNJUDGED,
+    RETURN_TO_LAUNCH,
+    STRAIGHT,
+    TAKEOFFS,
+    UNKNOWN,
+    stays,
+)
 from planning.dsm import Dsm, is_amsl
 from planning.errors import MissionError
-from planning.model import FlownLine, Mission, MissionItem
+from planning.model import FlownLine, Mission, MissionItem, Unjudged
 
 F64 = NDArray[np.float64]
 
@@ -26,6 +35,7 @@ STORED_ALTITUDE_M = 0.01
 LARGEST_STORED_M = 80_000.0
 """Beyond it centimetres do not fit the vehicle's 24 bits: no flight, left as it is for the judge to refuse."""
 HOME_TOLERANCE_M = 1.0
+RELATIVE = "Give the height above home (frame 3) instead."
 PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {LAND}
 
 
@@ -93,11 +103,10 @@ class _Flight:
 
     def __init__(self, mission: Mission, dsm: Dsm, item_xy_m: F64) -> None:
         self.ardupilot = mission.firmware == "ardupilot"
-        self.count = len(mission.items)
         self.item_xy_m = item_xy_m
         self.absolute = is_amsl(dsm.vertical_datum)
         self.datum = dsm.vertical_datum or "unknown"
-        self.unjudged: list[str] = []
+        self.unjudged: list[Unjudged] = []
         self.notes: list[str] = []
         self.home_xy_m = self._home_place(mission, dsm)
         self.home_alt_m = self._home_altitude(mission, dsm)
@@ -145,26 +154,34 @@ class _Flight:
         if stays(item.command):
             return
         if self.ended_by is not None:
-            self._cannot_judge(index, item, f"comes after item {self.ended_by + 1}, which ends the flight")
+            number = self.ended_by + 1
+            self._cannot_judge(
+                index,
+                item,
+                f"comes after item {number}, which ends the flight",
+                f"Remove what comes after item {number}.",
+            )
         elif item.command in TAKEOFFS:
             self._take_off(index, item)
         elif item.command in STRAIGHT:
             self._go(index, item)
         elif item.command in BENT:
-            self._cannot_judge(index, item, f"{BENT[item.command]}, which is no straight line")
+            what, mend = BENT[item.command]
+            self._cannot_judge(index, item, f"{what}, which is no straight line", mend)
             self._go(index, item)
         elif item.command in (LAND, RETURN_TO_LAUNCH):
             self._end(index, item)
         else:
-            self._cannot_judge(index, item, OTHER_UNJUDGED.get(item.command, "is not a command known here"))
+            self._cannot_judge(index, item, *OTHER_UNJUDGED.get(item.command, UNKNOWN))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         if self.points:
-            self._cannot_judge(index, item, "is a take-off in flight")
+            self._cannot_judge(index, item, "is a take-off in flight", "Remove it: one take-off begins the mission.")
             return
         alt_m = self._altitude(index, item, present_m=self.home_alt_m)
         if alt_m <= self.home_alt_m:
-            self._cannot_judge(index, item, "is a take-off to a height that is not above home")
+            what = "is a take-off to a height that is not above home"
+            self._cannot_judge(index, item, what, "Give it the height above home to climb to.")
         self.points.append((*self.home_xy_m, alt_m))
         self.first_item = index
         if not self.ardupilot and not math.isnan(self.item_xy_m[index, 0]):
@@ -172,7 +189,8 @@ class _Flight:
 
     def _go(self, index: int, item: MissionItem) -> None:
         if not self.points:
-            self._cannot_judge(index, item, "comes before any take-off: how the vehicle gets there is unknown")
+            what = "comes before any take-off: how the vehicle gets there is unknown"
+            self._cannot_judge(index, item, what, "Begin the mission with a take-off.")
             alt_m = self._altitude(index, item, present_m=self.home_alt_m)
             self.points.append((*self.home_xy_m, alt_m))
             self.first_item = index
@@ -201,20 +219,22 @@ class _Flight:
                 f"The altitude is {item.alt_m}.", where=f"Item {index + 1}", advice="Every place needs an altitude."
             )
         if item.frame in TERRAIN_FRAMES:
-            self._cannot_judge(index, item, "follows the autopilot's own terrain data (frame above terrain)")
+            what = "follows the autopilot's own terrain data (frame above terrain)"
+            self._cannot_judge(index, item, what, RELATIVE)
         elif item.frame in AMSL_FRAMES and not self.absolute:
+            what = f"is given above mean sea level, but the surface model's vertical datum is {self.datum}"
             self._cannot_judge(
-                index, item, f"is given above mean sea level, but the surface model's vertical datum is {self.datum}"
+                index, item, what, "Name the model's vertical datum, or give heights above home (frame 3)."
             )
         elif item.frame not in AMSL_FRAMES + HOME_FRAMES:
-            self._cannot_judge(index, item, f"uses frame {item.frame}")
+            self._cannot_judge(index, item, f"uses frame {item.frame}", RELATIVE)
         elif not (self.ardupilot and abs(item.alt_m) < STORED_ALTITUDE_M):
             alt_m = _stored_m(item.alt_m) if self.ardupilot else item.alt_m
             return alt_m if item.frame in AMSL_FRAMES else self.home_alt_m + alt_m
         return present_m
 
-    def _cannot_judge(self, index: int, item: MissionItem, why: str) -> None:
-        self.unjudged.append(f"Item {index + 1} of {self.count} (command {item.command}) {why}.")
+    def _cannot_judge(self, index: int, item: MissionItem, why: str, mend: str) -> None:
+        self.unjudged.append(Unjudged(f"{why}.", mend, index, item.command))
 
     def _leg(self, index: int, xy_m: tuple[float, float], alt_m: float) -> None:
         point = (*xy_m, alt_m)

@@ -10,7 +10,7 @@ import numpy as np
 from planning.dsm import Dsm, is_amsl
 from planning.errors import DatumError, MissionError, PoiError
 from planning.mission_items import FRAME_AMSL, FRAME_RELATIVE, Heights
-from planning.model import FlownLine, Home, MissionParams, SampledPath
+from planning.model import FlownLine, Home, MissionParams, SampledPath, Unjudged
 
 START_TOLERANCE_M = 0.5
 
@@ -39,7 +39,8 @@ def home_on_ground(line: FlownLine, unfilled: Dsm) -> FlownLine:
     if math.isfinite(float(unfilled.elevation_at(np.array([line.home_xy_m]))[0])):
         return line
     why = "Home lies in a hole of the surface model that was filled: its true height is unknown."
-    return replace(line, unjudged=(*line.unjudged, why))
+    unjudged = Unjudged(why, "Put home on ground that the surface model knows.")
+    return replace(line, unjudged=(*line.unjudged, unjudged))
 
 
 def item_heights(home: Home, params: MissionParams, dsm: Dsm) -> Heights:

@@ -195,6 +195,19 @@ class Mission:
 
 
 @dataclass(frozen=True, slots=True)
+class Unjudged:
+    """Why a part of a mission cannot be judged, and what would mend it."""
+
+    why: str
+    """A sentence without its subject where items are named ("flies a spline."), a whole one otherwise."""
+    mend: str
+    item: int | None = None
+    """Index into ``Mission.items``; None: the mission as a whole."""
+    command: int | None = None
+    """MAV_CMD of the item."""
+
+
+@dataclass(frozen=True, slots=True)
 class FlownLine:
     """The polyline that a vehicle flies through a mission, and its columns over home."""
 
@@ -206,7 +219,7 @@ class FlownLine:
     home_alt_dsm_m: float
     takeoff_alt_dsm_m: float
     ends_with_rtl: bool
-    unjudged: tuple[str, ...] = ()
+    unjudged: tuple[Unjudged, ...] = ()
     """Why some items cannot be judged (terrain frame, spline, jump ...): such a mission is not certified."""
     landing_xy_m: tuple[float, float] | None = None
     """Where a landing item ends the flight, its column is judged as home's is; None without one."""

@@ -11,35 +11,41 @@ STRAIGHT = frozenset({WAYPOINT, 17, 19})
 TAKEOFFS = frozenset({TAKEOFF, 84})
 """Take-off and VTOL take-off, which a multicopter flies alike."""
 
+REMOVE = "Remove it."
 BENT = {
-    18: "circles around a point",
-    31: "spirals to an altitude",
-    82: "flies a spline",
+    18: ("circles around a point", "Replace the circle by waypoints along it."),
+    31: ("spirals to an altitude", "Replace it by a waypoint with a hold, and give the next one the height."),
+    82: ("flies a spline", "Make it a plain waypoint."),
 }
-"""Go to a place, but not on a straight line."""
+"""(what it does, mend): go to a place, but not on a straight line."""
 
+_HANDED_OVER = "Remove it: what a companion computer flies is not in the mission."
 OTHER_UNJUDGED = {
-    85: "is a VTOL landing",
-    92: "hands the vehicle over to a companion computer",
-    113: "changes altitude",
-    176: "changes the flight mode",
-    177: "jumps to another item",
-    179: "moves home, to which altitudes and the return refer",
-    180: "changes a parameter, such as the return height",
-    185: "ends the flight",
-    186: "changes altitude",
-    189: "starts a landing sequence",
-    191: "breaks off a landing",
-    192: "flies somewhere else",
-    193: "pauses the mission",
-    208: "releases a parachute",
-    209: "tests a motor",
-    212: "starts tuning in flight",
-    218: "triggers an auxiliary function, which may change the flight mode",
-    221: "hands the vehicle over to another system",
-    222: "hands the vehicle over to another system",
-    223: "starts or stops an engine",
+    85: ("is a VTOL landing", "End the mission with a return or a landing."),
+    92: ("hands the vehicle over to a companion computer", _HANDED_OVER),
+    113: ("changes altitude", "Give the height to the next waypoint instead."),
+    176: ("changes the flight mode", "Remove it; end the mission with a return or a landing."),
+    177: ("jumps to another item", "Write the repeated items out, one after the other."),
+    179: ("moves home, to which altitudes and the return refer", "Remove it; set home before the upload."),
+    180: (
+        "changes a parameter, such as the return height",
+        "Remove it; set the parameter on the vehicle before the flight.",
+    ),
+    185: ("ends the flight", REMOVE),
+    186: ("changes altitude", "Give the height to the next waypoint instead."),
+    189: ("starts a landing sequence", "Remove it; end the mission with a return or a landing."),
+    191: ("breaks off a landing", REMOVE),
+    192: ("flies somewhere else", "Make it a plain waypoint."),
+    193: ("pauses the mission", "Remove it; give the waypoint before it a hold time."),
+    208: ("releases a parachute", REMOVE),
+    209: ("tests a motor", REMOVE),
+    212: ("starts tuning in flight", REMOVE),
+    218: ("triggers an auxiliary function, which may change the flight mode", REMOVE),
+    221: ("hands the vehicle over to another system", _HANDED_OVER),
+    222: ("hands the vehicle over to another system", _HANDED_OVER),
+    223: ("starts or stops an engine", REMOVE),
 }
+UNKNOWN = ("is not a command known here", "Remove it, or replace it by plain waypoints.")
 
 _STAY = frozenset(
     {93, 112, 114, 115, 178, 181, 182, 183, 184, 187, 188, 194, 195, 196, 197, 198}

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from planning.dsm import Dsm
-from planning.model import ClearanceParams, FlownLine, LegClearance, Reason, WorstPoint
+from planning.model import ClearanceParams, LegClearance, Reason, WorstPoint
 
 RTK_ERROR_M = 0.1
 FILL_OR_AVOID = (
@@ -137,11 +137,6 @@ def scale_reason(scale: float, tolerance: float) -> Reason | None:
         return None
     text = f"One metre on the ground is {scale:.4f} m in the surface model's CRS: distances in it are not true."
     return Reason("crs_scale", text, "Reproject the surface model to its UTM zone or another local CRS.")
-
-
-def unjudged_reasons(line: FlownLine) -> list[Reason]:
-    mend = "Replace it by plain waypoints relative to home, or remove it."
-    return [Reason("unjudged", text, mend) for text in line.unjudged]
 
 
 def _leg(leg: LegClearance) -> str:

@@ -11,6 +11,7 @@ from pyproj import CRS
 
 from planning.certificate.commands import WAYPOINT
 from planning.certificate.places import distance_flown
+from planning.certificate.unjudged import unjudged_words
 from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flight_time.predict import WAYPOINT_RADIUS_M, PredictedTime, predict_duration
@@ -81,7 +82,7 @@ def reference_line(
     Times are left unknown, with a note, when the mission's duration cannot be predicted.
     """
     line = flown_line(mission, dsm)
-    notes = [*line.notes, *line.unjudged]
+    notes = [*line.notes, *(text for text, _ in unjudged_words(line.unjudged))]
     predicted: PredictedTime | None = None
     try:
         placed = replace(mission, home=replace(mission.home, alt_dsm_m=line.home_alt_dsm_m))

@@ -14,7 +14,7 @@ from pyproj import CRS
 from planning.clearance import certificate_json, certify
 from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
-from planning.model import Certificate, ClearanceParams, FlownLine
+from planning.model import Certificate, ClearanceParams, FlownLine, Unjudged
 
 WEST, NORTH = 500_000.0, 5_000_100.0
 PARAMS = ClearanceParams(3.0, vehicle_radius_m=0.35, position_error_m=1.0, rtl_height_m=40.0)
@@ -220,7 +220,7 @@ def test_the_height_above_ground_is_limited():
 
 
 def test_what_cannot_be_judged_is_not_certified():
-    line = line_of(*PLAIN, unjudged=("Item 3 flies a spline.", "Item 5 jumps."))
+    line = line_of(*PLAIN, unjudged=(Unjudged("flies a spline.", "A", 2, 82), Unjudged("jumps.", "B", 4, 177)))
     certificate = certify(dsm_of(flat()), line, PARAMS)
     assert codes(certificate) == ["unjudged", "unjudged"]
 

@@ -9,6 +9,7 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.certificate.unjudged import unjudged_words
 from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flown import flown_line
@@ -63,9 +64,13 @@ def test_an_altitude_no_vehicle_can_store_is_left_to_the_judge():
     assert fly(TAKE_OFF, item(16, 60, 50, 1e300)).points_m[-1, 2] == 1e300
 
 
+def words(line: FlownLine) -> list[str]:
+    return [text for text, _ in unjudged_words(line.unjudged)]
+
+
 @pytest.mark.parametrize("command", [180, 209, 212, 221, 222, 223])
 def test_what_changes_later_items_or_the_engines_is_not_judged(command):
-    assert f"(command {command})" in fly(TAKE_OFF, item(command, frame=2), item(16, 60, 50, 12.0)).unjudged[0]
+    assert f"(command {command})" in words(fly(TAKE_OFF, item(command, frame=2), item(16, 60, 50, 12.0)))[0]
 
 
 def test_a_plain_mission_becomes_its_polyline():
@@ -128,24 +133,24 @@ def test_commands_that_do_not_move_the_vehicle_are_passed_over(command):
 def test_commands_that_cannot_be_judged_are_named(command):
     line = fly(TAKE_OFF, item(command, frame=2), item(16, 60, 50, 12.0))
     assert len(line.unjudged) == 1
-    assert f"Item 2 of 3 (command {command})" in line.unjudged[0]
+    assert f"Item 2 (command {command})" in words(line)[0]
 
 
 @pytest.mark.parametrize("command", [18, 31, 82])
 def test_bent_legs_are_named_and_shown_straight(command):
     line = fly(TAKE_OFF, item(command, 60, 50, 12.0))
     assert local(line)[-1] == [60, 50, 12]
-    assert "no straight line" in line.unjudged[0]
+    assert "no straight line" in words(line)[0]
 
 
 @pytest.mark.parametrize("frame", [10, 11])
 def test_the_terrain_frame_cannot_be_judged(frame):
-    assert "terrain data" in fly(TAKE_OFF, item(16, 60, 50, 12.0, frame=frame)).unjudged[0]
+    assert "terrain data" in words(fly(TAKE_OFF, item(16, 60, 50, 12.0, frame=frame)))[0]
 
 
 @pytest.mark.parametrize("frame", [1, 2, 7, 21])
 def test_other_frames_cannot_be_judged(frame):
-    assert f"uses frame {frame}" in fly(TAKE_OFF, item(16, 60, 50, 12.0, frame=frame)).unjudged[0]
+    assert f"uses frame {frame}" in words(fly(TAKE_OFF, item(16, 60, 50, 12.0, frame=frame)))[0]
 
 
 @pytest.mark.parametrize("frame", [0, 5])
@@ -155,32 +160,62 @@ def test_altitudes_above_sea_level_need_a_model_above_sea_level(frame):
     assert local(line) == [[50, 50, 10], [60, 50, 20]]
     assert line.unjudged == ()
     for datum in (None, "WGS 84 ellipsoid"):
-        unjudged = fly(*items, dsm=flat_dsm(vertical_datum=datum)).unjudged
-        assert any((datum or "unknown") in text for text in unjudged)
+        line = fly(*items, dsm=flat_dsm(vertical_datum=datum))
+        assert (datum or "unknown") in words(line)[-1]
+
+
+def test_a_cause_that_many_items_share_is_said_once_with_their_numbers() -> None:
+    items = [item(16, 60 + n, 50, 12.0, frame=10) for n in range(5)]
+    mixed = [TAKE_OFF, *items[:3], item(177, frame=2), items[3], item(16, 90, 50, 12.0), items[4], *items[:4:2]]
+    said = unjudged_words(fly(*mixed).unjudged)
+    assert [text for text, _ in said] == [
+        "7 items (command 16: 2 to 4, 6, 8 to 10), each follows the autopilot's own terrain data"
+        " (frame above terrain).",
+        "Item 5 (command 177) jumps to another item.",
+    ]
+    apart = [take for n in range(5) for take in (items[n], item(16, 90 + n, 50, 12.0))]
+    assert "(command 16: 2, 4, 6 and 2 more)" in words(fly(TAKE_OFF, *apart))[0]
+
+
+@pytest.mark.parametrize(
+    ("items", "mend"),
+    [
+        ([item(16, 60, 50, 12.0)], "Begin the mission with a take-off."),
+        ([TAKE_OFF, item(177, frame=2), item(16, 60, 50, 12.0)], "Write the repeated items out"),
+        ([TAKE_OFF, item(82, 60, 50, 12.0)], "Make it a plain waypoint."),
+        ([TAKE_OFF, item(16, 60, 50, 12.0, frame=10)], "Give the height above home (frame 3) instead."),
+        ([TAKE_OFF, RTL, item(16, 60, 50, 12.0)], "Remove what comes after item 2."),
+        ([TAKE_OFF, item(180, frame=2), item(16, 60, 50, 12.0)], "set the parameter on the vehicle"),
+        ([item(22, alt_m=0.0), item(16, 60, 50, 12.0)], "Give it the height above home"),
+        ([TAKE_OFF, item(9999, frame=2), item(16, 60, 50, 12.0)], "Remove it, or replace it by plain waypoints."),
+    ],
+)
+def test_each_cause_has_the_mend_that_fits_it(items: list[MissionItem], mend: str) -> None:
+    assert mend in unjudged_words(fly(*items).unjudged)[0][1]
 
 
 def test_nothing_is_flown_after_the_end():
     for end in (RTL, item(21, 70, 60)):
         line = fly(TAKE_OFF, item(16, 60, 50, 12.0), end, item(181, frame=2), item(16, 80, 50, 12.0))
         assert len(line.unjudged) == 1
-        assert "comes after item 3" in line.unjudged[0]
+        assert "comes after item 3" in words(line)[0]
         assert local(line)[-1][:2] != [80, 50]
 
 
 def test_a_mission_without_take_off_is_not_judged():
     line = fly(item(16, 60, 50, 12.0), RTL)
-    assert "before any take-off" in line.unjudged[0]
+    assert "before any take-off" in words(line)[0]
     assert local(line) == [[50, 50, 12], [60, 50, 12]]
 
 
 @pytest.mark.parametrize("alt_m", [0.0, -3.0])
 def test_a_take_off_that_does_not_rise_is_not_judged(alt_m):
     line = fly(item(22, alt_m=alt_m), item(16, 60, 50, 12.0))
-    assert "not above home" in line.unjudged[0]
+    assert "not above home" in words(line)[0]
 
 
 def test_a_second_take_off_is_not_judged():
-    assert "take-off in flight" in fly(TAKE_OFF, item(16, 60, 50, 12.0), TAKE_OFF).unjudged[0]
+    assert "take-off in flight" in words(fly(TAKE_OFF, item(16, 60, 50, 12.0), TAKE_OFF))[0]
 
 
 def test_up_and_down_is_one_leg_without_length():

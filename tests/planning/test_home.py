@@ -65,5 +65,5 @@ def test_a_home_on_a_filled_hole_cannot_be_judged() -> None:
     filled, _ = fill_holes(holed)
     assert filled.elevation_m[25, 11] == 8.0
     line = FlownLine(np.zeros((2, 3)), np.zeros(1, np.int64), (500_011.5, 5_000_024.5), 8.0, 13.0, True)
-    assert "filled" in home_on_ground(line, holed).unjudged[0]
+    assert "filled" in home_on_ground(line, holed).unjudged[0].why
     assert home_on_ground(line, filled) is line
