@@ -14,7 +14,7 @@ from planning.formats.detect import read_mission
 from planning.formats.kml import poi_from_placemark
 from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.poi_csv import read_pois_csv, write_pois_csv
-from planning.formats.safe_text import check_count, clean_name, decode_text, load_json
+from planning.formats.safe_text import check_count, clean_name, decode_text, load_json, said_once
 from planning.formats.swapped import looks_swapped
 from planning.model import Mission, MissionItem, Poi
 
@@ -134,4 +134,4 @@ def _joined(found: Sequence[PoiFile]) -> PoiFile:
     warnings = [w for f in found for w in f.warnings]
     if len(polygons) > 1:
         warnings.append(f"The file holds {len(polygons)} polygons; the first was taken.")
-    return PoiFile(tuple(p for f in found for p in f.pois), polygons[0] if polygons else None, tuple(warnings))
+    return PoiFile(tuple(p for f in found for p in f.pois), polygons[0] if polygons else None, said_once(warnings))

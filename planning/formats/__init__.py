@@ -1,6 +1,6 @@
 """Files that other programs read and write: each format's writer and its own reader."""
 
-from planning.formats.detect import read_mission
+from planning.formats.detect import read_flight, read_mission
 from planning.formats.geojson import GeoJsonPlan, read_geojson, write_geojson
 from planning.formats.kml import KmlTrack, read_kml_track, write_kml
 from planning.formats.poi_csv import write_pois_csv
@@ -12,6 +12,7 @@ __all__ = [
     "GeoJsonPlan",
     "KmlTrack",
     "Trajectory",
+    "read_flight",
     "read_geojson",
     "read_kml_track",
     "read_mission",

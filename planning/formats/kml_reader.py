@@ -40,21 +40,29 @@ def read_placemarks(name: str, data: bytes) -> tuple[Placemark, ...]:
     Raises FormatError for document type declarations, too deep or broken XML, bad coordinates.
     """
     file = clean_name(name)
-    text = decode_text(name, _unpacked(file, data) if data.startswith(b"PK") else data)
-    root = _parse(file, text)
-    marks = [e for e in root.iter() if _tag(e) == "Placemark"]
+    marks = [e for e in read_xml(name, data).iter() if tag(e) == "Placemark"]
     check_count(len(marks), "placemarks", file)
     found = (_placemark(mark, f"{file}, placemark {k}") for k, mark in enumerate(marks, start=1))
     return tuple(mark for mark in found if mark is not None)
 
 
-def _unpacked(file: str, data: bytes) -> bytes:
+def read_xml(name: str, data: bytes, *, prefer: str = ".kml") -> Element:
+    """The root of KML text, or of the KML inside a KMZ: the first entry that ends in ``prefer``, or in .kml.
+
+    Raises FormatError for document type declarations, too deep or broken XML and broken archives.
+    """
+    file = clean_name(name)
+    return _parse(file, decode_text(name, _unpacked(file, data, prefer) if data.startswith(b"PK") else data))
+
+
+def _unpacked(file: str, data: bytes, prefer: str) -> bytes:
     """The KML inside a KMZ; the unpacked size is limited while reading, headers are not believed."""
     advice = "Unpack it and choose the .kml inside."
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            inner = next((e for e in entries[:MAX_KMZ_ENTRIES] if e.filename.lower().endswith(".kml")), None)
+            entries = archive.infolist()[:MAX_KMZ_ENTRIES]
+            found = (e for end in (prefer, ".kml") for e in entries if e.filename.lower().endswith(end))
+            inner = next(found, None)
             if inner is None or inner.flag_bits & 1 or inner.compress_type not in _UNPACKED_METHODS:
                 raise FormatError("The archive holds no readable .kml.", where=file, advice=advice)
             with archive.open(inner) as stream:
@@ -87,29 +95,32 @@ def _parse(file: str, text: str) -> Element:
     return root
 
 
-def _tag(element: Element) -> str:
+def tag(element: Element) -> str:
+    """Without its namespace."""
     return str(element.tag).rpartition("}")[2]
 
 
-def _first(element: Element, *tags: str) -> Element | None:
-    return next((e for e in element.iter() if _tag(e) in tags), None)
+def first(element: Element, *tags: str) -> Element | None:
+    """The first of these at any depth."""
+    return next((e for e in element.iter() if tag(e) in tags), None)
 
 
-def _text(element: Element | None) -> str:
+def text_of(element: Element | None) -> str:
+    """Empty where there is no element."""
     return (element.text or "") if element is not None else ""
 
 
 def _placemark(mark: Element, where: str) -> Placemark | None:
-    geometry = _first(mark, "Point", "LineString", "Polygon")
+    geometry = first(mark, "Point", "LineString", "Polygon")
     if geometry is None:
         return None
-    shape = _first(geometry, "outerBoundaryIs") if _tag(geometry) == "Polygon" else geometry
-    coordinates = _coordinates(_text(_first(geometry if shape is None else shape, "coordinates")), where)
+    shape = first(geometry, "outerBoundaryIs") if tag(geometry) == "Polygon" else geometry
+    coordinates = _coordinates(text_of(first(geometry if shape is None else shape, "coordinates")), where)
     if not coordinates:
         raise FormatError("The placemark's coordinates are empty.", where=where)
-    own_name = next((e for e in mark if _tag(e) == "name"), None)
-    mode = _text(_first(geometry, "altitudeMode")).strip() or "clampToGround"
-    return Placemark(clean_name(_text(own_name)), _tag(geometry), coordinates, _data(mark), mode)
+    own_name = next((e for e in mark if tag(e) == "name"), None)
+    mode = text_of(first(geometry, "altitudeMode")).strip() or "clampToGround"
+    return Placemark(clean_name(text_of(own_name)), tag(geometry), coordinates, _data(mark), mode)
 
 
 def _coordinates(text: str, where: str) -> Coordinates:
@@ -128,5 +139,5 @@ def _coordinate(text: str, where: str) -> tuple[float, float, float]:
 
 
 def _data(mark: Element) -> dict[str, str]:
-    entries = (e for e in mark.iter() if _tag(e) == "Data")
-    return {clean_name(e.get("name", "")): _text(_first(e, "value")).strip() for e in entries}
+    entries = (e for e in mark.iter() if tag(e) == "Data")
+    return {clean_name(e.get("name", "")): text_of(first(e, "value")).strip() for e in entries}

@@ -8,7 +8,7 @@ from typing import Any
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
 from planning.formats.qgc_words import ALTITUDE_MODE, COMPUTED_ABOVE_TERRAIN, FIRMWARE_TYPE
-from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json
+from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
 from planning.model import Firmware, Home, Mission, MissionItem, Poi
 
@@ -33,7 +33,9 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
     home = _home(mission.get("plannedHomePosition"), ours, file)
     warnings += swapped_against_home(home, items) + _ignored(plan)
     home = home_or_first_place(home, items, warnings)
-    return Mission(home, tuple(items), _firmware(mission), _pois(ours, file), _speed(mission, ours), tuple(warnings))
+    return Mission(
+        home, tuple(items), _firmware(mission), _pois(ours, file), _speed(mission, ours), said_once(warnings)
+    )
 
 
 def _at(file: str, path: str) -> str:

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import unicodedata
+from collections.abc import Sequence
 from typing import NoReturn
 
 from planning.errors import FormatError
@@ -116,3 +117,15 @@ def check_count(count: int, what: str, where: str) -> None:
     """Refuse more than ``MAX_ITEMS`` of anything."""
     if count > MAX_ITEMS:
         raise FormatError(f"The file holds more than {MAX_ITEMS} {what}.", where=where, advice="Split it.")
+
+
+def said_once(warnings: Sequence[str]) -> tuple[str, ...]:
+    """Each "place: sentence" once; of those with the same sentence the first place, and how many more there are."""
+    places: dict[str, list[str]] = {}
+    for warning in warnings:
+        place, colon, sentence = warning.partition(": ")
+        places.setdefault(sentence if colon else warning, []).append(place if colon else "")
+    return tuple(
+        f"{at[0]}{f' and {len(at) - 1} more' if len(at) > 1 else ''}: {sentence}" if at[0] else sentence
+        for sentence, at in places.items()
+    )

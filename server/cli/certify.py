@@ -12,7 +12,7 @@ from planning.clearance import certify as certify_line
 from planning.dsm import Dsm
 from planning.flown import flown_line
 from planning.formats.commands import has_position
-from planning.formats.detect import read_mission
+from planning.formats.detect import read_flight
 from planning.holes import HoleReport, fill_holes
 from planning.home import home_on_ground
 from planning.model import Certificate, ClearanceParams, Mission, VehicleProfile
@@ -32,7 +32,7 @@ from server.stopwatch import StepTimer
 def certify(
     dsm: o.DsmFile,
     mission: Annotated[
-        Path, typer.Argument(metavar="MISSION", help="Mission: .waypoints or .plan.", show_default=False)
+        Path, typer.Argument(metavar="MISSION", help="Mission: .waypoints, .plan, .kml, .kmz.", show_default=False)
     ],
     as_json: o.AsJson = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show every leg.")] = False,
@@ -52,7 +52,7 @@ def certify(
         vehicle = profile_with(profile, position_error_m=position_error_m, rtl_height_m=rtl_height_m)
         check_hole_area(max_hole_m2)
         params = _demands(vehicle, required_clearance_m, max_height_above_ground_m)
-        flight = read_mission(mission.name, read_small(mission))
+        flight = read_flight(mission.name, read_small(mission))
         timer = StepTimer(progress)
         source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
         warnings = [*flight.warnings, *warn_swapped([i for i in flight.items if has_position(i)], source)]

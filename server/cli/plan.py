@@ -11,7 +11,8 @@ import numpy as np
 import typer
 
 from planning.dsm import Dsm
-from planning.errors import ParameterError
+from planning.errors import ParameterError, PoiError
+from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, PathParams, Poi, SurfaceParams
 from planning.poi import check_pois, shortest_order
 from planning.poi_files import read_pois, warn_swapped
@@ -30,7 +31,7 @@ def plan(
     pois: Annotated[
         Path,
         typer.Argument(
-            metavar="POIS", help="Points of interest: CSV, GeoJSON, KML, .waypoints or .plan.", show_default=False
+            metavar="POIS", help="Points of interest: CSV, GeoJSON, KML, KMZ, .waypoints or .plan.", show_default=False
         ),
     ],
     out: o.Out,
@@ -106,6 +107,12 @@ def plan(
         )
         check_request(request)
         points = read_pois(pois.name, read_small(pois))
+        if not points.pois:
+            raise PoiError(
+                "The file holds an area and no points.",
+                where=clean_name(pois.name),
+                advice="`hedgehop survey` plans lines over an area.",
+            )
         waiting = with_loiter(points.pois, loiter_s)
 
         def request_for(model: Dsm) -> PlanRequest:

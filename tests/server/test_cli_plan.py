@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 from pymavlink import mavwp
 
+from planning.demo import demo_survey_polygon
 from tests.server.cli_runs import Run, hedgehop
 
 KEYS = {
@@ -284,3 +286,24 @@ def test_grid_without_a_reference_system(shared_data: Path, tmp_path: Path) -> N
     assert "--crs" in refused.json["error"]["advice"]
     accepted = hedgehop("plan", model, points, "--out", tmp_path / "out", "--json", "--crs", "EPSG:32610")
     assert accepted.json["dsm"]["crs"] == "EPSG:32610"
+
+
+def test_an_area_without_points_is_sent_to_survey(hillside: tuple[Path, Path], tmp_path: Path) -> None:
+    ring = " ".join(f"{lon},{lat}" for lat, lon in [*demo_survey_polygon(), demo_survey_polygon()[0]])
+    area = tmp_path / "area.kml"
+    area.write_text(
+        '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><Polygon><outerBoundaryIs><LinearRing>'
+        f"<coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>"
+    )
+    run = hedgehop("plan", hillside[0], area, "--out", tmp_path / "out", "--json")
+    assert run.code == 2
+    assert "hedgehop survey" in run.json["error"]["advice"]
+
+
+def test_a_kmz_line_is_certified(hillside: tuple[Path, Path], flight: tuple[Run, Path], tmp_path: Path) -> None:
+    archive = tmp_path / "track.kmz"
+    with zipfile.ZipFile(archive, "w") as file:
+        file.write(flight[1] / "trajectory.kml", "doc.kml")
+    run = hedgehop("certify", hillside[0], archive, "--json", "--rtl-height-m", 70)
+    assert run.json["min_distance_m"] > 1.0
+    assert "the path as it was sampled" in run.err
