@@ -96,6 +96,10 @@ class Region:
     fov_rad: float
     height_m: float
     occupied: bool
+    nearest_m: float = 0.0
+    """What is nearer cannot be seen."""
+    hidden_m: float | None = None
+    """Distance of the nearest thing that stood in the way and cannot be seen now, so that it may still."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,6 +87,13 @@ class RangeFrame:
     """Above the horizontal plane; -pi/2 is straight down."""
     range_m: tuple[float, ...]
     """Only those that hit something."""
+    looks_rad: tuple[float, ...] = ()
+    """Bearings of all level directions that were measured in, hit or not."""
+    beam_rad: float = 0.0
+    """Width of each."""
+    nearest_m: float = 0.0
+    farthest_m: float = 0.0
+    """What is nearer or farther is not measured."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from mapping.corridor import MissionLine, length_m, tube_points
 from mapping.ground import GroundGrid
 from mapping.obstacles import Found, obstacles, sweep
 from mapping.perceiving.model import FrameResult, SearchedRegion, Settings, State
+from mapping.perceiving.remembered import Field, Remembered, Way
 from mapping.poses import Pose, PoseTrack
 from mapping.roi import search_sector, sector_points, to_enu
 from mapping.voxels import VoxelMap
@@ -57,6 +58,8 @@ class Perception:
     name = "sensor"
     reach_down = 0.0
     """See ``corridor.tube_points``."""
+    field = Field(nearest_m=0.5, aside_rad=math.radians(30.0))
+    """Where it sees what stands at the vehicle's height."""
 
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         self.settings = settings
@@ -75,6 +78,7 @@ class Perception:
         self._newest: tuple[float, int, str] | None = None
         self._sweep: tuple[float, tuple[float | None, ...]] = (-math.inf, ())
         self._sector = self._sector_points(settings)
+        self._remembered = Remembered(settings.resolution_m)
 
     # What is known
 
@@ -124,6 +128,7 @@ class Perception:
     def _forget(self) -> None:
         """What a subclass knows beside the map."""
         self._sweep = (-math.inf, ())
+        self._remembered = Remembered(self.map.resolution_m)
 
     @staticmethod
     def _sector_points(s: Settings) -> F64:
@@ -210,6 +215,7 @@ class Perception:
         """Regions, obstacles and alerts, after a frame has gone into the map."""
         self.frames += 1
         inside = self._in_sector(pose)
+        hidden_m = self._hidden_m(inside, pose)
         corridor_m, on_way = self._in_corridor(pose)
         found = self._found(inside, on_way, pose)
         alerts = self.alerts.observe(found if self._flying else [], t_mono_s)
@@ -222,7 +228,7 @@ class Perception:
             None,
             pose,
             points,
-            self._region(pose, len(inside) > 0),
+            self._region(pose, len(inside) > 0, hidden_m),
             corridor_m,
             len(on_way) > 0,
             tuple(found[:MOST_OBSTACLES]),
@@ -253,10 +259,7 @@ class Perception:
             step_m=s.resolution_m / 2,
             reach_down=self.reach_down,
         )
-        probability = self.map.probability(tube)
-        taken = probability > 0.5
-        taken[taken] = ~self.map.explained(tube[taken])
-        return ahead_m, self._centres(tube[taken])
+        return ahead_m, self._centres(tube[self._occupied(tube)])
 
     def _centres(self, points_enu: F64) -> F64:
         """The voxels that hold these places, each once, as centres."""
@@ -274,10 +277,36 @@ class Perception:
         found = obstacles(inside, region="roi", **shared) + obstacles(beyond, region="corridor", **shared)
         return sorted(found, key=lambda f: f.distance_m)
 
-    def _region(self, pose: Pose, occupied: bool) -> SearchedRegion:
+    def _hidden_m(self, inside: F64, pose: Pose) -> float | None:
+        """Distance of the nearest thing that stood in the way and cannot be seen now: nobody knows its height."""
+        s = self.settings
+        self._remembered.remember(inside)
+        way = Way(self._depth_m, s.fov_rad / 2, s.vehicle_radius_m + s.position_error_m, s.height_m)
+        hidden = self._remembered.look(pose, way, self._sees, self._occupied)
+        return float(hidden[0]) if len(hidden) else None
+
+    def _sees(self, range_m: F64, aside_rad: F64) -> NDArray[np.bool_]:
+        return self.field.sees(range_m, aside_rad)
+
+    def _occupied(self, points_enu: F64) -> NDArray[np.bool_]:
+        """(N,) Whether an unexplained voxel stands at each place."""
+        taken = self.map.probability(points_enu) > 0.5
+        if not self.settings.paper_bare:
+            taken[taken] = ~self.map.explained(points_enu[taken])
+        return taken
+
+    @property
+    def _depth_m(self) -> float:
+        """Of what is searched ahead."""
+        return self.settings.depth_m
+
+    def _region(self, pose: Pose, occupied: bool, hidden_m: float | None) -> SearchedRegion | None:
+        """None where this frame looks elsewhere."""
         s, p = self.settings, pose.position_enu_m
         tip = (float(p[0]), float(p[1]), float(p[2]))
-        return SearchedRegion(tip, pose.heading_rad, s.depth_m, s.fov_rad, s.height_m, occupied)
+        return SearchedRegion(
+            tip, pose.heading_rad, self._depth_m, s.fov_rad, s.height_m, occupied, self.field.nearest_m, hidden_m
+        )
 
     def _swept(self, t_mono_s: float, pose: Pose) -> tuple[float | None, ...]:
         if t_mono_s - self._sweep[0] >= SWEEP_EVERY_S:

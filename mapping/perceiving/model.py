@@ -74,6 +74,12 @@ class RangeScan:
     range_m: NDArray[np.floating]
     """(N,)"""
     source: str = ""
+    looks_rad: NDArray[np.floating] = field(default_factory=lambda: np.empty(0))
+    """(M,) bearings of all level directions that were measured in, hit or not, each ``beam_rad`` wide."""
+    beam_rad: float = 0.0
+    nearest_m: float = 0.0
+    farthest_m: float = 0.0
+    """What is nearer or farther is not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +102,10 @@ class SearchedRegion:
     fov_rad: float
     height_m: float
     occupied: bool
+    nearest_m: float = 0.0
+    """What is nearer cannot be seen."""
+    hidden_m: float | None = None
+    """Distance of the nearest thing that stood in the way and cannot be seen now, so that it may still."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from mapping.perceiving.base import Perception
 from mapping.perceiving.model import FrameResult, RadarScan, Settings
 from mapping.perceiving.radar_evidence import RadarEvidence, side_lobes
 from mapping.perceiving.radar_passing import Passing
+from mapping.perceiving.remembered import Field
 from mapping.poses import Pose
 from mapping.radar_targets import Gate, in_gate, polar, to_enu
 
@@ -30,10 +31,11 @@ class RadarPerception(Perception):
     name = "radar"
     reach_down = math.tan(Gate().elevation_high_rad)
     """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
+    gate = Gate()
+    field = Field(gate.nearest_m, gate.azimuth_rad)
 
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         super().__init__(settings, alert_prefix=alert_prefix)
-        self.gate = Gate()
         self._evidence = RadarEvidence()
         self._passing = Passing()
 

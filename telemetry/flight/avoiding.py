@@ -180,6 +180,7 @@ class Avoiding:
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         self._state = state
         self._slowing.on_state(state)
+        self.detour.trail.on_state(state)
         if self.released and state.mode != GUIDED:
             self._helm.let_go()
         if _is_flying(state):

@@ -81,4 +81,8 @@ def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
     what = f"{SENSOR_WORDS[seen[0].sensor]}, {seen[0].distance_m or 0.0:.0f} m ahead" if seen else ""
     if detour.phase in ("stopping", "taking"):
         return f"Braking: {what}." if what else "Braking."
-    return f"Climbing: {what}." if what else "Climbing: clear, it levels off."
+    if detour.phase == "backing":
+        return "Goes back: it is too near to see what is in the way."
+    if what or detour.phase != "levelling":
+        return f"Climbing: {what or 'until it has been seen to be clear'}."
+    return "Climbing: clear, it levels off."

@@ -2,6 +2,7 @@
 
 Bigazzi 2022, figs 9-10: velocity V1 until something is inside the region, then V2 (climb) until it is clear, then V1
 again at the new altitude. Before the climb the vehicle is brought to a stand: it does not drift into what it saw.
+Where it stands too near to see what is in the way, it first goes back on the way that it came.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from telemetry.flight.backing import Backing, Trail
 from telemetry.flight.climb import Climb
 from telemetry.flight.helm import GUIDED, Helm
 from telemetry.flight.legs import Legs
@@ -20,7 +22,9 @@ from telemetry.messages import GuidedTarget
 from telemetry.obstacles import Sensor
 from telemetry.vehicle import VehicleState
 
-Phase = Literal["idle", "stopping", "taking", "climbing", "levelling", "going", "holding", "ceiling", "ending"]
+Phase = Literal[
+    "idle", "stopping", "taking", "backing", "climbing", "levelling", "going", "holding", "ceiling", "ending"
+]
 HEARD_S = 2.0
 """A heartbeat as young as this shows the vehicle's mode."""
 
@@ -40,6 +44,7 @@ class Detour:
 
     def __init__(self, helm: Helm, regions: Regions, params: DetourParams) -> None:
         self._helm, self._regions, self._params = helm, regions, params
+        self.trail = Trail()
         self.forget()
 
     def forget(self) -> None:
@@ -60,6 +65,7 @@ class Detour:
         self._least_m = self._wanted_offset_m = self._way_from_m = 0.0
         self._plan_m: float | None = None
         """Height of the plan where the vehicle stands."""
+        self._backing: Backing | None = None
         self._climb: Climb | None = None
         self._legs: Legs | None = None
 
@@ -79,6 +85,7 @@ class Detour:
         """Something is in the way of a flight of which ``rest`` is left, at its planned heights."""
         self.rest, self.is_manoeuvre, self._over, self._way = rest, False, True, ()
         self._witnesses.sensors = seen_by
+        self._regions.rely()
         self._least_m, self._plan_m = 0.0, None
         return self._stop(now_s, then="climb")
 
@@ -142,7 +149,7 @@ class Detour:
         return actions
 
     def resume(self, state: VehicleState, now_s: float) -> list[Action]:
-        if self.phase == "ceiling" and not self._regions.occupied(now_s):
+        if self.phase == "ceiling" and self._witnesses.say_clear(now_s):
             return self._level(state, now_s)
         if not self._paused:
             if self.phase == "holding":
@@ -158,6 +165,7 @@ class Detour:
         steps = {
             "stopping": self._on_stopping,
             "taking": self._on_taking,
+            "backing": self._on_backing,
             "climbing": self._on_climbing,
             "levelling": self._on_levelling,
             "going": self._on_going,
@@ -189,6 +197,18 @@ class Detour:
         if self._then == "go":
             self.phase = "going"
             return [] if self._legs is None else self._legs.go(state, now_s)
+        back_m = self._witnesses.back_m(now_s) if self._over else 0.0
+        if back_m > 0.0:
+            self.phase, self._backing = "backing", Backing(self._helm, self.trail, state, back_m)
+            return self._backing.go(now_s)
+        return self._begin_climb(state, now_s)
+
+    def _on_backing(self, state: VehicleState, now_s: float) -> list[Action]:
+        assert self._backing is not None
+        if not self._backing.is_over(state, now_s):
+            return []
+        if why := self._witnesses.hidden(now_s):
+            return self._hold(why, now_s, then="climb")
         return self._begin_climb(state, now_s)
 
     def _begin_climb(self, state: VehicleState, now_s: float) -> list[Action]:
@@ -209,7 +229,7 @@ class Detour:
     def _on_climbing(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._climb is not None
         self._witnesses.join(now_s)
-        if why := self._witnesses.blind(state, now_s):
+        if why := self._why_not_clear(state, now_s):
             return self._hold(why, now_s, then="climb")
         if self._climb.is_high_enough(state) and self._is_clear(now_s):
             return self._level(state, now_s)
@@ -217,6 +237,11 @@ class Detour:
             self.phase = "ceiling"
             return []
         return self._climb.rise(state, now_s)
+
+    def _why_not_clear(self, state: VehicleState, now_s: float) -> str:
+        """Why nobody can tell whether the way is clear; empty while it can be seen, or need not be."""
+        blind = self._witnesses.blind(state, now_s)
+        return blind or (self._witnesses.hidden(now_s) if self._over else "")
 
     def _is_clear(self, now_s: float) -> bool:
         return not self._over or self._witnesses.say_clear(now_s)
@@ -228,7 +253,7 @@ class Detour:
 
     def _on_levelling(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._climb is not None
-        if why := self._witnesses.blind(state, now_s):
+        if why := self._why_not_clear(state, now_s):
             return self._hold(why, now_s, then="climb")
         if self._over and self._regions.occupied(now_s):
             self.phase = "climbing"
@@ -306,7 +331,7 @@ class Detour:
     def _on_holding(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._helm.has_stopped(state, now_s):
             return self._stop_again_if_unheard(state, now_s)
-        missing = self._witnesses.blind if self._then == "climb" else self._witnesses.silent
+        missing = self._why_not_clear if self._then == "climb" else self._witnesses.silent
         if self._paused or missing(state, now_s):
             return []
         self.phase = "taking"

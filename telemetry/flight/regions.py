@@ -5,7 +5,7 @@ And how fast that allows to fly: a region must be deep enough to stop in."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapping.braking import Braking, Stopping
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
@@ -45,6 +45,14 @@ class Sight:
     """Between its frames: so late may what enters the region be seen."""
     since_s: float = 0.0
     """It has worked without a break since then."""
+    nearest_m: float = 0.0
+    """What is nearer it cannot see."""
+    hidden_m: float | None = None
+    """Distance of the nearest thing that stood in the way and cannot be seen now: it may still stand there."""
+    frames: int = 0
+    """Of its map, up to this one."""
+    forgot: bool = False
+    """Its map began anew since it was last relied on: what stood in the way is not in it any more."""
 
     def is_fresh(self, now_s: float) -> bool:
         return self.counts and now_s - self.t_mono_s <= OLD_S
@@ -58,13 +66,14 @@ class Regions:
         self.sights: dict[Sensor, Sight] = {}
 
     def take(self, status: PerceptionStatus) -> None:
-        """Frames that come late or twice change nothing, nor does what is told of a frame that was refused."""
-        if status.state == "running" and status.region is None and not status.obstacles:
+        """Frames that come late or twice change nothing, nor does one that was refused or does not look ahead."""
+        if status.state == "running" and status.region is None:
             return
         before = self.sights.get(status.sensor)
         if before is not None and before.counts and status.t_mono_s < before.t_mono_s:
             return
         again = before is not None and status.t_mono_s == before.t_mono_s
+        hidden_m = None if status.region is None else status.region.hidden_m
         found_m = self._in_the_way_m(status)
         occupied = found_m is not None
         counted = 0 if before is None else before.clear_frames
@@ -78,9 +87,13 @@ class Regions:
             distance_m=found_m,
             depth_m=self._depth_m(status),
             latency_s=status.latency_s or 0.0,
-            clear_frames=0 if occupied or status.state != "running" else counted + (not again),
+            clear_frames=0 if occupied or hidden_m is not None or status.state != "running" else counted + (not again),
             period_s=_period_s(status, before),
             since_s=_since_s(status, before),
+            nearest_m=0.0 if status.region is None else status.region.nearest_m,
+            hidden_m=hidden_m,
+            forgot=before is not None and (before.forgot or status.frames < before.frames),
+            frames=status.frames,
         )
 
     def counted(self, now_s: float) -> tuple[Sensor, ...]:
@@ -96,12 +109,38 @@ class Regions:
         """Sensors that see something in the way."""
         return frozenset(sight.sensor for sight in self.occupied(now_s))
 
+    def rely(self) -> None:
+        """From now on a map that begins anew has forgotten something."""
+        self.sights = {sensor: replace(sight, forgot=False) for sensor, sight in self.sights.items()}
+
     def is_clear(self, engaged: frozenset[Sensor], now_s: float) -> bool:
-        """Nobody sees anything, and those who did have seen nothing for several fresh frames."""
-        witnesses = [self.sights[sensor] for sensor in engaged]
-        return not self.occupied(now_s) and all(
-            sight.is_fresh(now_s) and sight.clear_frames >= CLEAR_FRAMES for sight in witnesses
+        """SEEN to be clear: nobody sees anything, and those who did have looked there and seen nothing for several
+        fresh frames. Of nobody in particular: whoever works."""
+        witnesses = self._witnesses(engaged, now_s)
+        return (
+            len(witnesses) > 0
+            and not self.occupied(now_s)
+            and all(_has_seen_clear(sight) and sight.is_fresh(now_s) for sight in witnesses)
         )
+
+    def hidden(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
+        """Of the sensors that are counted on: one that cannot see what stood in the way."""
+        witnesses = self._witnesses(engaged, now_s)
+        return next((sight for sight in witnesses if sight.hidden_m is not None or sight.forgot), None)
+
+    def nearest_m(self, engaged: frozenset[Sensor], now_s: float) -> float:
+        """Distance of the nearest thing that stands, or may stand, in the way."""
+        known = self._witnesses(engaged, now_s)
+        seen = [sight.distance_m for sight in known if sight.distance_m is not None]
+        return min([*seen, *(sight.hidden_m for sight in known if sight.hidden_m is not None)], default=math.inf)
+
+    def blind_m(self, engaged: frozenset[Sensor], now_s: float) -> float:
+        """What is nearer cannot be seen by one of the sensors that are counted on."""
+        known = self._witnesses(engaged, now_s)
+        return max((sight.nearest_m for sight in known), default=0.0)
+
+    def _witnesses(self, engaged: frozenset[Sensor], now_s: float) -> list[Sight]:
+        return [self.sights[sensor] for sensor in engaged] or self.fresh(now_s)
 
     def oldest(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
         """Of the sensors that are counted on: the one whose frames are too old, if there is one."""
@@ -158,6 +197,10 @@ class Regions:
         if near:
             return min(near)
         return depth_m if status.region is not None and status.region.occupied else None
+
+
+def _has_seen_clear(sight: Sight) -> bool:
+    return sight.clear_frames >= CLEAR_FRAMES and not sight.forgot
 
 
 def _flowed_t_s(status: PerceptionStatus, before: Sight | None) -> float:

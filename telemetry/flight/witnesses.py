@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from telemetry.flight.avoiding_words import SENSOR_WORDS
 from telemetry.flight.regions import OLD_S, Regions, Sight
 from telemetry.obstacles import Sensor
 from telemetry.vehicle import VehicleState
+
+SEEN_FROM_M = 1.5
+"""Beyond what is too near to be seen: voxels are a metre wide, and the vehicle drifts."""
 
 
 class Witnesses:
@@ -20,11 +25,33 @@ class Witnesses:
     def say_clear(self, now_s: float) -> bool:
         return self._regions.is_clear(self.sensors, now_s)
 
+    def hidden(self, now_s: float) -> str:
+        """Why it cannot be told whether it is clear although frames come; empty while it can."""
+        sight = self._regions.hidden(self.sensors, now_s)
+        if sight is None:
+            return ""
+        who = SENSOR_WORDS[sight.sensor].capitalize()
+        if sight.forgot:
+            return f"{who}: its map began anew, what stood in the way is not in it any more. Return home or take over."
+        return (
+            f"{who}: it is {sight.hidden_m or 0.0:.1f} m away and cannot be seen from here, so nobody knows whether the"
+            " way is clear. Return home or take over."
+        )
+
+    def back_m(self, now_s: float) -> float:
+        """How far back everything that is in the way can be seen."""
+        nearest_m = self._regions.nearest_m(self.sensors, now_s)
+        if not math.isfinite(nearest_m):
+            return 0.0
+        return max(0.0, self._regions.blind_m(self.sensors, now_s) + SEEN_FROM_M - nearest_m)
+
     def blind(self, state: VehicleState, now_s: float) -> str:
         """Why nothing can be told about what is ahead now; empty while all is well."""
         sight = self._regions.oldest(self.sensors, now_s)
         advice = "It climbs on by itself once something comes. Or return home."
         missing = "" if sight is None else f"Nothing new from {SENSOR_WORDS[sight.sensor]}. {advice}"
+        if not self.sensors and not self._regions.counted(now_s):
+            missing = f"No sensor sees ahead. {advice}"
         return _old_position(state, now_s) or missing
 
     def silent(self, state: VehicleState, now_s: float) -> str:

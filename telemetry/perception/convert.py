@@ -23,7 +23,16 @@ def counts(dropped: Mapping[str, int]) -> tuple[Count, ...]:
 
 
 def region_of(region: SearchedRegion) -> Region:
-    return Region(region.enu_m, region.heading_rad, region.depth_m, region.fov_rad, region.height_m, region.occupied)
+    return Region(
+        region.enu_m,
+        region.heading_rad,
+        region.depth_m,
+        region.fov_rad,
+        region.height_m,
+        region.occupied,
+        region.nearest_m,
+        region.hidden_m,
+    )
 
 
 def obstacle_of(found: Found, frame: LocalFrame) -> Obstacle:

@@ -69,7 +69,18 @@ def _range_scan(frame: RangeFrame) -> RangeScan:
     bearing, elevation, range_m = (np.array(values, np.float64) for values in lists)
     if not len(bearing) == len(elevation) == len(range_m):
         raise ValueError(f"{len(bearing)} bearings, {len(elevation)} elevations and {len(range_m)} ranges")
-    return RangeScan(frame.t_mono_s, frame.number, bearing, elevation, range_m, frame.source)
+    return RangeScan(
+        frame.t_mono_s,
+        frame.number,
+        bearing,
+        elevation,
+        range_m,
+        frame.source,
+        np.array(frame.looks_rad, np.float64),
+        frame.beam_rad,
+        frame.nearest_m,
+        frame.farthest_m,
+    )
 
 
 def _few(xyz: Any) -> Any:

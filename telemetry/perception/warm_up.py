@@ -52,7 +52,7 @@ def hovering(t_s: float) -> VehicleState:
 
 def _frame(kind: SensorKind, t_s: float, number: int) -> RadarFrame | CloudFrame | RangeFrame:
     if kind.sensor == "ranges":
-        return RangeFrame(t_s, t_s, number, "warm-up", (0.0, 0.1), (0.0, 0.0), (6.0, 6.0))
+        return RangeFrame(t_s, t_s, number, "warm-up", (0.0, 0.1), (0.0, 0.0), (6.0, 6.0), (0.0, 0.1), 0.1, 0.2, 40.0)
     xyz = packed(np.repeat([[0.0, 6.0, 1.0], [0.5, 5.0, 0.2]], 50, axis=0))
     if kind.sensor == "vision":
         return CloudFrame(t_s, t_s, number, "warm-up", xyz)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from mapping.braking import Braking
 from mapping.perceiving import RadarPerception, RadarScan, RangePerception, RangeScan, Settings, VisionPerception
 from mapping.perceiving.base import Perception
 from tests.mapping.flights import Flight, flat_ground
@@ -151,7 +152,7 @@ def test_the_corridor_sees_along_the_mission_where_the_sector_does_not() -> None
     assert result.region is not None
     assert not result.region.occupied
     assert result.corridor_occupied
-    assert result.corridor_m == pytest.approx(4.0**2 / 5 + 5 * 4.0 + 0.5)
+    assert result.corridor_m == pytest.approx(Braking().distance_m(4.0) + 5 * 4.0 + 0.5)
     assert [o.region for o in result.obstacles] == ["corridor"]
     flight.perception.set_line(None)
     flight.move()
@@ -227,7 +228,8 @@ def test_ranges_become_voxels_in_their_directions() -> None:
     p = flight.position
     bearing, elevation = np.array([0.0, math.pi / 2, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -math.pi / 2, 0.0, 0.0])
     away = np.array([5.0, 6.0, 5.0, math.nan, 1e6])
-    result = ranges.on_frame(RangeScan(flight.t_s, 1, bearing, elevation, away), flight.t_s)
+    scan = RangeScan(flight.t_s, 1, bearing, elevation, away, "", np.array([0.0, 0.1]), 0.1, 0.2, 30.0)
+    result = ranges.on_frame(scan, flight.t_s)
     probability = ranges.map.probability(p + np.array([[5.0, 0, 0], [0, -6.0, 0], [0, 0, -5.0]]))
     assert (probability > 0.5).all()
     np.testing.assert_array_equal(ranges.map.explained(p + np.array([[5.0, 0, 0], [0, 0, -5.0]])), [False, True])

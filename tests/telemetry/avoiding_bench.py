@@ -73,6 +73,9 @@ class Sense:
 class Craft:
     """``trail`` holds (time, north, up) of the truth, ``orders`` what avoidance sent, with the time."""
 
+    speed_m_s = SPEED_M_S
+    """Of the mission."""
+
     def __init__(self, items: tuple[Item, ...], walls: list[Wall], senses: list[Sense] | None = None) -> None:
         self.bench = Bench(heartbeat=True)
         self.walls = walls
@@ -105,7 +108,7 @@ class Craft:
         home = (3, 16, 0.0, 0, 0, 0.0)
         rows = [(i.frame, i.command, 0.0, round(i.lat_deg * 1e7), round(i.lon_deg * 1e7), i.alt_m) for i in self.items]
         assert self.bench.upload([home, *rows]) == 0
-        self.bench.set_parameters(WPNAV_SPEED=100 * SPEED_M_S)
+        self.bench.set_parameters(WPNAV_SPEED=100 * self.speed_m_s)
         self.bench.fly_mission()
         self.until(lambda: self.state.mode == "AUTO" and self.state.landed == "in_air", 60)
         self.avoiding.enable(self.now_s)

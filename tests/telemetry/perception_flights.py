@@ -96,7 +96,9 @@ def cloud_frame(t_s: float, number: int, t0_mono_s: float, t0_utc_s: float, *, c
 def range_frame(t_s: float, number: int, t0_mono_s: float, t0_utc_s: float) -> RangeFrame:
     psi = 0.1 * math.sin(0.7 * t_s)
     away_m = (WALL_NORTH_M - SPEED_M_S * t_s) / math.cos(psi)
-    return RangeFrame(t0_mono_s + t_s, t0_utc_s + t_s, number, "test", (0.0,), (0.0,), (away_m,))
+    return RangeFrame(
+        t0_mono_s + t_s, t0_utc_s + t_s, number, "test", (0.0,), (0.0,), (away_m,), (0.0,), 0.4, 0.2, 40.0
+    )
 
 
 def slam_pose(t_s: float, t0_mono_s: float) -> SlamPose:

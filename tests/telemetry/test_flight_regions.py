@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from telemetry.flight.regions import CLEAR_FRAMES, Regions
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
 from tests.telemetry.avoiding_bench import seen_at
@@ -65,11 +67,58 @@ def test_late_frames_change_nothing_and_nearest_sights_come_first() -> None:
     regions = of(
         status(2.0, obstacles=(seen_at(5.0),)),
         status(1.0),
-        status(2.0, sensor="radar", region=None, obstacles=(seen_at(4.0),)),
+        status(2.0, sensor="radar", region=replace(ROI, depth_m=10.0), obstacles=(seen_at(4.0),)),
     )
     assert [(sight.sensor, sight.distance_m) for sight in regions.occupied(2.1)] == [("radar", 4.0), ("vision", 5.0)]
-    assert regions.sights["radar"].depth_m == PerceptionSettings().radar_depth_m
+    assert regions.sights["radar"].depth_m == PerceptionSettings().radar_depth_m == 10.0
     assert regions.seen_by(2.1) == {"radar", "vision"}
+
+
+def test_who_does_not_look_ahead_says_nothing_about_what_is_there() -> None:
+    """Such as a range finder that looks down."""
+    assert of(status(1.0, sensor="ranges", region=None, obstacles=(seen_at(4.0),))).counted(1.0) == ()
+
+
+def hidden(t_s: float, **changes: Any) -> PerceptionStatus:
+    return status(t_s, region=replace(ROI, nearest_m=1.5, hidden_m=0.6), **changes)
+
+
+def test_what_cannot_be_seen_is_not_clear_however_many_frames_show_nothing() -> None:
+    vision: frozenset[Sensor] = frozenset({"vision"})
+    regions = of(*(hidden(1.0 + 0.1 * k, frames=k) for k in range(20)))
+    assert not regions.is_clear(vision, 2.9)
+    assert not regions.is_clear(frozenset(), 2.9)
+    assert regions.nearest_m(vision, 2.9) == 0.6
+    for k in range(20, 20 + CLEAR_FRAMES):
+        regions.take(status(1.0 + 0.1 * k, frames=k))
+    assert regions.is_clear(vision, 3.2)
+
+
+def test_where_nobody_looks_nothing_is_clear() -> None:
+    assert not of().is_clear(frozenset(), 1.0)
+    assert not of(*(status(1.0 + 0.1 * k) for k in range(5))).is_clear(frozenset(), 3.0)
+
+
+def test_a_map_that_began_anew_has_forgotten_what_stood_there() -> None:
+    vision: frozenset[Sensor] = frozenset({"vision"})
+    regions = of(status(1.0, obstacles=(seen_at(5.0),), frames=50))
+    regions.rely()
+    for k in range(5):
+        regions.take(status(1.1 + 0.1 * k, frames=k))
+    assert not regions.is_clear(vision, 1.5)
+    assert regions.hidden(vision, 1.5) is not None
+
+
+def test_how_fast_it_may_be_follows_from_what_each_sensor_sees_and_how_late() -> None:
+    slow = of(*(status(1.0 + 0.2 * k, latency_s=0.1) for k in range(5)))
+    slowest = slow.slowest(1.8)
+    assert slowest is not None
+    sight, speed_m_s = slowest
+    assert sight.period_s == pytest.approx(0.2)
+    assert 2.5 < speed_m_s < 2.8  # 7 m less hull, error and half a voxel; half a second
+    late = of(*(status(1.0 + 0.2 * k, latency_s=0.5) for k in range(5))).slowest(1.8)
+    assert late is not None
+    assert late[1] < speed_m_s - 0.2
 
 
 def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None:

@@ -200,6 +200,8 @@ export interface Region {
   fov_rad: number;
   height_m: number;
   occupied: boolean;
+  nearest_m: number;
+  hidden_m: number | null;
 }
 
 export interface ReplayStatus {

@@ -21,6 +21,8 @@ const REGION = {
   fov_rad: Math.PI / 2,
   height_m: 2,
   occupied: false,
+  nearest_m: 1.5,
+  hidden_m: null,
 };
 
 const sweep = (fields: Record<number, number>) =>
