@@ -71,7 +71,10 @@ class Hold:
 
     def update(self, pilot: Pilot, dt_s: float) -> Motion:
         if self._place is None:
-            self._shaped.stop(pilot.axes(), dt_s)
+            if self.name == "BRAKE":
+                self._shaped.brake(pilot.axes(), dt_s)
+            else:
+                self._shaped.stop(pilot.axes(), dt_s)
             if self._shaped.at_rest:
                 self.goal = self._place = self._shaped.p_neu
             return self._shaped.motion

@@ -23,6 +23,11 @@ SPEED_PER_S = 4.0
 """Acceleration over a difference of speed, while that is small."""
 JERK_SHARE = 0.4
 """How much of the jerk limit the change of a large difference of speed counts on."""
+BRAKE_ACCEL_M_S2 = 7.5
+"""ArduCopter's BRAKE_MODE_DECEL_RATE."""
+BRAKE_PER_S = JERK_M_S3 / BRAKE_ACCEL_M_S2
+"""BRAKE's deceleration over speed: its shaper takes the highest deceleration for what the jerk limit allows only of
+speeds above 11 m/s, so that a vehicle nearly always glides to a halt, as recorded."""
 AT_REST_M_S = 0.02
 STOPPING_STEP_S = 0.02
 LONGEST_STOP = 1000
@@ -58,6 +63,10 @@ class Shaped:
         """One step of braking, wherever that ends."""
         self._step((0.0, 0.0), 0.0, axes, dt_s)
 
+    def brake(self, axes: Axes, dt_s: float) -> None:
+        """One step of the flight mode BRAKE."""
+        self._step((0.0, 0.0), 0.0, axes, dt_s, brakes=True)
+
     @property
     def at_rest(self) -> bool:
         return math.hypot(*self.v_neu) < AT_REST_M_S and math.hypot(*self.accel_neu) < 10 * AT_REST_M_S
@@ -78,9 +87,14 @@ class Shaped:
         speed = approach_speed(abs(away_m), BRAKING_SHARE * axes.vertical_accel_m_s2)
         return min(speed, axes.climb_m_s) if away_m > 0 else -min(speed, axes.descent_m_s)
 
-    def _step(self, flat_m_s: tuple[float, float], up_m_s: float, axes: Axes, dt_s: float) -> None:
+    def _step(
+        self, flat_m_s: tuple[float, float], up_m_s: float, axes: Axes, dt_s: float, *, brakes: bool = False
+    ) -> None:
         (an, ae, au), (vn, ve, vu), (n, e, u) = self.accel_neu, self.v_neu, self.p_neu
-        north, east = _limited(_wish(flat_m_s[0] - vn), _wish(flat_m_s[1] - ve), axes.accel_m_s2)
+        if brakes:
+            north, east = _limited(-BRAKE_PER_S * vn, -BRAKE_PER_S * ve, BRAKE_ACCEL_M_S2)
+        else:
+            north, east = _limited(_wish(flat_m_s[0] - vn), _wish(flat_m_s[1] - ve), axes.accel_m_s2)
         most = axes.vertical_accel_m_s2
         up = max(-most, min(most, _wish(up_m_s - vu)))
         dn, de = _limited(north - an, east - ae, JERK_M_S3 * dt_s)
