@@ -126,6 +126,11 @@ class AdoptedVehicle:
         if new is not None and new is not self.state:
             self._on_state(new, now_s)
 
+    def on_foreign(self, message: Message) -> None:
+        """Of another ground station on the same link."""
+        if self.onboard.on_foreign(message, self.target[0]):
+            self._telling.unsure()
+
     def on_tick(self) -> None:
         now_s = self._clock()
         self.exchanges.on_tick()

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from telemetry.errors import MissionUnknownError
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from telemetry.errors import MissionUnknownError, TelemetryError
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.onboard import OnBoard
 from telemetry.messages import Item, OnboardMission
 
+ReadMission = Callable[[], Awaitable[OnboardMission]]
+AGAIN_S = 8.0
+"""A vehicle on the ground switches its motors off 10 s after it has armed."""
 CHANGE_SPEED = 178
 GROUND, AIR = 1, 0
 """SPEED_TYPE; a multirotor takes them for the same."""
@@ -21,6 +27,23 @@ def check_same_mission(onboard: OnBoard, digest: str) -> None:
         f"{what}: somebody else has replaced it since it was checked.",
         advice="Return home, then upload the plan and check it again.",
     )
+
+
+async def check_again(onboard: OnBoard, digest: str, read_mission: ReadMission) -> None:
+    """The same, of a mission that is read back now: another station may have replaced it a moment ago.
+
+    Raises MissionUnknownError.
+    """
+    check_same_mission(onboard, digest)
+    try:
+        async with asyncio.timeout(AGAIN_S):
+            await read_mission()
+    except (TelemetryError, TimeoutError) as error:
+        raise MissionUnknownError(
+            f"The mission on board could not be read once more before the start: {str(error) or 'it took too long'}.",
+            advice="Improve the link, then start again.",
+        ) from None
+    check_same_mission(onboard, digest)
 
 
 async def set_speeds(vehicle: AdoptedVehicle, item: int) -> None:

@@ -9,7 +9,7 @@ from planning.formats.commands import FLOWN_TO
 from telemetry.errors import NotAllowedError
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.flight_keeper import sequence_of
-from telemetry.mavlink.going_on import check_same_mission, set_speeds
+from telemetry.mavlink.going_on import ReadMission, check_again, set_speeds
 from telemetry.messages import Item
 from telemetry.requests import StartAuto
 from telemetry.vehicle import VehicleState
@@ -26,7 +26,7 @@ METRES_PER_DEG = 111_195.0
 class JoinMission:
     """``take_off``, then ``go_on``, which may be called again after a pause."""
 
-    def __init__(self, vehicle: AdoptedVehicle, request: StartAuto) -> None:
+    def __init__(self, vehicle: AdoptedVehicle, request: StartAuto, read_mission: ReadMission) -> None:
         """Raises NotAllowedError when there is no safe way for it."""
         if vehicle.state.autopilot != "ardupilot":
             what = "Going on at a later item works with ArduPilot only."
@@ -35,6 +35,7 @@ class JoinMission:
             what = f"To go on at item {request.from_item} a height for the way there is needed."
             raise NotAllowedError(what, advice="Let the height be worked out from the surface model.")
         self._vehicle, self._item, self._digest = vehicle, request.from_item, request.digest
+        self._read_mission = read_mission
         self._climb_to_m = request.climb_to_m
         self._place = self._find_place()
         self.is_active = self.is_done = False
@@ -57,7 +58,7 @@ class JoinMission:
             accepted()
             await self._fly_there()
             vehicle = self._vehicle
-            check_same_mission(vehicle.onboard, self._digest)
+            await check_again(vehicle.onboard, self._digest, self._read_mission)
             await vehicle.obey(vehicle.orders.mission_item(sequence_of(self._item, vehicle.state.autopilot)))
             await vehicle.obey(vehicle.orders.mission_mode())
             self.is_done = True

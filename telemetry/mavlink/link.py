@@ -43,6 +43,8 @@ from telemetry.vehicle import VehicleState
 
 TICK_S = 0.05
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
+ALERT = 1
+"""MAV_SEVERITY"""
 AUTOPILOT = Operator("link", 0)
 """Who is named in the audit log for what the link does by itself."""
 
@@ -126,7 +128,14 @@ class Link:
         async def read_parameter(name: str) -> float | None:
             return (await transfers.read_parameters((name,)))[name]
 
-        self.pilot = Pilot(vehicle, self.flight, spawn=self.spawn, read_parameter=read_parameter)
+        self.pilot = Pilot(
+            vehicle,
+            self.flight,
+            spawn=self.spawn,
+            read_parameter=read_parameter,
+            read_mission=lambda: transfers.download(own_idea=True),
+            alarm=self._alarm,
+        )
         if self._settings is not None:
             self.pilot.avoidance.on_settings(self._settings)
         vehicle.send_first()
@@ -180,6 +189,8 @@ class Link:
                 self.publish(Topic.RANGE_FRAME, ranges)
             if self.pilot is not None:
                 self.pilot.avoidance.on_message(message)
+        elif verdict == "stranger" and self.vehicle is not None and line is self.vehicle.line:
+            self.vehicle.on_foreign(message)
 
     def on_perception(self, status: PerceptionStatus) -> None:
         """What a sensor's node says about the regions ahead."""
@@ -206,6 +217,11 @@ class Link:
 
     def _on_text(self, severity: int, text: str) -> None:
         self.publish(Topic.TEXT, VehicleText(time.time(), severity, text))
+
+    def _alarm(self, text: str) -> None:
+        """What the pilot must hear at once; what is done about it is written down."""
+        self._on_text(ALERT, text)
+        self.spawn(self.trail.record(AUTOPILOT, f"hold: {text}", must=False))
 
     def _on_sent(self, frame: bytes) -> None:
         assert self.vehicle is not None

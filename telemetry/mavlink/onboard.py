@@ -11,6 +11,8 @@ from telemetry.vehicle import VehicleState
 SETTLE_S = 2.0
 """After a transfer of ours late answers may come, and the vehicle's figures about its mission may be old ones."""
 _OF_A_TRANSFER = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
+_WRITES = ("MISSION_COUNT", "MISSION_WRITE_PARTIAL_LIST", "MISSION_CLEAR_ALL")
+"""How a ground station begins to replace a mission."""
 PLAN_RECEIVED = "Flight plan received"
 
 
@@ -20,7 +22,7 @@ class OnBoard:
     def __init__(self) -> None:
         self.mission: OnboardMission | None = None
         self._transferring = False
-        self._settled_s = 0.0
+        self._settled_s = self._counted_s = 0.0
         self._seen: tuple[int | None, int | None] | None = None
 
     @property
@@ -53,17 +55,31 @@ class OnBoard:
         if self._transferring:
             return False
         kind = message.get_type()
+        if kind == "MISSION_CURRENT":
+            self._counted_s = now_s
         if kind == "STATUSTEXT":  # of an upload of ours it comes before the read-back
             return self._lose() if message.text.startswith(PLAN_RECEIVED) else False
         transfer = kind in _OF_A_TRANSFER and message.mission_type == 0
         return self._lose() if transfer and now_s >= self._settled_s else False
+
+    def on_foreign(self, message: Message, system: int) -> bool:
+        """The same, from what another ground station is heard to send to the vehicle with this system id."""
+        is_write = message.get_type() in _WRITES and getattr(message, "mission_type", 0) == 0
+        return self._lose() if is_write and message.target_system in (0, system) else False
 
     def on_state(self, state: VehicleState, now_s: float) -> bool:
         """The same, from the number of items and the mission's id."""
         if self._transferring or now_s < self._settled_s or state.mission_item is None:
             return False
         seen, self._seen = self._seen, (state.mission_items, state.mission_id)
-        return self._lose() if seen is not None and seen != self._seen else False
+        changed = seen is not None and seen != self._seen
+        return self._lose() if changed or not self._fits(state) else False
+
+    def _fits(self, state: VehicleState) -> bool:
+        """Whether the vehicle counts as many items as were read back, where it counts them at all."""
+        if self.mission is None or self._counted_s < self._settled_s:
+            return True
+        return state.mission_items in (None, len(self.mission.items))
 
     def _lose(self) -> bool:
         was_known = self.mission is not None

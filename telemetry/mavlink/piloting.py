@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -14,7 +15,7 @@ from telemetry.flight.rest import Rest, rest_from, rest_of_flight
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.avoidance import Avoidance
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
-from telemetry.mavlink.going_on import check_same_mission, set_speeds
+from telemetry.mavlink.going_on import ReadMission, check_again, check_same_mission, set_speeds
 from telemetry.mavlink.joining import JoinMission
 from telemetry.mavlink.mode_change import change_mode
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
@@ -26,6 +27,10 @@ RESTART_PARAMETER = "MIS_RESTART"
 IN_THE_AIR = ("taking_off", "in_air", "landing")
 LOW_M = 1.0
 SUPERSEDED = "Another command was given."
+FOREIGN_MISSION = (
+    "The mission on board is not the one that was started any more: another ground station has written to it."
+    " The vehicle holds. Return home or land."
+)
 
 
 class Pilot:
@@ -38,18 +43,24 @@ class Pilot:
         *,
         spawn: Spawn,
         read_parameter: Callable[[str], Awaitable[float | None]],
+        read_mission: ReadMission,
+        alarm: Callable[[str], None],
     ) -> None:
+        """``read_mission``: reads back what is on board; ``alarm``: tells at once what has gone wrong in flight."""
         self.vehicle, self.flight = vehicle, flight
         self.script: GuidedScript | None = None
         self.join: JoinMission | None = None
         self.avoidance = Avoidance(
             vehicle, rest=self._rest, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
         )
-        self._procedures, self._read_parameter = Procedures(spawn, flight.say), read_parameter
+        self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
+        self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
         self._script_since_s: float | None = None
         self._script_accepted: Accepted = lambda: None
         self._started_digest: str | None = None
         """Of the mission that is under way, if it was started from here."""
+        self._known_foreign = False
+        """The alarm over another mission has been raised."""
 
     @property
     def script_flies(self) -> bool:
@@ -89,6 +100,26 @@ class Pilot:
         joining = self.join is not None and self.join.is_active
         if self.script is None:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
+        self._watch_mission(state)
+
+    def _watch_mission(self, state: VehicleState) -> None:
+        """A vehicle that flies by another mission than the one that was checked is stopped, once."""
+        started = self._started_digest
+        if started is None or self.vehicle.onboard.digest == started:
+            self._known_foreign = False
+            return
+        flies_it = state.armed and state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
+        if flies_it and not self._known_foreign:
+            self._known_foreign = True
+            self._alarm(FOREIGN_MISSION)
+            self._spawn(self._stop_foreign_mission())
+
+    async def _stop_foreign_mission(self) -> None:
+        try:
+            await self.pause()
+        except TelemetryError as error:
+            self._alarm(f"The vehicle does not hold: {error}")
+        self.flight.say(FOREIGN_MISSION)
 
     def _follow_avoidance(self) -> None:
         before = self.flight.status
@@ -120,7 +151,7 @@ class Pilot:
         self._check_start(request)
         self.join = None
         if request.from_item > 1:
-            self.join = JoinMission(self.vehicle, request)
+            self.join = JoinMission(self.vehicle, request, self._read_mission)
         await self._procedures.take_over(lambda accepted: self._start_auto(request, accepted))
 
     async def start_guided(self, request: StartGuided) -> None:
@@ -292,14 +323,22 @@ class Pilot:
         if vehicle.firmware == "ardupilot":
             await vehicle.obey(orders.mode("GUIDED"))
             await self._arm_if_needed()
-            check_same_mission(vehicle.onboard, digest)
+            await self._check_or_disarm(digest)
             await vehicle.obey(orders.mission_mode())
             await vehicle.obey(orders.start_mission())
         else:
             await vehicle.obey(orders.mission_mode())
-            check_same_mission(vehicle.onboard, digest)
+            await check_again(vehicle.onboard, digest, self._read_mission)
             await self._arm_if_needed()
             await vehicle.obey(orders.start_mission())
+
+    async def _check_or_disarm(self, digest: str) -> None:
+        try:
+            await check_again(self.vehicle.onboard, digest, self._read_mission)
+        except TelemetryError:
+            with contextlib.suppress(TelemetryError):  # it switches its motors off by itself soon
+                await self.vehicle.obey(self.vehicle.orders.disarm())
+            raise
 
     async def _arm_if_needed(self) -> None:
         if not self.vehicle.state.armed:

@@ -21,6 +21,9 @@ from telemetry.simulator.vehicle import SimulatedVehicle
 
 HEARTBEAT_S = 1.0
 TIMESYNC_S = 10.0
+NEWS_S = 0.15
+"""After this the other ground stations hear that one of them has written a mission; between 0.1 s and 0.2 s, measured
+on the real ArduCopter."""
 FASTEST_WALL_S = 0.02
 """However fast simulated time runs, no stream sends more often than 50 times a second."""
 GROUPS: dict[int, tuple[int, ...]] = {
@@ -65,6 +68,8 @@ class Endpoint:
         self._streams = Streams(vehicle, self._missions)
         self._commands = Commands(self._pilot)
         self._peers: dict[Hashable, _Peer] = {}
+        self._news: list[tuple[float, Reply]] = []
+        """That the other ground stations have not heard yet, and when they will."""
         self._heartbeat = _Stream(HEARTBEAT_S, 0.0)
         self._timesync = _Stream(TIMESYNC_S, TIMESYNC_S)
 
@@ -92,13 +97,15 @@ class Endpoint:
             self._on_heartbeat(message)
             return []
         if kind in MISSION_MESSAGES:
-            return self._missions.on_message(message, peer, wall_s) + self._tell()
+            return self._missions.on_message(message, peer, wall_s) + self._tell_first(peer, wall_s)
         replies = self._answer(kind, message, peer)
         return [(peer, reply) for reply in replies] + self._tell()
 
     def on_slice(self, wall_s: float) -> list[Reply]:
         """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
         out = self._missions.on_tick(wall_s)
+        out += [reply for due_s, reply in self._news if due_s <= wall_s]
+        self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]
         out += self._tell()
         now_s = self.vehicle.now_s
         if _due(self._heartbeat, now_s, wall_s) or wall_s - self._heartbeat.sent_wall_s > HEARTBEAT_S:
@@ -177,6 +184,12 @@ class Endpoint:
     def _beat(self, wall_s: float) -> list[Reply]:
         self._heartbeat.sent_wall_s = wall_s
         return self._to_all(self._streams.heartbeat())
+
+    def _tell_first(self, peer: Hashable, wall_s: float) -> list[Reply]:
+        """The news for this ground station; the others hear them later."""
+        told = self._tell()
+        self._news += [(wall_s + NEWS_S, reply) for reply in told if reply[0] != peer]
+        return [reply for reply in told if reply[0] == peer]
 
     def _tell(self) -> list[Reply]:
         """The autopilot's news, to everybody."""

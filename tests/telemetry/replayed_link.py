@@ -16,7 +16,7 @@ from unittest.mock import patch
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.formats.wpl import read_wpl
-from planning.model import Mission
+from planning.model import Firmware, Mission
 from telemetry.flight.targets import guided_plan
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.codec import Packer, Parser
@@ -75,7 +75,8 @@ class RecordedLine:
             return [wire.MAVLink_mission_count_message(*station, len(self._rows(items)), 0)]
         if kind == "MISSION_REQUEST_INT":
             row = self._rows(items)[message.seq]
-            return [item_message(row, message.seq, target=station, number=message.seq, firmware="ardupilot")]
+            firmware: Firmware = "ardupilot" if self.has_home_row else "px4"
+            return [item_message(row, message.seq, target=station, number=message.seq, firmware=firmware)]
         return []
 
     def _rows(self, items: tuple[Item, ...]) -> tuple[Item, ...]:

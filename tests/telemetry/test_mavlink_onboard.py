@@ -66,6 +66,31 @@ def test_another_ground_stations_upload_is_noticed(message: object) -> None:
     assert not onboard.on_message(heard(message), LATER_S)
 
 
+@pytest.mark.parametrize(
+    ("message", "lost"),
+    [
+        (mavlink.MAVLink_mission_count_message(1, 1, 7), True),
+        (mavlink.MAVLink_mission_clear_all_message(0, 0), True),
+        (mavlink.MAVLink_mission_count_message(2, 1, 7), False),
+        (mavlink.MAVLink_mission_count_message(1, 1, 7, mavlink.MAV_MISSION_TYPE_FENCE), False),
+        (mavlink.MAVLink_mission_request_list_message(1, 1), False),
+    ],
+)
+def test_another_ground_station_that_is_heard_to_write_is_noticed(message: object, lost: bool) -> None:
+    onboard = known()
+    assert onboard.on_foreign(heard(message), 1) is lost
+    assert (onboard.state == "unknown") is lost
+
+
+def test_a_count_that_does_not_fit_what_was_read_back_is_noticed_whenever_it_changed() -> None:
+    onboard, counts = known(), heard(mavlink.MAVLink_mission_current_message(0, 2))
+    two = replace(STATE, mission_items=2)
+    assert not onboard.on_state(two, LATER_S)  # a figure from before the transfer
+    onboard.on_message(counts, LATER_S)
+    assert onboard.on_state(two, LATER_S)
+    assert onboard.state == "unknown"
+
+
 def test_the_vehicles_own_words_about_it_count_at_once() -> None:
     words = heard(mavlink.MAVLink_statustext_message(6, b"Flight plan received"))
     onboard = known()

@@ -47,7 +47,20 @@ class Desk:
         async def no_parameter(_: str) -> float | None:
             return None
 
-        self.pilot = Pilot(self.bench.vehicle, self.flight, spawn=self._spawn, read_parameter=no_parameter)
+        async def read_mission() -> OnboardMission:
+            mission = self.bench.vehicle.onboard.mission
+            assert mission is not None
+            return mission
+
+        self.alarms: list[str] = []
+        self.pilot = Pilot(
+            self.bench.vehicle,
+            self.flight,
+            spawn=self._spawn,
+            read_parameter=no_parameter,
+            read_mission=read_mission,
+            alarm=self.alarms.append,
+        )
 
     def _spawn(self, coroutine: Any) -> asyncio.Task[None]:
         task = asyncio.get_running_loop().create_task(coroutine)
