@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.dsm import Dsm
+from planning.margins.budget import ClearanceBudget
+from planning.margins.following_error import Firmware, Way
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
-
-Firmware = Literal["ardupilot", "px4"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +69,16 @@ class VehicleProfile:
     position_error_m: float = 2.5
     rtl_height_m: float = 30.0
     """Return-to-launch height above home set in the autopilot (RTL_ALT, RTL_RETURN_ALT)."""
+    following_m: float | None = None
+    """Farthest that the autopilot departs from the line; None: as measured (``planning.margins.following_error``)."""
+    dsm_rms_m: float = 0.023
+    """RMS error of the surface model's check points (Melita 2020, section 6.1)."""
+    mass_kg: float = 2.0
+    """At take-off."""
+    rotors: int = 4
+    rotor_diameter_m: float = 0.254
+    downwash_m: float | None = None
+    """Kept below the rotors; None: by momentum theory (``planning.margins.downwash``)."""
     camera: Camera | None = None
 
 
@@ -182,6 +192,17 @@ class Home:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedFor:
+    """With which vehicle and which demands a mission was planned: whoever flies it counts on the same."""
+
+    profile: VehicleProfile
+    way: Way = "auto"
+    required_clearance_m: float | None = None
+    """Set by hand; None: the sum of the terms."""
+    max_height_above_ground_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Mission:
     """Items as uploaded, WITHOUT the home row that ArduPilot keeps at sequence 0."""
 
@@ -192,6 +213,8 @@ class Mission:
     cruise_speed_m_s: float | None = None
     warnings: tuple[str, ...] = ()
     """What a reader noticed: swapped coordinates, items it had to drop, guessed values."""
+    planned_for: PlannedFor | None = None
+    """None: the file does not say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,11 +260,13 @@ class ClearanceParams:
     rtl_height_m: float
     """Above home, as set in the autopilot."""
     max_height_above_ground_m: float | None = None
+    budget: ClearanceBudget | None = None
+    """What the required clearance is for; None: it is not known, and the line is taken to be flown exactly."""
 
-    @staticmethod
-    def default_required_m(*, position_error_m: float, vehicle_radius_m: float, downwash_m: float = 0.5) -> float:
-        """Position error + rotor downwash (no ground effect below it, Melita 2020 fig. 8) + vehicle radius."""
-        return position_error_m + downwash_m + vehicle_radius_m
+    @property
+    def following_m(self) -> float:
+        """Radius of the tube around the line for which the certificate is made."""
+        return 0.0 if self.budget is None else self.budget.value_m("following")
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,6 +324,13 @@ class Certificate:
     trend_distance_m: F64
     """(M,) 3-D distance to the surface model there"""
     assumptions: dict[str, object] = field(default_factory=dict)
+    budget: ClearanceBudget | None = None
+    """What the required clearance is for, term by term."""
+
+    @property
+    def following_m(self) -> float:
+        """Radius of the tube around the line that is proved."""
+        return 0.0 if self.budget is None else self.budget.value_m("following")
 
 
 @dataclass(frozen=True, slots=True)

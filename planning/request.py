@@ -6,7 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.model import ClearanceParams, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.margins.following_error import Way
+from planning.margins.vehicle_terms import budget_of
+from planning.model import ClearanceParams, MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
 from planning.survey import SurveyPlan
 
 LARGEST = 1e6
@@ -29,23 +31,30 @@ class PlanRequest:
     home_lat_lon_deg: tuple[float, float] | None = None
     """None: the first point of interest."""
     required_clearance_m: float | None = None
-    """None: position error + downwash + vehicle radius."""
+    """None: the sum of the terms (``planning.margins``)."""
     max_height_above_ground_m: float | None = None
     survey: SurveyPlan | None = None
     """The area and the pattern that the points come from; None: they are points of interest."""
+    way: Way = "auto"
+    """How it is flown: the autopilot departs from the line by that much."""
+
+    @property
+    def planned_for(self) -> PlannedFor:
+        """What the mission's own files carry."""
+        profile = effective_profile(self.profile, self.path)
+        return PlannedFor(profile, self.way, self.required_clearance_m, self.max_height_above_ground_m)
 
     def clearance(self) -> ClearanceParams:
-        required = self.required_clearance_m
-        if required is None:
-            required = ClearanceParams.default_required_m(
-                position_error_m=self.profile.position_error_m, vehicle_radius_m=self.profile.radius_m
-            )
+        """What is demanded of the line: the only place that says so."""
+        budget = budget_of(effective_profile(self.profile, self.path), self.way)
+        required_m = budget.total_m if self.required_clearance_m is None else self.required_clearance_m
         return ClearanceParams(
-            required_clearance_m=required,
+            required_clearance_m=required_m,
             vehicle_radius_m=self.profile.radius_m,
             position_error_m=self.profile.position_error_m,
             rtl_height_m=self.profile.rtl_height_m,
             max_height_above_ground_m=self.max_height_above_ground_m,
+            budget=budget,
         )
 
 
@@ -66,6 +75,18 @@ def survey_request(request: PlanRequest, survey: SurveyPlan) -> PlanRequest:
             camera_trigger_m=survey.trigger_distance_m if trigger_m is None else trigger_m,
             gimbal_pitch_deg=LOOKS_DOWN_DEG if pitch_deg is None else pitch_deg,
         ),
+    )
+
+
+def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfile:
+    """The profile with the speeds that a plan is flown at."""
+    return replace(
+        profile,
+        mean_speed_m_s=path.mean_speed_m_s,
+        max_speed_m_s=path.max_speed_m_s,
+        max_climb_m_s=path.max_climb_m_s,
+        max_descent_m_s=path.max_descent_m_s,
+        max_accel_m_s2=path.max_accel_m_s2,
     )
 
 
@@ -109,6 +130,13 @@ def check_demands(request: PlanRequest) -> None:
     _positive("Endurance", profile.endurance_s, "s")
     _at_least_zero("RTL height", profile.rtl_height_m, "m")
     _at_least_zero("Position error", profile.position_error_m, "m")
+    _at_least_zero("Accuracy of the surface model", profile.dsm_rms_m, "m")
+    for name, value in (("Following error", profile.following_m), ("Rotor downwash", profile.downwash_m)):
+        if value is not None:
+            _at_least_zero(name, value, "m")
+    _positive("Mass", profile.mass_kg, "kg")
+    _positive("Rotor diameter", profile.rotor_diameter_m, "m")
+    _positive("Number of rotors", profile.rotors, "")
     if request.required_clearance_m is not None:
         _positive("Required clearance", request.required_clearance_m, "m")
     if request.max_height_above_ground_m is not None:

@@ -17,7 +17,7 @@ SHIPPED = Path(__file__).parent / "profiles"
 DEFAULT_PROFILE = "generic-quad"
 FIRMWARES = ("ardupilot", "px4")
 MAX_FILE_BYTES = 65_536
-MAY_BE_ZERO = ("position_error_m", "rtl_height_m", "reserve_share")
+MAY_BE_ZERO = ("position_error_m", "rtl_height_m", "reserve_share", "following_m", "dsm_rms_m", "downwash_m")
 
 
 def shipped_profiles() -> tuple[str, ...]:
@@ -77,6 +77,7 @@ def _typed(table: Mapping[str, Any], kind: type, where: str) -> dict[str, Any]:
 
 
 def _value(value: Any, kind: str, where: str) -> Any:
+    kind = kind.removesuffix(" | None")
     if kind in ("int", "float"):
         whole = isinstance(value, int) or (isinstance(value, float) and value.is_integer())
         if isinstance(value, bool) or not isinstance(value, int | float) or (kind == "int" and not whole):
@@ -128,7 +129,7 @@ def dump_profile(profile: VehicleProfile) -> str:
     """The profile as TOML text that ``parse_profile`` reads back equal."""
     values = asdict(profile)
     camera = values.pop("camera")
-    lines = [f"{key} = {_toml(value)}" for key, value in values.items()]
+    lines = [f"{key} = {_toml(value)}" for key, value in values.items() if value is not None]
     if camera is not None:
         lines += ["", "[camera]", *(f"{key} = {_toml(value)}" for key, value in camera.items())]
     return "\n".join(lines) + "\n"

@@ -24,7 +24,12 @@ PATH = {
     "Acceleration limit": "max_accel_m_s2",
     "Sampling step": "step_m",
 }
-PROFILE = {"Vehicle radius": "radius_m", "Endurance": "endurance_s"}
+PROFILE = {
+    "Vehicle radius": "radius_m",
+    "Endurance": "endurance_s",
+    "Mass": "mass_kg",
+    "Rotor diameter": "rotor_diameter_m",
+}
 NOT_POSITIVE = (0.0, -1.0, math.nan, math.inf, -math.inf, 2 * LARGEST)
 
 
@@ -47,6 +52,9 @@ def test_must_be_positive(name: str, value: float) -> None:
 def test_must_not_be_negative(value: float) -> None:
     wrong = {
         "Position error": replace(SOUND, profile=replace(SOUND.profile, position_error_m=value)),
+        "Following error": replace(SOUND, profile=replace(SOUND.profile, following_m=value)),
+        "Rotor downwash": replace(SOUND, profile=replace(SOUND.profile, downwash_m=value)),
+        "Accuracy of the surface model": replace(SOUND, profile=replace(SOUND.profile, dsm_rms_m=value)),
         "RTL height": replace(SOUND, profile=replace(SOUND.profile, rtl_height_m=value)),
         "Excess height": replace(SOUND, mission=MissionParams(excess_height_m=value)),
         "Smoothing": replace(SOUND, surface=SurfaceParams(smooth_sigma_m=value)),
@@ -106,5 +114,12 @@ def test_ball_larger_than_the_model() -> None:
 
 
 def test_required_clearance_by_default() -> None:
-    assert SOUND.clearance().required_clearance_m == pytest.approx(2.5 + 0.5 + 0.35)
+    demanded = SOUND.clearance()
+    assert demanded.budget is not None
+    # Position error, following, three times the model's RMS, downwash, vehicle radius.
+    assert demanded.required_clearance_m == pytest.approx(2.5 + 1.1 + 0.069 + 0.593 + 0.35, abs=0.001)
+    assert demanded.following_m == 1.1
+    assert replace(SOUND, way="guided").clearance().following_m > 1.1
+    faster = replace(SOUND, path=PathParams(mean_speed_m_s=8.0, max_speed_m_s=12.0))
+    assert faster.clearance().following_m == pytest.approx(4 * 1.1)
     assert replace(SOUND, required_clearance_m=2.0).clearance().required_clearance_m == 2.0

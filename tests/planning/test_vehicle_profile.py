@@ -32,6 +32,12 @@ def test_the_shipped_profiles_are_sound() -> None:
     assert load_profile() == loaded["generic-quad"]
 
 
+def test_terms_that_are_left_to_hedgehop_are_not_written() -> None:
+    own = VehicleProfile("own", following_m=0.4, downwash_m=0.0, dsm_rms_m=0.1, mass_kg=3.2, rotors=6)
+    assert parse_profile(dump_profile(own).encode(), where="x.toml") == own
+    assert "following_m" not in dump_profile(VehicleProfile("measured"))
+
+
 @settings(deadline=None)
 @given(st.text(), st.floats(0.1, 20), st.integers(4, 5000), st.booleans())
 def test_what_is_saved_is_read_back(name: str, speed_m_s: float, max_items: int, with_camera: bool) -> None:
