@@ -1,5 +1,9 @@
 """The clearance certificate: proof that a flown line keeps its distance from a surface model.
 
+The certificate is of a tube, not of a line. The required clearance holds a term for how far the autopilot departs
+from the line (``ClearanceParams.following_m``); a point within that distance of the line is at most that much nearer
+to any column, so that the rest of the requirement holds for every point of the tube.
+
 The proof uses none of the code that makes the safe surface. Every cell of the model, at its full
 resolution, is a solid square column from below up to its elevation; unknown cells and everything outside
 the model are columns of infinite height; the line is straight between its points in the model's CRS.
@@ -117,6 +121,7 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
         trend_s_m=trend_s_m,
         trend_distance_m=trend_m,
         assumptions=_assumptions(dsm, line, params, scale),
+        budget=params.budget,
     )
 
 
@@ -127,7 +132,11 @@ def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Non
     for name, value in positive.items():
         if not 0.0 < value < math.inf:
             raise ParameterError(f"{name} is {value} m.", advice="It must be a positive number of metres.")
-    at_least_zero = {"vehicle's radius": params.vehicle_radius_m, "position error": params.position_error_m}
+    at_least_zero = {
+        "vehicle's radius": params.vehicle_radius_m,
+        "position error": params.position_error_m,
+        "following error": params.following_m,
+    }
     for name, value in at_least_zero.items():
         if not 0.0 <= value < math.inf:
             raise ParameterError(f"The {name} is {value} m.", advice="It must be zero or a positive number of metres.")
@@ -234,6 +243,12 @@ def _scale(dsm: Dsm, worst: WorstPoint) -> float:
     return max(scales, key=lambda scale: abs(scale - 1.0))
 
 
+def _following_words(params: ClearanceParams) -> str:
+    if params.budget is None:
+        return "the line is flown exactly: no wind, no way round corners"
+    return f"the vehicle stays within {params.following_m:.2f} m of the line; ways home begin and lead within that, too"
+
+
 def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: float) -> dict[str, object]:
     return {
         "version": planning.__version__,
@@ -245,7 +260,8 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
         "width_px": dsm.width_px,
         "height_px": dsm.height_px,
         "cells": "solid square columns at full resolution; unknown cells and everything outside: infinitely high",
-        "earth": "straight lines in the model's projected CRS, no wind, corners flown exactly",
+        "earth": "straight lines in the model's projected CRS",
+        "following": _following_words(params),
         "home_alt_dsm_m": line.home_alt_dsm_m,
         "takeoff_and_landing": "vertical columns, left out of the distances",
         "column_rule": (
@@ -257,6 +273,6 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
             " then straight and level to home; close to home the climb is cut short (ArduPilot RTL_CONE_SLOPE"
             f" {SLOPE:g}, PX4 RTL_CONE_ANG 45 within {NEAR_M:g} m)"
         ),
-        "parameters": asdict(params),
+        "parameters": {key: value for key, value in asdict(params).items() if key != "budget"},
         "notes": list(line.notes),
     }

@@ -12,8 +12,9 @@ from planning.camera import gsd_cm
 from planning.clearance import certificate_json
 from planning.dsm import Dsm
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
-from planning.plan import Plan, effective_profile, plan_trade
+from planning.plan import Plan, plan_trade
 from planning.report import ReportInput, TradeRow, render_report
+from planning.request import effective_profile
 from planning.summary import plan_summary
 
 FILES = (

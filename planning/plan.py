@@ -20,6 +20,7 @@ from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
 from planning.holes import HoleReport, fill_holes
 from planning.home import home_from_dsm
+from planning.margins.words import uncovered_words
 from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import (
     Certificate,
@@ -27,7 +28,6 @@ from planning.model import (
     Home,
     Mission,
     MissionParams,
-    PathParams,
     SampledPath,
     Surfaces,
     Timing,
@@ -35,7 +35,7 @@ from planning.model import (
 )
 from planning.path import sampled_path
 from planning.poi import check_pois
-from planning.request import PlanRequest, check_request, check_size
+from planning.request import PlanRequest, check_request, check_size, effective_profile
 from planning.surface import safe_surface, safe_surface_at
 from planning.survey_coverage import SurveyCoverage, survey_coverage
 from planning.timing import path_timing
@@ -101,6 +101,7 @@ def plan_mission(
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
     built = _mission(filled, request, profile, path, home)
+    built = replace(built, mission=replace(built.mission, planned_for=request.planned_for))
     report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **(assumptions or {})}
@@ -149,18 +150,6 @@ def _same_flight(line: FlownLine, meant: FlownLine) -> bool:
     off_m = line.points_m - meant.points_m
     off_home_m = np.abs([*np.subtract(line.home_xy_m, meant.home_xy_m), line.home_alt_dsm_m - meant.home_alt_dsm_m])
     return bool(max(np.abs(off_m).max(), off_home_m.max()) <= _READ_BACK_TOLERANCE_M)
-
-
-def effective_profile(profile: VehicleProfile, path: PathParams) -> VehicleProfile:
-    """The profile with the speeds that this plan is flown at."""
-    return replace(
-        profile,
-        mean_speed_m_s=path.mean_speed_m_s,
-        max_speed_m_s=path.max_speed_m_s,
-        max_climb_m_s=path.max_climb_m_s,
-        max_descent_m_s=path.max_descent_m_s,
-        max_accel_m_s2=path.max_accel_m_s2,
-    )
 
 
 def plan_trade(plan: Plan) -> list[Choice]:
@@ -231,7 +220,9 @@ def _coverage(dsm: Dsm, request: PlanRequest, line: FlownLine) -> SurveyCoverage
 
 def _warnings(request: PlanRequest, predicted: PredictedTime) -> list[str]:
     usable_s = request.profile.endurance_s * (1 - request.profile.reserve_share)
-    warnings = []
+    demanded = request.clearance()
+    uncovered = uncovered_words(demanded.budget, demanded.required_clearance_m)
+    warnings = [] if uncovered is None else [uncovered]
     if predicted.total_s > usable_s:
         warnings.append(
             f"The flight takes {predicted.total_s:.0f} s; endurance less reserve is {usable_s:.0f} s. "

@@ -18,6 +18,8 @@ _CERTIFICATE_KEYS = (
     "min_distance_m",
     "min_vertical_m",
     "required_clearance_m",
+    "clearance_budget",
+    "tube",
     "worst",
     "rtl_height_needed_m",
     "home_column_clear",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from planning.margins.words import budget_json, tube_json
 from planning.model import Certificate, finite_or_none
 
 WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")
@@ -19,6 +20,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "min_distance_m": certificate.min_distance_m,
         "min_vertical_m": certificate.min_vertical_m,
         "required_clearance_m": certificate.required_clearance_m,
+        "clearance_budget": budget_json(certificate.budget, certificate.required_clearance_m),
+        "tube": tube_json(certificate.following_m, certificate.min_distance_m, certificate.required_clearance_m),
         "worst": {key: getattr(certificate.worst, key) for key in WORST_KEYS},
         "rtl_height_needed_m": certificate.rtl_height_needed_m,
         "home_column_clear": certificate.home_column_clear,

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from planning.dsm import Dsm
+from planning.margins.words import is_by_hand
 from planning.model import ClearanceParams, LegClearance, Reason, WorstPoint
 
 RTK_ERROR_M = 0.1
@@ -54,20 +55,20 @@ def _clearance_reason(
     if worst_is_unknown:
         return Reason("clearance", text, FILL_OR_AVOID)
     mend = f"Raise H by at least {missing_m:.2f} m or take a larger R."
-    with_rtk_m = _default_required_m(params, RTK_ERROR_M)
-    is_default = math.isclose(required_m, _default_required_m(params, params.position_error_m))
-    if is_default and params.position_error_m > RTK_ERROR_M and nearest.min_distance_m >= with_rtk_m:
+    with_rtk_m = _required_with_rtk_m(params)
+    if nearest.min_distance_m >= with_rtk_m:
         mend += (
             f" With RTK ({RTK_ERROR_M} m) in place of {params.position_error_m} m position error it would be enough."
         )
     return Reason("clearance", text, mend)
 
 
-def _default_required_m(params: ClearanceParams, position_error_m: float) -> float:
-    """A requirement that was set by hand does not fall with the position error."""
-    return ClearanceParams.default_required_m(
-        position_error_m=position_error_m, vehicle_radius_m=params.vehicle_radius_m
-    )
+def _required_with_rtk_m(params: ClearanceParams) -> float:
+    """Infinite where RTK changes nothing: a requirement that was set by hand does not fall with the position error."""
+    budget = params.budget
+    if budget is None or params.position_error_m <= RTK_ERROR_M or is_by_hand(budget, params.required_clearance_m):
+        return math.inf
+    return budget.with_value("position_error", RTK_ERROR_M).total_m
 
 
 def return_reason(needed_m: float, from_m: np.ndarray | None, dsm: Dsm, params: ClearanceParams) -> Reason | None:
@@ -120,11 +121,13 @@ def column_reasons(home_obstacle: str | None, landing_obstacle: str | None) -> l
 
 
 def height_reason(highest_m: float, leg: int, item: int, params: ClearanceParams) -> Reason | None:
+    """The tube's upper side counts, as its lower side does for the clearance."""
     limit_m = params.max_height_above_ground_m
-    if limit_m is None or highest_m <= limit_m:
+    if limit_m is None or highest_m + params.following_m <= limit_m:
         return None
+    above = f", and the vehicle may be {_up(params.following_m, 0.01):.2f} m above it" if params.following_m else ""
     text = (
-        f"The line flies {_up(highest_m, 0.01):.2f} m above ground on leg {leg + 1} (item {item + 1});"
+        f"The line flies {_up(highest_m, 0.01):.2f} m above ground on leg {leg + 1} (item {item + 1}){above};"
         f" the limit is {limit_m:.2f} m."
     )
     return Reason(

@@ -16,6 +16,8 @@ from planning import __version__
 from planning.dsm import Dsm
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
+from planning.margins.budget import SUM_RULE
+from planning.margins.words import is_by_hand, tube_words
 from planning.model import (
     Certificate,
     FlownLine,
@@ -98,6 +100,8 @@ def render_report(plan: ReportInput) -> str:
             tiles=_tiles(plan),
             certificate_rows=_certificate_rows(plan),
             assumptions=assumption_rows(plan.certificate.assumptions),
+            term_rows=_term_rows(plan.certificate),
+            tube=tube_words(plan.certificate.following_m, plan.certificate.min_distance_m),
             legs=_tightest(plan.certificate.legs),
             mission_rows=_mission_rows(plan),
             parameter_rows=_parameter_rows(plan),
@@ -203,6 +207,21 @@ def _certificate_rows(plan: ReportInput) -> list[tuple[str, str, bool | None]]:
     ]
 
 
+def _term_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
+    """(term, metres, where it comes from), then the sum, and what a smaller clearance leaves out."""
+    budget, required_m = certificate.budget, certificate.required_clearance_m
+    if budget is None:
+        return [("Required", metres_up(required_m), "as given; what it is for is not known")]
+    rows = [(t.name.capitalize(), metres_up(t.value_m), t.source) for t in budget.terms]
+    rows.append(("Sum", metres_up(budget.total_m), SUM_RULE))
+    if is_by_hand(budget, required_m):
+        rows.append(("Required", metres_up(required_m), "set by hand"))
+    rows += [
+        (f"Not covered: {part.name}", metres_up(part.missing_m), "left out") for part in budget.uncovered_by(required_m)
+    ]
+    return rows
+
+
 def _tightest(legs: Sequence[LegClearance]) -> list[LegClearance]:
     return sorted(legs, key=lambda leg: leg.min_distance_m)[:TIGHTEST_LEGS]
 
@@ -239,6 +258,4 @@ def _parameter_rows(plan: ReportInput) -> list[tuple[str, str]]:
         ),
         ("Speed", f"mean {profile.mean_speed_m_s:g}, at most {profile.max_speed_m_s:g} m/s"),
         ("Climb, descent", f"at most {profile.max_climb_m_s:g} m/s up, {profile.max_descent_m_s:g} m/s down"),
-        ("Position error", metres(profile.position_error_m)),
-        ("Vehicle radius", metres(profile.radius_m)),
     ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planning.formats import trajectory_csv, wpl
-from planning.plan import effective_profile
+from planning.request import effective_profile
 from planning.vehicle_profile import dump_profile
 from server.jobs import Progress
 from server.schemas import PlanDoc

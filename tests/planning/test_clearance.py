@@ -14,7 +14,8 @@ from pyproj import CRS
 from planning.clearance import certificate_json, certify
 from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
-from planning.model import Certificate, ClearanceParams, FlownLine, Unjudged
+from planning.margins.vehicle_terms import budget_of
+from planning.model import Certificate, ClearanceParams, FlownLine, Unjudged, VehicleProfile
 
 WEST, NORTH = 500_000.0, 5_000_100.0
 PARAMS = ClearanceParams(3.0, vehicle_radius_m=0.35, position_error_m=1.0, rtl_height_m=40.0)
@@ -76,10 +77,39 @@ def test_too_little_clearance_says_where_how_much_and_what_helps():
 
 
 def test_rtk_is_named_where_it_would_help():
-    default_m = ClearanceParams.default_required_m(position_error_m=6.0, vehicle_radius_m=0.35)
-    params = replace(PARAMS, position_error_m=6.0, required_clearance_m=default_m)
+    budget = budget_of(VehicleProfile("quad", position_error_m=6.0))
+    params = replace(PARAMS, position_error_m=6.0, required_clearance_m=budget.total_m, budget=budget)
     reasons = {r.code: r for r in certify(dsm_of(flat()), line_of(*PLAIN), params).reasons}
     assert "With RTK (0.1 m)" in reasons["clearance"].mend
+
+
+def test_the_certificate_is_of_a_tube():
+    """Whatever lies within the following distance of the line keeps what is stated for the tube."""
+    budget = budget_of(VehicleProfile("quad", position_error_m=0.5, following_m=1.5))
+    params = replace(PARAMS, required_clearance_m=budget.total_m, budget=budget, rtl_height_m=60.0)
+    cells = flat()
+    cells[25:40, 30:34] = 4.0
+    certificate = certify(dsm_of(cells), line_of(*PLAIN), params)
+    tube = certificate_json(certificate)["tube"]
+    assert certificate.certified
+    assert certificate.min_distance_m >= 1.5 + tube["required_m"]
+    assert (tube["radius_m"], tube["min_distance_m"]) == (1.5, pytest.approx(certificate.min_distance_m - 1.5))
+    assert "everything within 1.50 m of the line" in tube["statement"]
+    random = np.random.default_rng(3)
+    for _ in range(40):
+        off_m = random.normal(size=3)
+        off_m *= 1.5 / np.linalg.norm(off_m)
+        beside = line_of(*(np.array(PLAIN) + off_m * (1, 1, 1)))
+        assert certify(dsm_of(cells), beside, params).min_distance_m >= tube["min_distance_m"] - 1e-9
+
+
+def test_the_height_limit_is_of_the_tube_too():
+    budget = budget_of(VehicleProfile("quad", position_error_m=0.5, following_m=1.5))
+    params = replace(PARAMS, required_clearance_m=budget.total_m, budget=budget, max_height_above_ground_m=11.5)
+    assert certify(dsm_of(flat()), line_of(*PLAIN), params).certified
+    lower = certify(dsm_of(flat()), line_of(*PLAIN), replace(params, max_height_above_ground_m=11.4))
+    assert codes(lower) == ["height_above_ground"]
+    assert "the vehicle may be 1.50 m above it" in lower.reasons[0].text
 
 
 def test_clearance_equal_to_the_required_is_enough():

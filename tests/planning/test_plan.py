@@ -53,7 +53,8 @@ def height_over_path(plan: Plan) -> np.ndarray:
 
 def test_a_plan_is_certified(plan: Plan) -> None:
     assert plan.certificate.certified
-    assert plan.certificate.min_distance_m >= plan.certificate.required_clearance_m == pytest.approx(1.35)
+    assert plan.certificate.min_distance_m >= plan.certificate.required_clearance_m == pytest.approx(2.612, abs=0.001)
+    assert plan.mission.planned_for == plan.request.planned_for
     assert plan.warnings == ()
     assert plan.predicted.total_s > plan.timing.t_s[-1]
     assert plan.mission.pois == plan.request.pois
