@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from planning.dsm import Dsm
-from planning.model import Camera, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
 from planning.poi_files import PoiFile
 from planning.request import PlanRequest, survey_request
 from planning.survey import SurveyPlan, survey_lines
+from planning.vehicle_profile import path_params
 from server.edits import new_poi_id
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
 
@@ -24,22 +25,14 @@ def doc_from_profile(profile: VehicleProfile) -> ProfileDoc:
 
 def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
     """Raises PlanningError when the survey polygon or camera cannot be flown."""
-    mission, profile = document.mission, document.profile
+    mission = document.mission
     place = mission.look_at
-    request = PlanRequest(
+    request = replace(
+        demands_from_doc(document),
         pois=tuple(Poi(p.lat_deg, p.lon_deg, p.name, p.loiter_s) for p in document.pois),
-        profile=profile_from_doc(profile),
         surface=SurfaceParams(**document.surface.model_dump()),
-        path=PathParams(
-            mean_speed_m_s=profile.mean_speed_m_s,
-            max_speed_m_s=profile.max_speed_m_s,
-            max_climb_m_s=profile.max_climb_m_s,
-            max_descent_m_s=profile.max_descent_m_s,
-            max_accel_m_s2=profile.max_accel_m_s2,
-            **document.path.model_dump(),
-        ),
         mission=MissionParams(
-            max_items=profile.max_items,
+            max_items=document.profile.max_items,
             excess_height_m=mission.excess_height_m,
             end=mission.end,
             altitude_reference=mission.altitude_reference,
@@ -50,10 +43,21 @@ def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
             camera_trigger_m=mission.camera_trigger_m,
         ),
         home_lat_lon_deg=None if document.home is None else (document.home.lat_deg, document.home.lon_deg),
-        required_clearance_m=document.clearance.required_clearance_m,
-        max_height_above_ground_m=document.clearance.max_height_above_ground_m,
     )
     return request if document.source == "pois" else survey_request(request, _survey(document, dsm))
+
+
+def demands_from_doc(document: PlanDoc) -> PlanRequest:
+    """Vehicle, limits and what is demanded of the line: all that a check needs, without points."""
+    profile = profile_from_doc(document.profile)
+    return PlanRequest(
+        pois=(),
+        profile=profile,
+        path=replace(path_params(profile), **document.path.model_dump()),
+        required_clearance_m=document.clearance.required_clearance_m,
+        max_height_above_ground_m=document.clearance.max_height_above_ground_m,
+        way=document.clearance.way,
+    )
 
 
 def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:

@@ -181,6 +181,8 @@ _SUMMARY_KEYS = (
     "min_distance_m",
     "min_vertical_m",
     "required_clearance_m",
+    "clearance_budget",
+    "tube",
     "rtl_height_needed_m",
     "rtl_height_m",
     "home_column_clear",

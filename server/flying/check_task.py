@@ -19,10 +19,9 @@ from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.holes import fill_holes
 from planning.model import ClearanceParams, Mission
-from planning.request import PlanRequest
 from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
-from server.documents import profile_from_doc
+from server.documents import demands_from_doc
 from server.jobs import Progress
 from server.library.seen import check_home_stands_on_ground, load_planned_terrain
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
@@ -98,13 +97,7 @@ def seen_in(record: PlanRecord) -> str | None:
 
 def clearance_of(record: PlanRecord) -> ClearanceParams:
     """What the plan demands."""
-    document = PlanDoc.model_validate_json(record.plan_json)
-    return PlanRequest(
-        pois=(),
-        profile=profile_from_doc(document.profile),
-        required_clearance_m=document.clearance.required_clearance_m,
-        max_height_above_ground_m=document.clearance.max_height_above_ground_m,
-    ).clearance()
+    return demands_from_doc(PlanDoc.model_validate_json(record.plan_json)).clearance()
 
 
 def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:

@@ -57,6 +57,12 @@ class ProfileDoc(Strict):
     max_items: int = 650
     position_error_m: Metres = 2.5
     rtl_height_m: Metres = 30.0
+    following_m: Metres | None = None
+    dsm_rms_m: Metres = 0.023
+    mass_kg: Metres = 2.0
+    rotors: int = 4
+    rotor_diameter_m: Metres = 0.254
+    downwash_m: Metres | None = None
     camera: CameraDoc | None = None
 
 
@@ -85,8 +91,10 @@ class MissionDoc(Strict):
 
 class ClearanceDoc(Strict):
     required_clearance_m: Metres | None = None
-    """None: position error + 0.5 m + vehicle radius."""
+    """None: the sum of the terms of the vehicle's profile."""
     max_height_above_ground_m: Metres | None = None
+    way: Literal["auto", "guided"] = "auto"
+    """How it will be flown: the autopilot departs from the line by that much."""
 
 
 class PlanDoc(Strict):

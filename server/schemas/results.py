@@ -38,6 +38,40 @@ class TradeRow(Strict):
     duration_s: float
 
 
+class TermDoc(Strict):
+    """One part of the required clearance."""
+
+    code: str
+    name: str
+    value_m: float
+    source: str
+
+
+class UncoveredDoc(Strict):
+    code: str
+    name: str
+    missing_m: float
+
+
+class BudgetDoc(Strict):
+    """What the required clearance is for."""
+
+    terms: list[TermDoc]
+    rule: str
+    total_m: float
+    set_by_hand: bool
+    uncovered: list[UncoveredDoc]
+
+
+class TubeDoc(Strict):
+    """Everything within ``radius_m`` of the line keeps ``min_distance_m``."""
+
+    radius_m: float
+    min_distance_m: float
+    required_m: float
+    statement: str
+
+
 class Chart(Strict):
     """Curves over the horizontal distance flown; null where unknown."""
 
@@ -79,6 +113,8 @@ class ResultDoc(Strict):
     min_distance_m: float | None
     min_vertical_m: float | None
     required_clearance_m: float
+    clearance_budget: BudgetDoc | None = None
+    tube: TubeDoc | None = None
     worst: WorstDoc | None
     rtl_height_needed_m: float | None
     rtl_height_m: float

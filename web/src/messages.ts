@@ -429,6 +429,12 @@ export interface ProfileDoc {
   max_items: number;
   position_error_m: number;
   rtl_height_m: number;
+  following_m: number | null;
+  dsm_rms_m: number;
+  mass_kg: number;
+  rotors: number;
+  rotor_diameter_m: number;
+  downwash_m: number | null;
   camera: CameraDoc | null;
 }
 
@@ -456,9 +462,11 @@ export interface MissionDoc {
 }
 
 export interface ClearanceDoc {
-  /** None: position error + 0.5 m + vehicle radius. */
+  /** None: the sum of the terms of the vehicle's profile. */
   required_clearance_m: number | null;
   max_height_above_ground_m: number | null;
+  /** How it will be flown: the autopilot departs from the line by that much. */
+  way: "auto" | "guided";
 }
 
 export interface PlanDoc {
@@ -508,6 +516,37 @@ export interface TradeRow {
   duration_s: number;
 }
 
+/** One part of the required clearance. */
+export interface TermDoc {
+  code: string;
+  name: string;
+  value_m: number;
+  source: string;
+}
+
+export interface UncoveredDoc {
+  code: string;
+  name: string;
+  missing_m: number;
+}
+
+/** What the required clearance is for. */
+export interface BudgetDoc {
+  terms: TermDoc[];
+  rule: string;
+  total_m: number;
+  set_by_hand: boolean;
+  uncovered: UncoveredDoc[];
+}
+
+/** Everything within ``radius_m`` of the line keeps ``min_distance_m``. */
+export interface TubeDoc {
+  radius_m: number;
+  min_distance_m: number;
+  required_m: number;
+  statement: string;
+}
+
 /** Curves over the horizontal distance flown; null where unknown. */
 export interface Chart {
   s_m: number[];
@@ -547,6 +586,8 @@ export interface ResultDoc {
   min_distance_m: number | null;
   min_vertical_m: number | null;
   required_clearance_m: number;
+  clearance_budget: BudgetDoc | null;
+  tube: TubeDoc | null;
   worst: WorstDoc | null;
   rtl_height_needed_m: number | null;
   rtl_height_m: number;

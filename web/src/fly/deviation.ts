@@ -1,12 +1,13 @@
-import type { AvoidanceStatus, ProfileDoc, VehicleState } from "../messages";
+import type { AvoidanceStatus, VehicleState } from "../messages";
 
 /** How far beside the planned line the vehicle may be, and where that is on a bar. */
 
-/** What the required clearance allows for following the path, beside the position error. */
-const FOLLOWING_ERROR_M = 0.5;
+/** Where no plan says how far the autopilot may depart from its line. */
+const USUAL_M = 1;
 
-export const tolerance_m = (profile: Pick<ProfileDoc, "position_error_m">) =>
-  profile.position_error_m + FOLLOWING_ERROR_M;
+/** The radius of the tube for which the plan's clearance is proved. */
+export const tolerance_m = (following_m: number | null | undefined) =>
+  following_m === null || following_m === undefined || following_m <= 0 ? USUAL_M : following_m;
 
 export type Verdict = "within" | "beyond" | "far" | "unknown";
 

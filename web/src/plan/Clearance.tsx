@@ -108,6 +108,11 @@ export function Clearance({ result }: { result: ResultDoc }) {
           testid="min-vertical"
         />
       </dl>
+      {result.tube && result.tube.radius_m > 0 && (
+        <p class="tube" data-testid="tube">
+          {result.tube.statement}
+        </p>
+      )}
       <Worst result={result} />
       <h2>Return and home</h2>
       <Return result={result} />

@@ -5,6 +5,7 @@ import { TraversabilitySection } from "../traversability/TraversabilitySection";
 import { PlanActions } from "./PlanActions";
 import { MissionSection } from "./sections/Mission";
 import { PointsSection } from "./sections/Points";
+import { RequiredSection } from "./sections/Required";
 import { SpeedsSection } from "./sections/Speeds";
 import { SurfaceSection } from "./sections/Surface";
 import { TerrainSection } from "./sections/Terrain";
@@ -25,6 +26,7 @@ export function PlanLeft() {
             <VehicleSection plan={plan} />
             <SurfaceSection plan={plan} />
             <SpeedsSection plan={plan} />
+            <RequiredSection plan={plan} />
             <MissionSection plan={plan} />
             <TraversabilitySection plan={plan} />
           </>

@@ -1,4 +1,3 @@
-import { metres } from "../../format";
 import type { ClearanceDoc, MissionDoc, PlanDoc } from "../../messages";
 import { Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
@@ -12,9 +11,6 @@ import { TradeTable } from "./TradeTable";
 const set = (label: string, fields: Partial<MissionDoc>) => editGroup("mission", "mission", label, fields);
 const demand = (label: string, fields: Partial<ClearanceDoc>) =>
   editGroup("clearance", "mission", label, fields);
-
-/** Position error + rotor downwash + vehicle radius, as the certificate does. */
-const DOWNWASH_M = 0.5;
 
 function Camera({ mission }: { mission: MissionDoc }) {
   return (
@@ -47,35 +43,20 @@ function Camera({ mission }: { mission: MissionDoc }) {
   );
 }
 
-function Safety({ plan: { clearance, profile } }: { plan: PlanDoc }) {
-  const required_m = profile.position_error_m + DOWNWASH_M + profile.radius_m;
+function HeightLimit({ clearance }: { clearance: ClearanceDoc }) {
   return (
-    <>
-      <AutoField
-        label="Own required clearance"
-        auto={`(${metres(required_m, 2)})`}
-        unit="m"
-        min={0}
-        max={500}
-        step={0.1}
-        value={clearance.required_clearance_m}
-        initial={Number(required_m.toFixed(2))}
-        testid="required-clearance"
-        onChange={(required_clearance_m) => demand("Required clearance", { required_clearance_m })}
-      />
-      <AutoField
-        label="Limit height above ground"
-        auto="(none)"
-        unit="m"
-        min={1}
-        max={10_000}
-        step={5}
-        value={clearance.max_height_above_ground_m}
-        initial={120}
-        testid="max-height"
-        onChange={(max_height_above_ground_m) => demand("Height limit", { max_height_above_ground_m })}
-      />
-    </>
+    <AutoField
+      label="Limit height above ground"
+      auto="(none)"
+      unit="m"
+      min={1}
+      max={10_000}
+      step={5}
+      value={clearance.max_height_above_ground_m}
+      initial={120}
+      testid="max-height"
+      onChange={(max_height_above_ground_m) => demand("Height limit", { max_height_above_ground_m })}
+    />
   );
 }
 
@@ -146,7 +127,7 @@ export function MissionSection({ plan }: { plan: PlanDoc }) {
       </div>
       <Heading mission={mission} />
       <Camera mission={mission} />
-      <Safety plan={plan} />
+      <HeightLimit clearance={plan.clearance} />
     </Section>
   );
 }
