@@ -7,6 +7,7 @@ import math
 
 from planning import __version__
 from planning.formats.commands import FRAME_NONE, POSITIONED, home_altitude_note, millimetres_up, plain_frame
+from planning.formats.planned_for import planned_for_json
 from planning.formats.qgc_plan_reader import read_plan
 from planning.formats.qgc_words import ALTITUDE_MODE, DEFAULT_SPEED_M_S, FIRMWARE_TYPE, QUADROTOR
 from planning.formats.safe_text import clean_name
@@ -77,6 +78,7 @@ def _provenance(mission: Mission) -> dict[str, object]:
         "note": home_altitude_note(home),
         "cruise_speed_m_s": mission.cruise_speed_m_s,
         "pois": [_poi(poi) for poi in mission.pois],
+        "planned_for": None if mission.planned_for is None else planned_for_json(mission.planned_for),
     }
 
 

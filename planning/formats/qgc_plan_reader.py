@@ -7,6 +7,7 @@ from typing import Any
 
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
+from planning.formats.planned_for import read_planned_for
 from planning.formats.qgc_words import ALTITUDE_MODE, COMPUTED_ABOVE_TERRAIN, FIRMWARE_TYPE
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
@@ -33,9 +34,10 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
     home = _home(mission.get("plannedHomePosition"), ours, file)
     warnings += swapped_against_home(home, items) + _ignored(plan)
     home = home_or_first_place(home, items, warnings)
-    return Mission(
-        home, tuple(items), _firmware(mission), _pois(ours, file), _speed(mission, ours), said_once(warnings)
-    )
+    raw = ours.get("planned_for")
+    planned = None if raw is None else read_planned_for(raw, _at(file, "$.hedgehop.planned_for"), warnings)
+    firmware, speed = _firmware(mission), _speed(mission, ours)
+    return Mission(home, tuple(items), firmware, _pois(ours, file), speed, said_once(warnings), planned)
 
 
 def _at(file: str, path: str) -> str:

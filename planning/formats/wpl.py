@@ -16,9 +16,10 @@ from planning.formats.commands import (
     millimetres_up,
     plain_frame,
 )
+from planning.formats.planned_for import planned_for_line, read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
 from planning.formats.swapped import swapped_against_home
-from planning.model import Home, Mission, MissionItem
+from planning.model import Home, Mission, MissionItem, PlannedFor
 
 HEADER = "QGC WPL 110"
 _NOTE = re.compile(r"#\s*([a-z_]+):\s*(.*)")
@@ -48,6 +49,7 @@ def _notes(mission: Mission) -> list[str]:
         f"# vertical_datum: {clean_name(home.vertical_datum or 'unknown')}",
         f"# firmware: {mission.firmware}",
         *([f"# cruise_speed_m_s: {speed:g}"] if speed is not None else []),
+        *([f"# planned_for: {planned_for_line(planned)}"] if (planned := mission.planned_for) is not None else []),
         f"# note: row 0 is home, {home_altitude_note(home)}",
     ]
 
@@ -80,7 +82,8 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
     warnings += swapped_against_home(home, items)
     home = home_or_first_place(home, items, warnings)
     firmware = "px4" if notes.get("firmware") == "px4" else "ardupilot"
-    return Mission(home, tuple(items), firmware, (), _speed(notes), tuple(warnings))
+    planned = _planned_for(lines, warnings)
+    return Mission(home, tuple(items), firmware, (), _speed(notes), tuple(warnings), planned)
 
 
 def _check_header(where: str, line: str) -> None:
@@ -98,6 +101,12 @@ def _check_header(where: str, line: str) -> None:
 def _notes_of(lines: list[str]) -> dict[str, str]:
     found = (_NOTE.match(line.strip()) for line in lines if line.startswith("#"))
     return {match[1]: clean_name(match[2]) for match in found if match}
+
+
+def _planned_for(lines: list[str], warnings: list[str]) -> PlannedFor | None:
+    texts = (match[2] for line in lines if (match := _NOTE.match(line.strip())) and match[1] == "planned_for")
+    text = next(texts, None)
+    return None if text is None else read_planned_for(text, "comment planned_for", warnings)
 
 
 def _item(fields: list[str], where: str) -> MissionItem:

@@ -15,15 +15,16 @@ from planning.formats.commands import has_position
 from planning.formats.detect import read_flight
 from planning.holes import HoleReport, fill_holes
 from planning.home import home_on_ground
-from planning.model import Certificate, ClearanceParams, Mission, VehicleProfile
+from planning.margins.words import uncovered_words
+from planning.model import Certificate, Mission, VehicleProfile
 from planning.plan import CERTIFICATE_STEP, hole_assumptions
 from planning.poi_files import warn_swapped
-from planning.request import PlanRequest, check_demands, check_hole_area
+from planning.request import check_hole_area
 from planning.summary import certificate_summary, dsm_summary
 from server.cli import options as o
 from server.cli.files import read_small
+from server.cli.mission_vehicle import demands_of, vehicle_of
 from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
-from server.cli.planning_run import profile_with
 from server.cli.terrain import ModelOptions, read_model
 from server.cli.verdict import leg_lines, verdict_lines
 from server.stopwatch import StepTimer
@@ -41,21 +42,43 @@ def certify(
     vertical_datum: o.VerticalDatum = None,
     max_hole_m2: o.MaxHole = 4.0,
     remove_spikes: o.RemoveSpikes = False,
-    profile: o.Profile = "generic-quad",
+    profile: o.MissionProfile = None,
     position_error_m: o.PositionError = None,
+    vehicle_radius_m: o.VehicleRadius = None,
+    following_m: o.FollowingError = None,
+    dsm_rms_m: o.DsmRms = None,
+    downwash_m: o.Downwash = None,
     rtl_height_m: o.RtlHeight = None,
+    flown_as: o.MissionFlownAs = None,
     required_clearance_m: o.RequiredClearance = None,
     max_height_above_ground_m: o.MaxHeight = None,
 ) -> None:
     """Prove the clearance of a mission made anywhere, against your own surface model."""
     with refusing(as_json=as_json):
-        vehicle = profile_with(profile, position_error_m=position_error_m, rtl_height_m=rtl_height_m)
         check_hole_area(max_hole_m2)
-        params = _demands(vehicle, required_clearance_m, max_height_above_ground_m)
         flight = read_flight(mission.name, read_small(mission))
+        vehicle = vehicle_of(
+            flight,
+            profile,
+            position_error_m=position_error_m,
+            rtl_height_m=rtl_height_m,
+            radius_m=vehicle_radius_m,
+            following_m=following_m,
+            dsm_rms_m=dsm_rms_m,
+            downwash_m=downwash_m,
+        )
+        request = demands_of(
+            flight, vehicle, way=flown_as, required_m=required_clearance_m, highest_m=max_height_above_ground_m
+        )
+        params = request.clearance()
         timer = StepTimer(progress)
         source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
-        warnings = [*flight.warnings, *warn_swapped([i for i in flight.items if has_position(i)], source)]
+        uncovered = uncovered_words(params.budget, params.required_clearance_m)
+        warnings = [
+            *flight.warnings,
+            *warn_swapped([i for i in flight.items if has_position(i)], source),
+            *([] if uncovered is None else [uncovered]),
+        ]
         for warning in warnings:
             say(f"Note: {warning}")
         timer(CERTIFICATE_STEP, None)
@@ -66,14 +89,6 @@ def certify(
         end_progress()
         _answer(summary | {"warnings": warnings}, certificate, as_json=as_json, verbose=verbose)
         raise typer.Exit(DONE if certificate.certified else FAILED)
-
-
-def _demands(vehicle: VehicleProfile, required_m: float | None, max_height_m: float | None) -> ClearanceParams:
-    request = PlanRequest(
-        pois=(), profile=vehicle, required_clearance_m=required_m, max_height_above_ground_m=max_height_m
-    )
-    check_demands(request)
-    return request.clearance()
 
 
 def _summary(

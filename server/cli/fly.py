@@ -20,13 +20,12 @@ import typer
 from planning.dsm import Dsm
 from planning.formats.detect import read_mission
 from planning.model import Mission
-from planning.request import PlanRequest, check_demands
 from server.cli import options as o
 from server.cli.files import check_directory, read_small
 from server.cli.flight_progress import FlightProgress
+from server.cli.mission_vehicle import demands_of, vehicle_of
 from server.cli.nodes import OPERATOR, Station, own_nodes
 from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
-from server.cli.planning_run import profile_with
 from server.cli.review import answer
 from server.cli.terrain import ModelOptions, read_model
 from server.errors import StorageError
@@ -71,8 +70,12 @@ def fly(
         Path | None, typer.Option("--record", metavar="FILE", help="Keep the recording (.mcap) here.")
     ] = None,
     as_json: o.AsJson = False,
-    profile: o.Profile = "generic-quad",
+    profile: o.MissionProfile = None,
     position_error_m: o.PositionError = None,
+    vehicle_radius_m: o.VehicleRadius = None,
+    following_m: o.FollowingError = None,
+    dsm_rms_m: o.DsmRms = None,
+    downwash_m: o.Downwash = None,
     rtl_height_m: o.RtlHeight = None,
     required_clearance_m: o.RequiredClearance = None,
     crs: o.Crs = None,
@@ -87,9 +90,17 @@ def fly(
         flight = read_mission(mission.name, read_small(mission))
         parse_address(link)
         _check_record(record)
-        vehicle = profile_with(profile, position_error_m=position_error_m, rtl_height_m=rtl_height_m)
-        request = PlanRequest(pois=(), profile=vehicle, required_clearance_m=required_clearance_m)
-        check_demands(request)
+        vehicle = vehicle_of(
+            flight,
+            profile,
+            position_error_m=position_error_m,
+            rtl_height_m=rtl_height_m,
+            radius_m=vehicle_radius_m,
+            following_m=following_m,
+            dsm_rms_m=dsm_rms_m,
+            downwash_m=downwash_m,
+        )
+        request = demands_of(flight, vehicle, way=mode, required_m=required_clearance_m, highest_m=None)
         model_options = ModelOptions(crs, z_scale, vertical_datum)
         model = read_model(dsm, StepTimer(progress), model_options)[0] if dsm else None
         for warning in flight.warnings:

@@ -123,6 +123,18 @@ Profile = Annotated[
         rich_help_panel=_VEHICLE,
     ),
 ]
+MissionProfile = Annotated[
+    str | None,
+    typer.Option(
+        "--profile",
+        metavar="NAME|FILE",
+        help=(
+            f"A shipped profile ({', '.join(shipped_profiles())}) or a TOML file; default: the one in the mission's"
+            " file. Options override it."
+        ),
+        rich_help_panel=_VEHICLE,
+    ),
+]
 MaxItems = Annotated[
     int | None,
     typer.Option(
@@ -145,11 +157,59 @@ RtlHeight = Annotated[
         rich_help_panel=_VEHICLE,
     ),
 ]
+MissionFlownAs = Annotated[
+    Literal["auto", "guided"] | None,
+    typer.Option(
+        "--flown-as",
+        help="Mission on board, or waypoints handed over one at a time; default: as it was planned.",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
 RequiredClearance = Annotated[
     float | None,
     typer.Option(
         "--required-clearance-m",
-        help="Default: position error + 0.5 m downwash + vehicle radius.",
+        help="Default: the sum of vehicle radius, position error, following, surface model's accuracy and downwash.",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
+VehicleRadius = Annotated[
+    float | None,
+    typer.Option(
+        "--vehicle-radius-m",
+        help="Half its largest extent, rotors included; default: the profile's (0.35).",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
+FollowingError = Annotated[
+    float | None,
+    typer.Option(
+        "--following-m",
+        help="Farthest that the autopilot departs from the line; default: as measured, by autopilot, way and speed.",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
+DsmRms = Annotated[
+    float | None,
+    typer.Option(
+        "--dsm-rms-m",
+        help="RMS error of the surface model; three times that is kept. Default: the profile's (0.023).",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
+Downwash = Annotated[
+    float | None,
+    typer.Option(
+        "--downwash-m",
+        help="Kept for the rotors' downwash; default: by momentum theory from mass and rotors.",
+        rich_help_panel=_CLEARANCE,
+    ),
+]
+FlownAs = Annotated[
+    Literal["auto", "guided"],
+    typer.Option(
+        "--flown-as",
+        help="Mission on board, or waypoints handed over one at a time: how well the line is followed.",
         rich_help_panel=_CLEARANCE,
     ),
 ]

@@ -75,7 +75,12 @@ def survey(
     profile: o.Profile = "mapper-rtk",
     max_items: o.MaxItems = None,
     position_error_m: o.PositionError = None,
+    vehicle_radius_m: o.VehicleRadius = None,
+    following_m: o.FollowingError = None,
+    dsm_rms_m: o.DsmRms = None,
+    downwash_m: o.Downwash = None,
     rtl_height_m: o.RtlHeight = None,
+    flown_as: o.FlownAs = "auto",
     required_clearance_m: o.RequiredClearance = None,
     max_height_above_ground_m: o.MaxHeight = None,
     home: o.Home = None,
@@ -94,6 +99,10 @@ def survey(
             max_accel_m_s2=max_accel_m_s2,
             max_items=max_items,
             position_error_m=position_error_m,
+            radius_m=vehicle_radius_m,
+            following_m=following_m,
+            dsm_rms_m=dsm_rms_m,
+            downwash_m=downwash_m,
             rtl_height_m=rtl_height_m,
         )
         if vehicle.camera is None:
@@ -118,6 +127,7 @@ def survey(
             home_lat_lon_deg=parse_place(home, "--home"),
             required_clearance_m=required_clearance_m,
             max_height_above_ground_m=max_height_above_ground_m,
+            way=flown_as,
         )
         check_request(request)
         corners = _corners(polygon)

@@ -14,6 +14,7 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
         "CERTIFIED" if summary["certified"] else "NOT CERTIFIED",
         f"  distance to the surface model: at least {_least(summary['min_distance_m'])}, "
         f"required {metres_up(summary['required_clearance_m'])}",
+        *_budget_lines(summary),
         f"  height above it: at least {_least(summary['min_vertical_m'])}",
         f"  nearest {_place(summary['worst'])}",
         f"  way home: {_way_home(summary)}",
@@ -37,6 +38,19 @@ def _photos(survey: dict[str, Any]) -> str:
 
 def _percent(share: float | None) -> str:
     return f"{math.floor(max(0.0, share or 0.0) * 100 + 1e-6)} %"
+
+
+def _budget_lines(summary: dict[str, Any]) -> list[str]:
+    """What the required clearance is for, and the tube that is proved."""
+    budget = summary["clearance_budget"]
+    terms = " + ".join(f"{term['name']} {metres_up(term['value_m'])}" for term in budget["terms"])
+    by_hand = f", set by hand; the terms come to {metres_up(budget['total_m'])}" if budget["set_by_hand"] else ""
+    left_out = ", ".join(f"{metres_up(part['missing_m'])} of {part['name']}" for part in budget["uncovered"])
+    return [
+        f"  required for: {terms}{by_hand}",
+        *([f"  NOT covered: {left_out}"] if left_out else []),
+        f"  {summary['tube']['statement']}",
+    ]
 
 
 def leg_lines(legs: list[dict[str, Any]]) -> list[str]:

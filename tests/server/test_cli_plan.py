@@ -53,8 +53,16 @@ def test_certified(flight: tuple[Run, Path]) -> None:
     assert summary["certified"] is True
     assert summary["reasons"] == []
     assert 5.0 <= summary["min_distance_m"] <= summary["min_vertical_m"] < 6.5
-    assert summary["required_clearance_m"] == pytest.approx(3.35)
-    assert summary["rtl_height_needed_m"] == pytest.approx(49.2, abs=0.2)
+    assert summary["required_clearance_m"] == pytest.approx(4.612, abs=0.001)
+    budget = summary["clearance_budget"]
+    assert sum(term["value_m"] for term in budget["terms"]) == pytest.approx(summary["required_clearance_m"])
+    assert {term["code"] for term in budget["terms"]} == {
+        "vehicle_radius", "position_error", "following", "dsm_accuracy", "downwash",
+    }  # fmt: skip
+    assert (budget["set_by_hand"], budget["uncovered"]) == (False, [])
+    assert summary["tube"]["radius_m"] == 1.1
+    assert summary["tube"]["min_distance_m"] == pytest.approx(summary["min_distance_m"] - 1.1)
+    assert summary["rtl_height_needed_m"] == pytest.approx(50.5, abs=0.2)
     assert summary["length_m"] == pytest.approx(208.4, abs=0.1)
     assert summary["samples"] == pytest.approx(2087, abs=5)
     assert 75 < summary["duration_s"] < 300
@@ -77,12 +85,49 @@ def test_worst_place_is_where_the_old_flight_was_lowest_too(flight: tuple[Run, P
     assert worst["alt_rel_home_m"] == pytest.approx(50.3, abs=0.3)
 
 
+def test_the_terms_are_set_and_what_is_left_out_is_said(hillside: tuple[Path, Path], tmp_path: Path) -> None:
+    options = ("--following-m", 0.3, "--dsm-rms-m", 0.1, "--downwash-m", 0.7, "--vehicle-radius-m", 0.4)
+    run = planned(hillside, tmp_path, "--position-error-m", 0.2, *options)
+    terms = {term["code"]: term["value_m"] for term in run.json["clearance_budget"]["terms"]}
+    assert terms == pytest.approx(
+        {"following": 0.3, "dsm_accuracy": 0.3, "downwash": 0.7, "vehicle_radius": 0.4, "position_error": 0.2}
+    )
+    by_hand = hedgehop(
+        "plan", *hillside, "--out", tmp_path, "--rtl-height-m", 70, "--required-clearance-m", 3, "--flown-as", "guided"
+    )
+    assert by_hand.code == 0
+    assert "following the line 1.80 m" in by_hand.out
+    assert "NOT covered: 1.65 m of following the line, 0.07 m of accuracy of the surface model" in by_hand.out
+    assert "The required clearance of 3.00 m was set by hand" in by_hand.err
+    page = (tmp_path / "report.html").read_text()
+    assert "Not covered: following the line" in page
+    assert "The proof is of a tube: everything within 1.80 m of the line" in page
+
+
+def test_certify_takes_vehicle_and_demands_from_the_missions_own_file(
+    hillside: tuple[Path, Path], tmp_path: Path
+) -> None:
+    run = planned(hillside, tmp_path, "--profile", "x500-rtk-px4", "--following-m", 0.6, "--flown-as", "guided")
+    for name in ("mission.waypoints", "mission.plan"):
+        again = hedgehop("certify", hillside[0], tmp_path / name, "--json")
+        assert again.code == 0
+        assert "vehicle as in the mission's file: X500, PX4, RTK" in again.err
+        assert again.json["clearance_budget"] == run.json["clearance_budget"]
+        assert again.json["rtl_height_m"] == 70
+    other = hedgehop("certify", hillside[0], tmp_path / "mission.plan", "--profile", "generic-quad", "--json")
+    assert other.json["required_clearance_m"] > run.json["required_clearance_m"]
+    assert "--profile generic-quad is taken instead of the mission's own X500, PX4, RTK" in other.err
+    wider = hedgehop("certify", hillside[0], tmp_path / "mission.plan", "--position-error-m", 0.5, "--json")
+    assert wider.json["required_clearance_m"] == pytest.approx(run.json["required_clearance_m"] + 0.4)
+    assert "position error of 0.5 m is taken instead of the mission's own 0.1" in wider.err
+
+
 def test_return_height_too_low(hillside: tuple[Path, Path], tmp_path: Path) -> None:
     run = hedgehop("plan", *hillside, "--out", tmp_path, "--rtl-height-m", 30)
     assert run.code == 1
     assert run.out.startswith("NOT CERTIFIED\n")
-    assert "way home: NOT clear at the return height of 30.00 m above home, needed 49." in run.out
-    assert "Set the return height to at least 50 m (ArduPilot: RTL_ALT 5000 cm" in run.out
+    assert "way home: NOT clear at the return height of 30.00 m above home, needed 50." in run.out
+    assert "Set the return height to at least 51 m (ArduPilot: RTL_ALT 5100 cm" in run.out
     assert json.loads((tmp_path / "certificate.json").read_text())["reasons"][0]["code"] == "return_height"
 
 

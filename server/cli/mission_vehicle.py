@@ -1,0 +1,56 @@
+"""Vehicle and demands of a mission that was planned before: its own files carry them, options win and are said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from planning.margins.following_error import WAY_NAMES, Way
+from planning.model import Mission, PlannedFor, VehicleProfile
+from planning.request import PlanRequest, check_demands
+from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
+from server.cli.output import harmless, say
+
+
+def vehicle_of(flight: Mission, profile: str | None, **overrides: float | None) -> VehicleProfile:
+    """The named profile, else the mission's own, else the default one; options override it. Says which it is."""
+    own = None if flight.planned_for is None else flight.planned_for.profile
+    if profile is not None:
+        vehicle = load_profile(profile)
+        if own is not None and own != vehicle:
+            say(f"Note: --profile {harmless(profile)} is taken instead of the mission's own {harmless(own.name)}.")
+    elif own is not None:
+        vehicle = own
+        say(
+            f"Note: vehicle as in the mission's file: {harmless(own.name)}, position error {own.position_error_m:g} m,"
+            f" return height {own.rtl_height_m:g} m."
+        )
+    else:
+        vehicle = load_profile(DEFAULT_PROFILE)
+        say(f"Note: the mission's file names no vehicle: {vehicle.name} is taken. Give --profile for another.")
+    given = {key: value for key, value in overrides.items() if value is not None}
+    for key, value in given.items():
+        if own is not None and (planned := getattr(own, key)) != value:
+            words = "what follows from the mission's own" if planned is None else f"the mission's own {planned:g}"
+            say(f"Note: {key.removesuffix('_m').replace('_', ' ')} of {value:g} m is taken instead of {words}.")
+    return replace(vehicle, **given)
+
+
+def demands_of(
+    flight: Mission, vehicle: VehicleProfile, *, way: Way | None, required_m: float | None, highest_m: float | None
+) -> PlanRequest:
+    """What a mission that was planned before is judged by: what is given wins over what its file says."""
+    own = flight.planned_for or PlannedFor(vehicle)
+    if required_m is not None and own.required_clearance_m not in (None, required_m):
+        say(f"Note: {required_m:g} m are required instead of the mission's own {own.required_clearance_m:g} m.")
+    if way is not None and flight.planned_for is not None and way != own.way:
+        say(f"Note: planned for {WAY_NAMES[own.way]}, judged as flown in {WAY_NAMES[way]}.")
+    request = PlanRequest(
+        pois=(),
+        profile=vehicle,
+        path=path_params(vehicle),
+        required_clearance_m=own.required_clearance_m if required_m is None else required_m,
+        max_height_above_ground_m=own.max_height_above_ground_m if highest_m is None else highest_m,
+        way=own.way if way is None else way,
+    )
+    check_demands(request)
+    return request
