@@ -10,14 +10,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
 from planning.formats.wpl import write_wpl
 from planning.geotiff import write_dsm
-from planning.model import Mission
+from planning.model import Mission, PlannedFor
+from planning.vehicle_profile import load_profile
 from server.cli.fly import keep_recording
 from server.cli.upload import upload_lines
 from server.errors import StorageError
@@ -131,6 +132,25 @@ def test_waypoints_one_at_a_time(ground: Ground) -> None:
     )
     assert run.code == 0, run.err
     assert run.out.startswith("COMPLETED\n")
+
+
+def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp_path: Path) -> None:
+    planned = PlannedFor(load_profile("mapper-rtk"), "auto", required_clearance_m=40.0)
+    high = write_mission(tmp_path / "high.waypoints", replace(SHORT, planned_for=planned))
+    run = hedgehop("fly", high, "--link", ground.link, "--dsm", ground.dsm, "--json")
+    assert run.code == 1
+    assert "vehicle as in the mission's file: Mapper, RTK, 24 Mpx, position error 0.1 m" in run.err
+    assert "the plan assumes 0.10 m" in run.err
+    assert "required 40.00 m" in run.json["error"]["what"]
+    wider = hedgehop(
+        "fly", high, "--link", ground.link, "--dsm", ground.dsm, "--json", "--mode", "guided",
+        "--position-error-m", 1.5, "--required-clearance-m", 41,
+    )  # fmt: skip
+    assert "position error of 1.5 m is taken instead of the mission's own 0.1" in wider.err
+    assert "41 m are required instead of the mission's own 40 m" in wider.err
+    assert "planned for AUTO, judged as flown in GUIDED" in wider.err
+    assert "the plan assumes 1.50 m" in wider.err
+    assert wider.code == 1
 
 
 def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:
