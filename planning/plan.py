@@ -15,6 +15,7 @@ import numpy as np
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
+from planning.feasibility import Feasibility, feasibility_of
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
@@ -66,6 +67,8 @@ class Plan:
     predicted: PredictedTime
     coverage: SurveyCoverage | None
     """What a survey's photos really see; None where the plan is no survey, or takes no photos."""
+    feasibility: Feasibility
+    """Whether the vehicle can fly it: a verdict of its own, beside the certificate's."""
     warnings: tuple[str, ...]
 
     @property
@@ -119,7 +122,8 @@ def plan_mission(
         certificate=certificate,
         predicted=predicted,
         coverage=coverage,
-        warnings=(*built.warnings, *_warnings(request, predicted)),
+        feasibility=feasibility_of(built.mission, profile, predicted.total_s),
+        warnings=(*built.warnings, *_warnings(request)),
     )
 
 
@@ -218,14 +222,7 @@ def _coverage(dsm: Dsm, request: PlanRequest, line: FlownLine) -> SurveyCoverage
     return survey_coverage(dsm, line, request.survey, camera, request.mission)
 
 
-def _warnings(request: PlanRequest, predicted: PredictedTime) -> list[str]:
-    usable_s = request.profile.endurance_s * (1 - request.profile.reserve_share)
+def _warnings(request: PlanRequest) -> list[str]:
     demanded = request.clearance()
     uncovered = uncovered_words(demanded.budget, demanded.required_clearance_m)
-    warnings = [] if uncovered is None else [uncovered]
-    if predicted.total_s > usable_s:
-        warnings.append(
-            f"The flight takes {predicted.total_s:.0f} s; endurance less reserve is {usable_s:.0f} s. "
-            "Fly faster, shorten the route or split it."
-        )
-    return warnings
+    return [] if uncovered is None else [uncovered]

@@ -9,6 +9,7 @@ import numpy as np
 
 from planning.clearance import certificate_json
 from planning.dsm import Dsm
+from planning.feasibility import feasibility_json
 from planning.model import Certificate, finite_or_none
 from planning.plan import Plan
 from planning.survey_coverage import SurveyCoverage
@@ -53,6 +54,7 @@ def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
     request = plan.request
     return {
         **certificate_summary(plan.certificate),
+        **feasibility_json(plan.feasibility),
         "rtl_height_m": request.profile.rtl_height_m,
         "length_m": float(plan.path.s_m[-1]),
         "duration_s": plan.predicted.total_s,

@@ -178,6 +178,8 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns:
 
 _SUMMARY_KEYS = (
     "certified",
+    "feasible",
+    "feasibility",
     "min_distance_m",
     "min_vertical_m",
     "required_clearance_m",

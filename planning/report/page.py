@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from planning import __version__
 from planning.dsm import Dsm
+from planning.feasibility import Feasibility, verdict_words
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
 from planning.margins.budget import SUM_RULE
@@ -61,6 +62,7 @@ class ReportInput:
     certificate: Certificate
     profile: VehicleProfile
     surface: SurfaceParams
+    feasibility: Feasibility
     predicted_duration_s: float
     """With the autopilot's corner behaviour, take-off and return."""
     max_items: int
@@ -101,6 +103,7 @@ def render_report(plan: ReportInput) -> str:
             certificate_rows=_certificate_rows(plan),
             assumptions=assumption_rows(plan.certificate.assumptions),
             term_rows=_term_rows(plan.certificate),
+            verdict=verdict_words(certified=plan.certificate.certified, feasible=plan.feasibility.feasible),
             tube=tube_words(plan.certificate.following_m, plan.certificate.min_distance_m),
             legs=_tightest(plan.certificate.legs),
             mission_rows=_mission_rows(plan),
@@ -152,7 +155,7 @@ def _tiles(plan: ReportInput) -> list[tuple[str, str, str, bool]]:
             "Duration",
             duration(plan.predicted_duration_s),
             f"usable {duration(usable_s)}",
-            plan.predicted_duration_s > usable_s,
+            any(row.code == "battery" for row in plan.feasibility.failures),
         ),
         ("Mission items", str(items), f"limit {plan.max_items}", items > plan.max_items),
     ]

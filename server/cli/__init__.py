@@ -1,6 +1,6 @@
 """The ``hedgehop`` command: the console's work without a browser.
 
-Exit codes: 0 done, 1 not certified or failed, 2 wrong input.
+Exit codes: 0 done, 1 not certified, not feasible or failed, 2 wrong input.
 """
 
 from __future__ import annotations

@@ -10,6 +10,9 @@ import typer
 from planning.clearance import certificate_json
 from planning.clearance import certify as certify_line
 from planning.dsm import Dsm
+from planning.errors import MissionError
+from planning.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
+from planning.flight_time.predict import predict_duration
 from planning.flown import flown_line
 from planning.formats.commands import has_position
 from planning.formats.detect import read_flight
@@ -85,10 +88,23 @@ def certify(
         filled, holes = fill_holes(source, max_area_m2=max_hole_m2)
         made |= {**hole_assumptions(holes, max_hole_m2), "vehicle_profile": vehicle.name}
         certificate = certify_line(filled, home_on_ground(flown_line(flight, filled), source), params, assumptions=made)
-        summary = _summary(certificate, flight, vehicle, source, holes) | {"seconds": timer.seconds()}
+        feasibility = _feasibility(flight, vehicle, filled, is_named=profile is not None)
+        summary = _summary(certificate, flight, vehicle, source, holes)
+        summary |= {**feasibility_json(feasibility), "seconds": timer.seconds()}
         end_progress()
         _answer(summary | {"warnings": warnings}, certificate, as_json=as_json, verbose=verbose)
-        raise typer.Exit(DONE if certificate.certified else FAILED)
+        raise typer.Exit(DONE if certificate.certified and feasibility.feasible is not False else FAILED)
+
+
+def _feasibility(flight: Mission, vehicle: VehicleProfile, dsm: Dsm, *, is_named: bool) -> Feasibility:
+    """Of a mission made anywhere, as far as its vehicle is known: by its own file, or by --profile."""
+    if flight.planned_for is None and not is_named:
+        return not_judged("The mission's file names no vehicle: whether one can fly it is not judged.")
+    try:
+        predicted_s = predict_duration(flight, vehicle, dsm).total_s
+    except MissionError:
+        predicted_s = None
+    return feasibility_of(flight, vehicle, predicted_s)
 
 
 def _summary(

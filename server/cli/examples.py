@@ -11,7 +11,7 @@ def _examples(*pairs: tuple[str, str]) -> str:
     return "\n\n".join(lines)
 
 
-EXIT_CODES = "Exit codes: 0 done, 1 not certified or failed, 2 wrong input."
+EXIT_CODES = "Exit codes: 0 done, 1 not certified, not feasible or failed, 2 wrong input."
 SERVE = _examples(
     ("A first look, with the demo terrain", "hedgehop serve --demo"),
     ("The same, the radar simulated from its samples on", "hedgehop serve --demo --radar iq"),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from planning.feasibility import commanded_speed_m_s
 from planning.margins.following_error import WAY_NAMES, Way
-from planning.model import Mission, PlannedFor, VehicleProfile
+from planning.model import Mission, PathParams, PlannedFor, VehicleProfile
 from planning.request import PlanRequest, check_demands
 from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
 from server.cli.output import harmless, say
@@ -47,10 +48,15 @@ def demands_of(
     request = PlanRequest(
         pois=(),
         profile=vehicle,
-        path=path_params(vehicle),
+        path=_as_fast_as_commanded(path_params(vehicle), flight),
         required_clearance_m=own.required_clearance_m if required_m is None else required_m,
         max_height_above_ground_m=own.max_height_above_ground_m if highest_m is None else highest_m,
         way=own.way if way is None else way,
     )
     check_demands(request)
     return request
+
+
+def _as_fast_as_commanded(path: PathParams, flight: Mission) -> PathParams:
+    """The faster it is flown, the less closely the line is followed: the mission's own speeds count, too."""
+    return replace(path, max_speed_m_s=max(path.max_speed_m_s, commanded_speed_m_s(flight) or 0.0))

@@ -38,7 +38,7 @@ def run(
     as_json: bool,
     model: ModelOptions,
 ) -> None:
-    """Plans, writes every file, says what came of it, and ends with 0 (certified) or 1."""
+    """Plans, writes every file, says what came of it, and ends with 0 (certified and feasible) or 1."""
     check_directory(out)
     timer = StepTimer(progress)
     source, made = read_model(dsm_file, timer, model)
@@ -52,7 +52,7 @@ def run(
     write_files(out, files)
     end_progress()
     _answer(plan, source, out, seconds, as_json=as_json)
-    raise typer.Exit(DONE if plan.certificate.certified else FAILED)
+    raise typer.Exit(DONE if plan.certificate.certified and plan.feasibility.feasible else FAILED)
 
 
 def _answer(plan: Plan, source: Dsm, out: Path, seconds: dict[str, float], *, as_json: bool) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from planning.feasibility import verdict_words
 from planning.report.words import metres, metres_up
 
 
 def verdict_lines(summary: dict[str, Any]) -> list[str]:
     """What a summary says. Clearances are rounded down and demands up, so that none is flattered."""
     lines = [
-        "CERTIFIED" if summary["certified"] else "NOT CERTIFIED",
+        verdict_words(certified=summary["certified"], feasible=summary["feasible"]),
         f"  distance to the surface model: at least {_least(summary['min_distance_m'])}, "
         f"required {metres_up(summary['required_clearance_m'])}",
         *_budget_lines(summary),
@@ -23,6 +24,7 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
     if (survey := summary.get("survey")) is not None:
         lines.append(f"  photos: {_photos(survey)}")
     lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
+    lines += [f"  - {row['text']} {row['mend']}" for row in summary["feasibility"] if row["state"] == "fails"]
     return lines
 
 

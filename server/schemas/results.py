@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from server.schemas.base import Strict
 from server.schemas.plan import PlanDoc
 
@@ -72,6 +74,15 @@ class TubeDoc(Strict):
     statement: str
 
 
+class FeasibilityDoc(Strict):
+    """One thing that the vehicle must be able to do."""
+
+    code: str
+    state: Literal["holds", "fails", "unknown"]
+    text: str
+    mend: str
+
+
 class Chart(Strict):
     """Curves over the horizontal distance flown; null where unknown."""
 
@@ -110,6 +121,9 @@ class SurveyResult(Strict):
 
 class ResultDoc(Strict):
     certified: bool
+    feasible: bool | None = None
+    """Whether the vehicle can fly it; null: not all is known."""
+    feasibility: list[FeasibilityDoc] = Field(default=[])
     min_distance_m: float | None
     min_vertical_m: float | None
     required_clearance_m: float

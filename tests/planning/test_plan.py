@@ -201,7 +201,11 @@ def test_too_close_is_told_not_raised(dsm: Dsm) -> None:
 
 def test_battery_is_watched(dsm: Dsm) -> None:
     plan = plan_mission(dsm, request_over(dsm, TRIANGLE, profile=replace(QUAD, endurance_s=60.0)))
-    assert "endurance less reserve is 45 s" in plan.warnings[0]
+    assert plan.certificate.certified
+    assert plan.feasibility.feasible is False
+    (failure,) = plan.feasibility.failures
+    assert failure.code == "battery"
+    assert "endurance less reserve is 45 s" in failure.text
 
 
 def test_assumptions(dsm: Dsm) -> None:

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from planning.feasibility import feasibility_of
 from planning.model import Certificate, FlownLine, LegClearance, Reason, SurfaceParams, VehicleProfile, WorstPoint
 from planning.report import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
@@ -48,6 +49,7 @@ def example(names=("P1", "P2", "P3")) -> ReportInput:
         certificate=certificate,
         profile=VehicleProfile("Quad"),
         surface=SurfaceParams(),
+        feasibility=feasibility_of(mission, VehicleProfile("Quad"), 125.0),
         predicted_duration_s=125.0,
         max_items=650,
         created_utc="2026-01-01 00:00 UTC",

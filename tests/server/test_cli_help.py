@@ -29,7 +29,7 @@ def test_help_of_plan_names_the_defaults_that_a_profile_gives() -> None:
 def test_overview() -> None:
     run = hedgehop("--help")
     assert run.code == 0
-    assert "Exit codes: 0 done, 1 not certified or failed, 2 wrong input." in run.out
+    assert "Exit codes: 0 done, 1 not certified, not feasible or failed, 2 wrong input." in run.out
 
 
 def test_version() -> None:

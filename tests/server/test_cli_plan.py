@@ -85,6 +85,33 @@ def test_worst_place_is_where_the_old_flight_was_lowest_too(flight: tuple[Run, P
     assert worst["alt_rel_home_m"] == pytest.approx(50.3, abs=0.3)
 
 
+def test_a_flight_longer_than_the_battery_is_not_feasible(hillside: tuple[Path, Path], tmp_path: Path) -> None:
+    weak = tmp_path / "weak.toml"
+    weak.write_text('name = "weak"\nendurance_s = 120.0\nrtl_height_m = 70.0\nposition_error_m = 0.5\n')
+    out = tmp_path / "out"
+    run = hedgehop("plan", *hillside, "--out", out, "--profile", weak)
+    assert run.code == 1
+    assert run.out.startswith("CERTIFIED, NOT FEASIBLE\n")
+    assert "endurance less reserve is 1 min 30 s. Fly faster, shorten the route or split it." in run.out
+    assert "✕ CERTIFIED, NOT FEASIBLE" in (out / "report.html").read_text()
+    answer = json.loads((out / "certificate.json").read_text())
+    assert (answer["certified"], answer["feasible"]) == (True, False)
+    states = {row["code"]: row["state"] for row in answer["feasibility"]}
+    assert states == {"battery": "fails", "speed": "holds", "climb": "holds", "items": "holds"}
+    again = hedgehop("certify", hillside[0], out / "mission.plan", "--json")
+    assert (again.code, again.json["certified"], again.json["feasible"]) == (1, True, False)
+
+
+def test_whether_a_nameless_vehicle_can_fly_is_not_judged(hillside: tuple[Path, Path]) -> None:
+    mission = hillside[1].parent / "mission.waypoints"
+    run = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70)
+    assert run.code == 0
+    assert run.out.startswith("CERTIFIED, feasibility not judged\n")
+    assert "names no vehicle: Generic quadrotor is taken" in run.err
+    named = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, "--profile", "generic-quad", "--json")
+    assert named.json["feasible"] is True
+
+
 def test_the_terms_are_set_and_what_is_left_out_is_said(hillside: tuple[Path, Path], tmp_path: Path) -> None:
     options = ("--following-m", 0.3, "--dsm-rms-m", 0.1, "--downwash-m", 0.7, "--vehicle-radius-m", 0.4)
     run = planned(hillside, tmp_path, "--position-error-m", 0.2, *options)
@@ -125,7 +152,7 @@ def test_certify_takes_vehicle_and_demands_from_the_missions_own_file(
 def test_return_height_too_low(hillside: tuple[Path, Path], tmp_path: Path) -> None:
     run = hedgehop("plan", *hillside, "--out", tmp_path, "--rtl-height-m", 30)
     assert run.code == 1
-    assert run.out.startswith("NOT CERTIFIED\n")
+    assert run.out.startswith("NOT CERTIFIED, FEASIBLE\n")
     assert "way home: NOT clear at the return height of 30.00 m above home, needed 50." in run.out
     assert "Set the return height to at least 51 m (ArduPilot: RTL_ALT 5100 cm" in run.out
     assert json.loads((tmp_path / "certificate.json").read_text())["reasons"][0]["code"] == "return_height"
@@ -188,7 +215,7 @@ def test_report_runs_nothing_and_loads_nothing(flight: tuple[Run, Path]) -> None
     page = (flight[1] / "report.html").read_text()
     assert "<script" not in page.lower()
     assert "http://" not in page.replace("http://www.w3.org/", "")
-    assert "✓ CERTIFIED" in page
+    assert "✓ CERTIFIED, FEASIBLE" in page
 
 
 @pytest.mark.parametrize("name", ["mission.waypoints", "mission.plan"])
@@ -215,7 +242,7 @@ def test_certify_shows_every_leg(flight: tuple[Run, Path], hillside: tuple[Path,
     mission = flight[1] / "mission.plan"
     text = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, "--verbose").out
     legs = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, "--verbose", "--json").json["legs"]
-    assert text.startswith("CERTIFIED\n")
+    assert text.startswith("CERTIFIED, FEASIBLE\n")
     assert len([line for line in text.splitlines() if line.startswith("  leg ")]) == len(legs) > 5
     assert min(leg["min_distance_m"] for leg in legs) == flight[0].json["min_distance_m"]
 

@@ -236,7 +236,9 @@ def test_mission_that_cannot_be_judged(demo: Inputs, tmp_path: Path, kind: str) 
 
 @pytest.mark.parametrize("option", ["--required-clearance-m", "--position-error-m", "--rtl-height-m", "--max-hole-m2"])
 def test_certify_demands(demo: Inputs, tmp_path: Path, option: str) -> None:
-    run = hedgehop("certify", demo.model, tmp_path / "unread.plan", option, "1e300", "--json")
+    mission = tmp_path / "plain.waypoints"
+    mission.write_text("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t37.729\t14.9926\t1712\t1\n")
+    run = hedgehop("certify", demo.model, mission, option, "1e300", "--json")
     assert (run.code, run.json["error"]["code"]) == (2, "parameter")
 
 

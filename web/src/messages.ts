@@ -547,6 +547,14 @@ export interface TubeDoc {
   statement: string;
 }
 
+/** One thing that the vehicle must be able to do. */
+export interface FeasibilityDoc {
+  code: string;
+  state: "holds" | "fails" | "unknown";
+  text: string;
+  mend: string;
+}
+
 /** Curves over the horizontal distance flown; null where unknown. */
 export interface Chart {
   s_m: number[];
@@ -583,6 +591,9 @@ export interface SurveyResult {
 
 export interface ResultDoc {
   certified: boolean;
+  /** Whether the vehicle can fly it; null: not all is known. */
+  feasible: boolean | null;
+  feasibility: FeasibilityDoc[];
   min_distance_m: number | null;
   min_vertical_m: number | null;
   required_clearance_m: number;

@@ -2,8 +2,10 @@ import { describe, expect, it } from "vitest";
 import { rememberResult, verdictOf } from "../src/store/results";
 import { computation, result, state } from "./samples";
 
-const ready = (revision: number, certified = true) =>
-  state(revision, { computation: computation({ revision, state: "ready", result: result(certified) }) });
+const ready = (revision: number, certified = true, feasible: boolean | null = true) =>
+  state(revision, {
+    computation: computation({ revision, state: "ready", result: result(certified, feasible) }),
+  });
 const running = (revision: number) => state(revision);
 
 describe("the last known result", () => {
@@ -33,6 +35,9 @@ describe("the verdict", () => {
   it("is certified or not only for the document on the page", () => {
     expect(verdictOf(ready(1), true)).toBe("certified");
     expect(verdictOf(ready(1, false), true)).toBe("not_certified");
+    expect(verdictOf(ready(1, true, false), true)).toBe("not_feasible");
+    expect(verdictOf(ready(1, false, false), true)).toBe("not_certified");
+    expect(verdictOf(ready(1, true, null), true)).toBe("certified");
     expect(verdictOf(ready(1), false)).toBe("computing");
     expect(verdictOf(running(1), false)).toBe("computing");
   });

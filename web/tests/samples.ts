@@ -37,4 +37,5 @@ export function state(revision: number, fields: Partial<PlanState> = {}): PlanSt
   };
 }
 
-export const result = (certified: boolean) => ({ certified }) as ResultDoc;
+export const result = (certified: boolean, feasible: boolean | null = true) =>
+  ({ certified, feasible }) as ResultDoc;

@@ -1,7 +1,7 @@
 import { Icon, type IconName } from "../ui/Icon";
 import { Menu } from "../ui/Menu";
-import { computation, isFresh, plan } from "../store/state";
-import { verdictOf } from "../store/results";
+import { computation } from "../store/state";
+import { verdict, verdictWord } from "./Verdict";
 import { busy, download, openReport } from "./downloads";
 
 const FILES: readonly { file: string; label: string; note: string; icon: IconName }[] = [
@@ -31,11 +31,11 @@ function Item(props: { label: string; note: string; icon: IconName; testid: stri
 }
 
 function Warning() {
-  const kind = verdictOf(plan.value, isFresh.value);
-  if (kind !== "not_certified") return null;
+  const kind = verdict();
+  if (kind !== "not_certified" && kind !== "not_feasible") return null;
   return (
     <p class="menu-warning">
-      <Icon name="warning" /> This plan is NOT CERTIFIED. The files say so.
+      <Icon name="warning" /> This plan is {verdictWord(kind)}. The files say so.
     </p>
   );
 }

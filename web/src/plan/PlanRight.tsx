@@ -47,11 +47,13 @@ function AgainstSeen({ result: { seen_columns: columns } }: { result: ResultDoc 
   );
 }
 
-function Reasons({ result: { reasons } }: { result: ResultDoc }) {
-  if (reasons.length === 0) return null;
+/** Why it is not certified, and why the vehicle cannot fly it. */
+function Reasons({ result: { reasons, feasibility } }: { result: ResultDoc }) {
+  const all = [...reasons, ...(feasibility ?? []).filter((row) => row.state === "fails")];
+  if (all.length === 0) return null;
   return (
     <ul class="reasons" data-testid="reasons">
-      {reasons.map((reason) => (
+      {all.map((reason) => (
         <li key={reason.code + reason.text} data-code={reason.code}>
           <Icon name="cross" />
           <div>

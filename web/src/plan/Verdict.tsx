@@ -1,10 +1,11 @@
-import { isFresh, link, plan } from "../store/state";
+import { isFresh, link, plan, result } from "../store/state";
 import { verdictOf, type VerdictKind } from "../store/results";
 
 const WORDS: Record<VerdictKind, string> = {
   none: "No plan yet",
   computing: "Computing…",
   certified: "CERTIFIED",
+  not_feasible: "CERTIFIED, NOT FEASIBLE",
   not_certified: "NOT CERTIFIED",
   error: "CANNOT COMPUTE",
 };
@@ -17,6 +18,7 @@ const SHAPES: Record<VerdictKind, { outline: string; mark: string }> = {
     outline: "M12 2.5 20 5.5v6c0 5-3.4 8.3-8 10-4.6-1.7-8-5-8-10v-6z",
     mark: "M8 12l3 3 5-6",
   },
+  not_feasible: { outline: "M12 3 22 21H2z", mark: "M12 10v5M12 18v.2" },
   not_certified: { outline: "M8 2.5h8L21.5 8v8L16 21.5H8L2.5 16V8z", mark: "M9 9l6 6M15 9l-6 6" },
   error: { outline: "M12 3 22 21H2z", mark: "M12 10v5M12 18v.2" },
 };
@@ -33,7 +35,9 @@ export function VerdictShape({ kind, size = 22 }: { kind: VerdictKind; size?: nu
 
 export const verdict = () => verdictOf(plan.value, isFresh.value);
 export function verdictWord(kind: VerdictKind): string {
-  return kind === "computing" && link.value === "lost" ? "No connection" : WORDS[kind];
+  if (kind === "computing" && link.value === "lost") return "No connection";
+  const isNeither = kind === "not_certified" && result.value?.feasible === false;
+  return isNeither ? "NOT CERTIFIED, NOT FEASIBLE" : WORDS[kind];
 }
 
 /** The certificate in the status bar. */

@@ -24,14 +24,15 @@ export function rememberResult(
   return stage === "running" && isSamePlan ? before : null;
 }
 
-export type VerdictKind = "none" | "computing" | "certified" | "not_certified" | "error";
+export type VerdictKind = "none" | "computing" | "certified" | "not_feasible" | "not_certified" | "error";
 
-/** The one word about safety. Figures of an older document never count as a verdict. */
+/** Clearance and feasibility in one. Figures of an older document never count as a verdict. */
 export function verdictOf(state: PlanState | null, fresh: boolean): VerdictKind {
   const stage = state?.computation.state ?? "empty";
   if (stage === "empty") return "none";
   if (stage === "error") return "error";
   const result = state?.computation.result;
   if (stage === "running" || !fresh || !result) return "computing";
-  return result.certified ? "certified" : "not_certified";
+  if (!result.certified) return "not_certified";
+  return result.feasible === false ? "not_feasible" : "certified";
 }
