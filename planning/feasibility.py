@@ -6,7 +6,7 @@ its photos cover, adds rows with ``Feasibility.with_rows``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -75,6 +75,13 @@ def battery_row(predicted_s: float | None, profile: VehicleProfile) -> Feasibili
     if predicted_s <= usable_s:
         return FeasibilityRow("battery", "holds", text)
     return FeasibilityRow("battery", "fails", text, "Fly faster, shorten the route or split it.")
+
+
+def photos_row(faults: Sequence[str]) -> FeasibilityRow:
+    """Whether a survey's photos show what was asked; ``faults`` say what they do not."""
+    if not faults:
+        return FeasibilityRow("photos", "holds", "The photos show the area as asked.")
+    return FeasibilityRow("photos", "fails", " ".join(faults), "Ask for more overlap, or fly more lines.")
 
 
 def _speed_row(mission: Mission, profile: VehicleProfile) -> FeasibilityRow:

@@ -15,7 +15,7 @@ import numpy as np
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
-from planning.feasibility import Feasibility, feasibility_of
+from planning.feasibility import Feasibility, feasibility_of, photos_row
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
@@ -122,7 +122,7 @@ def plan_mission(
         certificate=certificate,
         predicted=predicted,
         coverage=coverage,
-        feasibility=feasibility_of(built.mission, profile, predicted.total_s),
+        feasibility=_feasibility(built.mission, profile, predicted, coverage),
         warnings=(*built.warnings, *_warnings(request)),
     )
 
@@ -213,6 +213,13 @@ def _assumptions(request: PlanRequest, surfaces: Surfaces, holes: HoleReport) ->
         **hole_assumptions(holes, request.surface.fill_hole_area_m2),
         "vehicle_profile": request.profile.name,
     }
+
+
+def _feasibility(
+    mission: Mission, profile: VehicleProfile, predicted: PredictedTime, coverage: SurveyCoverage | None
+) -> Feasibility:
+    found = feasibility_of(mission, profile, predicted.total_s)
+    return found if coverage is None else found.with_rows(photos_row(coverage.faults()))
 
 
 def _coverage(dsm: Dsm, request: PlanRequest, line: FlownLine) -> SurveyCoverage | None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from planning.feasibility import FeasibilityRow, commanded_speed_m_s, feasibility_json, feasibility_of, verdict_words
+from planning.feasibility import commanded_speed_m_s, feasibility_json, feasibility_of, photos_row, verdict_words
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 
 QUAD = VehicleProfile("quad", endurance_s=1000.0, reserve_share=0.25)
@@ -52,7 +52,8 @@ def test_items() -> None:
 def test_more_rows_can_be_added() -> None:
     found = feasibility_of(mission(), QUAD, 100.0)
     assert found.feasible is True
-    more = found.with_rows(FeasibilityRow("photos", "fails", "57 % of the area is photographed.", "Fly higher."))
+    assert found.with_rows(photos_row(())).feasible is True
+    more = found.with_rows(photos_row(("Only 57 % of the area is photographed at all.",)))
     assert more.feasible is False
     assert [row.code for row in more.failures] == ["photos"]
     assert feasibility_json(more)["feasibility"][-1]["code"] == "photos"
