@@ -4,9 +4,10 @@ The certificate is of a tube, not of a line. The required clearance holds a term
 from the line (``ClearanceParams.following_m``); a point within that distance of the line is at most that much nearer
 to any column, so that the rest of the requirement holds for every point of the tube.
 
-The proof uses none of the code that makes the safe surface. Every cell of the model, at its full
-resolution, is a solid square column from below up to its elevation; unknown cells and everything outside
-the model are columns of infinite height; the line is straight between its points in the model's CRS.
+The proof uses none of the code that makes the safe surface. Every cell of the file, at its full
+resolution, is a solid column from below up to its elevation over the quadrilateral that it covers in the
+model's CRS; unknown cells and everything outside are columns of infinite height; the line is straight
+between its points in the model's CRS.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.places import distance_flown, places_along
-from planning.certificate.pyramid import MaxPyramid, max_pyramid
+from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (
     column_reasons,
     height_reason,
@@ -75,23 +76,23 @@ def certify(
     a line with a point that is not finite.
     """
     _check(line, params, trend_step_m)
-    with threads_for(dsm.elevation_m.size):
+    with threads_for(dsm.cells.elevation_m.size):
         certificate = _judged(dsm, line, params, trend_step_m)
     return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))
 
 
 def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Certificate:
-    pyramid = max_pyramid(dsm.elevation_m, dsm.resolution_m)
-    points_m = _from_corner(line.points_m, dsm)
+    pyramid = cells_pyramid(dsm.cells)
+    points_m = dsm.cells.layout.in_frame(line.points_m)
     start_m, end_m = points_m[:-1], points_m[1:]
     distance_m, share = nearest_distances(pyramid, start_m, end_m)
-    lowest_m, highest_m = height_range(dsm.elevation_m, dsm.resolution_m, start_m, end_m)
+    lowest_m, highest_m = height_range(pyramid, start_m, end_m)
     legs = _legs(line, distance_m, share, lowest_m)
     worst = _worst_point(dsm, line, distance_m, share)
     trend_places, trend_s_m = places_along(points_m, trend_step_m)
     trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
-    needed_m, needed_from = _return_height(pyramid, dsm, line, points_m, params)
-    near_m, near_from = _near_return(pyramid, dsm, line, points_m, params)
+    needed_m, needed_from = _return_height(pyramid, dsm, line, params)
+    near_m, near_from = _near_return(pyramid, dsm, line, params)
     home_obstacle, landing_obstacle = _columns(dsm, line, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
@@ -153,11 +154,6 @@ def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Non
         )
 
 
-def _from_corner(points_m: F64, dsm: Dsm) -> F64:
-    """Projected (K, 3) points -> metres east and SOUTH of the model's north-west corner, altitude as it is."""
-    return np.column_stack([points_m[:, 0] - dsm.transform.c, dsm.transform.f - points_m[:, 1], points_m[:, 2]])
-
-
 def _legs(line: FlownLine, distance_m: F64, share: F64, lowest_m: F64) -> tuple[LegClearance, ...]:
     s_m = distance_flown(line.points_m)
     at_s_m = s_m[:-1] + share * np.diff(s_m)
@@ -187,27 +183,23 @@ def _worst_point(dsm: Dsm, line: FlownLine, distance_m: F64, share: F64) -> Wors
 
 def _is_unknown_near(pyramid: MaxPyramid, dsm: Dsm, worst: WorstPoint, distance_m: F64) -> bool:
     """Whether a column of infinite height is what the worst point is near: then climbing does not help."""
-    far_above = _from_corner(np.array([[worst.x_m, worst.y_m, 1e6]]), dsm)
+    far_above = dsm.cells.layout.in_frame(np.array([[worst.x_m, worst.y_m, 1e6]]))
     unknown_m, _ = nearest_distances(pyramid, far_above, far_above)
     return bool(unknown_m[0] <= distance_m.min() + 1e-6)
 
 
-def _return_height(
-    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, points_m: F64, params: ClearanceParams
-) -> tuple[float, F64 | None]:
+def _return_height(pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[float, F64 | None]:
     """Height above home that every way home needs, 0 when none needs any, and the place that needs it."""
-    places_m, _ = places_along(points_m, RETURN_STEP_M)
+    places_m, _ = places_along(line.points_m, RETURN_STEP_M)
     return _needed(pyramid, dsm, line, places_m, places_m, params)
 
 
-def _near_return(
-    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, points_m: F64, params: ClearanceParams
-) -> tuple[float, F64 | None]:
+def _near_return(pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[float, F64 | None]:
     """As `_return_height`, regarding that close to home autopilots do not climb to the return height."""
-    places_m, _ = places_along(points_m, RETURN_STEP_M)
+    places_m, _ = places_along(line.points_m, RETURN_STEP_M)
     raised_m = places_m.copy()
     raised_m[:, 2] = return_altitudes(
-        places_m, _home(dsm, line), line.home_alt_dsm_m, rtl_height_m=params.rtl_height_m, step_m=RETURN_STEP_M
+        places_m, np.array(line.home_xy_m), line.home_alt_dsm_m, rtl_height_m=params.rtl_height_m, step_m=RETURN_STEP_M
     )
     return _needed(pyramid, dsm, line, places_m, raised_m, params)
 
@@ -216,16 +208,12 @@ def _needed(
     pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, places_m: F64, flown_m: F64, params: ClearanceParams
 ) -> tuple[float, F64 | None]:
     """Height above home, and the place, that returns flown at the altitudes of ``flown_m`` do not reach."""
-    altitude_m, place = return_altitude(pyramid, flown_m, _home(dsm, line), params.required_clearance_m)
+    layout = dsm.cells.layout
+    home_xy_m = layout.in_frame(np.array([line.home_xy_m]))[0]
+    altitude_m, place = return_altitude(pyramid, layout.in_frame(flown_m), home_xy_m, params.required_clearance_m)
     if place < 0:
         return 0.0, None
-    x, y, z = places_m[place]
-    at_m = np.array([x + dsm.transform.c, dsm.transform.f - y, z])
-    return max(0.0, altitude_m - line.home_alt_dsm_m), at_m
-
-
-def _home(dsm: Dsm, line: FlownLine) -> F64:
-    return _from_corner(np.array([[*line.home_xy_m, 0.0]]), dsm)[0, :2]
+    return max(0.0, altitude_m - line.home_alt_dsm_m), places_m[place]
 
 
 def _columns(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[str | None, str | None]:
@@ -259,7 +247,10 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
         "resolution_m": dsm.resolution_m,
         "width_px": dsm.width_px,
         "height_px": dsm.height_px,
-        "cells": "solid square columns at full resolution; unknown cells and everything outside: infinitely high",
+        "cells": (
+            "solid columns over the file's own cells at full resolution;"
+            " unknown cells and everything outside: infinitely high"
+        ),
         "earth": "straight lines in the model's projected CRS",
         "following": _following_words(params),
         "home_alt_dsm_m": line.home_alt_dsm_m,

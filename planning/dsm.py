@@ -10,6 +10,8 @@ from affine import Affine
 from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
+from planning.cells.cells import Cells, square_cells
+from planning.cells.squares import squares
 from planning.errors import ParameterError
 from planning.vertical_datum import is_above_sea_level
 
@@ -35,6 +37,8 @@ class Dsm:
     """Name of the vertical datum, e.g. "EGM96 height", "ellipsoid"; None when nobody declared it."""
     sha256: str
     """Hex digest of the file the model was read from."""
+    source: Cells | None = None
+    """The file's own cells where they are no squares of the grid; the grid is then nowhere lower than they are."""
 
     def __post_init__(self) -> None:
         t = self.transform
@@ -74,8 +78,17 @@ class Dsm:
         xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
         return (self.transform.f - xy[:, 1]) / self.resolution_m, (xy[:, 0] - self.transform.c) / self.resolution_m
 
+    @property
+    def cells(self) -> Cells:
+        """The cells that the heights were measured in, as they lie on the ground: what clearance is proved against."""
+        if self.source is not None:
+            return self.source
+        return square_cells(self.elevation_m, self.resolution_m, (self.transform.c, self.transform.f))
+
     def elevation_at(self, xy_m: F64) -> F64:
-        """Elevation of the cell that holds each projected point (N, 2); NaN outside or unknown."""
+        """Elevation of the (source) cell that holds each projected point (N, 2); NaN outside or unknown."""
+        if self.source is not None:
+            return self.source.elevation_at(xy_m)
         row_f, col_f = self.fractional_cell(xy_m)
         out = np.full(row_f.shape, np.nan)
         inside = (row_f >= 0) & (row_f < self.height_px) & (col_f >= 0) & (col_f < self.width_px)
@@ -83,18 +96,31 @@ class Dsm:
         return out
 
     def with_elevation(self, elevation_m: F32) -> Dsm:
-        """The same grid and provenance with other heights (same shape)."""
-        return replace(self, elevation_m=elevation_m)
+        """The same grid and provenance with other heights (same shape), which are nobody's measured cells."""
+        return replace(self, elevation_m=elevation_m, source=None)
+
+    def as_grid(self) -> Dsm:
+        """The grid alone, for what is nowhere to be lower than the surface but need not be exact."""
+        return self if self.source is None else replace(self, source=None)
+
+    def with_cells(self, elevation_m: F32) -> Dsm:
+        """The same model with other heights of its ``cells``; the grid follows them."""
+        if self.source is None:
+            return replace(self, elevation_m=elevation_m)
+        source = self.source.with_elevation(elevation_m)
+        return replace(self, source=source, elevation_m=squares(source, self.transform, self.elevation_m.shape))
 
     def window(self, row0: int, col0: int, height_px: int, width_px: int) -> Dsm:
-        """The part of the model that starts at (row0, col0); clipped to the model, no copy."""
+        """The part of the model that starts at (row0, col0); clipped to the model, no copy of the grid."""
         r0, c0 = max(0, row0), max(0, col0)
         r1, c1 = min(self.height_px, row0 + height_px), min(self.width_px, col0 + width_px)
         if r0 >= r1 or c0 >= c1:
             raise ParameterError("The window lies outside the surface model.")
-        return replace(
-            self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=self.transform @ Affine.translation(c0, r0)
-        )
+        transform, source = self.transform @ Affine.translation(c0, r0), self.source
+        if source is not None:
+            low, high = transform @ (0, r1 - r0), transform @ (c1 - c0, 0)
+            source = source.around(np.array(low), np.array(high))
+        return replace(self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=transform, source=source)
 
     def lat_lon_from_xy(self, xy_m: F64) -> F64:
         """Projected (N, 2) metres -> WGS84 (N, 2) latitude, longitude in degrees."""

@@ -71,9 +71,10 @@ def read_dsm_reported(
     """A surface model in metres, and what was found and done.
 
     ``crs`` and ``vertical_datum`` declare or override what the file says; ``z_scale`` is metres per
-    stored unit (0.01 for centimetres). Projected metres stay as they are. Degrees, feet and grids
-    whose metres are not true go to the local UTM zone; rotated or oblong cells become squares; no
-    height is lost on the way (``planning.rasters.regrid``). ``progress`` may raise to cancel.
+    stored unit (0.01 for centimetres). Projected metres stay as they are, feet become metres in their
+    places. Degrees and grids whose metres are not true go to the local UTM zone, rotated or oblong cells become
+    squares, no height is lost on the way (``planning.cells.squares``); the file's own cells stay with the model
+    for whatever must be exact (``Dsm.cells``). ``progress`` may raise to cancel.
     Raises a RasterError that says what to do.
     """
     dsm, report = _read(path, crs, z_scale, vertical_datum, limits or RasterLimits(), progress)

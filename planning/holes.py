@@ -33,21 +33,21 @@ def fill_holes(dsm: Dsm, max_area_m2: float = 4.0) -> tuple[Dsm, HoleReport]:
     Returns the same model when there is nothing to fill. Holes are found as runs of unknown cells along
     rows, so memory follows the number of runs, not of cells.
     """
-    rows = _count_runs(dsm.elevation_m)
+    cells = dsm.cells
+    rows = _count_runs(cells.elevation_m)
     first = np.concatenate([[0], np.cumsum(rows)]).astype(np.int64)
     if first[-1] == 0:
         return dsm, HoleReport(0, 0.0)
-    begin, end = _find_runs(dsm.elevation_m, first)
+    begin, end = _find_runs(cells.elevation_m, first)
     parent = _join_runs(first, begin, end)
-    max_cells = np.ceil(max_area_m2 / dsm.resolution_m**2 - 1e-9) - 1  # strictly under the limit
-    area_px = _small_holes(first, begin, end, parent, dsm.width_px, max_cells)
+    max_cells = np.ceil(max_area_m2 / cells.area_m2 - 1e-9) - 1  # strictly under the limit
+    area_px = _small_holes(first, begin, end, parent, cells.elevation_m.shape[1], max_cells)
     if not (area_px > 0).any():
         return dsm, HoleReport(0, 0.0)
-    rim_m = _rim_maxima(dsm.elevation_m, first, begin, end, parent, area_px)
-    filled_m = dsm.elevation_m.copy()
+    rim_m = _rim_maxima(cells.elevation_m, first, begin, end, parent, area_px)
+    filled_m = cells.elevation_m.copy()
     _fill(filled_m, first, begin, end, parent, rim_m)
-    filled = dsm.with_elevation(filled_m)
-    return filled, HoleReport(int((area_px > 0).sum()), float(area_px.sum()) * dsm.resolution_m**2)
+    return dsm.with_cells(filled_m), HoleReport(int((area_px > 0).sum()), float(area_px.sum()) * cells.area_m2)
 
 
 @njit(cache=True, nogil=True, parallel=True)

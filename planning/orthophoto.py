@@ -10,9 +10,10 @@ from affine import Affine
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from planning.cells.squares import Inverse, source_places
 from planning.errors import ParameterError, RasterError, RasterFormatError
 from planning.rasters.header import RasterHeader
-from planning.rasters.regrid import Inverse, source_mapping, source_places
+from planning.rasters.mapping import source_mapping
 
 U8 = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]

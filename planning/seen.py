@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from planning.avoiding.boxes import half_heights, segment_box_sq
 from planning.avoiding.room import Seen
 from planning.avoiding.standing import standing
+from planning.cells.cells import Layout
 from planning.dsm import Dsm
 
 F64 = NDArray[np.float64]
@@ -72,24 +73,29 @@ def burn(dsm: Dsm, columns: Columns) -> Dsm:
 
     Unknown cells stay unknown: nothing is flown over them anyway. Fill small holes before, not after.
     """
-    elevation_m = dsm.elevation_m.copy()
+    elevation_m = dsm.cells.elevation_m.copy()
     known = np.isfinite(columns.xy_m).all(axis=1) & np.isfinite(columns.top_alt_dsm_m)
-    row_f, col_f = dsm.fractional_cell(columns.xy_m[known])
+    low_px, high_px = _covered(dsm.cells.layout, columns.xy_m[known], columns.edge_m)
     top_m = columns.top_alt_dsm_m[known] + columns.edge_m / 2
-    reach_px = columns.edge_m / dsm.resolution_m  # half of the voxel and its safety
-    _raise_cells(elevation_m, row_f, col_f, top_m, reach_px)
-    return dsm.with_elevation(elevation_m)
+    _raise_cells(elevation_m, low_px, high_px, top_m)
+    return dsm.with_cells(elevation_m)
+
+
+def _covered(layout: Layout, xy_m: F64, reach_m: float) -> tuple[F64, F64]:
+    """(N, 2) smallest and largest row and column, in cells, of squares: half of the voxel and its safety around it."""
+    corners = [layout.places(xy_m + reach_m * np.array(sign)) for sign in ((-1, -1), (-1, 1), (1, -1), (1, 1))]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 @njit(cache=True, nogil=True)
-def _raise_cells(elevation_m, row_f, col_f, top_m, reach_px):
+def _raise_cells(elevation_m, low_px, high_px, top_m):
     rows, cols = elevation_m.shape
     for k in range(len(top_m)):
         top = np.float32(top_m[k])
         if top < top_m[k]:
             top = np.nextafter(top, np.float32(np.inf))
-        for r in range(max(0, math.floor(row_f[k] - reach_px)), min(rows, math.ceil(row_f[k] + reach_px))):
-            for c in range(max(0, math.floor(col_f[k] - reach_px)), min(cols, math.ceil(col_f[k] + reach_px))):
+        for r in range(max(0, math.floor(low_px[k, 0])), min(rows, math.ceil(high_px[k, 0]))):
+            for c in range(max(0, math.floor(low_px[k, 1])), min(cols, math.ceil(high_px[k, 1]))):
                 if elevation_m[r, c] < top:
                     elevation_m[r, c] = top
 

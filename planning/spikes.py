@@ -43,7 +43,7 @@ class Spike:
     rim_alt_dsm_m: float
     """Of the highest (a pit: the lowest) cell around it."""
     window: tuple[int, int, int, int]
-    """Its cells: first row, first column, rows, columns."""
+    """Its cells among the model's ``cells``: first row, first column, rows, columns."""
 
 
 def find_spikes(
@@ -58,13 +58,14 @@ def find_spikes(
     A spike is what a morphological opening takes away, small in both directions, surrounded by
     known cells, and above the highest of them by ``min_height_m`` and by twice their relief.
     """
-    size_m = max(1.0, 2.0 * dsm.resolution_m) if max_size_m is None else max_size_m
+    heights, cell_m = dsm.cells.elevation_m, _cell_m(dsm)
+    size_m = max(1.0, 2.0 * cell_m) if max_size_m is None else max_size_m
     if not (size_m > 0 and min_height_m > 0):
         raise ParameterError(f"Size and height of spikes must be greater than 0, got {size_m} and {min_height_m}.")
-    pool_px = max(1, int(size_m / dsm.resolution_m) // _CELLS_PER_SIZE)
-    highest, lowest = (dsm.elevation_m,) * 2 if pool_px == 1 else _pool(dsm.elevation_m, pool_px)
+    pool_px = max(1, int(size_m / cell_m) // _CELLS_PER_SIZE)
+    highest, lowest = (heights,) * 2 if pool_px == 1 else _pool(heights, pool_px)
     # A spike as large as allowed may straddle one more pooled cell.
-    size_px = math.ceil(size_m / (pool_px * dsm.resolution_m) - 1e-6) + (pool_px > 1)
+    size_px = math.ceil(size_m / (pool_px * cell_m) - 1e-6) + (pool_px > 1)
     found: list[Spike] = []
     searches: tuple[tuple[Literal["spike", "pit"], F32, float], ...] = (("spike", highest, 1.0), ("pit", lowest, -1.0))
     for step, (kind, grid, sign) in enumerate(searches):
@@ -79,13 +80,14 @@ def remove_spikes(dsm: Dsm, spikes: tuple[Spike, ...]) -> Dsm:
     """Spikes cut down to the highest cell around them, pits filled to the lowest."""
     if not spikes:
         return dsm
-    elevation = dsm.elevation_m.copy()
+    cells = dsm.cells
+    elevation = cells.elevation_m.copy()
     for spike in spikes:
         row, column, rows, columns = spike.window
         part = elevation[row : row + rows, column : column + columns]
         cut = np.minimum if spike.kind == "spike" else np.maximum
         cut(part, np.float32(spike.rim_alt_dsm_m), out=part)
-    return dsm.with_elevation(elevation)
+    return dsm.with_cells(elevation)
 
 
 def _search(grid: F32, size_px: int, min_height_m: float) -> Iterator[tuple[tuple[slice, slice], float]]:
@@ -131,19 +133,26 @@ def _rim(grid: F32, rows: slice, columns: slice, *, reach: int, min_height_m: fl
     return rim if peak - rim >= needed else None
 
 
+def _cell_m(dsm: Dsm) -> float:
+    """The longer side of a cell."""
+    lattice = dsm.cells.layout.lattice
+    return max(lattice.width_m, lattice.height_m)
+
+
 def _spike(dsm: Dsm, kind: Literal["spike", "pit"], window: tuple[slice, slice], rim: float, pool_px: int) -> Spike:
     row, column = window[0].start * pool_px, window[1].start * pool_px
-    part = dsm.elevation_m[row : window[0].stop * pool_px, column : window[1].stop * pool_px]
+    cells = dsm.cells
+    part = cells.elevation_m[row : window[0].stop * pool_px, column : window[1].stop * pool_px]
     tip = np.nanargmax(part) if kind == "spike" else np.nanargmin(part)
     tip_row, tip_column = np.unravel_index(tip, part.shape)
     alt = float(part[tip_row, tip_column])
-    xy = dsm.transform @ (column + tip_column + 0.5, row + tip_row + 0.5)
-    lat, lon = dsm.lat_lon_from_xy(np.array([xy]))[0]
+    xy_m = cells.layout.xy_of(row + tip_row + 0.5, column + tip_column + 0.5)
+    lat, lon = dsm.lat_lon_from_xy(np.array([xy_m]))[0]
     return Spike(
         kind=kind,
         lat_deg=float(lat),
         lon_deg=float(lon),
-        size_m=max(part.shape) * dsm.resolution_m,
+        size_m=max(part.shape) * _cell_m(dsm),
         height_m=abs(alt - rim),
         alt_dsm_m=alt,
         rim_alt_dsm_m=rim,

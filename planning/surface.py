@@ -39,7 +39,7 @@ def block_max(dsm: Dsm, factor: int) -> Dsm:
     if factor == 1:
         return dsm
     return replace(
-        dsm,
+        dsm.as_grid(),
         elevation_m=block_max_grid(dsm.elevation_m, factor),
         transform=dsm.transform @ Affine.scale(factor),
     )
@@ -96,7 +96,7 @@ def safe_surface(dsm: Dsm, params: SurfaceParams, *, around_xy_m: F64 | None = N
     filled, holes = fill_holes(dsm, params.fill_hole_area_m2)
     inner = Box.of(filled) if around_xy_m is None else Box.around(filled, around_xy_m, margin_m)
     block_px, outer = _extent(filled, params, sigma_m, inner)
-    part = outer.cut(filled)
+    part = outer.cut(filled.as_grid())
     safe = _dilate_in_blocks(part, radius_m=params.radius_m, height_m=params.height_m, block_px=block_px)
     safe = safe.with_elevation(gaussian_grid(safe.elevation_m, sigma_m / safe.resolution_m))
     floor = None

@@ -1,10 +1,11 @@
 """Exact smallest and largest height of straight lines above the cells below them.
 
-The cells that a line passes are walked row by row; over one cell the line's height is linear, so its
-extremes lie at the ends of the interval. Cells are closed: a line that runs along a border, or touches
-a corner, is judged against every cell it touches, which can only lower the smallest height.
+Rectangles that a line passes are walked row by row, other cells are found in the pyramid; over one cell
+the line's height is linear, so its extremes lie at the ends of the interval. Cells are closed: a line that
+runs along a border, or touches a corner, is judged against every cell it touches, which can only lower the
+smallest height.
 
-Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
+Coordinates: the lattice's frame, z up.
 """
 
 from __future__ import annotations
@@ -13,25 +14,27 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-F32 = NDArray[np.float32]
+from planning.cells.lattice import is_rectangular, quad_of
+from planning.certificate.nearest import STACK
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
+from planning.certificate.quads import part_inside
+
 F64 = NDArray[np.float64]
 
 
-def height_range(elevation_m: F32, resolution_m: float, start_m: F64, end_m: F64) -> tuple[F64, F64]:
+def height_range(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F64, F64]:
     """Smallest and largest height above the cells below each segment, (N,) each.
 
     ``start_m`` and ``end_m`` are (N, 3). The smallest is -inf where the segment passes an unknown cell
     or leaves the model; the largest regards known cells only (-inf where there is none).
     """
     lowest_m, highest_m = np.empty(len(start_m)), np.empty(len(start_m))
-    _ranges(
-        elevation_m,
-        resolution_m,
-        np.ascontiguousarray(start_m, dtype=np.float64),
-        np.ascontiguousarray(end_m, dtype=np.float64),
-        lowest_m,
-        highest_m,
-    )
+    start, end = (np.ascontiguousarray(points, dtype=np.float64) for points in (start_m, end_m))
+    cells, lattice = pyramid.elevation_m, pyramid.lattice
+    if is_rectangular(lattice):
+        _ranges(cells, lattice.width_m, lattice.height_m, start, end, lowest_m, highest_m)
+    else:
+        _ranges_over_quads(cells, pyramid.layout, lattice, pyramid.boxes_m, start, end, lowest_m, highest_m)
     return lowest_m, highest_m
 
 
@@ -53,11 +56,11 @@ def _touched(low_m, high_m, res):
 
 
 @njit(cache=True, nogil=True)
-def _range_in_row(elevation_m, res, row, ax, az, dx, dz, t0, t1, lowest, highest):
+def _range_in_row(elevation_m, wide, row, ax, az, dx, dz, t0, t1, lowest, highest):
     xa, xb = ax + t0 * dx, ax + t1 * dx
-    first, last = _touched(min(xa, xb), max(xa, xb), res)
+    first, last = _touched(min(xa, xb), max(xa, xb), wide)
     for col in range(first, last + 1):
-        u0, u1 = _inside(ax, dx, col * res, (col + 1) * res, t0, t1)
+        u0, u1 = _inside(ax, dx, col * wide, (col + 1) * wide, t0, t1)
         if u0 > u1:
             continue
         if not (0 <= row < elevation_m.shape[0] and 0 <= col < elevation_m.shape[1]):
@@ -73,16 +76,70 @@ def _range_in_row(elevation_m, res, row, ax, az, dx, dz, t0, t1, lowest, highest
 
 
 @njit(cache=True, nogil=True)
-def _ranges(elevation_m, res, start_m, end_m, lowest_m, highest_m):
+def _ranges(elevation_m, wide, high, start_m, end_m, lowest_m, highest_m):
     for k in range(start_m.shape[0]):
         ax, ay, az = start_m[k, 0], start_m[k, 1], start_m[k, 2]
         dx, dy, dz = end_m[k, 0] - ax, end_m[k, 1] - ay, end_m[k, 2] - az
-        first, last = _touched(min(ay, ay + dy), max(ay, ay + dy), res)
+        first, last = _touched(min(ay, ay + dy), max(ay, ay + dy), high)
         outside = first < 0 or last >= elevation_m.shape[0]
         lowest, highest = (-np.inf if outside else np.inf), -np.inf
         for row in range(max(first, 0), min(last, elevation_m.shape[0] - 1) + 1):
-            t0, t1 = _inside(ay, dy, row * res, (row + 1) * res, 0.0, 1.0)
+            t0, t1 = _inside(ay, dy, row * high, (row + 1) * high, 0.0, 1.0)
             if t0 <= t1:
-                lowest, highest = _range_in_row(elevation_m, res, row, ax, az, dx, dz, t0, t1, lowest, highest)
+                lowest, highest = _range_in_row(elevation_m, wide, row, ax, az, dx, dz, t0, t1, lowest, highest)
+        lowest_m[k] = lowest
+        highest_m[k] = highest
+
+
+@njit(cache=True, nogil=True)
+def _range_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, lowest, highest):
+    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
+        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+            t0, t1 = part_inside(quad_of(lattice, r, c), ax, ay, dx, dy)
+            if t0 > t1:
+                continue
+            ground = np.float64(elevation_m[r, c])
+            if not np.isfinite(ground):
+                lowest = -np.inf
+                continue
+            z0, z1 = az + t0 * dz, az + t1 * dz
+            lowest = min(lowest, min(z0, z1) - ground)
+            highest = max(highest, max(z0, z1) - ground)
+    return lowest, highest
+
+
+@njit(cache=True, nogil=True)
+def _ranges_over_quads(elevation_m, layout, lattice, boxes_m, start_m, end_m, lowest_m, highest_m):
+    node = np.empty((STACK, 3), np.int64)
+    height_px, width_px = elevation_m.shape
+    for k in range(start_m.shape[0]):
+        ax, ay, az = start_m[k, 0], start_m[k, 1], start_m[k, 2]
+        dx, dy, dz = end_m[k, 0] - ax, end_m[k, 1] - ay, end_m[k, 2] - az
+        # The ring of unknown cells is passed by every line that leaves the model and was inside.
+        outside = min(
+            edge_distance(lattice, height_px, width_px, ax, ay),
+            edge_distance(lattice, height_px, width_px, ax + dx, ay + dy),
+        )
+        lowest, highest = (np.inf if outside > 0.0 else -np.inf), -np.inf
+        node[0, 0], node[0, 1], node[0, 2] = layout.shape[0] - 1, 0, 0
+        size = 1
+        while size > 0:
+            size -= 1
+            level, i, j = node[size, 0], node[size, 1], node[size, 2]
+            offset, rows, cols = layout[level, 0], layout[level, 1], layout[level, 2]
+            x0, y0, x1, y1 = block_box(lattice, boxes_m, offset, cols, level, i, j)
+            t0, t1 = part_inside((x0, y0, x1, y0, x1, y1, x0, y1), ax, ay, dx, dy)
+            if t0 > t1:
+                continue
+            if level == 0:
+                lowest, highest = _range_in_leaf(
+                    elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, az, dx, dy, dz, lowest, highest
+                )
+                continue
+            rows, cols = layout[level - 1, 1], layout[level - 1, 2]
+            for ci in range(2 * i, min(rows, 2 * i + 2)):
+                for cj in range(2 * j, min(cols, 2 * j + 2)):
+                    node[size, 0], node[size, 1], node[size, 2] = level - 1, ci, cj
+                    size += 1
         lowest_m[k] = lowest
         highest_m[k] = highest

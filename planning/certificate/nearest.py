@@ -1,12 +1,14 @@
 """Exact 3-D distance from straight lines to a surface model whose cells are solid columns.
 
-The columns are closed boxes [x0, x1] x [y0, y1] x (-inf, elevation]. The squared distance of the moving
-point a + t d to one of them is convex in t, once differentiable and quadratic between the values of t
-where a coordinate passes a face, so its minimum over a segment has a closed form. A block of cells lies
-inside the column over its outline with the largest of its elevations, whose distance therefore bounds
-theirs from below: branch and bound over a pyramid of maxima skips blocks and loses nothing.
+Where cells are rectangles the columns are closed boxes [x0, x1] x [y0, y1] x (-inf, elevation]. The squared
+distance of the moving point a + t d to one of them is convex in t, once differentiable and quadratic between
+the values of t where a coordinate passes a face, so its minimum over a segment has a closed form; other
+quadrilaterals: ``planning.certificate.quads``. A block of cells lies inside the column over the box around
+it with the largest of its elevations, whose distance therefore bounds theirs from below: branch and bound
+over a pyramid of maxima skips blocks and loses nothing.
 
-Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
+Coordinates: the lattice's frame (of squares: metres from the model's north-west corner, x to the east, y to
+the SOUTH), z up.
 """
 
 from __future__ import annotations
@@ -15,7 +17,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from planning.certificate.pyramid import LEAF_PX, MaxPyramid
+from planning.cells.lattice import is_rectangular, quad_of
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
+from planning.certificate.quads import quad_box, quad_distance_sq
 
 F64 = NDArray[np.float64]
 
@@ -35,7 +39,8 @@ def nearest_distances(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F6
         pyramid.elevation_m,
         pyramid.maxima_m,
         pyramid.layout,
-        pyramid.resolution_m,
+        pyramid.lattice,
+        pyramid.boxes_m,
         np.ascontiguousarray(start_m, dtype=np.float64),
         np.ascontiguousarray(end_m, dtype=np.float64),
         distance_m,
@@ -98,14 +103,9 @@ def column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
 
 
 @njit(cache=True, nogil=True)
-def edge_distance(x, y, width_m, height_m):
-    """Distance of a place inside the model to the outside; 0 outside."""
-    return max(0.0, min(min(x, width_m - x), min(y, height_m - y)))
-
-
-@njit(cache=True, nogil=True)
-def _nearest_in_leaf(elevation_m, row0, col0, res, ax, ay, az, dx, dy, dz, best_sq, best_t):
+def _nearest_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, best_sq, best_t):
     lowest = min(az, az + dz)
+    boxes, wide, high = is_rectangular(lattice), lattice.width_m, lattice.height_m
     for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
         for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
             top = np.float64(elevation_m[r, c])
@@ -114,18 +114,25 @@ def _nearest_in_leaf(elevation_m, row0, col0, res, ax, ay, az, dx, dy, dz, best_
             above = lowest - top
             if above > 0.0 and above * above >= best_sq:
                 continue
-            sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, c * res, r * res, (c + 1) * res, (r + 1) * res, top)
+            if boxes:
+                x0, y0, x1, y1 = c * wide, r * high, (c + 1) * wide, (r + 1) * high
+                sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+            else:
+                quad = quad_of(lattice, r, c)
+                x0, y0, x1, y1 = quad_box(quad)
+                sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+                if sq < best_sq:
+                    sq, t = quad_distance_sq(ax, ay, az, dx, dy, dz, quad, top)
             if sq < best_sq:
                 best_sq, best_t = sq, t
     return best_sq, best_t
 
 
 @njit(cache=True, nogil=True)
-def _nearest(elevation_m, maxima_m, layout, res, ax, ay, az, dx, dy, dz):
+def _nearest(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, az, dx, dy, dz):
     """(squared distance, t) of one segment: depth first, nearer child first."""
-    width_m, height_m = elevation_m.shape[1] * res, elevation_m.shape[0] * res
-    at_start = edge_distance(ax, ay, width_m, height_m)
-    at_end = edge_distance(ax + dx, ay + dy, width_m, height_m)
+    at_start = edge_distance(lattice, elevation_m.shape[0], elevation_m.shape[1], ax, ay)
+    at_end = edge_distance(lattice, elevation_m.shape[0], elevation_m.shape[1], ax + dx, ay + dy)
     best_t = 0.0 if at_start <= at_end else 1.0  # the distance to the outside is concave along a line
     best_sq = min(at_start, at_end) ** 2
     bound = np.empty(STACK)
@@ -139,18 +146,16 @@ def _nearest(elevation_m, maxima_m, layout, res, ax, ay, az, dx, dy, dz):
         level, i, j = node[size, 0], node[size, 1], node[size, 2]
         if level == 0:
             best_sq, best_t = _nearest_in_leaf(
-                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, az, dx, dy, dz, best_sq, best_t
+                elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, az, dx, dy, dz, best_sq, best_t
             )
             continue
         offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
-        side = LEAF_PX * 2.0 ** (level - 1) * res
         first = size
         for ci in range(2 * i, min(rows, 2 * i + 2)):
             for cj in range(2 * j, min(cols, 2 * j + 2)):
                 top = np.float64(maxima_m[offset + ci * cols + cj])
-                sq, _ = column_distance_sq(
-                    ax, ay, az, dx, dy, dz, cj * side, ci * side, (cj + 1) * side, (ci + 1) * side, top
-                )
+                x0, y0, x1, y1 = block_box(lattice, boxes_m, offset, cols, level - 1, ci, cj)
+                sq, _ = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
                 if sq >= best_sq:
                     continue
                 k = size
@@ -164,11 +169,10 @@ def _nearest(elevation_m, maxima_m, layout, res, ax, ay, az, dx, dy, dz):
 
 
 @njit(cache=True, parallel=True, nogil=True)
-def _nearest_all(elevation_m, maxima_m, layout, res, start_m, end_m, distance_m, share):
+def _nearest_all(elevation_m, maxima_m, layout, lattice, boxes_m, start_m, end_m, distance_m, share):
     for k in prange(start_m.shape[0]):
         d = end_m[k] - start_m[k]
-        sq, t = _nearest(
-            elevation_m, maxima_m, layout, res, start_m[k, 0], start_m[k, 1], start_m[k, 2], d[0], d[1], d[2]
-        )
+        a = start_m[k]
+        sq, t = _nearest(elevation_m, maxima_m, layout, lattice, boxes_m, a[0], a[1], a[2], d[0], d[1], d[2])
         distance_m[k] = np.sqrt(sq)
         share[k] = t

@@ -8,7 +8,7 @@ triangle: no mast, however thin, stands between two ways home. A block of cells 
 column over its outline with its largest elevation asks for, so branch and bound over the pyramid of
 maxima finds the exact height at full resolution.
 
-Coordinates: metres from the model's north-west corner, x to the east, y to the SOUTH (rows), z up.
+Coordinates: the lattice's frame, z up.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from planning.certificate.nearest import STACK, column_distance_sq, edge_distance
-from planning.certificate.pyramid import LEAF_PX, MaxPyramid
+from planning.cells.lattice import is_rectangular, quad_of
+from planning.certificate.nearest import STACK, column_distance_sq
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
+from planning.certificate.quads import quad_box, quad_distance_sq
 
 F64 = NDArray[np.float64]
 
@@ -45,7 +47,8 @@ def return_altitude(pyramid: MaxPyramid, places_m: F64, home_xy_m: F64, clearanc
         pyramid.elevation_m,
         pyramid.maxima_m,
         pyramid.layout,
-        pyramid.resolution_m,
+        pyramid.lattice,
+        pyramid.boxes_m,
         np.ascontiguousarray(places_m, dtype=np.float64),
         float(home_xy_m[0]),
         float(home_xy_m[1]),
@@ -90,30 +93,65 @@ def _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m):
         sq = min(sq, _flat_distance_sq(ax, ay, bx, by, x0, y0, x1, y1))
         if sq > 0.0 and _holds(ax, ay, bx, by, hx, hy, x0, y0):
             sq = 0.0
-    if sq >= clearance_m * clearance_m:
-        return -np.inf
-    return top + np.sqrt(clearance_m * clearance_m - sq)
+    return _altitude_over(sq, top, clearance_m)
 
 
 @njit(cache=True, nogil=True)
-def _leaf_altitude(elevation_m, row0, col0, res, ax, ay, bx, by, hx, hy, clearance_m, needed):
+def _altitude_over(flat_sq, top, clearance_m):
+    """Altitude that keeps the clearance at a horizontal distance from a column."""
+    if flat_sq >= clearance_m * clearance_m:
+        return -np.inf
+    return top + np.sqrt(clearance_m * clearance_m - flat_sq)
+
+
+@njit(cache=True, nogil=True)
+def _quad_sq(ax, ay, bx, by, quad):
+    """Squared horizontal distance of the segment a b to a quadrilateral."""
+    sq, _ = quad_distance_sq(ax, ay, 0.0, bx - ax, by - ay, 0.0, quad, np.inf)
+    return sq
+
+
+@njit(cache=True, nogil=True)
+def _asked_by_quad(ax, ay, bx, by, hx, hy, quad, top, clearance_m):
+    """As `_asked`, of the column over a quadrilateral."""
+    sq = _quad_sq(ax, ay, hx, hy, quad)
+    if sq > 0.0 and (ax != bx or ay != by):
+        sq = min(sq, _quad_sq(bx, by, hx, hy, quad))
+        sq = min(sq, _quad_sq(ax, ay, bx, by, quad))
+        if sq > 0.0 and _holds(ax, ay, bx, by, hx, hy, quad[0], quad[1]):
+            sq = 0.0
+    return _altitude_over(sq, top, clearance_m)
+
+
+@njit(cache=True, nogil=True)
+def _leaf_altitude(elevation_m, row0, col0, lattice, ax, ay, bx, by, hx, hy, clearance_m, needed):
+    boxes, wide, high = is_rectangular(lattice), lattice.width_m, lattice.height_m
     for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
         for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
             top = np.float64(elevation_m[r, c])
             if not np.isfinite(top):
                 top = np.inf
-            if top + clearance_m > needed:
-                x0, y0, x1, y1 = c * res, r * res, (c + 1) * res, (r + 1) * res
+            if top + clearance_m <= needed:
+                continue
+            if boxes:
+                x0, y0, x1, y1 = c * wide, r * high, (c + 1) * wide, (r + 1) * high
                 needed = max(needed, _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m))
+            else:
+                quad = quad_of(lattice, r, c)
+                x0, y0, x1, y1 = quad_box(quad)
+                if _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m) > needed:
+                    needed = max(needed, _asked_by_quad(ax, ay, bx, by, hx, hy, quad, top, clearance_m))
     return needed
 
 
 @njit(cache=True, nogil=True)
-def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, bx, by, hx, hy, clearance_m, bar):
+def _needed_altitude(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, bx, by, hx, hy, clearance_m, bar):
     """The larger of ``bar`` and the altitude that the level flights from the segment a b to h need."""
-    width_m, height_m = elevation_m.shape[1] * res, elevation_m.shape[0] * res
-    to_edge = min(edge_distance(ax, ay, width_m, height_m), edge_distance(bx, by, width_m, height_m))
-    if min(to_edge, edge_distance(hx, hy, width_m, height_m)) < clearance_m:
+    height_px, width_px = elevation_m.shape
+    to_edge = min(
+        edge_distance(lattice, height_px, width_px, ax, ay), edge_distance(lattice, height_px, width_px, bx, by)
+    )
+    if min(to_edge, edge_distance(lattice, height_px, width_px, hx, hy)) < clearance_m:
         return np.inf
     needed = bar
     bound = np.empty(STACK)
@@ -127,19 +165,18 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, bx, by, hx, hy,
         level, i, j = node[size, 0], node[size, 1], node[size, 2]
         if level == 0:
             needed = _leaf_altitude(
-                elevation_m, i * LEAF_PX, j * LEAF_PX, res, ax, ay, bx, by, hx, hy, clearance_m, needed
+                elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, bx, by, hx, hy, clearance_m, needed
             )
             continue
         offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
-        side = LEAF_PX * 2.0 ** (level - 1) * res
         first = size
         for ci in range(2 * i, min(rows, 2 * i + 2)):
             for cj in range(2 * j, min(cols, 2 * j + 2)):
                 top = np.float64(maxima_m[offset + ci * cols + cj])
                 if top + clearance_m <= needed:
                     continue
-                x0, y0 = cj * side, ci * side
-                asked = _asked(ax, ay, bx, by, hx, hy, x0, y0, x0 + side, y0 + side, top, clearance_m)
+                x0, y0, x1, y1 = block_box(lattice, boxes_m, offset, cols, level - 1, ci, cj)
+                asked = _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m)
                 if asked <= needed:
                     continue
                 k = size
@@ -153,7 +190,7 @@ def _needed_altitude(elevation_m, maxima_m, layout, res, ax, ay, bx, by, hx, hy,
 
 
 @njit(cache=True, parallel=True, nogil=True)
-def _search(elevation_m, maxima_m, layout, res, places_m, home_x, home_y, clearance_m, needed_m, place):
+def _search(elevation_m, maxima_m, layout, lattice, boxes_m, places_m, home_x, home_y, clearance_m, needed_m, place):
     n = places_m.shape[0] - 1
     for chunk in prange(CHUNKS):
         best, best_place = -np.inf, -1
@@ -161,7 +198,19 @@ def _search(elevation_m, maxima_m, layout, res, places_m, home_x, home_y, cleara
             a, b = places_m[k], places_m[k + 1]
             bar = max(best, min(a[2], b[2]))
             found = _needed_altitude(
-                elevation_m, maxima_m, layout, res, a[0], a[1], b[0], b[1], home_x, home_y, clearance_m, bar
+                elevation_m,
+                maxima_m,
+                layout,
+                lattice,
+                boxes_m,
+                a[0],
+                a[1],
+                b[0],
+                b[1],
+                home_x,
+                home_y,
+                clearance_m,
+                bar,
             )
             if found > bar:
                 best, best_place = found, k

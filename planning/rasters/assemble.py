@@ -9,10 +9,10 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
+from planning.cells.squares import squares
 from planning.dsm import Dsm
 from planning.errors import NoElevationError
 from planning.rasters.heights import HeightStats, doubts, false_sentinels, mask_and_scale
-from planning.rasters.regrid import regrid
 from planning.rasters.surface_plan import SurfacePlan
 from planning.spikes import Spike
 
@@ -29,7 +29,7 @@ class ReadReport:
     pixel_size: tuple[float, float]
     """Width and height of a source pixel in the units of ``source_crs``."""
     resampled: bool
-    """Whether cells were brought to another grid."""
+    """Whether paths are laid over another grid than the file's; clearance is proved against the file's cells."""
     reprojected_to: str | None
     """Code of the UTM zone, when the source's units are not metres."""
     height_scale: float
@@ -58,17 +58,22 @@ def assemble(
             "Every cell is unknown.", where=where, advice="Check the export: it should hold the surface's heights."
         )
     mask_and_scale(stored, sentinels=sentinels, scale=plan.height_scale, offset=plan.height_offset)
-    elevation, transform = _north_up(stored, plan, progress)
-    dsm = Dsm(elevation, transform, plan.crs, plan.reference.vertical_datum, sha256)
+    dsm = _model(stored, plan, sha256, progress)
     found = doubts(stats, dtype=plan.header.dtypes[0], scaled=plan.scaled) if stats.known else ()
     return dsm, _report(dsm, plan, (*plan.notes, *_masked(stats, sentinels), *found))
 
 
-def _north_up(stored: F32, plan: SurfacePlan, progress: Callable[[str, float], None] | None) -> tuple[F32, Affine]:
-    if plan.regridding is not None:
-        resampled = regrid(stored, plan.regridding, progress=lambda s: progress("resample", s) if progress else None)
-        return resampled, plan.regridding.transform
-    t = plan.header.affine
+def _model(stored: F32, plan: SurfacePlan, sha256: str, progress: Callable[[str, float], None] | None) -> Dsm:
+    source = plan.placing.cells(stored) if plan.placing else None
+    if source is None or plan.grid is None:
+        elevation, transform = _north_up(stored, plan.affine)
+    else:
+        transform, shape = plan.grid
+        elevation = squares(source, transform, shape, progress=lambda s: progress("resample", s) if progress else None)
+    return Dsm(elevation, transform, plan.crs, plan.reference.vertical_datum, sha256, source)
+
+
+def _north_up(stored: F32, t: Affine) -> tuple[F32, Affine]:
     rows, columns = stored.shape
     size = (abs(t.a) + abs(t.e)) / 2 if not np.isclose(abs(t.a), abs(t.e), rtol=1e-9, atol=0) else abs(t.a)
     west, north = min(t.c, t.c + columns * t.a), max(t.f, t.f + rows * t.e)
@@ -89,13 +94,12 @@ def _masked(stats: HeightStats, sentinels: tuple[float, ...]) -> tuple[str, ...]
 def _report(dsm: Dsm, plan: SurfacePlan, warnings: tuple[str, ...]) -> ReadReport:
     t, source = plan.header.affine, plan.reference.source
     epsg = source.to_epsg()
-    reprojected = plan.crs != plan.reference.horizontal
     return ReadReport(
         source_crs=f"{source.name} (EPSG:{epsg})" if epsg else source.name,
         vertical_datum=dsm.vertical_datum,
         pixel_size=(float(np.hypot(t.a, t.d)), float(np.hypot(t.b, t.e))),
-        resampled=plan.regridding is not None,
-        reprojected_to=f"EPSG:{plan.crs.to_epsg()}" if reprojected else None,
+        resampled=plan.grid is not None,
+        reprojected_to=f"EPSG:{plan.crs.to_epsg()}" if plan.reprojected else None,
         height_scale=plan.height_scale,
         unknown_share=_unknown_share(dsm.elevation_m),
         spikes=(),

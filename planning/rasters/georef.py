@@ -165,15 +165,29 @@ def center_lon_lat(header: RasterHeader, horizontal: CRS, *, where: str) -> tupl
 
 
 def why_reproject(horizontal: CRS, lon: float, lat: float) -> str | None:
-    """Why a model in this reference system cannot stay in it; None when its units are true metres."""
+    """Why a model in this reference system cannot stay in it; None when its units, in metres, are true."""
     if horizontal.is_geographic:
         return "degrees"
-    unit = horizontal.axis_info[0]
-    if abs(unit.unit_conversion_factor - 1.0) > 1e-9:
-        return f"units of {unit.unit_name}"
     factors = Proj(horizontal).get_factors(lon, lat)
     scale = max(abs(factors.meridional_scale - 1.0), abs(factors.parallel_scale - 1.0))
     return f"metres that are {scale:.0%} off on the ground" if scale > _MOST_DISTORTION else None
+
+
+def unit_m(horizontal: CRS) -> float:
+    """Metres in the unit of a map projection's axes."""
+    return float(horizontal.axis_info[0].unit_conversion_factor)
+
+
+def in_metres(horizontal: CRS) -> CRS:
+    """The same map projection with its axes in metres."""
+    fields = horizontal.to_json_dict()
+    fields.pop("id", None)
+    for axis in fields["coordinate_system"]["axis"]:
+        axis["unit"] = "metre"
+    fields["name"] = f"{fields['name']} in metres"
+    made = CRS.from_json_dict(fields)
+    code = made.to_epsg()
+    return CRS.from_epsg(code) if code else made
 
 
 def local_utm(lon: float, lat: float, *, where: str) -> CRS:

@@ -1,4 +1,4 @@
-"""Surface models on disk: ``terrains/<id>/{manifest.json, elevation.npy}``; workers read and write them by folder."""
+"""Surface models on disk: ``terrains/<id>/{manifest.json, *.npy}``; workers read and write them by folder."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pyproj import CRS
 from planning.dsm import Dsm
 from planning.errors import NoElevationError
 from server.library.arrays import read_array, write_array
+from server.library.cells import CellsManifest, read_cells, write_cells
 from server.library.files import new_directory, new_id
 from server.library.shelf import read_manifest, utc_now, write_manifest
 from server.schemas import PlaceDoc, SpikeDoc, TerrainDoc
@@ -30,6 +31,8 @@ class TerrainManifest(BaseModel):
     transform: tuple[float, float, float, float, float, float]
     """Coefficients a..f: pixel corner (column, row) -> projected metres."""
     crs_wkt: str
+    source: CellsManifest | None = None
+    """Of the file's own cells, where they are no squares of the grid."""
 
 
 def store_terrain(
@@ -38,15 +41,13 @@ def store_terrain(
     """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``."""
     terrain_id = new_id()
     t = dsm.transform
-    manifest = TerrainManifest(
-        doc=_describe(dsm, terrain_id, name=name, spikes=spikes, warnings=warnings),
-        transform=(t.a, t.b, t.c, t.d, t.e, t.f),
-        crs_wkt=dsm.crs.to_wkt(),
-    )
+    doc = _describe(dsm, terrain_id, name=name, spikes=spikes, warnings=warnings)
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
-        write_manifest(folder, manifest)
-    return manifest.doc
+        source = write_cells(folder, dsm.source) if dsm.source else None
+        transform = (t.a, t.b, t.c, t.d, t.e, t.f)
+        write_manifest(folder, TerrainManifest(doc=doc, transform=transform, crs_wkt=dsm.crs.to_wkt(), source=source))
+    return doc
 
 
 def load_terrain(directory: Path) -> Dsm:
@@ -59,6 +60,7 @@ def load_terrain(directory: Path) -> Dsm:
         crs=CRS.from_wkt(manifest.crs_wkt),
         vertical_datum=manifest.doc.vertical_datum,
         sha256=manifest.doc.sha256,
+        source=read_cells(directory, manifest.source) if manifest.source else None,
     )
 
 

@@ -33,4 +33,4 @@ def plates(grid: HeightGrid) -> HeightGrid:
 def as_model(grid: HeightGrid, like: Dsm) -> Dsm:
     """A grid as a surface model of its own, to cast rays at."""
     transform = Affine(grid.cell_m, 0.0, grid.west_m, 0.0, -grid.cell_m, grid.north_m)
-    return replace(like, elevation_m=np.ascontiguousarray(grid.alt_dsm_m), transform=transform)
+    return replace(like.as_grid(), elevation_m=np.ascontiguousarray(grid.alt_dsm_m), transform=transform)

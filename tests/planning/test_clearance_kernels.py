@@ -86,7 +86,7 @@ def test_the_heights_above_the_cells_below_are_exact(case, margin_m):
     seed, rows, cols, holes, res = case
     terrain = rough_terrain(seed, rows=rows, cols=cols, holes=holes)
     start, end = random_segment(seed, width_m=cols * res, height_m=rows * res, margin_m=margin_m)
-    lowest_m, highest_m = height_range(terrain, res, start[None], end[None])
+    lowest_m, highest_m = height_range(max_pyramid(terrain, res), start[None], end[None])
     expected = oracle.height_range(terrain, res, start, end)
     assert lowest_m[0] == pytest.approx(expected[0], abs=1e-6)
     if np.isfinite(expected[0]):
@@ -96,7 +96,7 @@ def test_the_heights_above_the_cells_below_are_exact(case, margin_m):
 def test_heights_over_single_cells_are_exact():
     terrain = np.array([[0.0, 1.0, 5.0, 2.0]], dtype=np.float32)
     start, end = np.array([[0.5, 0.5, 10.0]]), np.array([[3.5, 0.5, 7.0]])
-    lowest_m, highest_m = height_range(terrain, 1.0, start, end)
+    lowest_m, highest_m = height_range(max_pyramid(terrain, 1.0), start, end)
     assert lowest_m[0] == pytest.approx(10.0 - 2.5 - 5.0)  # where the line leaves the third cell
     assert highest_m[0] == pytest.approx(10.0)
 
@@ -105,7 +105,7 @@ def test_a_line_along_a_border_is_judged_against_both_sides():
     terrain = np.zeros((4, 4), dtype=np.float32)
     terrain[:, 1] = 3.0
     start, end = np.array([[2.0, 0.5, 10.0]]), np.array([[2.0, 3.5, 10.0]])
-    lowest_m, highest_m = height_range(terrain, 1.0, start, end)
+    lowest_m, highest_m = height_range(max_pyramid(terrain, 1.0), start, end)
     assert (lowest_m[0], highest_m[0]) == (7.0, 10.0)
 
 
@@ -113,7 +113,7 @@ def test_a_line_along_a_border_is_judged_against_both_sides():
 def test_leaving_the_model_is_endless_depth_and_no_distance(end_x_m):
     terrain = np.zeros((4, 4), dtype=np.float32)
     start, end = np.array([[2.0, 2.0, 10.0]]), np.array([[end_x_m, 2.0, 10.0]])
-    lowest_m, _ = height_range(terrain, 1.0, start, end)
+    lowest_m, _ = height_range(max_pyramid(terrain, 1.0), start, end)
     distance_m, _ = nearest_distances(max_pyramid(terrain, 1.0), start, end)
     assert lowest_m[0] == -np.inf
     assert distance_m[0] == 0.0

@@ -57,11 +57,18 @@ def test_digest_is_that_of_the_file(shared_data: Path) -> None:
     assert dsm.sha256 == "869bc451e2cccb593ae0ce50b1424233d2f3cf494fa95f0b779d07cefcaa95ed"
 
 
-def test_feet_become_metres_in_the_local_utm_zone(shared_data: Path) -> None:
-    dsm, report = read_dsm_reported(shared_data / "dsm/autzen_feet/autzen_dsm_5ft.tif")
-    assert dsm.crs.to_epsg() == 32610
-    assert 0.93 * 1.524 < dsm.resolution_m < 1.524
-    assert report.reprojected_to == "EPSG:32610"
+def test_a_grid_in_feet_is_measured_in_metres_and_keeps_its_cells(shared_data: Path) -> None:
+    path = shared_data / "dsm/autzen_feet/autzen_dsm_5ft.tif"
+    dsm, report = read_dsm_reported(path)
+    assert dsm.crs.to_epsg() == 2993  # the same projection, its axes in metres
+    assert dsm.resolution_m == pytest.approx(5 * 0.3048, rel=1e-9)
+    assert (report.reprojected_to, report.resampled, dsm.source) == (None, False, None)
+    with rasterio.open(path) as source:
+        stored = source.read(1, masked=True).filled(np.nan)
+        assert (dsm.transform.c, dsm.transform.f) == pytest.approx(
+            (source.transform.c * 0.3048, source.transform.f * 0.3048), abs=1e-6
+        )
+    np.testing.assert_allclose(dsm.elevation_m, stored * 0.3048, rtol=1e-6)
     assert report.height_scale == pytest.approx(0.3048)
     assert float(np.nanmax(dsm.elevation_m)) == pytest.approx(520.51 * 0.3048, abs=1e-4)
     assert float(np.nanmin(dsm.elevation_m)) >= 406.56 * 0.3048 - 1e-4
