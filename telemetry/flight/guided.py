@@ -7,7 +7,7 @@ skips a target, waits while the link is down, and ends as soon as somebody else 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from planning.model import Firmware
@@ -17,6 +17,7 @@ from telemetry.flight.handover import Handover, is_fresh
 from telemetry.flight.mode_watch import ModeWatch
 from telemetry.flight.orders import Orders, Place
 from telemetry.flight.punctuality import Punctuality
+from telemetry.flight.standstill import Standstill
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.ends import GROUND_STATION, Ends
 from telemetry.messages import FlightStatus, GuidedTarget
@@ -61,6 +62,7 @@ class GuidedScript:
         self._speed_m_s: float | None = None
         self._reached_s: float | None = None
         self._return_at_s = 0.0
+        self._standstill, self._stands = Standstill(), ""
 
     @property
     def is_over(self) -> bool:
@@ -95,7 +97,7 @@ class GuidedScript:
             targets=self._request.targets[-1].item,
             since_utc_s=since_utc_s,
             broke_off_at=self.broke_off_at,
-            hint=self.hint or late,
+            hint=self.hint or self._stands or late,
         )
 
     def start(self, now_s: float) -> list[Action]:
@@ -174,8 +176,10 @@ class GuidedScript:
 
     def _climb(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._is_up(state, now_s):
+            up = replace(self._here(), alt_rel_home_m=self._request.takeoff_alt_rel_home_m)
+            self._stands = self._standstill.words(state, up, "the height of the take-off", now_s)
             return []
-        self.phase = "flying"
+        self.phase, self._stands = "flying", ""
         return self._hand_over(now_s)
 
     def _is_up(self, state: VehicleState, now_s: float) -> bool:
@@ -190,7 +194,10 @@ class GuidedScript:
             self._punctuality.reached(self.target, now_s)
         if self._reached_s is None:
             self._punctuality.on_the_way(self.target, now_s)
+            place = self._handover.place
+            self._stands = self._standstill.words(state, place, f"item {self.target.item}", now_s)
             return self._again_if_needed(state, now_s)
+        self._stands = ""
         if now_s - self._reached_s < self.target.loiter_s or not is_fresh(state, now_s):
             return []
         self._index += 1
@@ -260,6 +267,8 @@ class GuidedScript:
 
     def _again_if_needed(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None
+        if self._handover.follow_home(self._home_alt_amsl_m) and self._orders.counts_from_sea:
+            return self._send_place(now_s)
         if not self._handover.must_be_sent_again(state, now_s):
             return []
         if self._handover.sendings >= SLOW_TARGET_SENDINGS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from telemetry.flight.orders import Place
 from telemetry.mavlink.actions import Message
@@ -18,6 +19,8 @@ HOLD_AGAIN_S, HELD_M = 1.0, 2.0
 """A lost order to hold would let the vehicle fly on; the same place given twice does no harm."""
 NEARER_M, MOVING_M_S = 0.3, 0.3
 OLD_POSITION_S = 2.0
+HOME_MOVED_M = 0.05
+"""Less is noise of two heights that are told apart."""
 
 
 def away_m(state: VehicleState, place: Place) -> float:
@@ -48,6 +51,14 @@ class Handover:
         self._taken: bool | None = None
         self._sent_s = -math.inf
         self._away_when_sent_m = math.inf
+
+    def follow_home(self, home_alt_amsl_m: float) -> bool:
+        """Heights count from where home is now. True: it has moved, and the place with it."""
+        if not abs(home_alt_amsl_m - self.place.home_alt_amsl_m) > HOME_MOVED_M:
+            return False
+        self.place = replace(self.place, home_alt_amsl_m=home_alt_amsl_m)
+        self._taken = None
+        return True
 
     def sent(self, state: VehicleState, now_s: float) -> None:
         self.sendings += 1

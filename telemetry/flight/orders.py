@@ -45,6 +45,11 @@ class Orders:
         """In which the script is in charge; any other was chosen by somebody else."""
         return frozenset({"GUIDED"} if self.firmware == "ardupilot" else {"HOLD", "TAKEOFF"})
 
+    @property
+    def counts_from_sea(self) -> bool:
+        """Places are sent above mean sea level: they must be sent again when home moves."""
+        return self.firmware == "px4"
+
     def set_mode(self, name: str) -> Message:
         numbers = mode_numbers(self.firmware, name)
         assert numbers is not None, name

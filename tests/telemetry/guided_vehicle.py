@@ -28,6 +28,9 @@ class Craft:
     refuse_arming: bool = False
     deaf_to_targets: int = 0
     tells_its_target: bool = True
+    stuck: bool = False
+    home_shift_m: float = 0.0
+    """Its home has moved up by so much."""
     speed_m_s: float = 2.0
     at: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     """North, east, up of home, metres."""
@@ -104,7 +107,7 @@ class Craft:
         return messages
 
     def _move(self) -> None:
-        if not self.armed:
+        if not self.armed or self.stuck:
             return
         if self.mode in (RTL, PX4_RTL):
             self.to = [0.0, 0.0, self.at[2]] if math.hypot(*self.at[:2]) > 0.2 else [0.0, 0.0, 0.0]
@@ -129,9 +132,18 @@ class Craft:
     def _position(self, now_s: float, before: tuple[float, ...]) -> Any:
         v = [round((a - b) / DT_S * 100) for a, b in zip(self.at, before, strict=True)]
         up_mm = round(self.at[2] * 1000)
+        above_home_mm = up_mm - round(self.home_shift_m * 1000)
         lat, lon = self._degrees_e7(self.at)
         return mavlink.MAVLink_global_position_int_message(
-            round(now_s * 1000), lat, lon, round(HOME[2] * 1000) + up_mm, up_mm, v[0], v[1], -v[2], 0
+            round(now_s * 1000),
+            lat,
+            lon,
+            round(HOME[2] * 1000) + up_mm,
+            above_home_mm,
+            v[0],
+            v[1],
+            -v[2],
+            0,
         )
 
     def _target(self, now_s: float) -> Any:

@@ -15,6 +15,7 @@ from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided import GuidedEnd, GuidedScript
 from telemetry.flight.handover import Handover
 from telemetry.flight.orders import Place
+from telemetry.flight.standstill import Standstill
 from telemetry.mavlink.actions import Action, Done, Failed, Progress, Send
 from telemetry.messages import GuidedTarget
 from telemetry.reduce import reduce
@@ -292,6 +293,58 @@ def test_it_says_how_far_behind_the_plan_it_is_and_skips_nothing() -> None:
     Run(Watching(prompt), Craft()).until_end()
     assert prompt.behind_s is not None
     assert abs(prompt.behind_s) < 2.5
+
+
+def test_px4_is_sent_on_when_its_home_moves_in_flight() -> None:
+    craft = Craft(px4=True)
+
+    def moves(machine: GuidedScript, now_s: float) -> list[Action]:
+        craft.home_shift_m = 1.2
+        return []
+
+    run = fly(craft, acts={9.0: moves})
+    assert run.result.completed
+    assert run.now_s < 60.0
+    heights = [(t, m.z - HOME[2]) for t, m in craft.log if m.get_type() == "COMMAND_INT"]
+    assert {round(up_m, 1) for t, up_m in heights if t < 9.0} <= {10.0, 12.0}
+    assert {round(up_m, 1) for t, up_m in heights if t > 9.5} >= {11.2}
+
+
+@pytest.mark.parametrize(
+    ("stuck_s", "words"),
+    [(3.0, "no nearer to the height of the take-off for 1"), (9.5, "no nearer to item 5 for 1")],
+)
+def test_a_flight_that_does_not_move_says_so(stuck_s: float, words: str) -> None:
+    craft, told = Craft(), dict[float, str]()
+
+    def sticks(machine: GuidedScript, now_s: float) -> list[Action]:
+        craft.stuck = True
+        return []
+
+    def look(machine: GuidedScript, now_s: float) -> list[Action]:
+        told[now_s - stuck_s] = machine.status().hint
+        return []
+
+    def frees(machine: GuidedScript, now_s: float) -> list[Action]:
+        craft.stuck = False
+        return look(machine, now_s)
+
+    acts = {stuck_s: sticks, stuck_s + 8: look, stuck_s + 13: frees, stuck_s + 16.0: look}
+    assert fly(craft, acts=acts).result.completed
+    early, stuck, free = told.values()
+    assert "nearer" not in early + free
+    assert words in stuck
+
+
+def test_what_keeps_a_vehicle_from_going_on_is_guessed_from_its_state() -> None:
+    place = Place(HOME[0], HOME[1], -5.0, HOME[2])
+    here = replace(READY, lat_deg=HOME[0], lon_deg=HOME[1], alt_rel_home_m=0.0)
+    flying = replace(here, landed="in_air", alt_rel_home_m=-6.7)
+    for state, words in ((here, "leads below its home"), (flying, "hovers 1.7 m below it")):
+        standstill = Standstill()
+        assert standstill.words(state, place, "item 3", 0.0) == ""
+        assert standstill.words(state, place, "item 3", 9.9) == ""
+        assert words in standstill.words(state, place, "item 3", 10.0)
 
 
 def test_without_a_timing_nothing_is_said_about_delay() -> None:
