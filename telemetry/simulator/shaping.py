@@ -14,20 +14,14 @@ from telemetry.simulator.frame import Vec3
 JERK_M_S3 = 5.0
 """ArduCopter's PSC_JERK_XY and PSC_JERK_Z."""
 BRAKING_SHARE = 0.57
-"""Vertical deceleration on the approach over the highest acceleration, from the recorded take-offs."""
-FLAT_BRAKING_SHARE = 0.293
-"""The same over ground, from the recorded GUIDED flight."""
+"""Vertical deceleration on the last metres of a landing over the highest acceleration, from the recorded flights."""
 NEAR_PER_S = 2.0
-"""Speed over distance on the last metres."""
-SPEED_PER_S = 4.0
-"""Acceleration over a difference of speed, while that is small."""
-JERK_SHARE = 0.4
-"""How much of the jerk limit the change of a large difference of speed counts on."""
+"""Speed over distance there."""
+APPROACH_SHARE = 0.5
+"""Of acceleration and of its response to a difference of speed, for the approach to a place: ArduCopter's own."""
 BRAKE_ACCEL_M_S2 = 7.5
-"""ArduCopter's BRAKE_MODE_DECEL_RATE."""
-BRAKE_PER_S = JERK_M_S3 / BRAKE_ACCEL_M_S2
-"""BRAKE's deceleration over speed: its shaper takes the highest deceleration for what the jerk limit allows only of
-speeds above 11 m/s, so that a vehicle nearly always glides to a halt, as recorded."""
+"""ArduCopter's BRAKE_MODE_DECEL_RATE. Its shaper takes so much only of speeds above 11 m/s, for the jerk's sake: the
+vehicle nearly always glides to a halt, as recorded."""
 AT_REST_M_S = 0.02
 STOPPING_STEP_S = 0.02
 LONGEST_STOP = 1000
@@ -39,6 +33,13 @@ def approach_speed(distance_m: float, decel_m_s2: float) -> float:
     if distance_m <= linear_m:
         return NEAR_PER_S * distance_m
     return math.sqrt(2 * decel_m_s2 * (distance_m - linear_m / 2))
+
+
+def controlled(error: float, per_s: float, limit: float) -> float:
+    """ArduPilot's ``sqrt_controller``: proportional to a small error, to the root of what exceeds it."""
+    linear = limit / per_s**2
+    size = abs(error)
+    return math.copysign(per_s * size if size <= linear else math.sqrt(2 * limit * (size - linear / 2)), error)
 
 
 class Shaped:
@@ -65,7 +66,7 @@ class Shaped:
 
     def brake(self, axes: Axes, dt_s: float) -> None:
         """One step of the flight mode BRAKE."""
-        self._step((0.0, 0.0), 0.0, axes, dt_s, brakes=True)
+        self._step((0.0, 0.0), 0.0, replace(axes, accel_m_s2=BRAKE_ACCEL_M_S2), dt_s)
 
     @property
     def at_rest(self) -> bool:
@@ -80,23 +81,17 @@ class Shaped:
         distance = math.hypot(north, east)
         if distance < 1e-6:
             return 0.0, 0.0
-        speed = min(axes.speed_m_s, approach_speed(distance, FLAT_BRAKING_SHARE * axes.accel_m_s2))
+        speed = min(axes.speed_m_s, _approach(distance, axes.accel_m_s2))
         return speed * north / distance, speed * east / distance
 
     def _vertical_speed(self, away_m: float, axes: Axes) -> float:
-        speed = approach_speed(abs(away_m), BRAKING_SHARE * axes.vertical_accel_m_s2)
+        speed = _approach(abs(away_m), axes.vertical_accel_m_s2)
         return min(speed, axes.climb_m_s) if away_m > 0 else -min(speed, axes.descent_m_s)
 
-    def _step(
-        self, flat_m_s: tuple[float, float], up_m_s: float, axes: Axes, dt_s: float, *, brakes: bool = False
-    ) -> None:
+    def _step(self, flat_m_s: tuple[float, float], up_m_s: float, axes: Axes, dt_s: float) -> None:
         (an, ae, au), (vn, ve, vu), (n, e, u) = self.accel_neu, self.v_neu, self.p_neu
-        if brakes:
-            north, east = _limited(-BRAKE_PER_S * vn, -BRAKE_PER_S * ve, BRAKE_ACCEL_M_S2)
-        else:
-            north, east = _limited(_wish(flat_m_s[0] - vn), _wish(flat_m_s[1] - ve), axes.accel_m_s2)
-        most = axes.vertical_accel_m_s2
-        up = max(-most, min(most, _wish(up_m_s - vu)))
+        north, east = _wish(flat_m_s[0] - vn, flat_m_s[1] - ve, axes.accel_m_s2)
+        up, _ = _wish(up_m_s - vu, 0.0, axes.vertical_accel_m_s2)
         dn, de = _limited(north - an, east - ae, JERK_M_S3 * dt_s)
         step = JERK_M_S3 * dt_s
         an, ae, au = an + dn, ae + de, au + max(-step, min(step, up - au))
@@ -117,10 +112,19 @@ def _along(goal_neu: Vec3, p_neu: Vec3, axes: Axes) -> Axes:
     return replace(axes, speed_m_s=flat_m_s, climb_m_s=vertical, descent_m_s=vertical)
 
 
-def _wish(change_m_s: float) -> float:
-    """Acceleration that ends a difference of speed without overshoot under limited jerk."""
-    size = abs(change_m_s)
-    return math.copysign(min(SPEED_PER_S * size, math.sqrt(2 * JERK_SHARE * JERK_M_S3 * size)), change_m_s)
+def _approach(distance_m: float, accel_m_s2: float) -> float:
+    """Speed towards a place."""
+    per_s = APPROACH_SHARE * JERK_M_S3 / accel_m_s2
+    return controlled(distance_m, per_s, APPROACH_SHARE * accel_m_s2)
+
+
+def _wish(north_m_s: float, east_m_s: float, accel_m_s2: float) -> tuple[float, float]:
+    """Acceleration that ends a difference of speed."""
+    size = math.hypot(north_m_s, east_m_s)
+    if size < 1e-9:
+        return 0.0, 0.0
+    accel = min(controlled(size, JERK_M_S3 / accel_m_s2, JERK_M_S3), accel_m_s2)
+    return accel * north_m_s / size, accel * east_m_s / size
 
 
 def _limited(north: float, east: float, most: float) -> tuple[float, float]:
