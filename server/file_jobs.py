@@ -12,6 +12,7 @@ from server.errors import NotFoundError
 from server.job_board import JobBoard
 from server.jobs import Lane, Progress
 from server.library import Library
+from server.library.terrains import UNKNOWN_ORIGIN, Origin
 from server.schemas import JobDoc, OrthophotoDoc, PlanDoc, TerrainDoc
 
 T = TypeVar("T")
@@ -39,6 +40,7 @@ class FileJobs:
         upload: Path,
         filename: str,
         *,
+        origin: Origin = UNKNOWN_ORIGIN,
         crs: str | None,
         z_scale: float | None,
         vertical_datum: str | None,
@@ -53,6 +55,7 @@ class FileJobs:
                     self._library.root,
                     upload,
                     filename,
+                    origin=origin,
                     crs=crs,
                     z_scale=z_scale,
                     vertical_datum=vertical_datum,

@@ -14,7 +14,7 @@ from planning.spikes import remove_spikes as without
 from server.jobs import Progress
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
-from server.library.terrains import TerrainManifest, load_terrain, store_terrain
+from server.library.terrains import Origin, TerrainManifest, load_terrain, store_terrain
 from server.schemas import OrthophotoDoc, SpikeDoc, TerrainDoc
 
 _STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
@@ -44,6 +44,7 @@ def import_terrain(
     upload: Path,
     filename: str,
     *,
+    origin: Origin,
     crs: str | None,
     z_scale: float | None,
     vertical_datum: str | None,
@@ -62,7 +63,7 @@ def import_terrain(
         )
     report("Storing", None)
     spikes = () if found.spikes_removed else found.spikes
-    return store_terrain(root, dsm, name=filename, spikes=spike_docs(spikes), warnings=found.warnings)
+    return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
 
 
 def import_orthophoto(
@@ -91,6 +92,7 @@ def without_spikes(root: Path, terrain_dir: Path, *, report: Progress) -> Terrai
         root,
         without(dsm, spikes),
         name=f"{before.name} without spikes",
+        origin=Origin(before.folder, before.file_utc),
         warnings=[*before.warnings, f"{len(spikes)} isolated spikes and pits were removed."],
     )
 

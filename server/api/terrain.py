@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
-from server.api.uploads import display_name, stream_to_disk, suffix_of
+from server.api.uploads import display_folder, display_name, stream_to_disk, suffix_of
 from server.errors import BadRequestError
+from server.library.terrain_picture import terrain_picture_png
+from server.library.terrains import Origin
 from server.schemas import JobDoc, TerrainDoc
 
 router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["terrain"], responses=ERROR_RESPONSES)
@@ -28,6 +32,8 @@ async def add_terrain(
     z_scale: Annotated[str, Query(max_length=20, pattern=r"^[0-9.eE+-]*$")] = "",
     vertical_datum: Declared = "",
     remove_spikes: bool = False,
+    folder: Annotated[str, Query(max_length=1000)] = "",
+    file_utc: Annotated[datetime | None, Query()] = None,
 ) -> Response:
     """A GeoTIFF or ESRI ASCII grid; what the file does not say can be declared. Empty: nothing is."""
     scale = _positive(z_scale)
@@ -36,12 +42,21 @@ async def add_terrain(
     job = workspace.files.add_terrain(
         upload,
         name,
+        origin=Origin(display_folder(folder), file_utc and file_utc.astimezone(UTC).isoformat(timespec="seconds")),
         crs=crs.strip() or None,
         z_scale=scale,
         vertical_datum=vertical_datum.strip() or None,
         remove_spikes=remove_spikes,
     )
     return answer(job, 202)
+
+
+@router.get("/terrains/{terrain_id}/picture.png", response_class=Response)
+async def terrain_picture(terrain_id: str, request: Request) -> Response:
+    """The surface model's relief, small enough for a list."""
+    folder = parts_of(request).library.terrain_dir(terrain_id)
+    png = await asyncio.to_thread(terrain_picture_png, folder)
+    return Response(png, media_type="image/png", headers={"Cache-Control": "private, max-age=86400, immutable"})
 
 
 @router.post("/terrains/demo", response_model=TerrainDoc)

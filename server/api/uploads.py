@@ -21,6 +21,12 @@ def display_name(filename: str) -> str:
     return clean[:NAME_MAX_CHARS] or "unnamed"
 
 
+def display_folder(folder: str) -> str:
+    """Where a file lay, as its page says: one line, its last part where it is long; it never becomes a path."""
+    clean = "".join(char for char in folder.replace("\\", "/") if char.isprintable()).strip("/ ")
+    return clean[-NAME_MAX_CHARS:]
+
+
 def suffix_of(name: str) -> str:
     """The ending for readers that go by it: letters and digits only."""
     ending = PurePosixPath(name).suffix.lower()

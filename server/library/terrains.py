@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,17 @@ FOLDER = "terrains"
 _ELEVATION = "elevation.npy"
 
 
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What the page that sent a file knows of it, to tell two of the same name apart."""
+
+    folder: str = ""
+    file_utc: str | None = None
+
+
+UNKNOWN_ORIGIN = Origin()
+
+
 class TerrainManifest(BaseModel):
     model_config = ConfigDict(frozen=True)
 
@@ -36,12 +48,18 @@ class TerrainManifest(BaseModel):
 
 
 def store_terrain(
-    root: Path, dsm: Dsm, *, name: str, spikes: Sequence[SpikeDoc] = (), warnings: Sequence[str] = ()
+    root: Path,
+    dsm: Dsm,
+    *,
+    name: str,
+    origin: Origin = UNKNOWN_ORIGIN,
+    spikes: Sequence[SpikeDoc] = (),
+    warnings: Sequence[str] = (),
 ) -> TerrainDoc:
     """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``."""
     terrain_id = new_id()
     t = dsm.transform
-    doc = _describe(dsm, terrain_id, name=name, spikes=spikes, warnings=warnings)
+    doc = _describe(dsm, terrain_id, name=name, origin=origin, spikes=spikes, warnings=warnings)
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
         source = write_cells(folder, dsm.source) if dsm.source else None
@@ -81,7 +99,7 @@ def ground_notice(directory: Path) -> GroundNotice:
 
 
 def _describe(
-    dsm: Dsm, terrain_id: str, *, name: str, spikes: Sequence[SpikeDoc], warnings: Sequence[str]
+    dsm: Dsm, terrain_id: str, *, name: str, origin: Origin, spikes: Sequence[SpikeDoc], warnings: Sequence[str]
 ) -> TerrainDoc:
     known = int(np.count_nonzero(np.isfinite(dsm.elevation_m)))
     if known == 0:
@@ -104,6 +122,8 @@ def _describe(
         warnings=list(warnings),
         corner_lat_lon_deg=_corners(dsm),
         added_utc=utc_now(),
+        folder=origin.folder,
+        file_utc=origin.file_utc,
     )
 
 

@@ -34,6 +34,10 @@ class TerrainDoc(Strict):
     corner_lat_lon_deg: list[PlaceDoc]
     """The model's four outer corners, clockwise from the north-west."""
     added_utc: str
+    folder: str = ""
+    """Where the file lay, as far as the page that sent it could tell; empty: it could not."""
+    file_utc: str | None = None
+    """When the file was last changed."""
 
 
 class OrthophotoDoc(Strict):

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import logging.handlers
 import queue
 import socket
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from server.api.uploads import display_name, suffix_of
+from planning.demo import small_hill
+from server.api.uploads import display_folder, display_name, suffix_of
+from server.library.terrains import Origin, store_terrain
 from tests.server.running import Running
 
 RAW = {"Content-Type": "application/octet-stream"}
@@ -18,13 +23,21 @@ def test_an_upload_reaches_the_job_whole(served: Running) -> None:
     data = bytes(range(256)) * 4000
     response = served.http.post(
         "/api/terrains",
-        params={"filename": "a/b/Hügel.TIF", "crs": "EPSG:32760", "z_scale": "0.01", "vertical_datum": ""},
+        params={
+            "filename": "a/b/Hügel.TIF",
+            "crs": "EPSG:32760",
+            "z_scale": "0.01",
+            "vertical_datum": "",
+            "folder": "/survey 2026/../x\\dsm/",
+            "file_utc": "2026-11-02T12:30:00+01:00",
+        },
         content=data,
         headers=RAW,
     )
     assert (response.status_code, response.json()["label"]) == (202, "Reading Hügel.TIF")
     assert served.workspace.uploads["Hügel.TIF"] == data
     assert served.workspace.options == {
+        "origin": Origin("survey 2026/../x/dsm", "2026-11-02T11:30:00+00:00"),
         "crs": "EPSG:32760",
         "z_scale": 0.01,
         "vertical_datum": None,
@@ -32,11 +45,37 @@ def test_an_upload_reaches_the_job_whole(served: Running) -> None:
     }
 
 
-@pytest.mark.parametrize(("query", "where"), [({"z_scale": "1e"}, "z_scale"), ({"remove_spikes": "perhaps"}, "")])
+@pytest.mark.parametrize(
+    ("query", "where"),
+    [({"z_scale": "1e"}, "z_scale"), ({"remove_spikes": "perhaps"}, ""), ({"file_utc": "yesterday"}, "file_utc")],
+)
 def test_wrong_options_are_refused_before_the_body(served: Running, query: dict, where: str) -> None:
     response = served.http.post("/api/terrains", params={"filename": "x.tif", **query}, content=b"x", headers=RAW)
     assert (response.status_code, response.json()["code"]) == (422, "invalid")
     assert where in response.json()["where"]
+
+
+def test_a_model_has_a_picture_of_its_relief(served: Running) -> None:
+    library = served.parts.library
+    hill = small_hill()
+    height_m = hill.elevation_m.copy()
+    height_m[:, : hill.width_px // 2] = np.nan
+    doc = store_terrain(library.root, hill.with_elevation(height_m), name="dsm.tif", origin=Origin("east", None))
+    library.refresh()
+    assert (doc.folder, doc.file_utc) == ("east", None)
+    response = served.http.get(f"/api/terrains/{doc.id}/picture.png")
+    assert response.headers["content-type"] == "image/png"
+    picture = np.asarray(Image.open(io.BytesIO(response.content)))
+    assert max(picture.shape[:2]) <= 96
+    assert not picture[:, : picture.shape[1] // 2 - 1, 3].any()
+    assert picture[:, picture.shape[1] // 2 + 1 :, 3].all()
+    assert np.ptp(picture[..., 0][picture[..., 3] > 0]) > 40
+    assert served.http.get("/api/terrains/unknown/picture.png").status_code == 404
+
+
+def test_a_folder_is_one_short_line() -> None:
+    assert display_folder("\\flights\\new\n\x1b[31m/") == "flights/new[31m"
+    assert len(display_folder("deep/" * 90)) <= 80
 
 
 def test_an_empty_upload_is_refused_and_leaves_nothing(served: Running) -> None:

@@ -678,6 +678,10 @@ export interface TerrainDoc {
   /** The model's four outer corners, clockwise from the north-west. */
   corner_lat_lon_deg: PlaceDoc[];
   added_utc: string;
+  /** Where the file lay, as far as the page that sent it could tell; empty: it could not. */
+  folder: string;
+  /** When the file was last changed. */
+  file_utc: string | null;
 }
 
 export interface OrthophotoDoc {

@@ -1,6 +1,7 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
+import { droppedFiles } from "../store/dropped";
 import { isRadarLog, isRecording, takeFiles } from "../store/files";
 import { takeRadarLogs } from "../traversability/commands";
 import { dragging } from "./ui_state";
@@ -25,10 +26,11 @@ export function FileDrop() {
   }, []);
   if (!dragging.value) return null;
   const end = () => (dragging.value = false);
-  const drop = (event: DragEvent) => {
+  const drop = async (event: DragEvent) => {
     event.preventDefault();
     end();
-    const files = [...(event.dataTransfer?.files ?? [])];
+    if (!event.dataTransfer) return;
+    const files = await droppedFiles(event.dataTransfer);
     takeRecordings(files.filter(isRecording));
     takeRadarLogs(files.filter(isRadarLog));
     takeFiles(files.filter((file) => !isRecording(file) && !isRadarLog(file)));
@@ -39,14 +41,14 @@ export function FileDrop() {
       data-testid="drop-veil"
       onDragOver={(event) => event.preventDefault()}
       onDragLeave={end}
-      onDrop={drop}
+      onDrop={(event) => void drop(event)}
       onClick={end}
     >
       <div class="drop-card">
         <Icon name="import" size={40} />
         <p class="drop-title">Drop to open</p>
         <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
-        <p>Points or polygon: CSV, GeoJSON, KML, .waypoints, .plan</p>
+        <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
         <p>Recorded flight: .tlog, .mcap</p>
         <p>UWB radar log: .npz</p>
       </div>

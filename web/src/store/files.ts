@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import type { Imported, JobDoc, RecordingDoc } from "../messages";
 import { ApiError, asErrorDoc, request, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
+import { folderOf } from "./dropped";
 import { document_, jobs, notifyText, setError, terrain } from "./state";
 
 /** A file on its way to the server, before there is a job for it. */
@@ -33,7 +34,7 @@ export const sending = signal<Sending[]>([]);
 /** Files by the job that reads them: kept so that a file can be sent again with what was missing. */
 export const sentFiles = signal<ReadonlyMap<string, SentFile>>(new Map());
 
-const POINT_FILES = /\.(csv|geojson|json|kml|waypoints|plan|txt)$/i;
+const POINT_FILES = /\.(csv|geojson|json|kml|kmz|waypoints|plan|txt)$/i;
 const MOST_POINT_BYTES = 20e6;
 let nextId = 1;
 
@@ -63,7 +64,8 @@ export async function sendTerrain(
   replaces = false,
 ): Promise<void> {
   setError("terrain", null);
-  const query = new URLSearchParams({ filename: file.name });
+  const query = new URLSearchParams({ filename: file.name, folder: folderOf(file) });
+  if (file.lastModified) query.set("file_utc", new Date(file.lastModified).toISOString());
   if (hints.crs) query.set("crs", hints.crs);
   if (hints.z_scale) query.set("z_scale", hints.z_scale);
   if (hints.vertical_datum) query.set("vertical_datum", hints.vertical_datum);

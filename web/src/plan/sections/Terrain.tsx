@@ -1,4 +1,4 @@
-import { withUnit } from "../../format";
+import { clock, day, metres, number, withUnit } from "../../format";
 import type { PlanDoc, TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
@@ -41,14 +41,39 @@ function Offer({ plan }: { plan: PlanDoc }) {
   );
 }
 
+/** What tells one model from another of the same name, beside its picture, folder and CRS. */
+function terrainMarks(entry: TerrainDoc): string {
+  const [width_m, height_m] = [entry.width_px * entry.resolution_m, entry.height_px * entry.resolution_m];
+  const cell = withUnit(entry.resolution_m, "m", entry.resolution_m < 0.1 ? 3 : 2);
+  const date = day(entry.file_utc ?? entry.added_utc).slice(0, 10);
+  return [`${number(width_m)} × ${metres(height_m, 0)}`, cell, date].join(" · ");
+}
+
 function Row({ entry, isUsed }: { entry: TerrainDoc; isUsed: boolean }) {
   return (
     <li class={isUsed ? "current" : ""} data-testid="terrain-row">
       <button type="button" class="pick" aria-pressed={isUsed} onClick={() => !isUsed && useTerrain(entry)}>
         <span class="radio" aria-hidden="true" />
-        <span class="name">{entry.name}</span>
-        <span class="muted number">
-          {withUnit(entry.resolution_m, "m", entry.resolution_m < 0.1 ? 3 : 2)}
+        <img
+          class="terrain-picture"
+          src={`/api/terrains/${entry.id}/picture.png`}
+          alt=""
+          width={40}
+          height={40}
+          loading="lazy"
+        />
+        <span class="terrain-words">
+          <span class="name" title={entry.name}>
+            {entry.folder && <span class="muted">{entry.folder}/</span>}
+            {entry.name}
+          </span>
+          <span
+            class="muted terrain-marks"
+            title={`${entry.crs}, read ${day(entry.added_utc)} ${clock(entry.added_utc)}`}
+          >
+            {terrainMarks(entry)}
+          </span>
+          <span class="muted terrain-marks">{entry.crs}</span>
         </span>
       </button>
       {!isUsed && (
