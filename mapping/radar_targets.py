@@ -64,21 +64,14 @@ def to_enu(
 ) -> F64:
     """(N, 3) body metres -> (N, 3) map metres.
 
-    heading_only: elevation set to zero, turned by the heading alone (eqs 4-5): at the vehicle's own height.
+    heading_only: z set to zero, turned by the heading alone (eqs 4-5): at the vehicle's own height.
     full_attitude: turned by the whole attitude, measured elevation and all (fig. 15a).
-    full_attitude_flat: elevation set to zero, turned by the whole attitude (fig. 15b).
-    Where the elevation is set to zero the measured range is kept: z = 0 alone would leave the error of the elevation
-    in the distance, 4 m of 68 m at the gate's edge.
+    full_attitude_flat: z set to zero, turned by the whole attitude (fig. 15b).
+    x and y stay as measured (eq. 6): a thing stands no farther away than the radar has it, 6 % nearer than its slant
+    range at the gate's upper edge.
     """
     p_body = np.asarray(xyz_m, np.float64).reshape(-1, 3)
     if variant == "full_attitude":
         return p_body @ R_enu_body.T + position_enu_m
     R = heading_rotation(heading_rad) if variant == "heading_only" else R_enu_body
-    return _levelled(p_body) @ R.T + position_enu_m  # eq. 5
-
-
-def _levelled(p_body: F64) -> F64:
-    """The same ranges and azimuths at elevation zero."""
-    targets = polar(p_body)
-    x, y = targets.range_m * np.sin(targets.azimuth_rad), targets.range_m * np.cos(targets.azimuth_rad)
-    return np.column_stack([x, y, np.zeros_like(x)])
+    return p_body * (1.0, 1.0, 0.0) @ R.T + position_enu_m  # eqs 5, 6

@@ -48,15 +48,16 @@ def test_the_gate(azimuth_deg: float, elevation_deg: float, range_m: float, kept
 def test_variants(range_m: float, azimuth: float, elevation: float, heading: float, pitch: float, roll: float) -> None:
     xyz = from_polar(np.array([range_m]), np.array([azimuth]), np.array([elevation]))
     position, R = np.array([10.0, -20.0, 30.0]), attitude_rotation(heading, pitch, roll)
-    level = from_polar(np.array([range_m]), np.array([azimuth]), np.zeros(1))[0]
+    level = np.array([xyz[0, 0], xyz[0, 1], 0.0])
     only, full, flat = (
         to_enu(xyz, position, R, heading, v)[0] for v in ("heading_only", "full_attitude", "full_attitude_flat")
     )
     np.testing.assert_allclose(only, position + heading_rotation(heading) @ level, atol=1e-9)
     np.testing.assert_allclose(full, position + R @ xyz[0], atol=1e-9)
     np.testing.assert_allclose(flat, position + R @ level, atol=1e-9)
-    for place in (only, full, flat):
-        assert np.linalg.norm(place - position) == pytest.approx(range_m)
+    assert np.linalg.norm(full - position) == pytest.approx(range_m)
+    for place in (only, flat):
+        assert np.linalg.norm(place - position) == pytest.approx(range_m * math.cos(elevation)), "as measured, eq. 6"
     assert only[2] == pytest.approx(position[2]), "at the vehicle's own height"
 
 
