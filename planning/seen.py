@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from planning.avoiding.boxes import half_heights, segment_box_sq
 from planning.avoiding.room import Seen
-from planning.avoiding.standing import standing
+from planning.avoiding.standing import REACH_UP, standing
 from planning.cells.cells import Layout
 from planning.dsm import Dsm
 
@@ -107,10 +107,12 @@ def conflicts(
     resolution_m: float,
     radius_m: float,
     standing_from_enu_m: ArrayLike | None = None,
+    reach_up: float = REACH_UP,
 ) -> Conflict | None:
     """The first place of a line (K, 3) nearer than ``radius_m`` to a voxel, centres (N, 3). None: there is none.
 
-    ``standing_from_enu_m`` (3,): the vehicle, for voxels of a sensor that does not tell heights (``standing``).
+    ``standing_from_enu_m`` (3,): the vehicle, for voxels of a sensor that does not tell heights (``standing``),
+    and the slope that it looks up.
     """
     line = np.ascontiguousarray(line_enu_m, np.float64).reshape(-1, 3)
     centres = np.ascontiguousarray(centres_enu_m, np.float64).reshape(-1, 3)
@@ -121,7 +123,7 @@ def conflicts(
     if len(near.centres_enu_m) == 0:
         return None
     if standing_from_enu_m is not None:
-        near = standing(near, np.asarray(standing_from_enu_m, np.float64).reshape(3))
+        near = standing(near, np.asarray(standing_from_enu_m, np.float64).reshape(3), reach_up=reach_up)
     half_up_m = half_heights(near.half_up_m, half_m, len(near.centres_enu_m))
     along_m, leg, distance_m = _along(line, near.centres_enu_m, half_m, half_up_m, radius_m)
     found = np.flatnonzero(leg >= 0)

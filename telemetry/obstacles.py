@@ -239,6 +239,15 @@ class PerceptionSettings:
     paper_bare: bool = False
     """As the papers: no known ground, no corridor."""
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] = "heading_only"
+    radar_azimuth_deg: float = 45.0
+    """Of the radar's gate, to both sides; targets outside of it are not used."""
+    radar_low_deg: float = 0.0
+    radar_high_deg: float = 20.0
+    """Its elevations."""
+    climb_m_s: float = 1.5
+    """By itself, over what stands in the way (V2)."""
+    climb_ceiling_m: float = 30.0
+    """The most that it climbs, or a prepared way leads, above the plan."""
     vehicle_radius_m: float = 0.5
     position_error_m: float = 0.3
     brake_decel_m_s2: float = 7.5

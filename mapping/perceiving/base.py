@@ -56,8 +56,6 @@ class Perception:
     """
 
     name = "sensor"
-    reach_down = 0.0
-    """See ``corridor.tube_points``."""
     field = Field(nearest_m=0.5, aside_rad=math.radians(30.0))
     """Where it sees what stands at the vehicle's height."""
 
@@ -129,6 +127,11 @@ class Perception:
         """What a subclass knows beside the map."""
         self._sweep = (-math.inf, ())
         self._remembered = Remembered(self.map.resolution_m)
+
+    @staticmethod
+    def reach_down(settings: Settings) -> float:
+        """See ``corridor.tube_points``."""
+        return 0.0
 
     @staticmethod
     def _sector_points(s: Settings) -> F64:
@@ -257,7 +260,7 @@ class Perception:
             line,
             radius_m=s.vehicle_radius_m + s.position_error_m,
             step_m=s.resolution_m / 2,
-            reach_down=self.reach_down,
+            reach_down=self.reach_down(s),
         )
         return ahead_m, self._centres(tube[self._occupied(tube)])
 

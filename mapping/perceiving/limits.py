@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mapping.errors import CapacityError
+from mapping.errors import CapacityError, ParameterError
 from mapping.perceiving.base import LONGEST_CORRIDOR_M, ROI_STEP_M
 from mapping.perceiving.model import Settings
 from mapping.roi import MOST_POINTS, checked_sector
 from mapping.voxels.checks import checked_size
+
+LEAST_GATE_DEG = 5.0
+"""Elevations are measured to 7 degrees."""
 
 
 def check_settings(settings: Settings, *, reach_m: float | None, reach_down: float) -> None:
@@ -17,11 +20,29 @@ def check_settings(settings: Settings, *, reach_m: float | None, reach_down: flo
     ``reach_m``: see ``checked_size``; ``reach_down``: see ``tube_points``.
     """
     s = settings
+    check_gate(s)
     checked_size(s.resolution_m, reach_m, s.memory_limit_bytes)
     checked_sector(
         depth_m=s.depth_m, fov_rad=s.fov_rad, height_m=s.height_m, resolution_m=min(ROI_STEP_M, s.resolution_m)
     )
     _check_corridor(s.vehicle_radius_m + s.position_error_m, s.resolution_m, reach_down)
+
+
+def check_gate(s: Settings) -> None:
+    """Raises ParameterError."""
+    low_deg, high_deg = math.degrees(s.gate_low_rad), math.degrees(s.gate_high_rad)
+    if not (low_deg >= -90.0 and high_deg <= 80.0 and high_deg - low_deg >= LEAST_GATE_DEG - 1e-9):
+        raise ParameterError(
+            f"The radar's gate from {low_deg:g} to {high_deg:g} degrees of elevation lets nothing through.",
+            where="gate",
+            advice=f"Its upper edge must be at least {LEAST_GATE_DEG:g} degrees above its lower one (usually 0 to 20).",
+        )
+    if not 0.0 < s.gate_azimuth_rad <= math.pi / 2:
+        raise ParameterError(
+            f"The radar's gate is {math.degrees(s.gate_azimuth_rad):g} degrees wide to either side.",
+            where="gate",
+            advice="Give more than 0 and at most 90 degrees (usually 45).",
+        )
 
 
 def _check_corridor(radius_m: float, resolution_m: float, reach_down: float) -> None:

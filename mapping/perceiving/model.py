@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -29,6 +30,10 @@ class Settings:
     paper_bare: bool = False
     """As the papers: no known ground, no corridor, every target believed at once."""
     radar_variant: Variant = "heading_only"
+    gate_azimuth_rad: float = math.radians(45)
+    gate_low_rad: float = 0.0
+    gate_high_rad: float = math.radians(20)
+    """Where the radar's targets must be measured to be used: ``Gate``."""
     vehicle_radius_m: float = 0.5
     position_error_m: float = 0.3
     braking: Braking = field(default_factory=Braking)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mapping.perceiving.base import Perception
 from mapping.perceiving.model import FrameResult, RadarScan, Settings
-from mapping.perceiving.radar_evidence import RadarEvidence, side_lobes
+from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence, side_lobes
 from mapping.perceiving.radar_passing import Passing
 from mapping.perceiving.remembered import Field
 from mapping.poses import Pose
@@ -29,15 +29,29 @@ class RadarPerception(Perception):
     by, is "explained"."""
 
     name = "radar"
-    reach_down = math.tan(Gate().elevation_high_rad)
-    """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
-    gate = Gate()
-    field = Field(gate.nearest_m, gate.azimuth_rad)
+    evidence = EvidenceParams()
 
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         super().__init__(settings, alert_prefix=alert_prefix)
-        self._evidence = RadarEvidence()
+        self._evidence = RadarEvidence(self.evidence)
         self._passing = Passing()
+        self._look_through_the_gate()
+
+    def set_settings(self, settings: Settings) -> None:
+        super().set_settings(settings)
+        self._look_through_the_gate()
+
+    @staticmethod
+    def reach_down(settings: Settings) -> float:
+        """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
+        return math.tan(max(0.0, settings.gate_high_rad))
+
+    def _look_through_the_gate(self) -> None:
+        """What is expected of known ground is what the gate lets through."""
+        s = self.settings
+        self.gate = Gate(s.gate_azimuth_rad, s.gate_low_rad, s.gate_high_rad)
+        self.field = Field(self.gate.nearest_m, self.gate.azimuth_rad)
+        self._evidence.set_gate(self.gate)
 
     def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
         """Take one frame; never raises for what is in it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,14 @@ from mapping.ground import GroundGrid
 from mapping.ground_beams import BeamShape
 from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
 from mapping.poses import Pose
-from mapping.radar_targets import Polar
+from mapping.radar_targets import Gate, Polar
 
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+BESIDE_RAD = math.radians(3.0)
+"""Of the gate, to both sides: the noise of azimuths."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,16 @@ class RadarEvidence:
     def __init__(self, params: EvidenceParams | None = None) -> None:
         self._params = params or EvidenceParams()
         self.clear()
+
+    def set_gate(self, gate: Gate) -> None:
+        """Where targets are looked for, and the noise of their azimuths beside it."""
+        beam = replace(
+            self._params.beam,
+            azimuth_rad=gate.azimuth_rad + BESIDE_RAD,
+            elevation_low_rad=gate.elevation_low_rad,
+            elevation_high_rad=gate.elevation_high_rad,
+        )
+        self._params = replace(self._params, beam=beam)
 
     def clear(self) -> None:
         self._recent: deque[_Recent] = deque()

@@ -15,15 +15,16 @@ from planning.avoiding.room import Seen
 
 F64 = NDArray[np.float64]
 REACH_UP = math.tan(math.radians(20.0))
-"""Of the distance: the upper edge of the radar's gate in elevation."""
+"""Of the distance: the upper edge of the radar's usual gate in elevation."""
 DEEP_M = 100.0
 """Below the vehicle and all voxels: deep enough for any ground."""
 
 
-def standing(seen: Seen, position_enu_m: F64) -> Seen:
+def standing(seen: Seen, position_enu_m: F64, *, reach_up: float = REACH_UP) -> Seen:
     """Voxels as columns from the ground up, one for each place; ``position_enu_m`` (3,) is where the vehicle is now.
 
-    A column that has no voxel at the vehicle's height or above was looked at from above its top, and ends there.
+    ``reach_up``: the upper edge of the gate that it was seen through, as a slope. A column that has no voxel at the
+    vehicle's height or above was looked at from above its top, and ends there.
     """
     edge_m = seen.resolution_m
     centres = np.asarray(seen.centres_enu_m, np.float64).reshape(-1, 3)
@@ -35,7 +36,7 @@ def standing(seen: Seen, position_enu_m: F64) -> Seen:
     middles = (keys + 0.5) * edge_m
     is_open = top_m >= position_enu_m[2] - edge_m
     away_m = np.hypot(*(middles - position_enu_m[:2]).T)
-    high_m = top_m + edge_m / 2 + np.where(is_open, REACH_UP * away_m, 0.0)
+    high_m = top_m + edge_m / 2 + np.where(is_open, reach_up * away_m, 0.0)
     low_m = min(float(centres[:, 2].min()), float(position_enu_m[2])) - DEEP_M
     solid = np.column_stack([middles, (low_m + high_m) / 2]).astype(np.float64)
     return Seen(solid, edge_m, half_up_m=(high_m - low_m) / 2, is_open=is_open)

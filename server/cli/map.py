@@ -43,9 +43,23 @@ def build_map(
         float | None,
         typer.Option("--memory-mb", metavar="MB", help="The map's memory limit; default: as in flight."),
     ] = None,
+    radar_variant: Annotated[
+        Literal["heading-only", "full-attitude", "full-attitude-flat"] | None,
+        typer.Option("--radar-variant", help="How radar targets are put into the map; default: as in flight."),
+    ] = None,
+    azimuth_deg: Annotated[
+        float | None,
+        typer.Option("--radar-azimuth-deg", help="Radar targets to both sides up to; default: as in flight."),
+    ] = None,
+    low_deg: Annotated[
+        float | None, typer.Option("--radar-low-deg", help="And from this elevation; default: as in flight.")
+    ] = None,
+    high_deg: Annotated[
+        float | None, typer.Option("--radar-high-deg", help="Up to this one; default: as in flight.")
+    ] = None,
     as_json: o.AsJson = False,
 ) -> None:
-    """Build a recording's map of obstacles again: exactly as it was in flight, or at another resolution."""
+    """Build a recording's map of obstacles again: exactly as it was in flight, or otherwise."""
     with refusing(as_json=as_json):
         kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
         if kind is None:
@@ -55,7 +69,9 @@ def build_map(
         built = rebuild(
             recording,
             KINDS[sensor],
-            other=OtherMap(resolution_m, _limit_bytes(memory_mb)),
+            other=OtherMap(
+                resolution_m, _limit_bytes(memory_mb), _variant(radar_variant), azimuth_deg, low_deg, high_deg
+            ),
             progress=lambda share: progress("Building the map", share),
         )
         end_progress()
@@ -64,6 +80,10 @@ def build_map(
         out.write_bytes(exported(kind, built.folded))
         answer(built, out, time.monotonic() - began_s, as_json=as_json)
         raise typer.Exit(DONE)
+
+
+def _variant(name: str | None) -> Any:
+    return None if name is None else name.replace("-", "_")
 
 
 def _limit_bytes(memory_mb: float | None) -> int | None:

@@ -30,7 +30,14 @@ def read_settings(root: Path) -> PerceptionSettings:
 
 def _makes_sense(settings: PerceptionSettings) -> bool:
     """Every figure is used as a divisor, a length or an angle somewhere."""
-    lengths = (settings.brake_decel_m_s2, settings.brake_jerk_m_s3, settings.safety_radius_m, settings.approach_s)
+    lengths = (
+        settings.climb_m_s,
+        settings.climb_ceiling_m,
+        settings.brake_decel_m_s2,
+        settings.brake_jerk_m_s3,
+        settings.safety_radius_m,
+        settings.approach_s,
+    )
     around = (settings.vehicle_radius_m, settings.position_error_m)
     if not (all(value > 0 for value in lengths) and all(0 <= value <= WIDEST_M for value in around)):
         return False

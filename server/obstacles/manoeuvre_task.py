@@ -53,6 +53,10 @@ class Situation:
     """Each with an origin of its own: home may move a little between the starts of two sensors' nodes."""
     radius_m: float = 0.5
     """Of the vehicle."""
+    ceiling_m: float = 30.0
+    """Above the plan: no way leads higher."""
+    radar_high_deg: float = 20.0
+    """Upper edge of the radar's gate: what it has seen may be as high."""
     approach: ObstacleAlert | None = None
     """Of a moving object."""
     tracks: TracksStatus | None = None
@@ -104,11 +108,11 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
     ahead = None if line is None else _ahead(line, position, situation)
-    seen = [_seen(voxels, situation.origin, frame, position) for voxels in situation.maps if len(voxels.keys)]
+    reach_up = math.tan(math.radians(situation.radar_high_deg))
+    seen = [_seen(voxels, situation.origin, frame, position, reach_up) for voxels in situation.maps if len(voxels.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
-    usual = AvoidanceParams()
     params = AvoidanceParams(
-        radius_m=situation.radius_m, ceiling_m=max(0.0, usual.ceiling_m - situation.height_offset_m)
+        radius_m=situation.radius_m, ceiling_m=max(0.0, situation.ceiling_m - situation.height_offset_m)
     )
     prepared: list[Prepared] = []
     if (alert := situation.alert) is not None and ahead is not None:
@@ -121,7 +125,7 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     return tuple(prepared)
 
 
-def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64) -> Seen:
+def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64, reach_up: float) -> Seen:
     """What may matter to any way from there; a radar does not tell how high things are."""
     from planning.avoiding.room import Seen
     from planning.avoiding.standing import standing
@@ -129,7 +133,7 @@ def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64) -
     centres = _centres_enu_m(voxels, origin, frame)
     centres = centres[np.hypot(*(centres[:, :2] - position[:2]).T) <= NEAR_M]
     seen = Seen(centres, voxels.resolution_m)
-    return standing(seen, position) if voxels.sensor == "radar" else seen
+    return standing(seen, position, reach_up=reach_up) if voxels.sensor == "radar" else seen
 
 
 def _centres_enu_m(voxels: Voxels, origin: MapOrigin, frame: LocalFrame) -> F64:

@@ -159,6 +159,8 @@ class Obstacles:
             origin,
             maps,
             watch.settings.vehicle_radius_m,
+            ceiling_m=watch.settings.climb_ceiling_m,
+            radar_high_deg=watch.settings.radar_high_deg,
             approach=moving,
             tracks=tracks,
             safety_radius_m=watch.settings.safety_radius_m,

@@ -137,6 +137,15 @@ class PerceptionSettingsBody(Strict):
     safety_radius_m: Annotated[float, Field(ge=0.5, le=30)] | None = None
     approach_s: Annotated[float, Field(ge=2, le=30)] | None = None
     radar_variant: Literal["heading_only", "full_attitude", "full_attitude_flat"] | None = None
+    radar_azimuth_deg: Annotated[float, Field(ge=5, le=60)] | None = None
+    """Of the radar's gate, to both sides."""
+    radar_low_deg: Annotated[float, Field(ge=-30, le=0)] | None = None
+    radar_high_deg: Annotated[float, Field(ge=5, le=35)] | None = None
+    """Its elevations: what stands at the vehicle's own height must be seen."""
+    climb_m_s: Annotated[float, Field(ge=0.3, le=5)] | None = None
+    """By itself, over what stands in the way."""
+    climb_ceiling_m: Annotated[float, Field(ge=2, le=120)] | None = None
+    """Above the plan."""
     vehicle_radius_m: Annotated[float, Field(ge=0.1, le=5)] | None = None
     position_error_m: Annotated[float, Field(ge=0, le=10)] | None = None
     radar_resolution_m: Annotated[float, Field(ge=0.05, le=5)] | None = None

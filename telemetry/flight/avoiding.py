@@ -51,10 +51,11 @@ class Avoiding:
         on_engage: Callable[[], None] = lambda: None,
         on_end: Callable[[], None] = lambda: None,
     ) -> None:
-        self._params, self._rest = params or DetourParams(), rest
+        settings = settings or PerceptionSettings()
+        self._params, self._rest = params or DetourParams().following(settings), rest
         self._on_engage, self._on_end = on_engage, on_end
         self._watch = PilotWatch()
-        self.regions = Regions(settings or PerceptionSettings())
+        self.regions = Regions(settings)
         self._helm = Helm(target, self._watch.asked, own=own)
         self.detour = Detour(self._helm, self.regions, self._params)
         self._state: VehicleState | None = None
@@ -170,6 +171,8 @@ class Avoiding:
         self._watch.asked(mode, now_s)
 
     def on_settings(self, settings: PerceptionSettings) -> None:
+        self._params = self._params.following(settings)
+        self.detour.set_params(self._params)
         self.regions.settings = settings
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:

@@ -19,7 +19,7 @@ from telemetry.flight.rest import Rest
 from telemetry.flight.witnesses import Witnesses
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
-from telemetry.obstacles import Sensor
+from telemetry.obstacles import PerceptionSettings, Sensor
 from telemetry.vehicle import VehicleState
 
 Phase = Literal[
@@ -37,6 +37,10 @@ class DetourParams:
     """Above the plan."""
     latency_s: float = 0.3
     """From seeing to braking."""
+
+    def following(self, settings: PerceptionSettings) -> DetourParams:
+        """With what the operator has set."""
+        return replace(self, climb_m_s=settings.climb_m_s, ceiling_m=settings.climb_ceiling_m)
 
 
 class Detour:
@@ -68,6 +72,10 @@ class Detour:
         self._backing: Backing | None = None
         self._climb: Climb | None = None
         self._legs: Legs | None = None
+
+    def set_params(self, params: DetourParams) -> None:
+        """Of the next climb; one that has begun goes on as it is."""
+        self._params = params
 
     @property
     def is_engaged(self) -> bool:

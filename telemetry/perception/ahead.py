@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.corridor import MissionLine
+from planning.avoiding.standing import REACH_UP
 from planning.seen import conflicts
 from telemetry.obstacles import MapDelta, MapOrigin, MissionConflict, ObstacleAlert, Sensor
 from telemetry.perception.convert import frame_of
@@ -32,6 +33,8 @@ class Flight(NamedTuple):
     position_enu_m: tuple[float, float, float]
     speed_m_s: float
     radius_m: float
+    reach_up: float = REACH_UP
+    """``planning.avoiding.standing``: of the radar's gate."""
 
 
 class Ahead:
@@ -66,6 +69,7 @@ class Ahead:
             resolution_m=edge_m,
             radius_m=flight.radius_m,
             standing_from_enu_m=position if self._sensor == "radar" else None,
+            reach_up=flight.reach_up,
         )
         if found is None:
             return None

@@ -14,7 +14,8 @@ def check_perception(settings: PerceptionSettings) -> None:
     """Raises ParameterError or CapacityError, naming the sensor, the number and what to do."""
     for kind in KINDS.values():
         try:
-            check_settings(kind.settings(settings), reach_m=kind.reach_m, reach_down=kind.make.reach_down)
+            own = kind.settings(settings)
+            check_settings(own, reach_m=kind.reach_m, reach_down=kind.make.reach_down(own))
         except MappingError as error:
             raise type(error)(error.what, where=f"{kind.sensor} map", advice=error.advice) from None
     settings.tracker.params()

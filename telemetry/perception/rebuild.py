@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapping.ground import GroundGrid
+from mapping.perceiving.limits import check_gate
+from mapping.radar_targets import Variant
 from mapping.voxels.checks import checked_size
 from telemetry.errors import RecordingError
 from telemetry.messages import FlightStatus, PlanRecord, Published, Topic
@@ -39,9 +41,15 @@ class OtherMap:
 
     resolution_m: float | None = None
     memory_limit_bytes: int | None = None
+    radar_variant: Variant | None = None
+    radar_azimuth_deg: float | None = None
+    radar_low_deg: float | None = None
+    radar_high_deg: float | None = None
 
     def applied(self, settings: PerceptionSettings) -> PerceptionSettings:
-        settings = replace(settings, memory_limit_bytes=self.memory_limit_bytes or settings.memory_limit_bytes)
+        kept = ("memory_limit_bytes", "radar_variant", "radar_azimuth_deg", "radar_low_deg", "radar_high_deg")
+        other = {name: value for name in kept if (value := getattr(self, name)) is not None}
+        settings = replace(settings, **other)
         if self.resolution_m is None:
             return settings
         # Nothing is searched for the map's sake: what is fine and large needs no fine and large region.
@@ -268,6 +276,7 @@ class _Run:
 def _check(kind: SensorKind, wanted: PerceptionSettings) -> None:
     settings = kind.settings(wanted)
     checked_size(settings.resolution_m, kind.reach_m, settings.memory_limit_bytes)
+    check_gate(settings)
 
 
 def _has_bases(recording: Recording, kind: SensorKind) -> bool:

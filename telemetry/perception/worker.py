@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -113,7 +114,8 @@ class Worker:
         if where.origin is None or where.position is None or line is None or settings.paper_bare:
             return None
         radius_m = settings.vehicle_radius_m + settings.position_error_m
-        return Flight(line, where.origin, where.position, where.speed_m_s, radius_m)
+        reach_up = math.tan(math.radians(settings.radar_high_deg))
+        return Flight(line, where.origin, where.position, where.speed_m_s, radius_m, reach_up)
 
     def _take_messages(self) -> None:
         if skipped := self._inbox.skipped():

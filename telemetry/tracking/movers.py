@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from mapping.ground import GroundGrid
 from mapping.perceiving import FrameResult, RadarPerception, RadarScan, Settings
 from mapping.perceiving.model import State
-from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence
+from mapping.perceiving.radar_evidence import EvidenceParams
 from mapping.poses import Pose
-from mapping.radar_targets import Gate, polar, to_enu
+from mapping.radar_targets import polar, to_enu
 from mapping.tracker import Tracker, TrackState
 from telemetry.tracking.blobs import Blobs, blobs
 
@@ -32,11 +33,11 @@ MOST_TARGETS = 250
 class Movers(RadarPerception):
     """Frames, poses and ground as for the radar's map, which stays empty here. ``states`` are of the newest frame."""
 
+    evidence = EVIDENCE
+
     def __init__(self, settings: Settings, tracker: Tracker, *, alert_prefix: str = "") -> None:
         """``tracker`` is emptied; it outlives this flight so that no id is ever used twice."""
         super().__init__(settings, alert_prefix=alert_prefix)
-        self.gate = Gate(elevation_low_rad=LEVEL_RAD)
-        self._evidence = RadarEvidence(EVIDENCE)
         self._tracker = tracker
         tracker.clear()
         self._has_velocity = True
@@ -98,6 +99,10 @@ class Movers(RadarPerception):
         if ground is not None and pose.position_enu_m[2] - ground.up(pose.position_enu_m[None, :])[0] < LOW_M:
             fed[:] = False
         return blobs(polar(xyz[fed]), speed[fed], snr[fed], moving[fed])
+
+    def _look_through_the_gate(self) -> None:
+        super()._look_through_the_gate()
+        self.gate = replace(self.gate, elevation_low_rad=min(LEVEL_RAD, self.gate.elevation_low_rad))
 
     def _pose_state(self, now_mono_s: float) -> tuple[State, str]:
         state, text = super()._pose_state(now_mono_s)

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -215,3 +216,19 @@ def test_variants_are_the_settings_choice(variant: str) -> None:
     (centre,) = flight.perception.map.occupied()
     expected = {"heading_only": 0.5, "full_attitude": -3.5, "full_attitude_flat": -7.5}
     assert centre[2] == pytest.approx(expected[variant], abs=1.0)
+
+
+def test_the_gate_is_the_settings_choice_and_may_change_in_flight() -> None:
+    """A target 50 degrees aside, and one 25 degrees up."""
+    flight = hovering(None)
+    aside, above = [30.6, 25.7, 2.0], [0.0, 36.3, 16.9]
+    flight.move()
+    flight.radar(np.array([aside, above]), 40.0)
+    assert len(flight.perception.map.occupied()) == 0
+    wide = replace(flight.perception.settings, gate_azimuth_rad=math.radians(55), gate_high_rad=math.radians(30))
+    flight.perception.set_settings(wide)
+    for _ in range(3):
+        flight.move()
+        flight.radar(np.array([aside, above]), 40.0)
+    assert len(flight.perception.map.occupied()) == 2
+    assert RadarPerception.reach_down(wide) == pytest.approx(math.tan(math.radians(30)))

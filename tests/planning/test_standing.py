@@ -101,3 +101,18 @@ def test_distances_to_columns_are_those_to_stacks_of_cubes(seed: int) -> None:
     middles = feet + np.outer((high - 1) / 2, [0, 0, 1])
     found, _ = nearest_box(points, middles, 0.5, half_up_m=high / 2)
     assert found == pytest.approx(polyline_boxes_m(points, stacks, 0.5), abs=0.06)
+
+
+def test_through_a_higher_gate_it_may_be_higher() -> None:
+    seen = Seen(np.array([[0.5, 30.5, 8.5]]), 1.0)
+    usual, wide = standing(seen, HERE), standing(seen, HERE, reach_up=math.tan(math.radians(30)))
+    assert usual.half_up_m is not None
+    assert wide.half_up_m is not None
+    more_m = 2 * (wide.half_up_m[0] - usual.half_up_m[0])
+    assert more_m == pytest.approx(math.hypot(0.5, 30.5) * (math.tan(math.radians(30)) - UP_20_DEG))
+    steep = conflicts(
+        line(0.5), wall(40, 8.5), resolution_m=1.0, radius_m=0.8, standing_from_enu_m=HERE,
+        reach_up=math.tan(math.radians(30)),
+    )  # fmt: skip
+    assert steep is not None
+    assert conflicts(line(0.5), wall(40, 8.5), resolution_m=1.0, radius_m=0.8, standing_from_enu_m=HERE) is None

@@ -75,6 +75,10 @@ def test_the_one_in_charge_is_heard(
         ("settings", {"position_error_m": -0.1}),
         ("settings", {"brake_m_s2": 2.5}),
         ("settings", {"radar_variant": "upside_down"}),
+        ("settings", {"radar_azimuth_deg": 90}),
+        ("settings", {"radar_high_deg": 60}),
+        ("settings", {"climb_m_s": 0}),
+        ("settings", {"climb_ceiling_m": 500}),
         ("avoidance", {}),
         ("seen", {"seen": True, "sensors": ["sonar"]}),
     ],
@@ -90,9 +94,11 @@ def test_what_makes_no_sense_is_refused(served: Running, pilot: httpx.Client, pa
         {"memory_limit_bytes": 20_000_000},
         {"radar_resolution_m": 0.5, "vision_resolution_m": 0.25},
         {"vehicle_radius_m": 1.2, "position_error_m": 0.0},
+        {"radar_azimuth_deg": 30, "radar_low_deg": -5, "radar_high_deg": 25},
+        {"climb_m_s": 2.5, "climb_ceiling_m": 15},
     ],
 )
-def test_the_maps_memory_and_voxels_can_be_set(served: Running, pilot: httpx.Client, body: dict[str, Any]) -> None:
+def test_the_maps_the_gate_and_the_climb_can_be_set(served: Running, pilot: httpx.Client, body: dict[str, Any]) -> None:
     assert pilot.put("/api/obstacles/settings", json=body).is_success
     assert served.flying.asked == [("change_settings", PerceptionSettingsBody(**body))]
 

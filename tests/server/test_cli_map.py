@@ -154,3 +154,15 @@ def test_a_fine_map_of_the_camera_is_refused_with_what_would_do(recording: Path,
     assert isinstance(found["error"], dict)
     assert "One look out to 40 m" in found["error"]["what"]
     assert "0.07 m or coarser" in found["error"]["advice"]
+
+
+def test_the_radars_gate_may_be_another_than_in_flight(recording: Path, tmp_path: Path) -> None:
+    as_flown = run(recording, "--sensor", "radar", "--out", tmp_path / "a.ply")[1]
+    narrow = run(recording, "--sensor", "radar", "--out", tmp_path / "b.ply", "--radar-azimuth-deg", "1")[1]
+    assert narrow["points"] < as_flown["points"]  # type: ignore[operator]
+    placed = run(recording, "--sensor", "radar", "--out", tmp_path / "c.ply", "--radar-variant", "full-attitude")[1]
+    assert placed["points"] == as_flown["points"]
+    assert (tmp_path / "c.ply").read_bytes() != (tmp_path / "a.ply").read_bytes()
+    code, refused = run(recording, "--sensor", "radar", "--out", tmp_path / "d.ply", "--radar-high-deg", "2")
+    assert code == 2
+    assert "at least 5 degrees above" in str(refused["error"])

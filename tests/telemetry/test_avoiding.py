@@ -341,3 +341,12 @@ def test_something_new_just_as_it_goes_on_is_climbed_over_although_the_vehicle_s
     assert it.states == ["off", "watching", "climbing", "offset", "climbing", "offset", "watching"]
     assert it.modes() == [BRAKE, GUIDED, BRAKE, GUIDED, RTL]
     assert all(up > it.walls[1].top_m for _, north, up in it.trail if north > north_m + 4.0)
+
+
+def test_how_fast_and_how_high_it_climbs_is_set() -> None:
+    it = craft(Wall(25, 90))
+    it.avoiding.on_settings(replace(it.avoiding.regions.settings, climb_m_s=2.5, climb_ceiling_m=12.0))
+    it.until(lambda: state(it) == "ceiling")
+    it.advance(4.0)
+    assert max(up_m for _, _, up_m in it.trail) == pytest.approx(20.0, abs=0.5)
+    assert (2.0, 2.5) in [(m.param1, m.param2) for m in it.sent("COMMAND_LONG") if m.command == 178]

@@ -139,6 +139,11 @@ export interface PerceptionSettings {
   height_m: number;
   paper_bare: boolean;
   radar_variant: "heading_only" | "full_attitude" | "full_attitude_flat";
+  radar_azimuth_deg: number;
+  radar_low_deg: number;
+  radar_high_deg: number;
+  climb_m_s: number;
+  climb_ceiling_m: number;
   vehicle_radius_m: number;
   position_error_m: number;
   brake_decel_m_s2: number;
@@ -1115,6 +1120,15 @@ export interface PerceptionSettingsBody {
   safety_radius_m?: number | null;
   approach_s?: number | null;
   radar_variant?: "heading_only" | "full_attitude" | "full_attitude_flat" | null;
+  /** Of the radar's gate, to both sides. */
+  radar_azimuth_deg?: number | null;
+  radar_low_deg?: number | null;
+  /** Its elevations, at least 5 degrees apart. */
+  radar_high_deg?: number | null;
+  /** By itself, over what stands in the way. */
+  climb_m_s?: number | null;
+  /** Above the plan. */
+  climb_ceiling_m?: number | null;
   vehicle_radius_m?: number | null;
   position_error_m?: number | null;
   radar_resolution_m?: number | null;

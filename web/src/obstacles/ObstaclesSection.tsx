@@ -23,6 +23,17 @@ const FIELDS = [
   { key: "approach_s", label: "Warn of it ahead by", unit: "s", min: 2, max: 30, step: 1 },
 ] as const;
 
+const GATE = [
+  { key: "radar_azimuth_deg", label: "To both sides", unit: "°", min: 5, max: 60, step: 5 },
+  { key: "radar_low_deg", label: "From elevation", unit: "°", min: -30, max: 0, step: 1 },
+  { key: "radar_high_deg", label: "Up to elevation", unit: "°", min: 5, max: 35, step: 1 },
+] as const;
+
+const CLIMB = [
+  { key: "climb_m_s", label: "Climbs at", unit: "m/s", min: 0.3, max: 5, step: 0.1 },
+  { key: "climb_ceiling_m", label: "At most above plan", unit: "m", min: 2, max: 120, step: 1 },
+] as const;
+
 const VARIANTS: readonly { value: PerceptionSettings["radar_variant"]; label: string }[] = [
   { value: "heading_only", label: "Heading only, at own height" },
   { value: "full_attitude", label: "Attitude and measured elevation" },
@@ -31,23 +42,40 @@ const VARIANTS: readonly { value: PerceptionSettings["radar_variant"]; label: st
 
 const change = (body: PerceptionSettingsBody) => void setPerception(body);
 
+type Key = (typeof FIELDS | typeof GATE | typeof CLIMB)[number]["key"];
+
+interface FieldsProps {
+  fields: readonly { key: Key; label: string; unit: string; min: number; max: number; step: number }[];
+  settings: PerceptionSettings;
+}
+
+function Fields({ fields, settings }: FieldsProps) {
+  return (
+    <div class="field-grid">
+      {fields.map(({ key, ...field }) => (
+        <NumberField
+          key={key}
+          {...field}
+          value={settings[key]}
+          disabled={!lease.value.mine}
+          testid={`perception-${key}`}
+          onChange={(value) => change({ [key]: value })}
+        />
+      ))}
+    </div>
+  );
+}
+
 /** What is searched ahead, and how radar targets are placed. */
 function Searched({ settings }: { settings: PerceptionSettings }) {
   const disabled = !lease.value.mine;
   return (
     <>
-      <div class="field-grid">
-        {FIELDS.map(({ key, ...field }) => (
-          <NumberField
-            key={key}
-            {...field}
-            value={settings[key]}
-            disabled={disabled}
-            testid={`perception-${key}`}
-            onChange={(value) => change({ [key]: value })}
-          />
-        ))}
-      </div>
+      <Fields fields={FIELDS} settings={settings} />
+      <h3>Over what stands in the way</h3>
+      <Fields fields={CLIMB} settings={settings} />
+      <h3>Radar targets that are used</h3>
+      <Fields fields={GATE} settings={settings} />
       <SelectField
         label="Radar targets"
         value={settings.radar_variant}
