@@ -31,11 +31,12 @@ def check_settings(settings: Settings, *, reach_m: float | None, reach_down: flo
 def check_gate(s: Settings) -> None:
     """Raises ParameterError."""
     low_deg, high_deg = math.degrees(s.gate_low_rad), math.degrees(s.gate_high_rad)
-    if not (low_deg >= -90.0 and high_deg <= 80.0 and high_deg - low_deg >= LEAST_GATE_DEG - 1e-9):
+    if not (-80.0 <= low_deg <= 0.0 and LEAST_GATE_DEG - 1e-9 <= high_deg <= 80.0):
         raise ParameterError(
-            f"The radar's gate from {low_deg:g} to {high_deg:g} degrees of elevation lets nothing through.",
+            f"Through a gate from {low_deg:g} to {high_deg:g} degrees of elevation the radar does not see what stands "
+            "at the vehicle's height.",
             where="gate",
-            advice=f"Its upper edge must be at least {LEAST_GATE_DEG:g} degrees above its lower one (usually 0 to 20).",
+            advice=f"Begin it at 0 degrees or lower, and end it at {LEAST_GATE_DEG:g} or higher (usually 0 to 20).",
         )
     if not 0.0 < s.gate_azimuth_rad <= math.pi / 2:
         raise ParameterError(

@@ -41,7 +41,7 @@ def test_memory_and_region_are_checked_as_the_map_checks_them() -> None:
     ("low_deg", "high_deg", "azimuth_deg", "words"),
     [
         (0, 4, 45, "from 0 to 4 degrees"),
-        (15, 10, 45, "lets nothing"),
+        (3, 20, 45, "does not see what stands"),
         (0, 90, 45, "0 to 90"),
         (0, 20, 0, "0 degrees wide"),
     ],

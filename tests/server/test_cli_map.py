@@ -165,4 +165,4 @@ def test_the_radars_gate_may_be_another_than_in_flight(recording: Path, tmp_path
     assert (tmp_path / "c.ply").read_bytes() != (tmp_path / "a.ply").read_bytes()
     code, refused = run(recording, "--sensor", "radar", "--out", tmp_path / "d.ply", "--radar-high-deg", "2")
     assert code == 2
-    assert "at least 5 degrees above" in str(refused["error"])
+    assert "end it at 5 or higher" in str(refused["error"])

@@ -36,7 +36,7 @@ def test_of_tracker_and_velocities_what_is_not_named_stays(tmp_path: Path) -> No
      '{"memory_limit_bytes": 0}', '{"height_m": "high"}', '{"safety_radius_m": 0}', '{"approach_s": -1}',
      '{"tracker": {"coordinates": "round"}}', '{"tracker": {"birth": 9.5}}', '{"tracker": {"gate": 0}}',
      '{"velocities": {"max_turn_deg": -1}}', '{"velocities": {"stands_m": 0}}',
-     '{"climb_m_s": 0}', '{"climb_ceiling_m": -3}', '{"radar_high_deg": 3}', '{"radar_low_deg": 18}',
+     '{"climb_m_s": 0}', '{"climb_ceiling_m": -3}', '{"radar_high_deg": 3}', '{"radar_low_deg": 2}',
      '{"vision_resolution_m": 0.01}', '{"position_error_m": 1e300}', '{"clear_count": -1}'],
 )  # fmt: skip
 def test_damaged_settings_are_the_defaults(text: str, tmp_path: Path) -> None:

@@ -1123,7 +1123,7 @@ export interface PerceptionSettingsBody {
   /** Of the radar's gate, to both sides. */
   radar_azimuth_deg?: number | null;
   radar_low_deg?: number | null;
-  /** Its elevations, at least 5 degrees apart. */
+  /** Its elevations: what stands at the vehicle's own height must be seen. */
   radar_high_deg?: number | null;
   /** By itself, over what stands in the way. */
   climb_m_s?: number | null;
