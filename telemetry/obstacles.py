@@ -269,16 +269,34 @@ class PerceptionSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class Eye:
+    """A sensor whose word counts at present."""
+
+    sensor: Sensor
+    since_t_mono_s: float
+    """Without a break."""
+    depth_m: float
+    """So far ahead it is relied on."""
+    largest_speed_m_s: float
+    """From which that is enough to stop in."""
+
+
+@dataclass(frozen=True, slots=True)
 class AvoidanceStatus:
     """The link node's: what is done about obstacles by itself."""
 
     enabled: bool = False
-    state: Literal["off", "watching", "holding", "climbing", "offset", "manoeuvre", "released", "ceiling"] = "off"
-    """holding: braked, because frames or poses are too old; ceiling: it may not climb any further and holds; offset:
-    goes on in GUIDED, higher than planned; released: the pilot has taken over, it stays off for this flight."""
+    state: Literal["off", "blind", "watching", "holding", "climbing", "offset", "manoeuvre", "released", "ceiling"] = (
+        "off"
+    )
+    """blind: it is on, but no sensor sees ahead; holding: braked, because frames or poses are too old; ceiling: it may
+    not climb any further and holds; offset: goes on in GUIDED, higher than planned; released: the pilot has taken over,
+    it stays off for this flight."""
     text: str = ""
     height_offset_m: float = 0.0
     largest_speed_m_s: float | None = None
     """At which a region of the present depth still suffices to stop."""
     sensors: tuple[Sensor, ...] = ()
     """Whose word counts at present."""
+    eyes: tuple[Eye, ...] = ()
+    """The same, with what each sees."""

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mapping.braking import Braking
 from planning.certificate.as_json import certificate_json
 from planning.dsm import Dsm
 from planning.formats.trajectory_csv import read_trajectory
@@ -30,6 +31,7 @@ from telemetry.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from telemetry.flight.preflight import Preflight
+    from telemetry.flight.speeds import Speeds
     from telemetry.flight.targets import GuidedPlan
 
 
@@ -55,6 +57,10 @@ class Checked:
     """What was read back, as it will be flown from where the vehicle stands."""
     clearance: ClearanceParams | None = None
     """What was demanded of it, with the vehicle's own return height."""
+    speeds: Speeds | None = None
+    """At which the vehicle will fly."""
+    braking: Braking = field(default_factory=Braking)
+    """That the profile counts on."""
 
 
 def check_start(
@@ -69,17 +75,19 @@ def check_start(
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
     from telemetry.flight.preflight import check
+    from telemetry.flight.speeds import flown_speeds
 
     report("Checking the start", None)
     dsm, planned = load_planned_terrain(directory, seen_in(record)), read_wpl(record.mission_wpl)
     if seen_in(record) is not None:
         check_home_stands_on_ground(directory, dsm, (state.home_lat_deg, state.home_lon_deg))
+    profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
     found = check(
         onboard,
         state,
         parameters,
         dsm=dsm,
-        profile=parse_profile(record.profile_toml.encode(), where="the plan's profile"),
+        profile=profile,
         clearance=clearance_of(record),
         planned_home=planned.home,
         firmware=record.firmware,
@@ -87,7 +95,9 @@ def check_start(
     )
     certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
-    return Checked(_doc(found, rereferenced_m), certificate, moved, found.mission, found.clearance)
+    speeds = flown_speeds(parameters, onboard, record.firmware)
+    braking = Braking(profile.brake_decel_m_s2, profile.brake_jerk_m_s3)
+    return Checked(_doc(found, rereferenced_m), certificate, moved, found.mission, found.clearance, speeds, braking)
 
 
 def seen_in(record: PlanRecord) -> str | None:

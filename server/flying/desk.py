@@ -17,11 +17,12 @@ from server.errors import CheckNeededError, ConflictError
 from server.flying.asking import Asks
 from server.flying.check_task import Checked
 from server.flying.onboard import Onboard, is_plan, onboard, read_onboard, write_onboard
-from server.flying.starting import Ready, check_start
+from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
-from server.schemas import FlyMessage, FlyState, OnboardDoc, PlanDoc, ServerMessage, StartFlight
+from server.schemas import FlyMessage, FlyState, OnboardDoc, PlanDoc, PreflightDoc, ServerMessage, StartFlight
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
 from telemetry.messages import FlightStatus, Item, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.obstacles import AvoidanceStatus
 from telemetry.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
 from telemetry.vehicle import VehicleState
 
@@ -56,10 +57,12 @@ class FlightDesk:
         vehicle: Callable[[], VehicleState | None],
         tell: Callable[[ServerMessage], None],
         publish_plan: Callable[[PlanRecord], None],
+        avoidance: Callable[[], AvoidanceStatus] = AvoidanceStatus,
     ) -> None:
         self._link, self._works, self._file = link, works, file
         self._present_document, self._vehicle, self._tell = present_document, vehicle, tell
-        self._publish_plan = publish_plan
+        self._publish_plan, self._avoidance = publish_plan, avoidance
+        self._utc_minus_mono_s = time.time() - time.monotonic()
         self._onboard: Onboard | None = read_onboard(file)
         self._status: LinkStatus | None = None
         self._flight = FlightStatus()
@@ -79,7 +82,7 @@ class FlightDesk:
     def state(self) -> FlyState:
         return FlyState(
             onboard=self._onboard_doc(),
-            preflight=None if self._ready is None else self._ready.checked.doc,
+            preflight=None if self._ready is None else self._preflight(self._ready),
             resume_from_item=self._flight.broke_off_at,
             busy=self._busy,
         )
@@ -137,11 +140,11 @@ class FlightDesk:
     async def start(self, operator: Operator, body: StartFlight) -> None:
         """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted."""
         async with self._doing("Starting"):
-            ready = check_start(self._ready, body, self._state(), time.monotonic())
+            ready = self._check_start(body)
             record = self._known_record(body.digest)
             request = await self._start_request(operator, body, record, ready)
             # What was prepared meanwhile may have taken its time.
-            check_start(self._ready, body, self._state(), time.monotonic())
+            self._check_start(body)
             self._publish_plan(replace(record, t_utc_s=time.time()))
             await self._link.call(request)
 
@@ -150,6 +153,19 @@ class FlightDesk:
         await self._link.call(request)
 
     # How
+
+    def _preflight(self, ready: Ready) -> PreflightDoc:
+        return preflight_now(ready, self._avoidance(), utc_minus_mono_s=self._utc_minus_mono_s)
+
+    def _check_start(self, body: StartFlight) -> Ready:
+        return check_start(
+            self._ready,
+            body,
+            self._state(),
+            self._avoidance(),
+            now_mono_s=time.monotonic(),
+            utc_minus_mono_s=self._utc_minus_mono_s,
+        )
 
     async def _send(
         self, operator: Operator, items: tuple[Item, ...], record: PlanRecord, home: tuple[float, float, float]

@@ -91,6 +91,7 @@ class Flying:
             vehicle=lambda: self.live.state,
             tell=tell,
             publish_plan=self._publish_plan,
+            avoidance=lambda: self._obstacles.watches["live"].avoidance,
         )
         self.recording = RecordingDesk(
             self.shelf,
@@ -219,6 +220,7 @@ class Flying:
         relay.on(Topic.TEXT, self.replay.on_text, replayed=True, each=True)
         relay.on(Topic.FLIGHT, self.replay.on_flight, replayed=True)
         self._obstacles.hear(relay)
+        self._obstacles.sees_differently = self.desk.refresh
         return relay
 
     def _on_state(self, state: VehicleState) -> None:

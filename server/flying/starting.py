@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from server.errors import CheckNeededError
 from server.flying.check_task import Checked
 from server.placing import metres_apart
-from server.schemas import StartFlight
+from server.schemas import CheckRow, PreflightDoc, StartFlight
+from telemetry.obstacles import AvoidanceStatus
 from telemetry.vehicle import VehicleState
 
 FRESH_S = 120.0
@@ -30,7 +31,27 @@ class Ready:
     checked_mono_s: float
 
 
-def check_start(ready: Ready | None, body: StartFlight, state: VehicleState, now_mono_s: float) -> Ready:
+def preflight_now(ready: Ready, avoidance: AvoidanceStatus, *, utc_minus_mono_s: float) -> PreflightDoc:
+    """The check with what avoidance sees by now: a sensor may have come or gone since."""
+    from telemetry.flight.eyes_check import avoidance_row
+    from telemetry.flight.speeds import Speeds
+
+    checked = ready.checked
+    speeds = checked.speeds or Speeds()
+    row = avoidance_row(avoidance, speeds, checked.braking, utc_minus_mono_s=utc_minus_mono_s)
+    shown = CheckRow(code=row.code, state=row.state, text=row.text, mend=row.mend)
+    return checked.doc.model_copy(update={"rows": [*checked.doc.rows, shown]})
+
+
+def check_start(
+    ready: Ready | None,
+    body: StartFlight,
+    state: VehicleState,
+    avoidance: AvoidanceStatus,
+    *,
+    now_mono_s: float,
+    utc_minus_mono_s: float,
+) -> Ready:
     """The check that allows this start. Raises CheckNeededError with the first reason why there is none."""
     if ready is None or ready.digest != body.digest:
         raise CheckNeededError("This mission has not been checked before the start.", advice="Press Check first.")
@@ -38,7 +59,7 @@ def check_start(ready: Ready | None, body: StartFlight, state: VehicleState, now
         raise CheckNeededError(f"The check is {now_mono_s - ready.checked_mono_s:.0f} s old.", advice=_AGAIN)
     if _has_moved(ready.state, state):
         raise CheckNeededError("The vehicle was moved after the check.", advice=_AGAIN)
-    for row in ready.checked.doc.rows:
+    for row in preflight_now(ready, avoidance, utc_minus_mono_s=utc_minus_mono_s).rows:
         if row.state in ("bad", "unknown"):
             raise CheckNeededError(row.text, advice=row.mend or _AGAIN)
         if row.state == "accept" and row.code not in body.accept:

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from planning.errors import PlanningError
+from planning.vehicle_profile import parse_profile
 from server.errors import NotReadyError, reported
 from server.flying.asking import Asks
 from server.jobs import Lane
@@ -29,7 +31,7 @@ from server.schemas import (
     SetAvoidanceBody,
     Source,
 )
-from telemetry.messages import LinkStatus
+from telemetry.messages import LinkStatus, PlanRecord
 from telemetry.obstacles import SENSORS, PerceptionSettings
 from telemetry.perception.limits import check_memory, check_perception
 from telemetry.requests import Operator, SetAvoidance
@@ -47,7 +49,7 @@ class SeesPlans(Protocol):
     async def plan_without_seen(self) -> PlanState: ...
 
 
-DEMO_SETTINGS = PerceptionSettings(radar_depth_m=15.0, vision_depth_m=10.0)
+DEMO_SETTINGS = PerceptionSettings(radar_depth_m=15.0, vision_depth_m=14.0)
 """The demo flies at 5 m/s: the papers' regions, for 3 m/s, would end where it can only just stop."""
 
 
@@ -76,11 +78,26 @@ class ObstacleDesk:
         """Of the demo's simulated vehicle: it climbs over what stands in its way."""
         self._kept = PerceptionSettings()
         """What the operator has set; the demo's own settings are never written down."""
+        self._profile_toml = ""
 
     async def start(self) -> None:
         """Nodes get the settings from the bus whenever they start."""
         self._kept = await asyncio.to_thread(read_settings, self._root)
         self._set(self._kept)
+
+    def brake_as(self, record: PlanRecord | None) -> None:
+        """The vehicle brakes as the profile of the plan on board says."""
+        if record is None or record.profile_toml == self._profile_toml:
+            return
+        self._profile_toml = record.profile_toml
+        try:
+            profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
+        except PlanningError as error:
+            log.warning("How the vehicle brakes: %s", reported(error, log, "Reading the plan's profile").what)
+            return
+        brakes = {"brake_decel_m_s2": profile.brake_decel_m_s2, "brake_jerk_m_s3": profile.brake_jerk_m_s3}
+        self._kept = replace(self._kept, **brakes)
+        self._set(replace(self._live.settings, **brakes))
 
     async def acknowledge(self, body: AcknowledgeBody) -> ObstaclesState:
         self._live.acknowledge(body.alert_id)

@@ -25,12 +25,12 @@ from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.rest_of_plan import Underway
 from server.obstacles.sensor_nodes import SensorNodes
 from server.obstacles.tracks import TracksWatch
-from server.obstacles.watch import Watch
+from server.obstacles.watch import Watch, is_in_air
 from server.schemas import ServerMessage, Source
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.messages import LinkStatus, PlanRecord, Topic
-from telemetry.obstacles import SENSORS, ObstacleAlert, Sensor
+from telemetry.obstacles import SENSORS, AvoidanceStatus, ObstacleAlert, Sensor
 from telemetry.requests import Operator, WholeMap
 
 log = logging.getLogger("hedgehop.obstacles")
@@ -59,7 +59,12 @@ class Obstacles:
     ) -> None:
         self._bus, self._library, self._workspace, self._nodes = bus, library, workspace, nodes
         self._live, self._onboard, self._lane = live, onboard, lane
-        self.watches: dict[Source, Watch] = {"live": Watch("live", tell), "replay": Watch("replay", tell)}
+        self.watches: dict[Source, Watch] = {
+            "live": Watch("live", tell, in_air=lambda: is_in_air(live.state)),
+            "replay": Watch("replay", tell),
+        }
+        self.sees_differently: Callable[[], None] = lambda: None
+        """Called whenever what avoidance says of itself has changed."""
         watch = self.watches["live"]
         self.tracks: dict[Source, TracksWatch] = {
             source: TracksWatch(source, tell, each.on_alert) for source, each in self.watches.items()
@@ -92,7 +97,7 @@ class Obstacles:
             relay.on(topic, replay.on_status, replayed=True)
         for watch, replayed in ((live, False), (replay, True)):
             relay.on(Topic.ALERT, watch.on_alert, replayed=replayed, each=True)
-            relay.on(Topic.AVOIDANCE, watch.on_avoidance, replayed=replayed)
+            relay.on(Topic.AVOIDANCE, watch.on_avoidance if replayed else self._on_avoidance, replayed=replayed)
         for source, tracks in self.tracks.items():
             relay.on(Topic.TRACKS, tracks.on_status, replayed=source == "replay")
 
@@ -125,9 +130,14 @@ class Obstacles:
 
     def on_plan(self) -> None:
         """Another plan on board or open, or another answer to it."""
+        self.desk.brake_as(self._onboard())
         self._ground.want(self._onboard(), self._workspace.document.terrain_id)
         self.watches["live"].seen_in_plan = self._workspace.seen_columns
         self.watches["live"].refresh()
+
+    def _on_avoidance(self, status: AvoidanceStatus) -> None:
+        self.watches["live"].on_avoidance(status)
+        self.sees_differently()
 
     def _flown(self) -> Underway | None:
         record, state = self._onboard(), self._live.state

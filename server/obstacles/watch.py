@@ -30,6 +30,7 @@ from telemetry.obstacles import (
     PerceptionStatus,
     Sensor,
 )
+from telemetry.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -49,9 +50,12 @@ class Watch:
         *,
         now_mono_s: Callable[[], float] = time.monotonic,
         now_utc_s: Callable[[], float] = time.time,
+        in_air: Callable[[], bool] = lambda: False,
     ) -> None:
         self._source: Source = source
         self._tell, self._now_mono_s, self._now_utc_s = tell, now_mono_s, now_utc_s
+        self._in_air = in_air
+        self._blind: ObstacleAlert | None = None
         self._alerts = LatchedAlerts()
         self._maps_drawn: tuple[MapDrawn, ...] = ()
         self._told_mono_s = dict.fromkeys(SENSORS, float("-inf"))
@@ -109,8 +113,22 @@ class Watch:
         self.refresh()
 
     def on_avoidance(self, status: AvoidanceStatus) -> None:
-        self.avoidance = status
+        before, self.avoidance = self.avoidance, status
+        self._tell_blindness(before)
         self.refresh()
+
+    def _tell_blindness(self, before: AvoidanceStatus) -> None:
+        """In flight nobody may believe that avoidance watches while it sees nothing."""
+        if self._blind is None and self.avoidance.state == "blind" and self._in_air():
+            sensor: Sensor = before.sensors[0] if before.sensors else "radar"
+            now_s = self._now_mono_s()
+            text = "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself."
+            self._blind = ObstacleAlert(f"blind-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
+            self._tell_own(self._blind)
+        elif self._blind is not None and self.avoidance.state != "blind":
+            over = "sees again" if self.avoidance.enabled else "is off"
+            blind, self._blind = self._blind, None
+            self._tell_own(replace(blind, phase="ends", text=f"Avoidance {over}."))
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         self.settings = settings
@@ -196,3 +214,7 @@ class Watch:
     def _tell_own(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()
         self.on_alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))
+
+
+def is_in_air(state: VehicleState | None) -> bool:
+    return state is not None and state.armed and state.landed != "on_ground"

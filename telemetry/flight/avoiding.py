@@ -15,9 +15,9 @@ from telemetry.flight.avoiding_words import status_of
 from telemetry.flight.detour import Detour, DetourParams
 from telemetry.flight.helm import GUIDED, STOP_MODES, Helm
 from telemetry.flight.pilot_watch import PilotWatch
-from telemetry.flight.regions import Regions, Sight
+from telemetry.flight.regions import Regions, Sight, largest_speed
 from telemetry.flight.rest import RETURNS, Rest
-from telemetry.flight.slowing import Slowing, largest_speed
+from telemetry.flight.slowing import Slowing
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.ends import GROUND_STATION
 from telemetry.messages import FlightStatus

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from telemetry.flight.slowing import FASTER_M_S
-from telemetry.obstacles import AvoidanceStatus
+from telemetry.flight.regions import FASTER_M_S
+from telemetry.obstacles import AvoidanceStatus, Eye
 
 if TYPE_CHECKING:
     from telemetry.flight.avoiding import Avoiding
@@ -19,20 +19,36 @@ def status_of(avoiding: Avoiding, now_s: float) -> AvoidanceStatus:
     largest_m_s = avoiding.largest_speed_m_s(now_s)
     return AvoidanceStatus(
         enabled=avoiding.enabled and not avoiding.released,
-        state=_state(avoiding),
+        state=_state(avoiding, now_s),
         text=avoiding.failed or _text(avoiding, now_s, largest_m_s),
         height_offset_m=round(avoiding.detour.offset_m, 2),
         largest_speed_m_s=None if largest_m_s is None else round(largest_m_s, 1),
         sensors=avoiding.regions.counted(now_s),
+        eyes=_eyes(avoiding, now_s),
     )
 
 
-def _state(avoiding: Avoiding):
+def _eyes(avoiding: Avoiding, now_s: float) -> tuple[Eye, ...]:
+    regions = avoiding.regions
+    return tuple(
+        Eye(
+            sight.sensor,
+            round(sight.since_s, 1),
+            sight.depth_m,
+            round(regions.stopping(sight).largest_speed_m_s(sight.depth_m), 1),
+        )
+        for sight in regions.eyes(now_s)
+    )
+
+
+def _state(avoiding: Avoiding, now_s: float):
     detour = avoiding.detour
     if avoiding.released:
         return "released"
     if not detour.is_engaged:
-        return "watching" if avoiding.enabled else "off"
+        if not avoiding.enabled:
+            return "off"
+        return "watching" if avoiding.regions.eyes(now_s) else "blind"
     if detour.phase in ("holding", "ceiling"):
         return detour.phase
     if detour.is_manoeuvre:
@@ -52,7 +68,9 @@ def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
         return "Something is in the way, but what is flown now is nothing that avoidance can go on with."
     slowest = avoiding.regions.slowest(now_s)
     if slowest is None:
-        return "No sensor sees ahead at the moment."
+        if avoiding.regions.eyes(now_s):
+            return ""
+        return "No sensor sees ahead: nothing brakes by itself."
     return _speed_words(avoiding, *slowest)
 
 

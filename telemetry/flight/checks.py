@@ -14,7 +14,7 @@ from telemetry.flight.parameters import ReturnSettings
 from telemetry.messages import OnboardMission
 from telemetry.vehicle import GnssFix, VehicleState
 
-Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready"]
+Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance"]
 State = Literal["good", "accept", "bad", "unknown"]
 
 AWAY_M = 3.0

@@ -10,7 +10,10 @@ from planning.certificate.cone import SLOPE
 from planning.model import Firmware
 
 NAMES: dict[Firmware, tuple[str, ...]] = {
-    "ardupilot": ("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
+    "ardupilot": (
+        *("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
+        *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
+    ),
     "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG"),
 }
 """What to read before a start. ArduPilot 4.7 counts in metres what earlier versions count in centimetres."""

@@ -12,12 +12,18 @@ from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
 
 OLD_S = 0.5
 """A frame or pose older than this says nothing about what is ahead now."""
+BLIND_S = 1.0
+"""Without a frame for so long a sensor is no eye any more."""
 CLEAR_FRAMES = 3
 """One empty frame may be a drop-out."""
 LEAST_LATENCY_S = 0.3
 """From seeing to braking."""
 REACTION_S = 0.2
 """From the region's word to the vehicle's first braking."""
+FASTER_M_S = 0.1
+"""Than allowed, before it is slowed: a vehicle does not keep a speed any better."""
+SLOWEST_M_S = 0.3
+"""No vehicle is told to fly slower than this: its sensors see nothing that it could stop for."""
 PERIOD_FADES = 0.95
 """A longer time between two frames counts on, less and less: what came late once may again."""
 
@@ -56,6 +62,11 @@ class Sight:
 
     def is_fresh(self, now_s: float) -> bool:
         return self.counts and now_s - self.t_mono_s <= OLD_S
+
+
+def largest_speed(sees_enough_for_m_s: float) -> float:
+    """As it is ordered."""
+    return max(SLOWEST_M_S, math.floor(10 * sees_enough_for_m_s) / 10)
 
 
 class Regions:
@@ -161,6 +172,10 @@ class Regions:
             max(LEAST_LATENCY_S, sight.latency_s + REACTION_S) + sight.period_s,
             s.vehicle_radius_m + s.position_error_m + voxel_m / 2,
         )
+
+    def eyes(self, now_s: float) -> list[Sight]:
+        """Those that work, one late frame or not."""
+        return [sight for sight in self.sights.values() if sight.counts and now_s - sight.t_mono_s <= BLIND_S]
 
     def fresh(self, now_s: float) -> list[Sight]:
         """Those whose word counts at present."""

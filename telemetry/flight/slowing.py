@@ -5,20 +5,12 @@ from __future__ import annotations
 import math
 
 from telemetry.flight.helm import Helm
+from telemetry.flight.regions import FASTER_M_S, largest_speed
 from telemetry.mavlink.actions import Action
 from telemetry.vehicle import VehicleState
 
-FASTER_M_S = 0.1
-"""Than allowed, before it is slowed: a vehicle does not keep a speed any better."""
 AGAIN_S = 2.0
 """A vehicle that is still too fast, or again because its mission says so, is told once more."""
-SLOWEST_M_S = 0.3
-"""No vehicle is told to fly slower than this: its sensors see nothing that it could stop for."""
-
-
-def largest_speed(sees_enough_for_m_s: float) -> float:
-    """As it is ordered."""
-    return max(SLOWEST_M_S, math.floor(10 * sees_enough_for_m_s) / 10)
 
 
 class Slowing:

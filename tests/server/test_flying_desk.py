@@ -20,11 +20,12 @@ from server.flying.desk import FlightDesk
 from server.flying.work import FlightWork
 from server.jobs import Lane
 from server.library import Library
-from server.schemas import Computation, FlyState, PlanState, ServerMessage, StartFlight
+from server.schemas import CheckRow, Computation, FlyState, PlanState, ServerMessage, StartFlight
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
 from telemetry.mavlink.storage import as_stored
 from telemetry.mavlink.verify import compare, digest
 from telemetry.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.obstacles import AvoidanceStatus, Eye
 from telemetry.requests import Arm, Download, Operator, ReadParameters, StartAuto, StartGuided, Upload
 from telemetry.vehicle import VehicleState
 
@@ -128,6 +129,7 @@ class Bench:
     def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane]) -> None:
         self.vehicle, self.plan = Vehicle(), made.plan()
         self.state: VehicleState | None = made.standing()
+        self.avoidance = AvoidanceStatus()
         self.told: list[FlyState] = []
         self.records: list[PlanRecord] = []
         work = FlightWork(
@@ -141,6 +143,7 @@ class Bench:
             vehicle=lambda: self.state,
             tell=self._tell,
             publish_plan=self.records.append,
+            avoidance=lambda: self.avoidance,
         )
         self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
 
@@ -307,6 +310,31 @@ def test_what_must_be_accepted_is_not_flown_without(
         await bench.desk.check(ME)
         with pytest.raises(CheckNeededError, match="no fix"):
             await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))
+
+    runner.run(scenario())
+
+
+def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    def row_of(bench: Bench) -> CheckRow:
+        assert bench.desk.state.preflight is not None
+        return next(row for row in bench.desk.state.preflight.rows if row.code == "avoidance")
+
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        start = StartFlight(digest=await bench.ready())
+        assert row_of(bench).text.startswith("Avoidance is off")
+        bench.avoidance = AvoidanceStatus(enabled=True, state="blind")
+        bench.desk.refresh()
+        assert row_of(bench).state == bench.told[-1].preflight.rows[-1].state == "accept"
+        with pytest.raises(CheckNeededError, match="no sensor sees ahead"):
+            await bench.desk.start(ME, start)
+        bench.avoidance = replace(bench.avoidance, state="watching", eyes=(Eye("radar", 1.0, 30.0, 9.0),))
+        assert row_of(bench).state == "good"
+        await bench.desk.start(ME, start)
+        bench.avoidance = replace(bench.avoidance, state="blind", eyes=())
+        await bench.desk.start(ME, start.model_copy(update={"accept": ["avoidance"]}))
 
     runner.run(scenario())
 

@@ -43,6 +43,7 @@ def flying(demo: Station) -> Station:
     )
     assert demo.answer().state == "ready"
     ok(demo.http.post("/api/flight/upload", json={"revision": demo.state.revision}))
+    demo.until(lambda m: m.type == "obstacles" and m.source == "live" and bool(m.obstacles.avoidance.eyes), LONG_S)
     checked = FlyState.model_validate_json(ok(demo.http.post("/api/flight/check")).text)
     ok(demo.http.post("/api/flight/start", json={"digest": checked.onboard.digest}))
     return demo

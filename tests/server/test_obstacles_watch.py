@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from server.obstacles.watch import DEAD_S, Watch
+from telemetry.obstacles import AvoidanceStatus
 from tests.server.obstacle_messages import alert, delta, status
 
 
@@ -32,6 +33,26 @@ def test_an_alert_is_told_at_once_before_the_list_that_holds_it() -> None:
     watch.acknowledge("radar-1")
     watch.on_alert(alert(phase="ends"))
     assert told[-1].obstacles.alerts == []
+
+
+def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_sees_or_is_off() -> None:
+    told: list[Any] = []
+    flies = True
+    watch = Watch("live", told.append, now_mono_s=Clock(), now_utc_s=lambda: 5000.0, in_air=lambda: flies)
+    sees = AvoidanceStatus(enabled=True, state="watching", sensors=("vision",))
+    blind = AvoidanceStatus(enabled=True, state="blind")
+    watch.on_avoidance(sees)
+    watch.on_avoidance(blind)
+    (lost,) = [each.alert for each in watch.state.alerts]
+    assert (lost.kind, lost.sensor, lost.phase) == ("sensor", "vision", "begins")
+    assert "sees nothing any more" in lost.text
+    watch.on_avoidance(replace(blind, text="still"))
+    assert len([message for message in told if message.type == "alert"]) == 1
+    watch.on_avoidance(sees)
+    assert [message.alert.text for message in told if message.type == "alert"][-1] == "Avoidance sees again."
+    flies = False
+    watch.on_avoidance(blind)
+    assert len([message for message in told if message.type == "alert"]) == 2
 
 
 def test_begin_and_end_are_passed_on_once() -> None:

@@ -350,3 +350,19 @@ def test_how_fast_and_how_high_it_climbs_is_set() -> None:
     it.advance(4.0)
     assert max(up_m for _, _, up_m in it.trail) == pytest.approx(20.0, abs=0.5)
     assert (2.0, 2.5) in [(m.param1, m.param2) for m in it.sent("COMMAND_LONG") if m.command == 178]
+
+
+def test_without_a_frame_it_says_that_it_is_blind_and_as_soon_as_frames_stop() -> None:
+    it = craft(senses=[Sense("radar", 10.0, 0.1)])
+    it.advance(1.0)
+    assert state(it) == "watching"
+    (eye,) = it.avoiding.status.eyes
+    assert (eye.sensor, eye.depth_m) == ("radar", 10.0)
+    assert 3.5 < eye.largest_speed_m_s < 4.5
+    it.senses[0].silent = True
+    it.until(lambda: state(it) == "blind", 1.2)
+    assert it.avoiding.status.text == "No sensor sees ahead: nothing brakes by itself."
+    assert it.avoiding.status.eyes == ()
+    it.senses[0].silent = False
+    it.until(lambda: state(it) == "watching", 0.5)
+    assert it.avoiding.status.eyes[0].since_t_mono_s > eye.since_t_mono_s

@@ -5,11 +5,12 @@ export const PROTOCOL_VERSION = 1;
 /** The link node's: what is done about obstacles by itself. */
 export interface AvoidanceStatus {
   enabled: boolean;
-  state: "off" | "watching" | "holding" | "climbing" | "offset" | "manoeuvre" | "released" | "ceiling";
+  state: "off" | "blind" | "watching" | "holding" | "climbing" | "offset" | "manoeuvre" | "released" | "ceiling";
   text: string;
   height_offset_m: number;
   largest_speed_m_s: number | null;
   sensors: ("radar" | "vision" | "ranges")[];
+  eyes: Eye[];
 }
 
 /** What was known when a frame was worked on: with it a recording's map comes out exactly as live. */
@@ -53,6 +54,14 @@ export interface ErrorInfo {
   what: string;
   where: string;
   advice: string;
+}
+
+/** A sensor whose word counts at present. */
+export interface Eye {
+  sensor: "radar" | "vision" | "ranges";
+  since_t_mono_s: number;
+  depth_m: number;
+  largest_speed_m_s: number;
 }
 
 /** What Hedgehop itself is doing with the vehicle. */
@@ -819,7 +828,7 @@ export interface TrackDoc {
 
 /** One line of the check before the start. */
 export interface CheckRow {
-  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready";
+  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready" | "avoidance";
   /** accept: may be flown once the operator accepts it; bad and unknown: not at all. */
   state: "good" | "accept" | "bad" | "unknown";
   text: string;
@@ -913,7 +922,7 @@ export interface UploadPlan {
 export interface StartFlight {
   way?: "auto" | "guided";
   digest: string;
-  accept?: ("gnss" | "battery" | "rtl_height")[];
+  accept?: ("gnss" | "battery" | "rtl_height" | "avoidance")[];
   from_item?: number;
 }
 

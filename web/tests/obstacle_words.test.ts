@@ -95,6 +95,7 @@ describe("avoidance", () => {
     height_offset_m: 0,
     largest_speed_m_s: null,
     sensors: [],
+    eyes: [],
     ...fields,
   });
 

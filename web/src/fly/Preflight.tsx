@@ -34,6 +34,7 @@ const TITLES: Record<CheckRow["code"], string> = {
   rtl_height: "Return height",
   battery: "Battery",
   ready: "Ready to arm",
+  avoidance: "Avoidance",
 };
 
 function Row({ row }: { row: CheckRow }) {
@@ -51,7 +52,7 @@ function Row({ row }: { row: CheckRow }) {
         {row.mend && <p class="mend">{row.mend}</p>}
         {row.state === "accept" && isAcceptable(row.code) && (
           <Check
-            label="I accept this"
+            label={row.code === "avoidance" ? "I fly without it, or slowed" : "I accept this"}
             checked={isAccepted}
             disabled={!lease.value.mine}
             testid={`accept-${row.code}`}

@@ -29,7 +29,7 @@ export const resumeFrom = computed(() => (resumes.value ? (fly.value?.resume_fro
 export const wayToFly = computed(() => (resumeFrom.value === null ? way.value : "auto"));
 
 export const isAcceptable = (code: CheckRow["code"]): code is Accepted =>
-  code === "gnss" || code === "battery" || code === "rtl_height";
+  code === "gnss" || code === "battery" || code === "rtl_height" || code === "avoidance";
 
 export function accept(code: Accepted, yes: boolean): void {
   const next = new Set(accepted.value);

@@ -37,6 +37,7 @@ const NOTHING: ObstaclesState = {
     height_offset_m: 0,
     largest_speed_m_s: null,
     sensors: [],
+    eyes: [],
   },
   settings: {
     radar_depth_m: 10,
