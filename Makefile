@@ -27,7 +27,7 @@ else \
 fi
 endef
 
-.PHONY: help setup demo test check bench lock clean
+.PHONY: help setup demo test check bench proof lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -56,6 +56,9 @@ check: $(STAMPS)/test web/node_modules/.stamp ## lint, formatting, types and the
 
 bench: $(STAMPS)/test ## measure the speed of the kernels and print it
 	@$(VENV_PYTHON) -m tests.bench
+
+proof: $(STAMPS)/test ## prove the certificates of over 200 missions by a slow independent measurement, print the table
+	@$(VENV_PYTHON) -m tests.proof
 
 lock: ## resolve the requirements files anew (LOCK_ARGS=--upgrade for newer versions)
 	@command -v $(UV) >/dev/null || { echo 'make lock needs uv: python3 -m pip install uv'; exit 1; }

@@ -31,9 +31,11 @@ class Ground:
     top_m: F64
     corners_m: F64
     to_metres: Transformer
+    metres_wkt: str
     unit_m: float
     to_pixel: rasterio.Affine
     to_source: Transformer
+    turns: bool
 
 
 def read_ground(path: Path, *, crs: str | None = None, height_scale: float = 1.0) -> Ground:
@@ -56,7 +58,7 @@ def read_ground(path: Path, *, crs: str | None = None, height_scale: float = 1.0
     top[2:-2, 2:-2] = _filled(height_m, _cell_area(corners))
     to_metres = Transformer.from_crs(CRS.from_epsg(4326), metres, always_xy=True)
     to_source = Transformer.from_crs(CRS.from_epsg(4326), horizontal, always_xy=True)
-    return Ground(top, corners, to_metres, unit_m, ~affine, to_source)
+    return Ground(top, corners, to_metres, metres.to_wkt(), unit_m, ~affine, to_source, horizontal.is_geographic)
 
 
 def mission_line(text: str, ground: Ground) -> F64:
@@ -135,6 +137,8 @@ def _filled(height_m: F64, cell_m2: float) -> F64:
 
 def _cell_of(ground: Ground, lat: float, lon: float) -> tuple[int, int]:
     x, y = ground.to_source.transform(lon, lat)
+    if ground.turns:  # a grid across the date line counts on beyond 180
+        x += 360.0 * round(((~ground.to_pixel).c - x) / 360.0)
     column, row = ground.to_pixel @ (x, y)
     return math.floor(row) + 2, math.floor(column) + 2
 
