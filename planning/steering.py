@@ -24,6 +24,8 @@ ONWARD_SHARE = 0.25
 DISC_WIDER = 1.3
 """Discs of neighbouring directions overlap."""
 LEAST_DISC_M = 0.5
+TOGETHER = 3
+"""So many neighbouring directions share a disc, at the nearest ground of them: it bounds the time that it takes."""
 
 
 def steer(
@@ -53,11 +55,12 @@ def with_ground(obstacles: Obstacles, room_m: Sequence[float], *, farthest_m: fl
 
     ``room_m`` are even directions clockwise from north; nothing is added farther than ``farthest_m``.
     """
-    room = np.asarray(room_m, np.float64)
+    together = TOGETHER if len(room_m) % TOGETHER == 0 else 1
+    room = np.asarray(room_m, np.float64).reshape(-1, together).min(axis=1)
     near = room < farthest_m
     if not near.any():
         return obstacles
-    bearing = np.arange(len(room))[near] * (2 * math.pi / len(room))
+    bearing = (np.arange(len(room))[near] * together + (together - 1) / 2) * (2 * math.pi / len(room_m))
     radius = np.maximum(LEAST_DISC_M, DISC_WIDER * math.pi / len(room) * room[near])
     towards = np.column_stack([np.sin(bearing), np.cos(bearing)])
     places = obstacles.position_enu_m + towards * (room[near] + radius)[:, None]

@@ -268,6 +268,10 @@ class PerceptionSettings:
     velocities: VelocitySettings = field(default_factory=VelocitySettings)
 
 
+AvoidBy = Literal["climb", "sidestep"]
+"""sidestep: past objects that are followed, level; it climbs over what it cannot step aside of."""
+
+
 @dataclass(frozen=True, slots=True)
 class Eye:
     """A sensor whose word counts at present."""
@@ -300,3 +304,4 @@ class AvoidanceStatus:
     """Whose word counts at present."""
     eyes: tuple[Eye, ...] = ()
     """The same, with what each sees."""
+    by: AvoidBy = "climb"

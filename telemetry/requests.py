@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from telemetry.messages import GuidedTarget, Item
+from telemetry.obstacles import AvoidBy
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,9 @@ class Land:
 
 @dataclass(frozen=True, slots=True)
 class SetAvoidance:
-    """Switches climbing over obstacles on or off. ``consent``: of the operator, for a vehicle that is no simulation.
+    """Switches avoiding obstacles by itself on or off, and says how.
+
+    ``consent``: of the operator, for a vehicle that is no simulation.
 
     -> None; NotAllowedError without consent, or for an autopilot for which it is not built
     """
@@ -156,6 +159,7 @@ class SetAvoidance:
     operator: Operator
     enabled: bool
     consent: bool = False
+    by: AvoidBy = "climb"
 
 
 @dataclass(frozen=True, slots=True)

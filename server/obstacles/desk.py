@@ -106,7 +106,7 @@ class ObstacleDesk:
     async def set_avoidance(self, operator: Operator, body: SetAvoidanceBody) -> None:
         """Raises NotAllowedError and what else the link says."""
         self._avoid_when_adopted = False
-        await self._link.call(SetAvoidance(operator, body.enabled, body.consent))
+        await self._link.call(SetAvoidance(operator, body.enabled, body.consent, body.by))
 
     def avoid_in_demo(self) -> None:
         """As soon as the simulated vehicle is connected; whoever switches avoidance before that decides."""

@@ -83,6 +83,8 @@ class ObstaclesState(Strict):
 class SetAvoidanceBody(Strict):
     enabled: bool
     consent: bool = False
+    by: Literal["climb", "sidestep"] = "climb"
+    """sidestep: past objects that are followed, level; it climbs over what it cannot step aside of."""
 
 
 class AcknowledgeBody(Strict):

@@ -21,8 +21,9 @@ from telemetry.flight.slowing import Slowing
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.ends import GROUND_STATION
 from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.requests import FlyManoeuvre
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 LOW_M = 1.0
@@ -60,6 +61,7 @@ class Avoiding:
         self.detour = Detour(self._helm, self.regions, self._params)
         self._state: VehicleState | None = None
         self.enabled = False
+        self.by: AvoidBy = "climb"
         self.released = ""
         """Who has taken over; it stays off for this flight."""
         self._slowing = Slowing(self._helm)
@@ -106,15 +108,18 @@ class Avoiding:
 
     # Switch.
 
-    def enable(self, now_s: float) -> None:
-        """Raises NotAllowedError after a release, until the vehicle has landed."""
+    def enable(self, now_s: float, by: AvoidBy = "climb") -> None:
+        """``by`` sidestep: it climbs only where it cannot step aside.
+
+        Raises NotAllowedError after a release, until the vehicle has landed.
+        """
         if self.released:
             raise NotAllowedError(
                 f"Avoidance stays off for this flight. {self.released}", advice="Switch it on again after the landing."
             )
         if not self.enabled:
             self._watch.begin()
-        self.enabled, self._now_s = True, now_s
+        self.enabled, self.by, self._now_s = True, by, now_s
 
     def disable(self, now_s: float) -> list[Action]:
         """A vehicle that has been taken over goes on as it is: higher than planned, and nothing stops it any more."""
@@ -173,7 +178,7 @@ class Avoiding:
     def on_settings(self, settings: PerceptionSettings) -> None:
         self._params = self._params.following(settings)
         self.detour.set_params(self._params)
-        self.regions.settings = settings
+        self.regions.settings = self.detour.aside.settings = settings
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         """Any of the vehicle, and those by which others fly it by hand."""
@@ -194,6 +199,10 @@ class Avoiding:
 
     def on_perception(self, status: PerceptionStatus, now_s: float) -> list[Action]:
         self.regions.take(status)
+        return self._look(now_s)
+
+    def on_tracks(self, status: TracksStatus, now_s: float) -> list[Action]:
+        self.detour.aside.on_tracks(status)
         return self._look(now_s)
 
     def on_tick(self, now_s: float) -> list[Action]:
@@ -224,9 +233,29 @@ class Avoiding:
         if not actions and self.detour.goes_past:
             blocked = self._is_blocked(state, now_s)
             return self.detour.stop_short(now_s) if blocked else self.detour.hold_if_silent(state, now_s)
+        if self.detour.phase == "aside":
+            return self._climb_if_blocked(state, now_s) or actions
         if self.enabled and not actions:
-            actions = self._look_ahead(state, now_s)
+            actions = self._look_aside(state, now_s) or self._look_ahead(state, now_s)
         return actions
+
+    def _look_aside(self, state: VehicleState, now_s: float) -> list[Action]:
+        """Steps aside, where that is chosen and leads past what is in the way, sooner than a region ahead begins."""
+        going = self.detour.phase == "going" and not self.detour.is_manoeuvre
+        if self.by != "sidestep" or not _is_flying(state) or (self.is_engaged and not going):
+            return []
+        rest = self.detour.rest if going else self._rest(state)
+        if rest is None or not self.detour.aside.wants(state, rest.raised(self.detour.offset_m).targets, now_s):
+            return []
+        self._on_engage()
+        return self.detour.step_aside(state, rest, now_s)
+
+    def _climb_if_blocked(self, state: VehicleState, now_s: float) -> list[Action]:
+        """On the way aside something stands so near ahead that it must brake now, or there is no way on."""
+        seen_by, is_stuck = self.regions.seen_by(now_s), self.detour.aside.is_stuck(now_s)
+        if seen_by and (is_stuck or self._is_blocked(state, now_s)):
+            return self.detour.avoid_again(seen_by, now_s)
+        return self.detour.give_up_aside(state, now_s) if is_stuck and self.regions.counted(now_s) else []
 
     def _is_blocked(self, state: VehicleState, now_s: float) -> bool:
         """Whether something ahead is so near that it must brake now; what it flies alongside is not ahead."""

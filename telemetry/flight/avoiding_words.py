@@ -25,6 +25,7 @@ def status_of(avoiding: Avoiding, now_s: float) -> AvoidanceStatus:
         largest_speed_m_s=None if largest_m_s is None else round(largest_m_s, 1),
         sensors=avoiding.regions.counted(now_s),
         eyes=_eyes(avoiding, now_s),
+        by=avoiding.by,
     )
 
 
@@ -51,8 +52,8 @@ def _state(avoiding: Avoiding, now_s: float):
         return "watching" if avoiding.regions.eyes(now_s) else "blind"
     if detour.phase in ("holding", "ceiling"):
         return detour.phase
-    if detour.is_manoeuvre:
-        return "manoeuvre"
+    if detour.is_manoeuvre or detour.phase == "aside":
+        return "holding" if detour.aside.why and not detour.is_manoeuvre else "manoeuvre"
     return "offset" if detour.phase in ("going", "ending") else "climbing"
 
 
@@ -66,6 +67,8 @@ def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
         return ""
     if avoiding.cannot:
         return "Something is in the way, but what is flown now is nothing that avoidance can go on with."
+    if avoiding.by == "sidestep" and (why := avoiding.detour.aside.why_not(now_s)):
+        return why
     slowest = avoiding.regions.slowest(now_s)
     if slowest is None:
         if avoiding.regions.eyes(now_s):
@@ -89,6 +92,8 @@ def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
     detour = avoiding.detour
     if detour.phase == "holding":
         return detour.why
+    if detour.phase == "aside":
+        return detour.aside.why or "Steps aside past what is on its way, then goes on along the mission."
     if detour.phase == "ceiling":
         return "Still not clear at the highest allowed height: it holds. Return home or take over."
     if detour.phase in ("going", "ending"):

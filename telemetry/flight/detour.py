@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from telemetry.flight.aside import Aside
 from telemetry.flight.backing import Backing, Trail
 from telemetry.flight.climb import Climb
 from telemetry.flight.helm import GUIDED, Helm
@@ -23,7 +24,7 @@ from telemetry.obstacles import PerceptionSettings, Sensor
 from telemetry.vehicle import VehicleState
 
 Phase = Literal[
-    "idle", "stopping", "taking", "backing", "climbing", "levelling", "going", "holding", "ceiling", "ending"
+    "idle", "stopping", "taking", "backing", "climbing", "levelling", "going", "holding", "ceiling", "ending", "aside"
 ]
 HEARD_S = 2.0
 """A heartbeat as young as this shows the vehicle's mode."""
@@ -49,6 +50,7 @@ class Detour:
     def __init__(self, helm: Helm, regions: Regions, params: DetourParams) -> None:
         self._helm, self._regions, self._params = helm, regions, params
         self.trail = Trail()
+        self.aside = Aside(helm)
         self.forget()
 
     def forget(self) -> None:
@@ -124,6 +126,33 @@ class Detour:
         self.phase, self._then, self._paused = "taking", "go", False
         return self._helm.change_mode(GUIDED, now_s)
 
+    def step_aside(self, state: VehicleState, rest: Rest, now_s: float) -> list[Action]:
+        """Past what the tracks say, along the rest of the flight and back onto its line."""
+        self.rest, self.is_manoeuvre, self._over, self._way = rest, False, False, ()
+        self._witnesses.sensors = frozenset()
+        targets = rest.raised(self.offset_m).targets
+        self.phase, self._then, self._legs = "aside", "go", Legs(self._helm, targets)
+        self.aside.begin(state, targets)
+        return self._on_aside(state, now_s)
+
+    def _on_aside(self, state: VehicleState, now_s: float) -> list[Action]:
+        actions, left = self.aside.look(state, now_s), len(self.aside.left)
+        if left < len(self.rest.targets):
+            self.rest = replace(self.rest, targets=self.rest.targets[len(self.rest.targets) - left :])
+            self._legs = Legs(self._helm, self.rest.raised(self.offset_m).targets)
+        return [*actions, *self._go_back(state, now_s)] if self.aside.is_back(now_s) else actions
+
+    def give_up_aside(self, state: VehicleState, now_s: float) -> list[Action]:
+        """On towards what it cannot pass, slowly enough to stop, until a region shows it: then it is climbed over."""
+        self.aside.give_up(now_s)
+        return [*self._helm.change_mode(GUIDED, now_s), *self._go_back(state, now_s)]
+
+    def _go_back(self, state: VehicleState, now_s: float) -> list[Action]:
+        """On with the rest, from the line or from where it is."""
+        assert self._legs is not None
+        self.phase = "going"
+        return self._legs.go(state, now_s) or self._on_going(state, now_s)
+
     @property
     def goes_over(self) -> bool:
         """On a prepared way over something, whose top may not have been seen yet."""
@@ -159,6 +188,8 @@ class Detour:
     def resume(self, state: VehicleState, now_s: float) -> list[Action]:
         if self.phase == "ceiling" and self._witnesses.say_clear(now_s):
             return self._level(state, now_s)
+        if self.phase == "aside" and self.aside.why:
+            return self.give_up_aside(state, now_s)
         if not self._paused:
             if self.phase == "holding":
                 self.count_on_nobody()
@@ -179,6 +210,7 @@ class Detour:
             "going": self._on_going,
             "holding": self._on_holding,
             "ending": self._on_ending,
+            "aside": self._on_aside,
         }
         step = steps.get(self.phase)
         return [] if step is None else step(state, now_s)

@@ -113,8 +113,9 @@ class Answering:
         _, pilot, _ = self._link.need_vehicle(live=request.enabled)
         if request.enabled:
             await pilot.avoidance.check_may_be_enabled(consent=request.consent)
-            await self._record(request, f"avoidance on{', with consent' if request.consent else ''}")
-            pilot.avoidance.enable()
+            by = "" if request.by == "climb" else f" by {request.by}"
+            await self._record(request, f"avoidance on{by}{', with consent' if request.consent else ''}")
+            pilot.avoidance.enable(request.by)
         else:
             await self._record(request, "avoidance off", must=False)
             pilot.avoidance.disable()

@@ -13,8 +13,9 @@ from telemetry.mavlink.actions import Action, Message, Send
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.modes import commanded_mode
 from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.requests import FlyManoeuvre
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 WHO_IT_IS_S = 3.0
@@ -67,7 +68,7 @@ class Avoidance:
         if consent or await self._is_simulation():
             return
         raise NotAllowedError(
-            "On a real vehicle avoidance needs your consent: it will stop and climb by itself.",
+            "On a real vehicle avoidance needs your consent: it will stop, climb or step aside by itself.",
             advice="Give it when you switch avoidance on.",
         )
 
@@ -79,8 +80,8 @@ class Avoidance:
             )
         return vehicle.is_simulation
 
-    def enable(self) -> None:
-        self._avoiding.enable(time.monotonic())
+    def enable(self, by: AvoidBy = "climb") -> None:
+        self._avoiding.enable(time.monotonic(), by)
 
     def disable(self) -> None:
         self._perform(self._avoiding.disable(time.monotonic()))
@@ -115,6 +116,9 @@ class Avoidance:
 
     def on_perception(self, status: PerceptionStatus) -> None:
         self._perform(self._avoiding.on_perception(status, time.monotonic()))
+
+    def on_tracks(self, status: TracksStatus) -> None:
+        self._perform(self._avoiding.on_tracks(status, time.monotonic()))
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         self._avoiding.on_settings(settings)

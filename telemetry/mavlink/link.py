@@ -39,6 +39,7 @@ from telemetry.messages import (
 )
 from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
 from telemetry.requests import LinkRequest, Operator
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 TICK_S = 0.05
@@ -196,6 +197,11 @@ class Link:
         """What a sensor's node says about the regions ahead."""
         if self.pilot is not None:
             self.pilot.avoidance.on_perception(status)
+
+    def on_tracks(self, status: TracksStatus) -> None:
+        """What moves or stands around, and how far away known ground is."""
+        if self.pilot is not None:
+            self.pilot.avoidance.on_tracks(status)
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         """How deep the regions are, and how large the vehicle is."""

@@ -21,6 +21,7 @@ from telemetry.messages import Topic
 from telemetry.node import NodeContext, run_node
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus
 from telemetry.requests import LinkRequest
+from telemetry.tracks import TracksStatus
 
 LOOK_EVERY_S = 0.5
 PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
@@ -104,7 +105,7 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
             node = LinkNode(link, context, file)
             await node.take_up(memory, links)
             await bus.serve("link", link.handle, LinkRequest)
-            for topic in (*PERCEPTION, Topic.PERCEPTION_SETTINGS):
+            for topic in (*PERCEPTION, Topic.TRACKS, Topic.PERCEPTION_SETTINGS):
                 link.spawn(_listen(bus, link, topic))
             await node.run()
     finally:
@@ -118,6 +119,8 @@ async def _listen(bus: Bus, link: Link, topic: str) -> None:
         async for _, message in subscription:
             if isinstance(message, PerceptionStatus):
                 link.on_perception(message)
+            elif isinstance(message, TracksStatus):
+                link.on_tracks(message)
             elif isinstance(message, PerceptionSettings):
                 link.on_settings(message)
     finally:

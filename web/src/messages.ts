@@ -11,6 +11,7 @@ export interface AvoidanceStatus {
   largest_speed_m_s: number | null;
   sensors: ("radar" | "vision" | "ranges")[];
   eyes: Eye[];
+  by: "climb" | "sidestep";
 }
 
 /** What was known when a frame was worked on: with it a recording's map comes out exactly as live. */
@@ -1079,6 +1080,8 @@ export interface ObstaclesState {
 export interface SetAvoidanceBody {
   enabled: boolean;
   consent?: boolean;
+  /** sidestep: past objects that are followed, level; it climbs over what it cannot step aside of. */
+  by?: "climb" | "sidestep";
 }
 
 /** Null: all of them. */

@@ -94,6 +94,7 @@ describe("avoidance", () => {
     text: "",
     height_offset_m: 0,
     largest_speed_m_s: null,
+    by: "climb",
     sensors: [],
     eyes: [],
     ...fields,

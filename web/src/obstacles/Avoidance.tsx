@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { withUnit } from "../format";
+import type { AvoidanceStatus } from "../messages";
 import { lease, nodes, vehicle } from "../store/flying";
 import { obstacles } from "../store/obstacles";
 import { link, setError } from "../store/state";
@@ -18,18 +19,48 @@ function whyNot(): string | null {
   return lease.value.mine ? null : "You observe: take control first";
 }
 
+type AvoidBy = AvoidanceStatus["by"];
+
+const WILL: Record<AvoidBy, string> = {
+  climb: "brake, climb up to 30 m above the plan, and fly the rest that much higher",
+  sidestep:
+    "fly past it beside the mission's line, level and clear of known ground, and back onto the line; where it cannot, it brakes and climbs up to 30 m",
+};
+const TITLES: Record<AvoidBy, string> = {
+  climb: "Climbs by itself over what it sees",
+  sidestep: "Steps aside by itself past what the radar follows; climbs where it cannot",
+};
+
+/** Chosen before it is switched on. */
+function How({ by, fixed, onChange }: { by: AvoidBy; fixed: boolean; onChange: (by: AvoidBy) => void }) {
+  return (
+    <select
+      class="avoid-by"
+      aria-label="How it avoids"
+      title={fixed ? `${TITLES[by]}. Switch off to choose` : TITLES[by]}
+      data-testid="avoid-by"
+      value={by}
+      disabled={fixed}
+      onChange={(event) => onChange(event.currentTarget.value as AvoidBy)}
+    >
+      <option value="climb">Climb</option>
+      <option value="sidestep">Step aside</option>
+    </select>
+  );
+}
+
 /** A real vehicle leaves its mission by itself only if somebody has said in words that it may. */
-function Consent({ onDone }: { onDone: () => void }) {
+function Consent({ by, onDone }: { by: AvoidBy; onDone: () => void }) {
   const [agrees, setAgrees] = useState(false);
   const why = whyNot();
   const grant = async () => {
-    if (await switchAvoidance(true, true)) onDone();
+    if (await switchAvoidance(true, by, true)) onDone();
   };
   return (
     <div class="consent" data-testid="avoidance-consent">
       <p>
         <strong>This is a real vehicle.</strong> When a sensor sees something ahead, Hedgehop will take it out
-        of its mission, brake, climb up to 30 m above the plan, and fly the rest that much higher.
+        of its mission, {WILL[by]}.
       </p>
       <p>Any stick or mode change hands it back for the rest of the flight.</p>
       <Check
@@ -56,7 +87,7 @@ function Consent({ onDone }: { onDone: () => void }) {
   );
 }
 
-function Switch({ isOn, ask }: { isOn: boolean; ask: () => void }) {
+function Switch({ isOn, by, ask }: { isOn: boolean; by: AvoidBy; ask: () => void }) {
   const why = whyNot();
   if (isOn) {
     return (
@@ -64,7 +95,7 @@ function Switch({ isOn, ask }: { isOn: boolean; ask: () => void }) {
         title={why ?? "From now on you steer clear yourself"}
         disabled={why !== null}
         testid="avoidance-off"
-        onClick={() => void switchAvoidance(false)}
+        onClick={() => void switchAvoidance(false, by)}
       >
         Switch off
       </Button>
@@ -83,9 +114,9 @@ function Switch({ isOn, ask }: { isOn: boolean; ask: () => void }) {
       icon="shield"
       place={AVOIDANCE}
       disabled={why !== null}
-      title={why ?? "Climbs by itself over what it sees"}
+      title={why ?? TITLES[by]}
       testid="avoidance-on"
-      onHold={() => void switchAvoidance(true)}
+      onHold={() => void switchAvoidance(true, by)}
     />
   );
 }
@@ -110,8 +141,10 @@ function Speed() {
 /** What is done about obstacles without asking, and the switch for it. */
 export function Avoidance() {
   const [asks, setAsks] = useState(false);
+  const [chosen, setChosen] = useState<AvoidBy>("climb");
   const status = obstacles.live.value.avoidance;
-  const { word, level, note } = avoidanceWords(status);
+  const by = status.enabled ? status.by : chosen;
+  const { word, level, note } = avoidanceWords({ ...status, by });
   const close = () => {
     setAsks(false);
     setError(AVOIDANCE, null);
@@ -131,12 +164,13 @@ export function Avoidance() {
           <span class="muted">Avoidance</span>
           <strong role="status">{word}</strong>
         </span>
-        {!consents && <Switch isOn={status.enabled} ask={() => setAsks(true)} />}
+        <How by={by} fixed={status.enabled} onChange={setChosen} />
+        {!consents && <Switch isOn={status.enabled} by={by} ask={() => setAsks(true)} />}
       </div>
       <p class="avoidance-note">
         {note} <Speed />
       </p>
-      {consents && <Consent onDone={close} />}
+      {consents && <Consent by={by} onDone={close} />}
       <Outcome place={AVOIDANCE} />
     </section>
   );

@@ -1,5 +1,6 @@
 import type {
   AcknowledgeBody,
+  AvoidanceStatus,
   ManoeuvreDoc,
   PerceptionSettingsBody,
   PlanState,
@@ -32,8 +33,12 @@ export function acknowledgeFirst(): void {
   if (first) void acknowledge(first.alert.id);
 }
 
-export async function switchAvoidance(enabled: boolean, consent = false): Promise<boolean> {
-  const body: SetAvoidanceBody = { enabled, consent };
+export async function switchAvoidance(
+  enabled: boolean,
+  by: AvoidanceStatus["by"],
+  consent = false,
+): Promise<boolean> {
+  const body: SetAvoidanceBody = { enabled, consent, by };
   const done = enabled ? "Avoidance is on." : "Avoidance is off.";
   const answer = await order({
     place: AVOIDANCE,

@@ -115,10 +115,16 @@ const AVOIDANCE: Record<AvoidanceStatus["state"], AvoidanceWords> = {
   ceiling: { word: "At its ceiling", level: "bad", note: "It may not climb any further, and holds. Decide." },
 };
 
+const WATCHES: Record<AvoidanceStatus["by"], string> = {
+  climb: AVOIDANCE.watching.note,
+  sidestep: "Steps aside by itself past what it follows; climbs where it cannot.",
+};
+
 export function avoidanceWords(status: AvoidanceStatus): AvoidanceWords {
   const words = AVOIDANCE[status.state];
   const higher = status.height_offset_m >= 0.05 ? ` +${metres(status.height_offset_m)}` : "";
-  return { ...words, word: words.word + higher, note: status.text || words.note };
+  const note = status.state === "watching" ? WATCHES[status.by] : words.note;
+  return { ...words, word: words.word + higher, note: status.text || note };
 }
 
 /** Faster than the region lets it stop. */

@@ -38,6 +38,7 @@ const NOTHING: ObstaclesState = {
     largest_speed_m_s: null,
     sensors: [],
     eyes: [],
+    by: "climb",
   },
   settings: {
     radar_depth_m: 10,

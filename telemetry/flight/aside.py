@@ -1,0 +1,301 @@
+"""Steps aside by itself: along the mission at every frame anew, past what the tracks say, and back onto its line.
+
+Velocity obstacles (Wessendorp 2021, III-C) in the link node: tracks, ground and limits come from the tracks node, the
+mission's line from what is left of the flight. Sans-IO; a place is all that is ever ordered, a few seconds ahead: a
+vehicle that hears nothing more stops there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.errors import ParameterError
+from planning.steering import steer, with_ground
+from planning.velocity_obstacles import Limits, Obstacles, Proposal
+from telemetry.flight.handover import METRES_PER_DEG
+from telemetry.flight.helm import GUIDED, Helm, here_of, moved
+from telemetry.mavlink.actions import Action
+from telemetry.messages import GuidedTarget
+from telemetry.obstacles import PerceptionSettings
+from telemetry.tracks import Track, TracksStatus
+from telemetry.vehicle import VehicleState
+
+F64 = NDArray[np.float64]
+
+OLD_S = 0.7
+"""Tracks older than this say nothing about now."""
+LATENCY_S = 0.3
+"""From measuring a frame to what is flown because of it."""
+SPARE, SIGMAS = 1.25, 2.0
+"""As a proposal has them: of the safety radius of what moves, and of the uncertainty of what stands."""
+LEAD_S, LEAST_LEAD_M = 3.0, 2.0
+"""So far ahead is the place that is ordered."""
+CARROT_S, LEAST_CARROT_M = 3.0, 4.0
+"""So far along the line ahead lies what it steers for."""
+BACK_M, BACK_S = 0.7, 0.6
+"""So near to the line and for so long with nothing in the way, it is handed back to it."""
+PASSED_M = 0.7
+STANDS_M_S, STUCK_S, GIVEN_UP_S = 0.2, 4.0, 20.0
+SPEED_STEP_M_S = 0.25
+"""Speeds are ordered in steps: every order waits for its answer."""
+AGAIN_M, AGAIN_S = 0.25, 0.5
+MOST = 24
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """What is around the vehicle: it is at (0, 0)."""
+
+    obstacles: Obstacles
+    limits: Limits
+    nearest_only: bool
+    horizon_m: float
+
+
+class Aside:
+    """``wants`` says whether the way ahead leads into something; ``begin`` and ``look`` fly past it."""
+
+    def __init__(self, helm: Helm) -> None:
+        self._helm = helm
+        self._tracks: TracksStatus | None = None
+        self._room_m: tuple[float, ...] = ()
+        self.settings = PerceptionSettings()
+        self.why = ""
+        """It stands: no velocity leads past, or nothing is seen any more."""
+        self._line: list[F64] = []
+        self._targets: tuple[GuidedTarget, ...] = ()
+        self._origin = (0.0, 0.0)
+        self._free_since_s: float | None = None
+        self._given_up_s = -math.inf
+        self._stands_since_s: float | None = None
+        self._judged_t_s = -math.inf
+        """Of the newest tracks that were acted on: each are looked at once, however often something else is new."""
+        self._sent: tuple[float, float, float] | None = None
+        self._sent_s = -math.inf
+
+    def on_tracks(self, tracks: TracksStatus) -> None:
+        if self._tracks is None or tracks.t_mono_s >= self._tracks.t_mono_s or tracks.state != "running":
+            self._tracks = tracks
+
+    def sees(self, now_s: float) -> bool:
+        """Whether there are tracks of now, and known ground to keep off."""
+        tracks = self._tracks
+        return tracks is not None and tracks.state == "running" and now_s - tracks.t_mono_s <= OLD_S
+
+    def why_not(self, now_s: float) -> str:
+        """It could not step aside now; empty while it could."""
+        if not self.sees(now_s):
+            return "Objects are not followed at the moment: it climbs instead of stepping aside."
+        if not self.knows_ground():
+            return "No surface model is known here: it climbs instead of stepping aside."
+        return ""
+
+    def knows_ground(self) -> bool:
+        return self._tracks is not None and bool(self._tracks.room_m)
+
+    # On the way.
+
+    def wants(self, state: VehicleState, targets: tuple[GuidedTarget, ...], now_s: float) -> bool:
+        """Whether the velocity flown now, or the way to the next target, leads into something that can be passed."""
+        if not (targets and self.sees(now_s) and self.knows_ground()) or state.lat_deg is None or not self._is_new():
+            return False
+        if now_s - self._given_up_s < GIVEN_UP_S:
+            return False
+        towards = _towards(state, targets[0])
+        length_m = math.hypot(*towards)
+        if length_m < PASSED_M:
+            return False
+        scene = self._scene(state, targets[0].speed_m_s, now_s)
+        found = self._steered(scene, towards * (targets[0].speed_m_s / length_m), _velocity(state))
+        return found is not None and bool(found.evades) and math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S
+
+    def _is_new(self) -> bool:
+        assert self._tracks is not None
+        is_new, self._judged_t_s = self._tracks.t_mono_s != self._judged_t_s, self._tracks.t_mono_s
+        return is_new
+
+    def begin(self, state: VehicleState, targets: tuple[GuidedTarget, ...]) -> None:
+        """The line to come back to begins here: at its targets' planned heights, or at the vehicle's own if higher."""
+        assert state.lat_deg is not None
+        assert state.lon_deg is not None
+        self._origin = (state.lat_deg, state.lon_deg)
+        self._targets, self.why, self._judged_t_s = targets, "", -math.inf
+        here = np.array([0.0, 0.0, state.alt_rel_home_m or 0.0])
+        self._line = [here, *(self._point(target) for target in targets)]
+        self._free_since_s, self._sent, self._sent_s = None, None, -math.inf
+        self._stands_since_s = None
+
+    @property
+    def left(self) -> tuple[GuidedTarget, ...]:
+        return self._targets
+
+    def is_back(self, now_s: float) -> bool:
+        """On the line, with nothing in the way of it, for long enough; or past its end."""
+        free_s = 0.0 if self._free_since_s is None else now_s - self._free_since_s
+        return not self._targets or free_s >= BACK_S
+
+    def look(self, state: VehicleState, now_s: float) -> list[Action]:
+        """The next orders."""
+        if not self.sees(now_s):
+            return self._stand("The radar's tracks have stopped: it holds.", now_s)
+        if not self.knows_ground():
+            return self._stand("No surface model is known around it: it holds.", now_s)
+        if not self._is_new():
+            return []
+        at = self._at(state)
+        self._drop_passed(at)
+        if not self._targets:
+            return []
+        carrot, aside_m = self._carrot(at, self._targets[0].speed_m_s)
+        scene = self._scene(state, self._targets[0].speed_m_s, now_s)
+        wanted = _with_speed(carrot[:2] - at[:2], self._targets[0].speed_m_s)
+        found = self._steered(scene, wanted, _velocity(state))
+        if found is None or math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
+            return self._stand("No velocity leads past: it holds. Resume goes on, or return home.", now_s)
+        is_free = not found.evades
+        if not (is_free and aside_m <= BACK_M):
+            self._free_since_s = None
+        elif self._free_since_s is None:
+            self._free_since_s = now_s
+        self.why, self._stands_since_s = "", None
+        return self._go(state, found, carrot, aside_m, is_free=is_free, now_s=now_s)
+
+    def give_up(self, now_s: float) -> None:
+        """For a while it does not begin again: those who climb over what is ahead have their turn."""
+        self._given_up_s = now_s
+
+    def is_stuck(self, now_s: float) -> bool:
+        """It has stood for so long that what moves would have passed."""
+        return self._stands_since_s is not None and now_s - self._stands_since_s >= STUCK_S
+
+    def _stand(self, why: str, now_s: float) -> list[Action]:
+        self.why, self._free_since_s, self._sent = why, None, None
+        if self._stands_since_s is None:
+            self._stands_since_s = now_s
+        return self._helm.stop(now_s)
+
+    def _go(
+        self, state: VehicleState, found: Proposal, carrot: F64, aside_m: float, *, is_free: bool, now_s: float
+    ) -> list[Action]:
+        if state.mode != GUIDED:
+            return self._helm.change_mode(GUIDED, now_s)
+        velocity = np.array(found.velocity_enu_m_s)
+        speed_m_s = math.hypot(*velocity)
+        at = self._at(state)
+        offset = carrot[:2] - at[:2] if is_free else velocity * max(LEAD_S, LEAST_LEAD_M / speed_m_s)
+        up_m = max(float(carrot[2]), state.alt_rel_home_m or 0.0, self._sent[2] if self._sent else -math.inf)
+        if is_free and aside_m <= BACK_M:
+            up_m = max(float(carrot[2]), state.alt_rel_home_m or 0.0)
+        steps = max(1, math.ceil(speed_m_s / SPEED_STEP_M_S - 1e-6))
+        actions = self._helm.set_speed(steps * SPEED_STEP_M_S, now_s)
+        place = (float(at[0] + offset[0]), float(at[1] + offset[1]), up_m)
+        if self._sent is not None and math.dist(place, self._sent) < AGAIN_M and now_s - self._sent_s < AGAIN_S:
+            return actions
+        self._sent, self._sent_s = place, now_s
+        here = here_of(state)
+        heading = math.atan2(offset[0], offset[1]) % math.tau if offset.any() else state.heading_rad
+        goal = moved(here, float(offset[1]), float(offset[0]), up_m - here.alt_rel_home_m)
+        return [*actions, *self._helm.go_to(replace(goal, heading_rad=heading), now_s, radius_m=LEAST_LEAD_M)]
+
+    # Where things are.
+
+    def _at(self, state: VehicleState) -> F64:
+        """(3,) east, north and up of the vehicle, from where it began."""
+        assert state.lat_deg is not None
+        assert state.lon_deg is not None
+        return np.array([*_offset(self._origin, state.lat_deg, state.lon_deg), state.alt_rel_home_m or 0.0])
+
+    def _point(self, target: GuidedTarget) -> F64:
+        return np.array([*_offset(self._origin, target.lat_deg, target.lon_deg), target.alt_rel_home_m])
+
+    def _drop_passed(self, at: F64) -> None:
+        """A target is passed once the vehicle is beside it, or beyond."""
+        while self._targets:
+            a, b = self._line[0], self._line[1]
+            length_m = math.hypot(*(b - a)[:2])
+            along_m = float((at - a)[:2] @ (b - a)[:2]) / length_m if length_m > 0.0 else math.inf
+            if along_m < length_m - PASSED_M:
+                return
+            self._targets, self._line = self._targets[1:], self._line[1:]
+
+    def _carrot(self, at: F64, speed_m_s: float) -> tuple[F64, float]:
+        """A place on the present leg ahead of the vehicle, and how far beside the leg the vehicle is."""
+        a, b = self._line[0], self._line[1]
+        leg = b - a
+        length_m = math.hypot(*leg[:2])
+        along_m = max(0.0, float((at - a)[:2] @ leg[:2]) / length_m)
+        beside_m = math.hypot(*(at - a - leg * (along_m / length_m))[:2])
+        ahead_m = min(length_m, along_m + max(LEAST_CARROT_M, CARROT_S * speed_m_s))
+        carrot = a + leg * (ahead_m / length_m)
+        return np.array([carrot[0], carrot[1], max(a[2] + leg[2] * along_m / length_m, carrot[2])]), beside_m
+
+    def _scene(self, state: VehicleState, speed_m_s: float, now_s: float) -> _Scene:
+        tracks = self._tracks
+        assert tracks is not None
+        settings, velocities = self.settings, self.settings.velocities
+        at_s = state.position_t_mono_s or now_s
+        later_s = max(0.0, at_s - tracks.t_mono_s) + LATENCY_S
+        horizon_m = max(speed_m_s, math.hypot(*_velocity(state))) * velocities.stands_s + velocities.stands_m
+        near = [t for t in tracks.tracks if t.moving or t.range_m < horizon_m][:MOST]
+        assert state.lat_deg is not None
+        assert state.lon_deg is not None
+        here = (state.lat_deg, state.lon_deg)
+        ahead = _velocity(state) * LATENCY_S
+        places = [
+            np.array(_offset(here, t.lat_deg, t.lon_deg)) + later_s * np.array(t.velocity_enu_m_s) - ahead for t in near
+        ]
+        obstacles = Obstacles.of(
+            [0.0, 0.0],
+            np.array(places).reshape(-1, 2),
+            np.array([t.velocity_enu_m_s for t in near]).reshape(-1, 2),
+            radius_m=np.array([_radius_m(t, settings) for t in near]),
+        )
+        limits = velocities.limits(Limits(max_speed_m_s=max(tracks.max_speed_m_s, speed_m_s)))
+        return _Scene(obstacles, limits, velocities.nearest_only, horizon_m)
+
+    def _steered(self, scene: _Scene, wanted: F64, velocity: F64) -> Proposal | None:
+        """The line itself is certified: ground is looked at only where it is left."""
+        tracks = self._tracks
+        assert tracks is not None
+        try:
+            straight = steer(scene.obstacles, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
+            if straight is None or not straight.evades:
+                return straight
+            everything = with_ground(scene.obstacles, tracks.room_m, farthest_m=scene.horizon_m)
+            return steer(everything, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
+        except ParameterError:
+            return None
+
+
+def _radius_m(track: Track, settings: PerceptionSettings) -> float:
+    if track.moving:
+        return SPARE * settings.safety_radius_m
+    ee, en, nn = track.covariance_m2
+    worst_m2 = (ee + nn) / 2 + math.hypot((ee - nn) / 2, en)
+    stands_m = settings.velocities.stands_m
+    return stands_m + min(SIGMAS * math.sqrt(max(0.0, worst_m2)), stands_m / 2)
+
+
+def _offset(origin: tuple[float, float], lat_deg: float, lon_deg: float) -> tuple[float, float]:
+    """East and north in metres."""
+    shrink = math.cos(math.radians(origin[0]))
+    return (lon_deg - origin[1]) * METRES_PER_DEG * shrink, (lat_deg - origin[0]) * METRES_PER_DEG
+
+
+def _towards(state: VehicleState, target: GuidedTarget) -> F64:
+    assert state.lat_deg is not None
+    assert state.lon_deg is not None
+    return np.array(_offset((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
+
+
+def _velocity(state: VehicleState) -> F64:
+    return np.array([state.v_east_m_s or 0.0, state.v_north_m_s or 0.0])
+
+
+def _with_speed(direction: F64, speed_m_s: float) -> F64:
+    length_m = math.hypot(*direction)
+    return direction * (speed_m_s / length_m) if length_m > 1e-6 else np.zeros(2)
