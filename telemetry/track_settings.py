@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
+from mapping.errors import ParameterError
 from mapping.perceiving.radar_evidence import EvidenceParams
 from mapping.tracker import TrackerParams
 from planning.velocity_obstacles import Limits
@@ -86,3 +88,36 @@ class VelocitySettings:
             max_turn_rad=math.radians(self.max_turn_deg),
             leave_m_s=self.leave_m_s,
         )
+
+
+def with_figures(part: TrackerSettings | VelocitySettings, figures: Mapping[str, object]):
+    """The same with other figures, given as text or as they are. Raises ParameterError, naming the figure."""
+    known = {field.name: getattr(part, field.name) for field in fields(part)}
+    made: dict[str, object] = {}
+    for name, value in figures.items():
+        if name not in known:
+            raise ParameterError(f'There is no "{name}".', where=name, advice=f"Choose of {', '.join(known)}.")
+        made[name] = _as_is(name, known[name], value)
+    changed = replace(part, **made)  # type: ignore[arg-type]
+    if isinstance(changed, TrackerSettings):
+        changed.params()
+    else:
+        changed.limits(Limits())
+    return changed
+
+
+def _as_is(name: str, known: object, value: object) -> object:
+    """Text as the kind of value that ``known`` is."""
+    if isinstance(known, bool):
+        if str(value).lower() in ("true", "false"):
+            return str(value).lower() == "true"
+        raise ParameterError(f'"{value}" is neither true nor false.', where=name, advice="Give one of them.")
+    if isinstance(known, str):
+        return str(value)
+    try:
+        number = float(str(value))
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number >= 0.0):
+        raise ParameterError(f'"{value}" is no number to set it to.', where=name, advice="Give 0 or more.")
+    return int(number) if isinstance(known, int) else number

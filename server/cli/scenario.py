@@ -15,6 +15,7 @@ from server.errors import StorageError
 from telemetry.scenarios.catalogue import NAMES, run_scenario
 from telemetry.scenarios.result import ScenarioResult, tally, tally_json
 from telemetry.scenarios.wanted import Wanted
+from telemetry.sensing import RadarKind
 
 
 def scenario(
@@ -25,6 +26,18 @@ def scenario(
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the scene, the sensors' noise and the wind.")] = 0,
     seeds: Annotated[int, typer.Option("--seeds", min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
+    radar: Annotated[
+        RadarKind | None, typer.Option("--radar", help="arena: by what it would report, or from its samples on.")
+    ] = None,
+    figures: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="arena: a figure of the tracker or of velocities, such as tracker.coordinates=polar or "
+            "velocities.max_turn_deg=60. May be given several times.",
+        ),
+    ] = None,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -41,10 +54,11 @@ def scenario(
     """
     with refusing(as_json=as_json):
         _check(name, record, seeds)
+        own = _own(name, radar, figures or [])
         results: list[ScenarioResult] = []
         for number in range(seed, seed + seeds):
             progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
-            results.append(run_scenario(name, Wanted(number, o.existing(world), record)))
+            results.append(run_scenario(name, Wanted(number, o.existing(world), radar, own, record)))
             end_progress()
             if not as_json:
                 typer.echo("\n".join(results[-1].lines()))
@@ -70,3 +84,21 @@ def _check(name: str, record: Path | None, seeds: int) -> None:
     if record.exists():
         raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")
     record.parent.mkdir(parents=True, exist_ok=True)
+
+
+def _own(name: str, radar: RadarKind | None, figures: list[str]) -> dict[str, dict[str, str]]:
+    """``part.name=value`` each, by part."""
+    if name != "arena" and (radar is not None or figures):
+        raise ParameterError(
+            "Radar and figures can be chosen of the arena only.", where=name, advice="Leave out --radar and --set."
+        )
+    out: dict[str, dict[str, str]] = {"tracker": {}, "velocities": {}}
+    for figure in figures:
+        place, equals, value = figure.partition("=")
+        part, dot, what = place.partition(".")
+        if not (equals and dot and part in out):
+            raise ParameterError(
+                f'"{figure}" sets nothing.', where="--set", advice="Write tracker.NAME=VALUE or velocities.NAME=VALUE."
+            )
+        out[part][what] = value
+    return out

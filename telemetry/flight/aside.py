@@ -17,7 +17,7 @@ from planning.errors import ParameterError
 from planning.steering import steer, with_ground
 from planning.velocity_obstacles import Limits, Obstacles, Proposal
 from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.flight.helm import GUIDED, Helm, here_of, moved
+from telemetry.flight.helm import GUIDED, Helm, here_of, moved, stopping_place
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.obstacles import PerceptionSettings
@@ -141,9 +141,9 @@ class Aside:
     def look(self, state: VehicleState, now_s: float) -> list[Action]:
         """The next orders."""
         if not self.sees(now_s):
-            return self._stand("The radar's tracks have stopped: it holds.", now_s)
+            return self._stand(state, "The radar's tracks have stopped: it holds.", now_s)
         if not self.knows_ground():
-            return self._stand("No surface model is known around it: it holds.", now_s)
+            return self._stand(state, "No surface model is known around it: it holds.", now_s)
         if not self._is_new():
             return []
         at = self._at(state)
@@ -155,7 +155,7 @@ class Aside:
         wanted = _with_speed(carrot[:2] - at[:2], self._targets[0].speed_m_s)
         found = self._steered(scene, wanted, _velocity(state))
         if found is None or math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
-            return self._stand("No velocity leads past: it holds. Resume goes on, or return home.", now_s)
+            return self._stand(state, "No velocity leads past: it holds. Resume goes on, or return home.", now_s)
         is_free = not found.evades
         if not (is_free and aside_m <= BACK_M):
             self._free_since_s = None
@@ -172,11 +172,15 @@ class Aside:
         """It has stood for so long that what moves would have passed."""
         return self._stands_since_s is not None and now_s - self._stands_since_s >= STUCK_S
 
-    def _stand(self, why: str, now_s: float) -> list[Action]:
+    def _stand(self, state: VehicleState, why: str, now_s: float) -> list[Action]:
+        """In GUIDED where it is in that already: it may go on with the next frame."""
+        is_new = self._stands_since_s is None or self._sent is not None
         self.why, self._free_since_s, self._sent = why, None, None
         if self._stands_since_s is None:
             self._stands_since_s = now_s
-        return self._helm.stop(now_s)
+        if state.mode != GUIDED or not self.sees(now_s):
+            return self._helm.stop(now_s)
+        return self._helm.go_to(stopping_place(state), now_s, radius_m=LEAST_LEAD_M, holds=True) if is_new else []
 
     def _go(
         self, state: VehicleState, found: Proposal, carrot: F64, aside_m: float, *, is_free: bool, now_s: float
@@ -277,7 +281,7 @@ def _radius_m(track: Track, settings: PerceptionSettings) -> float:
     ee, en, nn = track.covariance_m2
     worst_m2 = (ee + nn) / 2 + math.hypot((ee - nn) / 2, en)
     stands_m = settings.velocities.stands_m
-    return stands_m + min(SIGMAS * math.sqrt(max(0.0, worst_m2)), stands_m / 2)
+    return stands_m + min(SIGMAS * math.sqrt(max(0.0, worst_m2)), stands_m / 4)
 
 
 def _offset(origin: tuple[float, float], lat_deg: float, lon_deg: float) -> tuple[float, float]:

@@ -1,123 +1,241 @@
-"""One way through the arena: the vehicle flies to its goal and past what its radar's tracker follows."""
+"""One way through the arena by the code that flies live, tracks node and link, before a simulated vehicle."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.tracker import Tracker, TrackState
-from planning.velocity_obstacles import Limits, Obstacles, propose
-from telemetry.scenarios.arena_course import POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
-from telemetry.scenarios.arena_radar import Position2Go
-from telemetry.simulator.dynamics import Airframe, Demand, Multirotor
+from mapping.ground import GroundGrid, ground_grid
+from telemetry.errors import TelemetryError
+from telemetry.flight.avoiding import Avoiding
+from telemetry.flight.rest import rest_of_flight
+from telemetry.mavlink.items import items_from_mission
+from telemetry.obstacles import PerceptionSettings
+from telemetry.scenarios.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
+from telemetry.scenarios.arena_radar import Position2Go, SampledPosition2Go
+from telemetry.scenarios.course import Course, Waypoint, course_mission
+from telemetry.scenarios.pilots import MissionPilot
+from telemetry.scenarios.setup import ORDER_S, PERCEPTION_S
+from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S, VEHICLE, Wire
+from telemetry.sensing import RadarFrame, RadarKind, SimTruth
+from telemetry.simulator.frame import Frame
+from telemetry.simulator.parameters import Parameters
+from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.track_settings import TrackerSettings, VelocitySettings
+from telemetry.tracking.following import Following
+from telemetry.tracks import TracksStatus
 
 F64 = NDArray[np.float64]
 
-CRUISE_M_S = 1.2
-LIMITS = Limits(max_speed_m_s=1.8, max_turn_rad=math.radians(90.0), leave_m_s=0.3)
+FRAME = Frame(51.9906, 4.3754, 0.0)
+CRUISE_M_S, UP_M = 1.2, 3.0
+LOOKS_UP_M = 2.0
+"""Lower nothing is followed: every echo would graze the floor."""
 MARGIN_M = 0.35
 """Kept beyond the hulls: for the errors of the radar, and for the way that a change of velocity takes."""
-RADIUS_M = POLE_RADIUS_M + VEHICLE_RADIUS_M + MARGIN_M
-IMMINENT_M = 5.0
-"""Farther poles are followed but not yet avoided."""
-STEPS_PER_FRAME = 4
-VELOCITY_PER_S, MOST_M_S2 = 3.0, 3.0
-OWN_SPEED_SIGMA_M_S, OWN_PLACE_SIGMA_M = 0.05, 0.01
-ARRIVED_M, LATEST_S = 0.5, 40.0
+STANDS_M = POLE_RADIUS_M + VEHICLE_RADIUS_M + MARGIN_M
+STANDS_S = 4.0
+MAX_SPEED_M_S, MAX_TURN_DEG = 1.8, 90.0
+ARRIVED_M, LATEST_S, READY_S = 0.5, 60.0, 60.0
 SAME_M = 1.5
 """A track this near to a pole is that pole's."""
+LOOK_EVERY = 3
+"""Slices between the avoidance's own looks, about as the link's clock has it."""
 
 
 @dataclass(slots=True)
 class Flown:
-    """What one way came to."""
+    """What one way came to, from where the vehicle left its start on."""
 
     duration_s: float = 0.0
     nearest_gap_m: float = math.inf
     arrived: bool = False
     first_evasion_s: float | None = None
+    climbed_m: float = 0.0
     errors: list[tuple[float, float, float]] = field(default_factory=list)
     """Of tracked poles in view: off the nose (rad), error of range (m), error of bearing (rad)."""
 
 
-def fly(approach: Approach, random: np.random.Generator, *, nearest_only: bool) -> Flown:
-    """From wall to wall; ``nearest_only`` as the paper's vehicle, which knew of no second obstacle."""
-    radar, flown = Position2Go(), Flown()
-    tracker, vehicle = Tracker(radar.tracker()), _at_start(approach)
-    while flown.duration_s < LATEST_S and not flown.arrived:
-        place, velocity = _flat(vehicle.p_neu), _flat(vehicle.v_neu)
-        known = place + random.normal(0.0, OWN_PLACE_SIGMA_M, 2)
-        known_m_s = velocity + random.normal(0.0, OWN_SPEED_SIGMA_M_S, 2)
-        states = tracker.step(
-            flown.duration_s,
-            radar.frame(_true(approach, place, velocity, vehicle.heading_rad), random),
-            position_enu_m=known,
-            velocity_enu_m_s=known_m_s,
-            heading_rad=vehicle.heading_rad,
-        )
-        objects = [state for state in states if state.confirmed]
-        flown.errors += _errors(approach, radar, objects, place, vehicle.heading_rad)
-        wanted = _wanted(flown, approach, objects, known, known_m_s, nearest_only=nearest_only)
-        for _ in range(STEPS_PER_FRAME):
-            _move(vehicle, wanted, approach.heading_rad, radar.every_s / STEPS_PER_FRAME)
-            flown.nearest_gap_m = min(flown.nearest_gap_m, approach.gap_m(_flat(vehicle.p_neu)))
-        flown.duration_s += radar.every_s
-        flown.arrived = _is_through(approach, _flat(vehicle.p_neu))
-    return flown
+class Radar(Protocol):
+    def frame(self, truth: SimTruth) -> RadarFrame: ...
 
 
-def _wanted(
-    flown: Flown, approach: Approach, objects: Sequence[TrackState], place: F64, velocity: F64, *, nearest_only: bool
-) -> F64:
-    """Towards the goal where that leads into nothing, else the nearest velocity to the present one that does not."""
-    near = [state for state in objects if np.hypot(*(state.position_enu_m - place)) <= IMMINENT_M]
-    obstacles = Obstacles.of(
-        place,
-        np.array([state.position_enu_m for state in near]).reshape(-1, 2),
-        np.array([state.velocity_enu_m_s for state in near]).reshape(-1, 2),
-        radius_m=RADIUS_M,
+def arena_settings(*, nearest_only: bool, tracker: TrackerSettings | None = None) -> PerceptionSettings:
+    """Of the paper's vehicle in its hall; what a console would be set to."""
+    return PerceptionSettings(
+        vehicle_radius_m=VEHICLE_RADIUS_M,
+        position_error_m=0.1,
+        tracker=tracker or Position2Go().tracker(),
+        velocities=VelocitySettings(
+            max_speed_m_s=MAX_SPEED_M_S,
+            max_turn_deg=MAX_TURN_DEG,
+            nearest_only=nearest_only,
+            stands_m=STANDS_M,
+            stands_s=STANDS_S,
+        ),
     )
-    to_goal = approach.goal_enu_m - place
-    to_goal *= CRUISE_M_S / max(float(np.hypot(*to_goal)), 1e-3)
-    straight = propose(obstacles, to_goal, LIMITS, nearest_only=nearest_only)
-    if straight is not None and not straight.evades:
-        return to_goal
-    if flown.first_evasion_s is None:
-        flown.first_evasion_s = flown.duration_s
-    speed = float(np.hypot(*velocity))
-    onward = velocity * (CRUISE_M_S / speed) if speed > CRUISE_M_S / 4 else to_goal
-    evasion = propose(obstacles, onward, LIMITS, nearest_only=nearest_only)
-    return np.zeros(2) if evasion is None else np.array(evasion.velocity_enu_m_s)
 
 
-def _errors(
-    approach: Approach, radar: Position2Go, objects: Sequence[TrackState], place: F64, heading_rad: float
-) -> list[tuple[float, float, float]]:
+def fly(approach: Approach, random: np.random.Generator, *, settings: PerceptionSettings, radar: RadarKind) -> Flown:
+    """From a stand at one wall to the other one."""
+    return _Way(approach, random, settings, radar).run()
+
+
+class _Way:
+    def __init__(
+        self, approach: Approach, random: np.random.Generator, settings: PerceptionSettings, radar: RadarKind
+    ) -> None:
+        self._approach, self._flown = approach, Flown()
+        seed = int(random.integers(2**31))
+        self._wire = Wire(_vehicle(seed), order_latency_s=ORDER_S)
+        self._radar: Radar = _radar_of(radar, approach, np.random.default_rng(seed))
+        self._radar_due_s = 0.0
+        self._waiting: deque[RadarFrame] = deque()
+        self._following = Following(run="arena", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
+        self._following.on_settings(settings)
+        self._until_ready()
+        self._pilot = pilot = MissionPilot(self._wire, items_from_mission(_mission(approach)))
+        self._avoiding = Avoiding(VEHICLE, rest=lambda state: rest_of_flight(pilot.onboard, state), settings=settings)
+        self._avoiding.on_settings(settings)
+        self._avoiding.enable(self._wire.now_s, "sidestep")
+        self._began_s: float | None = None
+        self._slices = 0
+
+    def run(self) -> Flown:
+        wire, flown, until_s = self._wire, self._flown, self._wire.now_s + LATEST_S
+        while wire.now_s < until_s and not flown.arrived:
+            self._step()
+        return flown
+
+    def _until_ready(self) -> None:
+        while self._wire.now_s < T0_MONO_S + READY_S:
+            self._wire.step()
+            state = self._wire.state
+            if state is not None and state.estimator_ok and state.home_lat_deg is not None and state.landed is not None:
+                return
+        raise TelemetryError("The simulated vehicle did not become ready.")
+
+    def _step(self) -> None:
+        wire, avoiding, before = self._wire, self._avoiding, self._wire.state
+        self._slices += 1
+        for message in wire.step():
+            self._pilot.on_message(message)
+            wire.perform(avoiding.on_message(message, wire.now_s))
+        assert wire.state is not None
+        self._pilot.on_slice(wire.state, is_new=wire.state is not before)
+        if wire.state is not before:
+            self._following.perceiver.on_state(wire.state)
+            wire.perform(avoiding.on_state(wire.state, wire.now_s))
+        if self._slices % LOOK_EVERY == 0:
+            wire.perform(avoiding.on_tick(wire.now_s))
+        truth = wire.truth()
+        self._sense(truth)
+        self._follow(truth)
+        self._note(truth)
+
+    def _sense(self, truth: SimTruth) -> None:
+        if truth.armed and truth.position_enu_m[2] > LOOKS_UP_M and truth.t_sim_s >= self._radar_due_s - 1e-6:
+            self._radar_due_s = max(self._radar_due_s + Position2Go().every_s, truth.t_sim_s)
+            self._waiting.append(self._radar.frame(truth))
+
+    def _follow(self, truth: SimTruth) -> None:
+        while self._waiting and self._waiting[0].t_mono_s + PERCEPTION_S <= self._wire.now_s + 1e-9:
+            frame = self._waiting.popleft()
+            told = self._following.work(frame, lambda: self._wire.now_s)
+            if self._following.perceiver.perception.ground is None:
+                self._following.perceiver.set_ground(_floor())
+            self._wire.perform(self._avoiding.on_tracks(told.status, self._wire.now_s))
+            if self._began_s is not None:
+                self._flown.errors += _errors(self._approach, told.status, truth)
+
+    def _note(self, truth: SimTruth) -> None:
+        """From the moment on at which it has reached its height and goes."""
+        place, flown = np.array(truth.position_enu_m[:2]), self._flown
+        if self._began_s is None:
+            if truth.position_enu_m[2] < UP_M - 0.5:
+                return
+            self._began_s = self._wire.now_s
+        flown.duration_s = self._wire.now_s - self._began_s
+        flown.nearest_gap_m = min(flown.nearest_gap_m, self._approach.gap_m(place + self._approach.start_enu_m))
+        flown.climbed_m = max(flown.climbed_m, truth.position_enu_m[2] - UP_M)
+        if flown.first_evasion_s is None and self._avoiding.is_engaged:
+            flown.first_evasion_s = flown.duration_s
+        flown.arrived = _is_through(self._approach, place)
+
+
+def _radar_of(name: RadarKind, approach: Approach, random: np.random.Generator) -> Radar:
+    poles = approach.poles_enu_m - approach.start_enu_m
+    if name == "iq":
+        return SampledPosition2Go(FRAME, poles, POLE_RADIUS_M, seed=int(random.integers(2**31)))
+    return _Detections(poles, random)
+
+
+class _Detections:
+    """The Position2Go's detections, as the tracks node takes a radar's frames."""
+
+    def __init__(self, poles_enu_m: F64, random: np.random.Generator) -> None:
+        self._poles_enu_m, self._random = poles_enu_m, random
+        self._radar, self._number = Position2Go(), 0
+
+    def frame(self, truth: SimTruth) -> RadarFrame:
+        self._number += 1
+        place, velocity = np.array(truth.position_enu_m[:2]), np.array(truth.velocity_enu_m_s[:2])
+        rows = []
+        for pole in self._poles_enu_m:
+            range_m, bearing_rad = _polar(pole - place, truth.heading_rad)
+            rows.append((range_m - POLE_RADIUS_M, bearing_rad, -float((pole - place) @ velocity) / range_m))
+        return self._radar.told(truth, self._number, self._radar.frame(np.array(rows), self._random))
+
+
+def _vehicle(seed: int) -> SimulatedVehicle:
+    parameters = Parameters()
+    parameters.set("WPNAV_SPEED", 100 * CRUISE_M_S)
+    return SimulatedVehicle(FRAME, seed=seed, parameters=parameters, boot_s=3.0)
+
+
+def _mission(approach: Approach):
+    """Through the hall and on by a little, so that it does not slow down before the far wall."""
+    way = approach.goal_enu_m - approach.start_enu_m
+    beyond = way * (1.0 + 2.0 / approach.length_m)
+    course = Course((Waypoint((float(beyond[0]), float(beyond[1]), UP_M), CRUISE_M_S),), UP_M)
+    return course_mission(course, FRAME)
+
+
+@lru_cache(maxsize=1)
+def _floor() -> GroundGrid:
+    """Level, and known well beyond the hall."""
+    half = 8 * HALF_M
+    cells = round(2 * half)
+    return ground_grid(np.zeros((cells, cells), np.float32), [[0.0, -1.0, half], [1.0, 0.0, half]])
+
+
+def _errors(approach: Approach, status: TracksStatus, truth: SimTruth) -> list[tuple[float, float, float]]:
     """Of the track nearest to each pole in view: an echo comes from the side of a pole that faces the radar."""
-    out = []
-    for pole in approach.poles_enu_m:
-        true = _polar(pole - place, heading_rad)
-        found = [state.position_enu_m - place for state in objects]
-        near = [xy for xy in found if np.hypot(*(xy + place - pole)) <= SAME_M]
-        if not near or not radar.sees(np.array([true[0] - POLE_RADIUS_M]), np.array([true[1]]))[0]:
+    out, sensor = [], Position2Go()
+    place = np.array(truth.position_enu_m[:2])
+    back_s = truth.t_mono_s - status.t_mono_s
+    then = place - back_s * np.array(truth.velocity_enu_m_s[:2])
+    for pole in approach.poles_enu_m - approach.start_enu_m:
+        true = _polar(pole - then, truth.heading_rad)
+        found = [np.array(t.enu_m[:2]) - then for t in status.tracks if not t.remembered]
+        near = [xy for xy in found if np.hypot(*(xy + then - pole)) <= SAME_M]
+        if not near or not sensor.sees(np.array([true[0] - POLE_RADIUS_M]), np.array([true[1]]))[0]:
             continue
-        tracked = _polar(min(near, key=lambda xy: np.hypot(*(xy + place - pole))), heading_rad)
+        tracked = _polar(_nearest(near, pole - then), truth.heading_rad)
         off_m = abs(tracked[0] - (true[0] - POLE_RADIUS_M))
         out.append((abs(true[1]), off_m, abs(math.remainder(tracked[1] - true[1], 2 * math.pi))))
     return out
 
 
-def _true(approach: Approach, place: F64, velocity: F64, heading_rad: float) -> F64:
-    """(2, 3) What a radar without errors would measure of the poles."""
-    rows = []
-    for pole in approach.poles_enu_m:
-        range_m, bearing_rad = _polar(pole - place, heading_rad)
-        rows.append((range_m - POLE_RADIUS_M, bearing_rad, -float((pole - place) @ velocity) / range_m))
-    return np.array(rows)
+def _nearest(places: Sequence[F64], to: F64) -> F64:
+    return min(places, key=lambda xy: float(np.hypot(*(xy - to))))
 
 
 def _polar(offset_enu_m: F64, heading_rad: float) -> tuple[float, float]:
@@ -125,30 +243,7 @@ def _polar(offset_enu_m: F64, heading_rad: float) -> tuple[float, float]:
     return float(np.hypot(*offset_enu_m)), bearing
 
 
-def _at_start(approach: Approach) -> Multirotor:
-    """Already at its speed."""
-    vehicle, heading = Multirotor(Airframe(), approach.heading_rad), approach.heading_rad
-    vehicle.p_neu = (float(approach.start_enu_m[1]), float(approach.start_enu_m[0]), 1.5)
-    vehicle.v_neu = (CRUISE_M_S * math.cos(heading), CRUISE_M_S * math.sin(heading), 0.0)
-    return vehicle
-
-
-def _move(vehicle: Multirotor, wanted_enu_m_s: F64, heading_rad: float, dt_s: float) -> None:
-    """A controller of velocity alone, as the paper's: the nose stays on the goal."""
-    drag = vehicle.airframe.drag_per_s
-    change = VELOCITY_PER_S * (wanted_enu_m_s - _flat(vehicle.v_neu))
-    change *= min(1.0, MOST_M_S2 / max(float(np.hypot(*change)), 1e-9))
-    east, north = change + drag * _flat(vehicle.v_neu)
-    up = VELOCITY_PER_S * (1.5 - vehicle.p_neu[2]) - VELOCITY_PER_S * vehicle.v_neu[2]
-    vehicle.step(Demand((float(north), float(east), up), heading_rad), (0.0, 0.0, 0.0), dt_s)
-
-
-def _flat(neu: tuple[float, float, float]) -> F64:
-    """East and north."""
-    return np.array([neu[1], neu[0]])
-
-
 def _is_through(approach: Approach, place: F64) -> bool:
     """At the far wall, however far aside."""
-    along = (place - approach.start_enu_m) @ (approach.goal_enu_m - approach.start_enu_m) / approach.length_m
+    along = place @ (approach.goal_enu_m - approach.start_enu_m) / approach.length_m
     return float(along) >= approach.length_m - ARRIVED_M

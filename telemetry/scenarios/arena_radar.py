@@ -8,9 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.tracker import TrackerParams
+from mapping.perceiving.radar_evidence import EvidenceParams
+from telemetry.sensing import RadarFrame, SimTruth, packed, rows
+from telemetry.simulator.frame import Frame
+from telemetry.simulator.scene import World
+from telemetry.simulator.sensors.iq import IqRadarSensor
+from telemetry.simulator.sensors.iq_model import POSITION2GO_IQ
+from telemetry.track_settings import TrackerSettings
 
 F64 = NDArray[np.float64]
+POLES_M = 6.0
+"""High."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +43,25 @@ class Position2Go:
     false_alarms: float = 0.3
     """Per frame."""
 
-    def tracker(self) -> TrackerParams:
+    def tracker(self) -> TrackerSettings:
         """As it must be told of this radar, and of a hall."""
-        return TrackerParams(
+        return TrackerSettings(
             range_sigma_m=self.range_sigma_m,
-            bearing_sigma_rad=self.bearing_sigma_rad,
-            bearing_edge_rad=self.bearing_edge_rad,
-            bearing_edge_sigma_rad=self.bearing_edge_sigma_rad,
+            bearing_sigma_deg=math.degrees(self.bearing_sigma_rad),
+            bearing_edge_deg=math.degrees(self.bearing_edge_rad),
+            bearing_edge_sigma_deg=math.degrees(self.bearing_edge_sigma_rad),
             radial_speed_sigma_m_s=self.radial_speed_sigma_m_s,
+            radial_speed_folded_m_s=0.0,
             extent_m=0.1,
             acceleration_m_s2=1.0,
             speed_m_s=1.0,
         )
+
+    def told(self, truth: SimTruth, number: int, detections: F64) -> RadarFrame:
+        """As a sensor's frame: on its axis' level, each as strong as 1 m2 is to the radar that flies live."""
+        range_m, bearing_rad, speed_m_s = detections.T
+        xyz_m = np.column_stack([range_m * np.sin(bearing_rad), range_m * np.cos(bearing_rad), np.zeros(len(range_m))])
+        return _frame(truth, number, xyz_m, speed_m_s, _snr_db(np.ones(len(range_m)), range_m))
 
     def sees(self, range_m: F64, bearing_rad: F64) -> NDArray[np.bool_]:
         return (np.abs(bearing_rad) <= self.half_fov_rad) & (range_m >= self.nearest_m) & (range_m <= self.farthest_m)
@@ -80,3 +95,35 @@ class Position2Go:
                 random.uniform(-3.0, 3.0, n),
             ]
         )
+
+
+class SampledPosition2Go:
+    """The same radar from its samples on: echoes of the poles and the floor, and the live chain of processing."""
+
+    def __init__(self, frame: Frame, poles_enu_m: F64, radius_m: float, *, seed: int) -> None:
+        poles = [
+            {"type": "cylinder", "at_m": pole, "radius_m": radius_m, "height_m": POLES_M, "material": "plaster"}
+            for pole in poles_enu_m.tolist()
+        ]
+        world = World.parse({"format": "hedgehop-world", "version": 1, "objects": poles}, frame=frame)
+        self._sensor = IqRadarSensor(world, seed=seed, model=POSITION2GO_IQ)
+
+    def frame(self, truth: SimTruth) -> RadarFrame:
+        """Its strengths are told as the radar that flies live would hear the same cross sections."""
+        found, beam = self._sensor.frame(truth), POSITION2GO_IQ.beam
+        xyz_m, snr_db = rows(found.xyz_m, 3), rows(found.snr_db, 1)[:, 0]
+        range_m = np.linalg.norm(xyz_m, axis=1)
+        area_m2 = 10 ** (snr_db / 10) / beam.rated_snr * (range_m / beam.range_m) ** 4
+        speed_m_s = rows(found.radial_speed_m_s, 1)[:, 0]
+        return _frame(truth, found.number, xyz_m, speed_m_s, _snr_db(area_m2, range_m))
+
+
+def _snr_db(area_m2: F64, range_m: F64) -> F64:
+    rated = EvidenceParams()
+    away = np.maximum(range_m, 0.1)
+    return rated.rated_snr_db + 10 * np.log10(np.maximum(area_m2, 1e-9)) + 40 * np.log10(rated.rated_range_m / away)
+
+
+def _frame(truth: SimTruth, number: int, xyz_m: F64, speed_m_s: F64, snr_db: F64) -> RadarFrame:
+    columns = (packed(xyz_m), packed(speed_m_s), packed(snr_db))
+    return RadarFrame(truth.t_mono_s, truth.t_utc_s, number, "simulated", *columns)

@@ -12,8 +12,9 @@ from mapping.radar_targets import Polar
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-SAME_M, SAME_M_S = 2.5, 0.8
-"""Echoes nearer to the strongest one, and as fast as it, are of the same thing."""
+SAME_M, SAME_STANDS_M, SAME_M_S = 2.5, 1.0, 0.8
+"""Echoes nearer to the strongest one, and as fast as it, are of the same thing. Of what stands still only those that
+are nearer still: the middle between two poles is the way between them."""
 MOST_BLOBS = 150
 """The nearest are kept: what is bounded here bounds the tracker's work on a frame."""
 
@@ -48,7 +49,7 @@ def blobs(targets: Polar, radial_speed_m_s: F64, snr_db: F64, moving: Bools) -> 
             continue
         same = (
             free
-            & (np.hypot(x - x[k], y - y[k]) <= SAME_M)
+            & (np.hypot(x - x[k], y - y[k]) <= (SAME_M if moving[k] else SAME_STANDS_M))
             & (np.abs(radial_speed_m_s - radial_speed_m_s[k]) <= SAME_M_S)
         )
         free &= ~same

@@ -65,7 +65,7 @@ def evasion(followed: Sequence[Followed], pose: Pose, rules: Rules) -> Evasion:
 def _radius_m(one: Followed, keep: Keep) -> float:
     """Of what stands still: with the uncertainty of its place, which of what moves lies in its velocity."""
     radius_m, _ = keep.of(moving=one.moving)
-    return radius_m if one.moving else radius_m + min(SIGMAS * one.sigma_m, radius_m / 2)
+    return radius_m if one.moving else radius_m + min(SIGMAS * one.sigma_m, radius_m / 4)
 
 
 def _obstacles(followed: Sequence[Followed], pose: Pose, radius_m: Sequence[float]) -> Obstacles:
