@@ -10,6 +10,7 @@ from planning.margins.following_error import Way
 from planning.margins.vehicle_terms import budget_of
 from planning.model import ClearanceParams, MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
 from planning.survey import SurveyPlan
+from planning.vehicle_profile import path_params
 
 LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
@@ -56,6 +57,18 @@ class PlanRequest:
             max_height_above_ground_m=self.max_height_above_ground_m,
             budget=budget,
         )
+
+
+def clearance_of_planned(planned: PlannedFor) -> ClearanceParams:
+    """What a mission's own file demands of its line."""
+    return PlanRequest(
+        pois=(),
+        profile=planned.profile,
+        path=path_params(planned.profile),
+        required_clearance_m=planned.required_clearance_m,
+        max_height_above_ground_m=planned.max_height_above_ground_m,
+        way=planned.way,
+    ).clearance()
 
 
 def survey_request(request: PlanRequest, survey: SurveyPlan) -> PlanRequest:

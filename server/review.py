@@ -6,9 +6,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from planning.dsm import Dsm
+from planning.following.below import below_required
 from planning.following.figures import Judged, judge
 from planning.model import Mission
-from server.review_curves import curves, events, figures_doc, histogram_doc, predicted_note
+from server.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
 from server.review_flight import Flight, placed_flight
 from server.schemas.flight import RecordingDoc
 from server.schemas.review import ReviewDoc, ReviewSeries
@@ -77,6 +78,9 @@ def _notes(flight: Flight | None, judged: Judged | None, dsm: Dsm | None, log: F
     if judged.figures is None:
         return [*notes, "The flight never came to the mission's line: there are no figures."]
     figures = judged.figures
+    below = below_required(figures, demanded_of(flight))
+    if below is not None:
+        notes.insert(0, below.text)
     if figures.told_by == "geometry":
         notes.append("The vehicle did not say what it reached: waypoints count where the track is nearest to them.")
     if flight.track.detours:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.following.below import Demanded, below_required
 from planning.following.figures import Judged, TrackFigures
 from planning.following.reference import Reference
 from planning.model import F64
+from planning.request import clearance_of_planned
 from server.review_flight import Flight
 from server.schemas.review import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
 from telemetry.obstacles import ObstacleAlert
@@ -25,6 +28,8 @@ _WARNING, _INFO = 4, 6
 
 def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
     nearest, home = figures.nearest, figures.nearest_on_way_home
+    demanded = demanded_of(flight)
+    below = below_required(figures, demanded)
     lat_deg = lon_deg = None
     if nearest:
         lat_deg, lon_deg = (float(v) for v in flight.dsm.lat_lon_from_xy(np.array([nearest.xyz_m[:2]]))[0])
@@ -44,6 +49,8 @@ def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
         min_distance_m=nearest.distance_m if nearest else None,
         min_vertical_m=figures.min_vertical_m,
         certified_distance_m=certified_distance_m(flight.log),
+        required_distance_m=demanded.required_m if demanded else None,
+        below_required=below.text if below else None,
         min_distance_t_s=nearest.t_s if nearest else None,
         min_distance_s_m=nearest.s_m if nearest else None,
         min_distance_lat_deg=lat_deg,
@@ -57,13 +64,33 @@ def figures_doc(flight: Flight, figures: TrackFigures) -> ReviewFigures:
 
 def certified_distance_m(log: FlightLog) -> float | None:
     """What was certified of the mission that flew; None when the recording holds no certificate."""
-    if log.plan is None or not log.plan.certificate_json:
+    return _metres(_certificate(log), "min_distance_m")
+
+
+def demanded_of(flight: Flight) -> Demanded | None:
+    """By the recorded certificate, which is of what was on board; else by what the mission's own file says."""
+    certificate = _certificate(flight.log)
+    required_m = _metres(certificate, "required_clearance_m")
+    if required_m is not None:
+        return Demanded(required_m, _metres(certificate.get("tube"), "radius_m") or 0.0)
+    planned = None if flight.mission is None else flight.mission.planned_for
+    if planned is None:
         return None
+    params = clearance_of_planned(planned)
+    return Demanded(params.required_clearance_m, params.following_m)
+
+
+def _certificate(log: FlightLog) -> dict[str, Any]:
     try:
-        value = json.loads(log.plan.certificate_json)["min_distance_m"]
-    except (ValueError, KeyError, TypeError):
-        return None
-    return float(value) if isinstance(value, int | float) else None
+        found = json.loads(log.plan.certificate_json) if log.plan is not None else {}
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _metres(values: object, key: str) -> float | None:
+    value = values.get(key) if isinstance(values, dict) else None
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 def histogram_doc(figures: TrackFigures) -> Histogram:

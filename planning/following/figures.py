@@ -74,6 +74,8 @@ class TrackFigures:
     min_vertical_m: float | None
     nearest_on_way_home: Nearest | None
     min_vertical_on_way_home_m: float | None
+    came_home: bool
+    """Whether the way home led to home."""
     unknown_positions: int
     """Positions of those that count below which the surface model knows nothing."""
     histogram_edges_m: F64
@@ -148,6 +150,7 @@ def _figures(
         min_vertical_m=_smallest(height_m, near_ground),
         nearest_on_way_home=_nearest(track, found, home, distance_m),
         min_vertical_on_way_home_m=_smallest(height_m, home),
+        came_home=_came_home(reference, track, window),
         unknown_positions=0 if below is None else int(np.isnan(below).sum()),
         histogram_edges_m=edges_m,
         histogram_counts=counts,
@@ -188,6 +191,11 @@ def _way_home(reference: Reference, track: Track, window: Window) -> NDArray[np.
     there = np.flatnonzero(after & (away_m <= AT_HOME_M))
     before_landing = np.arange(len(away_m)) < (there[0] if len(there) else len(away_m))
     return after & before_landing
+
+
+def _came_home(reference: Reference, track: Track, window: Window) -> bool:
+    away_m = np.hypot(*(track.xyz_m[:, :2] - reference.home_xy_m).T)
+    return bool(((track.t_s > window.end_s) & (away_m <= AT_HOME_M)).any())
 
 
 def _nearest(track: Track, found: Deviations, chosen: NDArray[np.bool_], distance_m: F64 | None) -> Nearest | None:

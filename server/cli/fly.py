@@ -26,7 +26,7 @@ from server.cli.flight_progress import FlightProgress
 from server.cli.mission_vehicle import demands_of, vehicle_of
 from server.cli.nodes import OPERATOR, Station, own_nodes
 from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
-from server.cli.review import answer
+from server.cli.review import answer, say_below
 from server.cli.terrain import ModelOptions, read_model
 from server.errors import StorageError
 from server.review import recording_of, review
@@ -123,8 +123,10 @@ def fly(
         completed = result.completed and (doc.figures is None or doc.figures.completed)
         if doc.figures is not None:
             doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
+        say_below(doc)
         answer(doc, as_json=as_json)
-        raise typer.Exit(DONE if completed else FAILED)
+        kept = doc.figures is None or doc.figures.below_required is None
+        raise typer.Exit(DONE if completed and kept else FAILED)
 
 
 def _check_record(record: Path | None) -> None:

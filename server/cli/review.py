@@ -48,7 +48,10 @@ def review(
     z_scale: o.ZScale = None,
     vertical_datum: o.VerticalDatum = None,
 ) -> None:
-    """Judge a recorded flight: errors against its mission, distances to the surface model, lag."""
+    """Judge a recorded flight: errors against its mission, distances to the surface model, lag.
+
+    Ends with 1 when it went below its required clearance.
+    """
     with refusing(as_json=as_json):
         flown = read_mission(mission.name, read_small(mission)) if mission else None
         timer = StepTimer(progress)
@@ -60,8 +63,15 @@ def review(
         end_progress()
         for note in doc.notes:
             say(f"Note: {note}")
+        say_below(doc)
         answer(doc, as_json=as_json)
-        raise typer.Exit(DONE if doc.figures is not None else FAILED)
+        raise typer.Exit(DONE if doc.figures is not None and doc.figures.below_required is None else FAILED)
+
+
+def say_below(doc: ReviewDoc) -> None:
+    """Last and on its own, so that nobody overlooks it."""
+    if doc.figures is not None and doc.figures.below_required is not None:
+        say(f"WARNING: {doc.figures.below_required}")
 
 
 def answer(doc: ReviewDoc, *, as_json: bool) -> None:
@@ -107,6 +117,8 @@ def figure_lines(doc: ReviewDoc) -> list[str]:
     if figures.min_distance_m is not None:
         certified = figures.certified_distance_m
         proved = f", certified {_number(certified)} m" if certified is not None else ""
+        required = figures.required_distance_m
+        proved += f", required {_number(required)} m" if required is not None else ""
         lines.append(
             f"  distance to the surface model: at least {_number(figures.min_distance_m)} m{proved};"
             f" on the way home {_number(figures.min_distance_way_home_m)} m"
@@ -116,6 +128,7 @@ def figure_lines(doc: ReviewDoc) -> list[str]:
 
 def _ending(figures: ReviewFigures) -> str:
     word = "COMPLETED" if figures.completed else "NOT COMPLETED"
+    word += "" if figures.below_required is None else ", BELOW THE REQUIRED CLEARANCE"
     if figures.higher_m is None:
         return word
     return f"{word}, up to {_number(figures.higher_m, 0)} m higher from item {figures.higher_from_item}"

@@ -40,6 +40,10 @@ class FollowDoc(Strict):
     """Later (positive) or earlier than the plan's prediction."""
     home_distance_m: float | None
     home_bearing_deg: float | None
+    required_distance_m: float | None = None
+    """What the plan on board requires of the flight."""
+    least_distance_m: float | None = None
+    """The smallest ``distance_to_dsm_m`` of this flight along its line so far."""
 
 
 class TrackDoc(Strict):

@@ -26,6 +26,10 @@ class ReviewFigures(Strict):
     min_distance_m: float | None
     min_vertical_m: float | None
     certified_distance_m: float | None
+    required_distance_m: float | None = None
+    """Null where nothing tells what was required."""
+    below_required: str | None = None
+    """How far the flight went below its required clearance, in a sentence; null where it did not."""
     min_distance_t_s: float | None
     min_distance_s_m: float | None
     min_distance_lat_deg: float | None = None

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from planning.margins.budget import TERM_NAMES, ClearanceBudget, Term
 from planning.margins.downwash import far_wake, felt_below_m, induced_speed_m_s
-from planning.margins.following_error import FIRMWARE_NAMES, MEASURED, WAY_NAMES, following_error_m
+from planning.margins.following_error import FIRMWARE_NAMES, MEASURED, WAY_NAMES, Firmware, Way, following_error_m
 from planning.margins.vehicle_terms import budget_of
 from planning.margins.words import budget_json, sum_words, tube_words, uncovered_words
 from planning.model import VehicleProfile
@@ -58,7 +58,12 @@ def test_following_is_what_was_measured_and_grows_beyond_it() -> None:
         assert following_error_m(firmware, way, row.speed_m_s) == row.worst_m
         assert following_error_m(firmware, way, 2 * row.speed_m_s) == pytest.approx(4 * row.worst_m)
     # Measured on the real autopilots' code: 0.89 m below, 1.05 m beside; GUIDED 1.72 m; PX4 0.99 m and 1.12 m.
-    least = {("ardupilot", "auto"): 1.05, ("ardupilot", "guided"): 0.3, ("px4", "auto"): 0.99, ("px4", "guided"): 1.12}
+    least: dict[tuple[Firmware, Way], float] = {
+        ("ardupilot", "auto"): 1.05,
+        ("ardupilot", "guided"): 0.3,
+        ("px4", "auto"): 0.99,
+        ("px4", "guided"): 1.12,
+    }
     assert all(MEASURED[key].worst_m >= worst_m for key, worst_m in least.items())
 
 

@@ -12,17 +12,22 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from planning.formats.wpl import write_wpl
-from planning.geotiff import write_dsm
+from planning.geotiff import read_dsm, write_dsm
 from planning.model import Mission, PlannedFor
 from planning.vehicle_profile import load_profile
 from server.cli.fly import keep_recording
 from server.cli.upload import upload_lines
 from server.errors import StorageError
+from server.review import recording_of
+from server.review import review as judge
+from server.schemas.review import ReviewDoc
 from telemetry.messages import OnboardMission, Rounded, UploadReport
+from telemetry.recording.flight_log import read_flight_log
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
@@ -223,6 +228,45 @@ def test_review_of_another_stations_log(shared_data: Path) -> None:
     assert run.json["min_distance_m"] == pytest.approx(4.97, abs=0.05)
     true = hedgehop("review", folder / "auto.tlog", "--dsm", dsm, "--json", "--truth")
     assert true.json["height_error_max_m"] == pytest.approx(0.16, abs=0.05)
+
+
+def test_a_flight_below_its_required_clearance_ends_with_1(shared_data: Path) -> None:
+    """A real ArduCopter in GUIDED: certified at 1.29 m, 1.15 m required, 0.76 m by its own positions."""
+    dsm = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
+    folder = shared_data / "logs" / "real_flights"
+    low = folder / "arducopter-4.7_guided_below_certified.mcap"
+    run = hedgehop("review", low, "--dsm", dsm, "--json")
+    assert run.code == 1
+    assert run.json["min_distance_m"] == pytest.approx(0.757, abs=0.01)
+    assert run.json["required_distance_m"] == pytest.approx(1.15)
+    assert "went below its required clearance: it came within 0.75 m" in run.json["below_required"]
+    assert f"WARNING: {run.json['below_required']}" in run.err
+    people = hedgehop("review", low, "--dsm", dsm)
+    assert people.out.split("\n")[0].endswith("COMPLETED, BELOW THE REQUIRED CLEARANCE")
+    assert "certified 1.29 m, required 1.15 m" in people.out
+    for name in ("arducopter-4.7_auto.mcap", "px4-1.17_auto_rtk.mcap", "px4-1.17_guided_rtk.mcap"):
+        kept = hedgehop("review", folder / name, "--dsm", dsm, "--json")
+        assert (kept.code, kept.json["below_required"]) == (0, None)
+
+
+def test_fly_ends_with_1_when_the_flight_was_too_low(
+    ground: Ground, shared_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, dsm = shared_data / "logs" / "real_flights", shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
+    path = folder / "arducopter-4.7_guided_below_certified.mcap"
+    log = read_flight_log(path)
+    doc = judge(log, recording_of(log, path), dsm=read_dsm(dsm))
+    assert doc.figures is not None
+    done = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": True})})
+
+    async def flown(_: object) -> tuple[object, ReviewDoc]:
+        return SimpleNamespace(completed=True, text="The mission was flown and the vehicle has landed."), done
+
+    monkeypatch.setattr(sys.modules["server.cli.fly"]._Conductor, "run", flown)
+    run = hedgehop("fly", ground.mission, "--link", ground.link, "--json")
+    assert run.code == 1
+    assert run.json["completed"] is True
+    assert "WARNING: The flight went below its required clearance" in run.err
 
 
 def test_review_without_figures(shared_data: Path, tmp_path: Path) -> None:

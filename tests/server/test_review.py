@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planning.formats.wpl import write_wpl
-from planning.model import Home
+from planning.model import Home, PlannedFor
 from planning.vehicle_profile import dump_profile, load_profile
 from server.review import recording_of, review
 from server.review_curves import STRETCHES, thinned
@@ -252,3 +252,67 @@ def test_a_simulation_that_ran_ten_times_as_fast() -> None:
     assert doc.figures.duration_s == pytest.approx(50.0, abs=0.5)
     assert doc.first_waypoint_t_s == pytest.approx(1.0, abs=0.1)  # of the recording, as all curves are
     assert any("ran 10 times as fast" in note for note in doc.notes)
+
+
+LOW = 13.0
+"""Metres above home of a flight that was planned at 20 m, 8 m of tower below: 5 m are left."""
+
+
+def low_flight(required_m: float, *, following_m: float | None = None, sink_to_m: float = LOW) -> FlightLog:
+    """The flight that sinks over the tower, and what its recorded certificate demanded."""
+    certificate: dict[str, object] = {"min_distance_m": 12.0, "required_clearance_m": required_m}
+    if following_m is not None:
+        certificate["tube"] = {"radius_m": following_m}
+    low = [(x, y, sink_to_m) if z == 20.0 and 190.0 < x < 210.0 else (x, y, z) for x, y, z in positions()]
+    return with_plan(log_of(low), certificate=json.dumps(certificate))
+
+
+def test_a_flight_below_its_required_clearance_says_so_first() -> None:
+    doc = reviewed(low_flight(6.5), dsm=PLAIN)
+    assert doc.figures is not None
+    assert doc.figures.required_distance_m == 6.5
+    assert doc.figures.below_required == doc.notes[0]
+    assert "came within 4.99 m" in doc.notes[0] or "came within 5.00 m" in doc.notes[0]
+    assert "on the mission, 6.50 m were required, 1.5" in doc.notes[0]
+    assert "following" not in doc.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("following_m", "words"), [(2.0, "It stayed within the 2.00 m"), (1.0, "more than the 1.00 m")]
+)
+def test_it_says_whether_the_flight_left_the_tube(following_m: float, words: str) -> None:
+    below = figures(low_flight(6.5, following_m=following_m), dsm=PLAIN).below_required
+    assert below is not None
+    assert words in below
+
+
+def test_a_flight_that_kept_its_clearance_is_not_accused() -> None:
+    kept = figures(low_flight(4.9), dsm=PLAIN)
+    assert (kept.required_distance_m, kept.below_required) == (4.9, None)
+    unknown = figures(log_of(positions(), flown=FLOWN), dsm=PLAIN)
+    assert (unknown.required_distance_m, unknown.below_required) == (None, None)
+
+
+def test_the_way_home_is_judged_too() -> None:
+    log = low_flight(6.5, sink_to_m=20.0)
+    back = [(x, y, 14.0) if k > 160 and z == 30.0 else (x, y, z) for k, (x, y, z) in enumerate(positions())]
+    assert log.plan is not None
+    flown = replace(log_of(back), plan=log.plan, mission=None)
+    below = figures(flown, dsm=PLAIN).below_required
+    assert below is not None
+    assert "on the way home, 6.50 m were required" in below
+
+
+def test_landing_elsewhere_is_no_lack_of_clearance() -> None:
+    """The way home never came home: the vehicle was landed on the ground where it was."""
+    log = low_flight(6.5, sink_to_m=20.0)
+    along = [place for place in positions() if place[2] <= 20.0][: 50 + 251]
+    down = [(250.0, 150.0, float(z)) for z in np.arange(20.0, 0.0, -0.4)]
+    assert figures(replace(log_of([*along, *down]), plan=log.plan), dsm=PLAIN).below_required is None
+
+
+def test_the_missions_own_file_tells_what_was_required() -> None:
+    planned = replace(FLOWN, planned_for=PlannedFor(load_profile("mapper-rtk"), required_clearance_m=15.0))
+    found = figures(log_of(positions(), flown=planned), dsm=PLAIN)
+    assert found.required_distance_m == 15.0
+    assert found.below_required is not None

@@ -815,6 +815,10 @@ export interface FollowDoc {
   behind_plan_s: number | null;
   home_distance_m: number | null;
   home_bearing_deg: number | null;
+  /** What the plan on board requires of the flight. */
+  required_distance_m: number | null;
+  /** The smallest ``distance_to_dsm_m`` of this flight along its line so far. */
+  least_distance_m: number | null;
 }
 
 /** The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring. */
@@ -965,6 +969,10 @@ export interface ReviewFigures {
   min_distance_m: number | null;
   min_vertical_m: number | null;
   certified_distance_m: number | null;
+  /** Null where nothing tells what was required. */
+  required_distance_m: number | null;
+  /** How far the flight went below its required clearance, in a sentence; null where it did not. */
+  below_required: string | null;
   min_distance_t_s: number | null;
   min_distance_s_m: number | null;
   min_distance_lat_deg: number | null;

@@ -139,6 +139,8 @@ describe("the distance flown", () => {
     expect(flownLevel(5, 4)).toBe("good");
     expect(flownLevel(3, 4)).toBe("near");
     expect(flownLevel(0, 4)).toBe("bad");
+    expect(flownLevel(3, 4, 3.5)).toBe("bad");
+    expect(flownLevel(3.6, 4, 3.5)).toBe("near");
     expect(flownLevel(3, null)).toBe("neutral");
     expect(flownLevel(null, 4)).toBe("neutral");
   });

@@ -23,9 +23,18 @@ function Figure(props: { label: string; value: string; level?: Level; testid?: s
 
 function Distance({ figures }: { figures: ReviewFigures }) {
   const { min_distance_m, certified_distance_m, min_distance_t_s } = figures;
-  const level = flownLevel(min_distance_m, certified_distance_m);
+  const required_m = figures.required_distance_m ?? null;
+  const level = flownLevel(min_distance_m, certified_distance_m, required_m);
   return (
     <>
+      {figures.below_required && (
+        <p class="below-required" role="alert" data-testid="below-required">
+          <Icon name="warning" size={20} />
+          <span>
+            <strong>Below the required clearance</strong> {figures.below_required}
+          </span>
+        </p>
+      )}
       <div class={`big-figure ${level}`}>
         <span class="value" data-testid="flown-distance">
           {clearance(min_distance_m)}
@@ -33,6 +42,7 @@ function Distance({ figures }: { figures: ReviewFigures }) {
         <span class="muted">smallest distance flown</span>
         <span class="required">
           {certified_distance_m === null ? "none certified" : `${clearance(certified_distance_m)} certified`}
+          {required_m !== null && `, ${metres(required_m, 2)} required`}
         </span>
       </div>
       {min_distance_t_s !== null && (
