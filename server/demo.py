@@ -18,6 +18,8 @@ TERRAIN_NAME = "Demo hillside (generated)"
 PLAN_NAME = "Demo flight"
 _NOTE = "demo-plan"
 _RTL_HEIGHT_M = 60.0
+_HEIGHT_M = 5.5
+"""High enough for both ways of flying: handed over one at a time, waypoints are followed less closely."""
 
 
 def terrain(library: Library) -> TerrainDoc | None:
@@ -52,5 +54,5 @@ def _document(terrain: TerrainDoc) -> PlanDoc:
         ],
         survey=SurveyDoc(polygon=[PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]),
         profile=profile.model_copy(update={"rtl_height_m": _RTL_HEIGHT_M}),
-        surface=SurfaceDoc(),
+        surface=SurfaceDoc(height_m=_HEIGHT_M),
     )

@@ -19,7 +19,7 @@ from planning.dsm import Dsm
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.holes import fill_holes
-from planning.model import ClearanceParams, Mission
+from planning.model import Certificate, ClearanceParams, Mission
 from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
 from server.documents import demands_from_doc
@@ -61,6 +61,8 @@ class Checked:
     """At which the vehicle will fly."""
     braking: Braking = field(default_factory=Braking)
     """That the profile counts on."""
+    not_guided: str = ""
+    """Why waypoints cannot be handed over one at a time: the line is followed less closely then. Empty: they can."""
 
 
 def check_start(
@@ -97,7 +99,28 @@ def check_start(
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
     speeds = flown_speeds(parameters, onboard, record.firmware)
     braking = Braking(profile.brake_decel_m_s2, profile.brake_jerk_m_s3)
-    return Checked(_doc(found, rereferenced_m), certificate, moved, found.mission, found.clearance, speeds, braking)
+    return Checked(
+        _doc(found, rereferenced_m),
+        certificate,
+        moved,
+        found.mission,
+        found.clearance,
+        speeds,
+        braking,
+        not_guided="" if found.certificate is None else _not_guided(record, found.certificate),
+    )
+
+
+def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
+    """Another way of flying is another term for following the line."""
+    demands = demands_from_doc(PlanDoc.model_validate_json(record.plan_json))
+    required_m = replace(demands, way="guided").clearance().required_clearance_m
+    if certificate.min_distance_m >= required_m:
+        return ""
+    return (
+        f"The line keeps {math.floor(certificate.min_distance_m * 100) / 100:.2f} m; handed over one at a time it needs"
+        f" {math.ceil(required_m * 100 - 1e-6) / 100:.2f} m, because the vehicle follows it less closely."
+    )
 
 
 def seen_in(record: PlanRecord) -> str | None:

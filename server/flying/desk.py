@@ -199,6 +199,9 @@ class FlightDesk:
                 raise NotAllowedError(
                     "The navigation script begins at the first waypoint.", advice="Go on with the mission in AUTO."
                 )
+            if ready.checked.not_guided:
+                advice = "Choose GUIDED under Required clearance in Plan and upload again, or fly in AUTO."
+                raise NotAllowedError(ready.checked.not_guided, advice=advice)
             plan = await self._works.guided(record)
             return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
         if body.from_item == 1:

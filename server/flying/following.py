@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planning.dsm import Dsm
+from planning.following.below import Demanded
 from planning.following.live import Following, follow_on
 from planning.following.reference import Reference, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.formats.wpl import read_wpl
 from planning.model import F64, finite_or_none
 from planning.vehicle_profile import parse_profile
+from server.flying.check_task import clearance_of
 from server.placing import Placer, home_distance_bearing
 from server.schemas import FollowDoc
 from telemetry.messages import FlightStatus, PlanRecord
@@ -36,13 +38,15 @@ class Followed:
     placer: Placer
     surface: SurfaceDistance
     reference: Reference
+    demanded: Demanded | None = None
+    """What the plan requires of the flight; None where nothing tells it."""
 
     @staticmethod
     def of(record: PlanRecord, dsm: Dsm) -> Followed:
         """Takes a second or so: for a thread. Raises PlanningError."""
         mission = read_wpl(record.mission_wpl)
         profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
-        return Followed.over(reference_line(mission, dsm, profile), dsm)
+        return replace(Followed.over(reference_line(mission, dsm, profile), dsm), demanded=_demanded(record))
 
     @staticmethod
     def over(reference: Reference, dsm: Dsm) -> Followed:
@@ -60,10 +64,11 @@ class Follower:
         self._over = None if over is None else Placer(over)
         self._following = Following()
         self._share: float | None = None
+        self._least_m: float | None = None
 
     def begin_again(self) -> None:
         """The next position is the first of a flight, or lies elsewhere."""
-        self._following, self._share = Following(), None
+        self._following, self._share, self._least_m = Following(), None, None
 
     def follow(self, state: VehicleState, flight: FlightStatus = NO_FLIGHT) -> FollowDoc | None:
         """None as long as there is no position. On the way home nothing is held against the plan any more."""
@@ -81,13 +86,25 @@ class Follower:
             near = self._over_ground(self._followed, xyz_m)
             if flight.phase not in _OFF_PLAN:
                 near |= self._against_plan(self._followed, xyz_m, state)
+                self._keep_least(flight, near)
             elif flight.phase != "landed":
                 near["progress"] = self._share
+            near |= self._against_required(self._followed)
         return FollowDoc(
             **{**_UNKNOWN, "alt_rel_home_m": state.alt_rel_home_m, **near},
             home_distance_m=distance_m,
             home_bearing_deg=bearing_deg,
         )
+
+    def _keep_least(self, flight: FlightStatus, near: dict[str, float | None]) -> None:
+        """Only on the line: rising to it and landing, the vehicle is near the ground as it must be."""
+        distance_m = near["distance_to_dsm_m"]
+        if flight.phase == "flying" and near["cross_track_m"] is not None and distance_m is not None:
+            self._least_m = distance_m if self._least_m is None else min(self._least_m, distance_m)
+
+    def _against_required(self, followed: Followed) -> dict[str, float | None]:
+        required_m = None if followed.demanded is None else followed.demanded.required_m
+        return {"required_distance_m": required_m, "least_distance_m": self._least_m}
 
     def _over_ground(self, followed: Followed, xyz_m: tuple[float, float, float]) -> dict[str, float | None]:
         return {
@@ -113,6 +130,13 @@ class Follower:
             # On the ground nobody is late.
             "behind_plan_s": progress.behind_plan_s if state.armed else None,
         }
+
+
+def _demanded(record: PlanRecord) -> Demanded | None:
+    if not record.plan_json:
+        return None
+    params = clearance_of(record)
+    return Demanded(params.required_clearance_m, params.following_m)
 
 
 def _distance_m(surface: SurfaceDistance, xyz_m: tuple[float, float, float]) -> float | None:

@@ -229,6 +229,25 @@ def test_a_flight_from_upload_to_start(
     runner.run(scenario())
 
 
+def test_what_is_proved_for_auto_only_is_not_handed_over_one_at_a_time(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    """5.6 m are kept: enough for AUTO with 2.9 m of position error, 0.1 m too little for GUIDED."""
+
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        profile = made.document.profile.model_copy(update={"position_error_m": 2.9})
+        bench.plan = bench.plan.model_copy(update={"document": made.document.model_copy(update={"profile": profile})})
+        digest_ = await bench.ready()
+        with pytest.raises(NotAllowedError, match=r"one at a time it needs 5\.72 m") as caught:
+            await bench.desk.start(ME, StartFlight(digest=digest_, way="guided"))
+        assert "fly in AUTO" in caught.value.advice
+        assert bench.vehicle.told == []
+        await bench.desk.start(ME, StartFlight(digest=digest_))
+
+    runner.run(scenario())
+
+
 def test_another_home_moves_the_heights(
     made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:

@@ -1,4 +1,4 @@
-import { DASH, deviation, duration, metres, percent } from "../format";
+import { DASH, clearance, deviation, duration, metres, percent } from "../format";
 import type { FollowDoc, VehicleState } from "../messages";
 import type { Source } from "../store/flying";
 import { obstacles } from "../store/obstacles";
@@ -59,6 +59,22 @@ interface Props {
   isOld: boolean;
 }
 
+/** Loud, and there until the next flight: it flew nearer to the ground than was required. */
+function Below({ follow }: { follow: FollowDoc | null }) {
+  const least_m = follow?.least_distance_m ?? null;
+  const required_m = follow?.required_distance_m ?? null;
+  if (least_m === null || required_m === null || least_m >= required_m) return null;
+  return (
+    <p class="below-required" role="alert" data-testid="below-required">
+      <Icon name="warning" size={20} />
+      <span>
+        <strong>Below the required clearance</strong> {clearance(least_m)} flown, {metres(required_m, 2)}{" "}
+        required
+      </span>
+    </p>
+  );
+}
+
 /** How well the plan is being followed, how far it is flown, and how long it will take. */
 export function Following({ source, state, follow, isOld }: Props) {
   const flown = againstFlown(follow?.height_error_m ?? null, obstacles[source].value.avoidance);
@@ -67,6 +83,7 @@ export function Following({ source, state, follow, isOld }: Props) {
   const progress = follow?.progress ?? null;
   return (
     <section class={`instrument following ${isOld ? "old" : ""}`} aria-label="Following the plan">
+      <Below follow={follow} />
       <SignedBar
         label="Cross-track"
         value_m={follow?.cross_track_m ?? null}

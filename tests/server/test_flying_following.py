@@ -1,0 +1,58 @@
+"""The live vehicle against what its plan requires: the smallest distance of a flight stays in sight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from planning.following.below import Demanded
+from planning.following.reference import reference_line
+from planning.vehicle_profile import load_profile
+from server.flying.following import Followed, Follower
+from server.schemas import FollowDoc
+from telemetry.messages import FlightStatus
+from telemetry.vehicle import VehicleState
+from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
+
+FLYING = FlightStatus(phase="flying")
+FLOWN = mission(ROUTE)
+
+
+def at(x_m: float, z_m: float, *, t_s: float) -> VehicleState:
+    home_lat, home_lon = (float(v) for v in degrees([(50.0, 150.0)])[0])
+    lat, lon = (float(v) for v in degrees([(x_m, 150.0)])[0])
+    return VehicleState(
+        1,
+        1,
+        autopilot="ardupilot",
+        mode="AUTO",
+        armed=True,
+        lat_deg=lat,
+        lon_deg=lon,
+        alt_rel_home_m=z_m,
+        home_lat_deg=home_lat,
+        home_lon_deg=home_lon,
+        t_utc_s=t_s,
+    )
+
+
+def follower() -> Follower:
+    followed = Followed.over(reference_line(FLOWN, PLAIN, load_profile("generic-quad")), PLAIN)
+    return Follower(replace(followed, demanded=Demanded(6.0, 1.1)))
+
+
+def told(doc: FollowDoc | None) -> tuple[float | None, float | None]:
+    assert doc is not None
+    return doc.required_distance_m, None if doc.least_distance_m is None else round(doc.least_distance_m, 2)
+
+
+def test_the_smallest_distance_of_a_flight_stays_until_the_next() -> None:
+    live = follower()
+    assert told(live.follow(at(50.0, 0.0, t_s=0.0), FlightStatus(phase="taking_off"))) == (6.0, None)
+    places = [(50.0, 20.0), (100.0, 20.0), (200.0, 13.0), (240.0, 20.0)]
+    docs = [live.follow(at(x_m, z_m, t_s=10.0 + 10 * k), FLYING) for k, (x_m, z_m) in enumerate(places)]
+    assert [told(doc)[1] for doc in docs] == [20.0, 20.0, 5.0, 5.0]
+    # On the way down it is near the ground as it must be.
+    assert told(live.follow(at(50.0, 0.2, t_s=90.0), FlightStatus(phase="returning"))) == (6.0, 5.0)
+    assert told(live.follow(at(50.0, 0.0, t_s=99.0), FlightStatus(phase="landed"))) == (6.0, 5.0)
+    live.begin_again()
+    assert told(live.follow(at(50.0, 0.0, t_s=200.0), FlightStatus(phase="idle"))) == (6.0, None)
