@@ -48,12 +48,7 @@ def _colors(drawing: Drawing, clearance_m: F64, plan: PlanScene) -> U8:
 def _path(drawing: Drawing, plan: PlanScene) -> list[Node]:
     points = drawing.frame.scene_from_model(plan.path_m)
     colors = _colors(drawing, path_clearance_m(plan), plan)
-    return [line_node("/path", _in_sight(drawing, points), colors, width_px=6.0), *_curtain(drawing, plan, points)]
-
-
-def _in_sight(drawing: Drawing, points: F64) -> F64:
-    """Lifted off the safe surface, which the path touches and which would veil it."""
-    return raised(points, 0.25 * drawing.mark_m)
+    return [line_node("/path", points, colors, width_px=6.0), *_curtain(drawing, plan, points)]
 
 
 def _curtain(drawing: Drawing, plan: PlanScene, points: F64) -> list[Node]:
@@ -84,7 +79,7 @@ def _curtain(drawing: Drawing, plan: PlanScene, points: F64) -> list[Node]:
 def _flown(drawing: Drawing, plan: PlanScene) -> list[Node]:
     if len(plan.flown_m) < 2:
         return []
-    points = _in_sight(drawing, drawing.frame.scene_from_model(plan.flown_m))
+    points = drawing.frame.scene_from_model(plan.flown_m)
     nodes = [line_node("/flown", points, _colors(drawing, plan.flown_distance_m, plan), width_px=2.0)]
     if len(points) <= _MOST_WAYPOINT_MARKS:
         rgb = tuple(palette.dimmed(palette.POI, stale=drawing.state.plan_is_stale).tolist())

@@ -10,9 +10,10 @@ from server.scene.glb import textured_glb
 from server.scene.mesh import gap_mesh, grid_mesh
 from server.scene.nodes import Node
 from server.scene.overlay import laid_over
-from server.scene.payload import U8, HeightGrid
+from server.scene.payload import F32, U8, HeightGrid, Relief
 
 _SURFACE_OPACITY = 0.26
+SURFACE_BELOW_M = 0.04
 _HATCH_PX = 14
 _HATCH_TEXTURE_PX = 1200
 
@@ -34,13 +35,12 @@ def unknown_nodes(drawing: Drawing) -> list[Node]:
 
 def surface_nodes(drawing: Drawing) -> list[Node]:
     plan = drawing.state.plan
-    if plan is None or not drawing.state.view.show_surface or not np.isfinite(plan.safe_surface.alt_dsm_m).any():
+    if plan is None or not drawing.state.view.show_surface or not len(plan.safe_surface.faces):
         return []
-    mesh = grid_mesh(plan.safe_surface, drawing.frame)
     color = palette.dimmed(palette.SURFACE, stale=drawing.state.plan_is_stale)
     props = {
-        "vertices": mesh.vertices,
-        "faces": mesh.faces,
+        "vertices": _below_path(plan.safe_surface, drawing),
+        "faces": plan.safe_surface.faces,
         "color": tuple(int(channel) for channel in color),
         "opacity": _SURFACE_OPACITY,
         "side": "double",
@@ -49,6 +49,13 @@ def surface_nodes(drawing: Drawing) -> list[Node]:
         "receive_shadow": False,
     }
     return [Node("/surface", "mesh_simple", props)]
+
+
+def _below_path(surface: Relief, drawing: Drawing) -> F32:
+    """(V, 3) so little below what the path touches that it does not veil it."""
+    frame = drawing.frame
+    origin_m = np.array([frame.centre_x_m, frame.centre_y_m, frame.reference_alt_dsm_m + SURFACE_BELOW_M])
+    return (surface.points_m - origin_m).astype(np.float32)
 
 
 def _glb_node(name: str, glb: bytes, drawing: Drawing) -> Node:

@@ -27,6 +27,16 @@ class HeightGrid:
 
 
 @dataclass(frozen=True, slots=True)
+class Relief:
+    """A surface as triangles."""
+
+    points_m: F64
+    """(V, 3) x, y, alt_dsm"""
+    faces: NDArray[np.uint32]
+    """(F, 3) counter-clockwise seen from above"""
+
+
+@dataclass(frozen=True, slots=True)
 class TerrainScene:
     """A surface model as the view draws it."""
 
@@ -42,7 +52,7 @@ class TerrainScene:
 class PlanScene:
     """A computed plan as the view draws it; all points are x, y, alt_dsm."""
 
-    safe_surface: HeightGrid
+    safe_surface: Relief
     path_m: F64
     """(N, 3) the sampled path, thinned for drawing"""
     path_s_m: F64

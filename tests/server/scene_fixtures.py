@@ -9,7 +9,7 @@ from affine import Affine
 from pyproj import CRS
 
 from planning.dsm import Dsm
-from server.scene.payload import HeightGrid, PlanScene, SceneState
+from server.scene.payload import PlanScene, Relief, SceneState
 from server.scene.terrain_payload import build_terrain_scene
 from server.schemas import PlanDoc, PoiDoc, SelectionDoc, ViewDoc
 
@@ -41,7 +41,7 @@ def plan_over(dsm: Dsm, *, height_m: float = 5.0) -> PlanScene:
     ground = dsm.elevation_at(xy)
     path = np.column_stack([xy, ground + height_m])
     return PlanScene(
-        safe_surface=HeightGrid(dsm.elevation_m + np.float32(height_m), 500_000, 4_000_000, 1.0),
+        safe_surface=Relief(path[[0, 35, 70]] + [[0, 0, 0], [0, 9.0, 0], [0, 0, 0]], np.array([[0, 2, 1]], np.uint32)),
         path_m=path,
         path_s_m=x - x[0],
         path_ground_alt_dsm_m=ground,
