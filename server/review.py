@@ -19,6 +19,7 @@ EMPTY = ReviewSeries(
     t_s=[],
     alt_rel_home_m=[],
     reference_alt_rel_home_m=[],
+    planned_alt_rel_home_m=[],
     ground_rel_home_m=[],
     cross_track_m=[],
     s_m=[],

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planning.following.below import Demanded, below_required
 from planning.following.figures import Judged, TrackFigures
+from planning.following.lag import planned_alt_dsm_m
 from planning.following.reference import Reference
 from planning.model import F64
 from planning.request import clearance_of_planned
@@ -102,7 +103,7 @@ def curves(flight: Flight, judged: Judged | None) -> ReviewSeries:
     track = flight.track
     n = len(track.t_s)
     nowhere = np.full(n, math.nan)
-    cross_m, s_m, reference_m, distance_m = nowhere, nowhere, nowhere, nowhere
+    cross_m, s_m, reference_m, distance_m, planned_m = nowhere, nowhere, nowhere, nowhere, nowhere
     if flight.surface is not None:
         distance_m = judged.distance_m if judged and judged.distance_m is not None else _distances(flight)
     if judged is not None and judged.window is not None and flight.reference is not None:
@@ -111,15 +112,17 @@ def curves(flight: Flight, judged: Judged | None) -> ReviewSeries:
         s_m = np.where(counts, judged.found.s_m, math.nan)
         line_m = track.xyz_m[:, 2] - judged.found.height_error_m - flight.home_alt_dsm_m
         reference_m = np.where(counts, line_m, math.nan)
+        planned_m = planned_alt_dsm_m(flight.reference, track.t_s - judged.window.start_s) - flight.home_alt_dsm_m
     height_m = track.xyz_m[:, 2] - flight.home_alt_dsm_m
     ground_m = nowhere
     if flight.surface is not None:
         ground_m = flight.dsm.elevation_at(track.xyz_m[:, :2]) - flight.home_alt_dsm_m
-    kept = thinned(n, (cross_m, height_m - reference_m, distance_m, height_m))
+    kept = thinned(n, (cross_m, height_m - reference_m, distance_m, height_m, planned_m))
     return ReviewSeries(
         t_s=track.t_s[kept].tolist(),
         alt_rel_home_m=_or_null(height_m[kept]),
         reference_alt_rel_home_m=_or_null(reference_m[kept]),
+        planned_alt_rel_home_m=_or_null(planned_m[kept]),
         ground_rel_home_m=_or_null(ground_m[kept]),
         cross_track_m=_or_null(cross_m[kept]),
         s_m=_or_null(s_m[kept]),

@@ -30,6 +30,19 @@ def late_s(reference: Reference, at: Deviation, since_first_waypoint_s: float) -
     return late if math.isfinite(late) else None
 
 
+def planned_alt_dsm_m(reference: Reference, since_first_waypoint_s: F64) -> F64:
+    """(N,) height at which the plan's clock is then (figs 21 and 27); NaN before and after the plan, or without times.
+
+    At a waypoint it stays for as long as the plan holds there.
+    """
+    plan_s = np.column_stack([reference.arrive_s, reference.leave_s]).ravel() - reference.takeoff_s
+    alt_m = np.repeat(reference.points_m[:, 2], 2)
+    known = np.isfinite(plan_s)
+    if not known.any():
+        return np.full(len(since_first_waypoint_s), math.nan)
+    return np.interp(since_first_waypoint_s, plan_s[known], alt_m[known], left=math.nan, right=math.nan)
+
+
 def lag_s(reference: Reference, t_s: F64, found: Deviations, start_s: float) -> float | None:
     """The lag of a track, whose positions (N,) lie between its first and last waypoint; None without a plan's times."""
     if len(t_s) < 2:

@@ -50,6 +50,9 @@ class ReviewSeries(Strict):
     t_s: list[float]
     alt_rel_home_m: list[float | None]
     reference_alt_rel_home_m: list[float | None]
+    """The plan at the place of its line that is nearest."""
+    planned_alt_rel_home_m: list[float | None]
+    """The plan by its own clock, which starts at the first waypoint as the flight's does."""
     ground_rel_home_m: list[float | None]
     cross_track_m: list[float | None]
     s_m: list[float | None]

@@ -14,7 +14,7 @@ from pyproj import CRS
 
 from planning.dsm import Dsm
 from planning.following.figures import judge, track_figures
-from planning.following.lag import late_s, planned_s
+from planning.following.lag import late_s, planned_alt_dsm_m, planned_s
 from planning.following.live import Following, follow_on
 from planning.following.nearest import follow
 from planning.following.surface import SurfaceDistance
@@ -222,3 +222,18 @@ def test_without_times_there_is_no_delay_and_no_lag():
     at = follow(timeless, (60.0, 30.0, 15.2))
     assert late_s(timeless, at, 3.0) is None
     assert math.isnan(planned_s(timeless, 1, 0.5))
+
+
+def test_the_plans_own_clock_tells_its_height_and_waits_where_it_holds():
+    heights = np.linspace(10.0, 50.0, len(SQUARE.points_m))
+    climbing = replace(SQUARE, points_m=np.column_stack([SQUARE.points_m[:, :2], heights]))
+    held = replace(climbing, leave_s=climbing.leave_s + 0.0)
+    held.leave_s[1] = (held.arrive_s[1] + held.arrive_s[2]) / 2
+    half_s = (held.arrive_s[1] + held.leave_s[1]) / 2 - held.takeoff_s
+    assert planned_alt_dsm_m(held, np.array([half_s]))[0] == pytest.approx(heights[1])
+    after_s = (held.leave_s[1] + held.arrive_s[2]) / 2 - held.takeoff_s
+    assert planned_alt_dsm_m(held, np.array([after_s]))[0] == pytest.approx(heights[1:3].mean())
+    outside = np.array([-1e6, 1e6])
+    assert np.isnan(planned_alt_dsm_m(held, outside)).all()
+    untimed = replace(held, arrive_s=np.full(len(heights), np.nan), leave_s=np.full(len(heights), np.nan))
+    assert np.isnan(planned_alt_dsm_m(untimed, np.array([0.0]))).all()

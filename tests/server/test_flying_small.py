@@ -56,6 +56,7 @@ def test_a_replays_path_ends_where_it_was_wound_to() -> None:
         t_s=[float(k) for k in range(count)],
         alt_rel_home_m=[float(k) for k in range(count)],
         reference_alt_rel_home_m=none,
+        planned_alt_rel_home_m=none,
         ground_rel_home_m=none,
         cross_track_m=none,
         s_m=none,

@@ -118,6 +118,13 @@ def test_curves_are_relative_to_the_plans_home_and_equally_long() -> None:
     assert series.cross_track_m[0] is None  # the take-off is not judged
 
 
+def test_a_delayed_flight_lies_behind_the_plan_by_its_own_clock() -> None:
+    series = reviewed(log_of(positions(), flown=FLOWN), dsm=PLAIN).series
+    planned = [alt_m for alt_m in series.planned_alt_rel_home_m if alt_m is not None]
+    assert planned == pytest.approx([20.0] * len(planned), abs=0.05)
+    assert planned
+
+
 def test_a_long_flight_is_thinned_and_keeps_its_peaks() -> None:
     n = 40_000
     peaky = np.zeros(n)

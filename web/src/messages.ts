@@ -991,7 +991,10 @@ export interface ReviewFigures {
 export interface ReviewSeries {
   t_s: number[];
   alt_rel_home_m: (number | null)[];
+  /** The plan at the place of its line that is nearest. */
   reference_alt_rel_home_m: (number | null)[];
+  /** The plan by its own clock, which starts at the first waypoint as the flight's does. */
+  planned_alt_rel_home_m: (number | null)[];
   ground_rel_home_m: (number | null)[];
   cross_track_m: (number | null)[];
   s_m: (number | null)[];
@@ -1455,10 +1458,17 @@ export interface SetSelection {
   change: number;
 }
 
-/** Move this page's camera: to the whole terrain, the plan, from above, the worst point, or the vehicle. */
+/** Move this page's camera: to the whole terrain, the plan, from above, the worst point, or behind a vehicle. "chase" follows the vehicle until another target is asked for. */
 export interface FrameView {
   type: "frame_view";
-  target: "terrain" | "plan" | "top" | "worst" | "poi" | "vehicle";
+  target: "terrain" | "plan" | "top" | "worst" | "poi" | "chase";
+  source?: "live" | "replay";
+}
+
+/** A hand is on this page's camera: what follows a vehicle waits. */
+export interface HoldCamera {
+  type: "hold_camera";
+  held: boolean;
 }
 
 export type ServerMessage =
@@ -1495,4 +1505,5 @@ export type ClientMessage =
   | HoverView
   | SetView
   | SetSelection
-  | FrameView;
+  | FrameView
+  | HoldCamera;

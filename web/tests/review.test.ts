@@ -93,6 +93,7 @@ describe("the charts", () => {
       t_s: [0, 10, 20],
       alt_rel_home_m: [0, 10, 20],
       reference_alt_rel_home_m: [1, 11, 21],
+      planned_alt_rel_home_m: [1, 12, 20],
       ground_rel_home_m: [0, null, 0],
       cross_track_m: [0.5, -0.5, 0],
       s_m: [0, 1, 2],

@@ -1,6 +1,6 @@
 import { signal } from "@preact/signals";
 import { useCallback, useEffect, useState } from "preact/hooks";
-import { deviation, metres, timecode } from "../format";
+import { deviation, metres, timecode, withUnit } from "../format";
 import type { ReviewDoc } from "../messages";
 import { ChartBox, VerticalLine } from "../chart/ChartBox";
 import { ResizeHandle } from "../chart/ResizeHandle";
@@ -94,13 +94,21 @@ function Values({ open, shown }: { open: ReviewDoc; shown: Tab }) {
   );
 }
 
-function Keys({ alerts }: { alerts: boolean }) {
+function Keys({ open }: { open: ReviewDoc }) {
+  const lag_s = open.figures?.lag_s ?? null;
   return (
     <span class="chart-keys" aria-hidden="true">
       <span class="key ground">Ground</span>
-      <span class="key reference">Plan</span>
-      <span class="key track">Flown</span>
-      {alerts && <span class="key alert-key">Alert</span>}
+      <span class="key reference" title="The plan at the nearest place of its line">
+        Plan
+      </span>
+      {lag_s !== null && (
+        <span class="key on-time" title="Where the plan's own clock is, from the first waypoint on">
+          Plan on time
+        </span>
+      )}
+      <span class="key track">Flown{lag_s === null ? "" : `, lag ${withUnit(lag_s, "s", 1)}`}</span>
+      {alertTimes(open.events).length > 0 && <span class="key alert-key">Alert</span>}
     </span>
   );
 }
@@ -152,9 +160,7 @@ export function TimePane() {
           ]}
           onChange={(next) => (tab.value = next)}
         />
-        {open && (shown === "altitude" || shown === "both") && (
-          <Keys alerts={alertTimes(open.events).length > 0} />
-        )}
+        {open && (shown === "altitude" || shown === "both") && <Keys open={open} />}
         <span class="spring" />
         {open && <Values open={open} shown={shown} />}
       </header>

@@ -22,15 +22,16 @@ const TOP_PX = 8;
 
 const noPoints = { points: { show: false } };
 
-/** Altitude above home against time: ground, the plan at the nearest place, and what was flown. */
+/** Altitude above home against time: ground, what was flown, the plan at the nearest place and by its own clock. */
 export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette, pointing: Pointing): Made {
-  const { t_s, ground_rel_home_m, reference_alt_rel_home_m, alt_rel_home_m } = review.series;
+  const { t_s, ground_rel_home_m, reference_alt_rel_home_m, planned_alt_rel_home_m, alt_rel_home_m } =
+    review.series;
   const unknown = gaps(t_s, ground_rel_home_m);
   const options = chartOptions({
     ...size,
     palette,
     yLabel: "m above home",
-    range: heightRange([ground_rel_home_m, reference_alt_rel_home_m, alt_rel_home_m]),
+    range: heightRange([ground_rel_home_m, reference_alt_rel_home_m, planned_alt_rel_home_m, alt_rel_home_m]),
     series: [
       {
         stroke: palette.groundLine,
@@ -41,6 +42,7 @@ export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette
       } as uPlot.Series,
       { stroke: palette.replayed, width: 2.5, ...noPoints },
       { stroke: palette.path, width: 1.75, dash: [7, 5], ...noPoints },
+      { stroke: palette.surface, width: 2, ...noPoints },
     ],
     drawUnder: (u) => drawUnknown(u, unknown, palette),
     draw: () => undefined,
@@ -50,7 +52,8 @@ export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette
     xText: axisTime,
     top: TOP_PX,
   });
-  return { options, data: [t_s, ground_rel_home_m, alt_rel_home_m, reference_alt_rel_home_m] };
+  const curves = [ground_rel_home_m, alt_rel_home_m, reference_alt_rel_home_m, planned_alt_rel_home_m];
+  return { options, data: [t_s, ...curves] };
 }
 
 /** Cross-track error against time, right of the line positive. */
