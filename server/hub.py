@@ -37,7 +37,7 @@ RATE_PER_S, BURST = 120.0, 600.0
 CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
 
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
-_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view")
+_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera")
 
 OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
 

@@ -11,6 +11,7 @@ from server.scene.payload import PlanScene, ReviewScene
 from server.schemas import (
     ClientMessage,
     FrameView,
+    HoldCamera,
     HoverProfile,
     HoverView,
     PlanDoc,
@@ -58,6 +59,8 @@ class OnShow:
                 self.select(message.selection)
             case FrameView():
                 await self._picture.frame(message, page_id)
+            case HoldCamera():
+                self._picture.hold_camera(page_id, held=message.held)
 
     def show_view(self, view: ViewDoc) -> None:
         self.view = view

@@ -17,7 +17,7 @@ from server.jobs import Lane
 from server.library import Library
 from server.scene.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
 from server.scene.shots import Target
-from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, ViewDoc
+from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, Source, ViewDoc
 
 log = logging.getLogger("hedgehop.scene")
 
@@ -29,7 +29,9 @@ class View(Protocol):
 
     async def cursor(self, at_m: np.ndarray | None) -> None: ...
 
-    async def frame(self, page_id: str, target: Target) -> None: ...
+    async def frame(self, page_id: str, target: Target, source: Source = "live") -> None: ...
+
+    def hold_camera(self, page_id: str, *, held: bool) -> None: ...
 
     def sample_under(self, page_id: str, x: float, y: float) -> float | None: ...
 
@@ -194,4 +196,7 @@ class Picture:
         return await self.mark(plan, None if pointer is None else self._view.sample_under(page_id, *pointer))
 
     async def frame(self, message: FrameView, page_id: str) -> None:
-        await self._view.frame(page_id, message.target)
+        await self._view.frame(page_id, message.target, message.source)
+
+    def hold_camera(self, page_id: str, *, held: bool) -> None:
+        self._view.hold_camera(page_id, held=held)

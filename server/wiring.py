@@ -39,5 +39,6 @@ def make_workspace(library: Library, hub: Hub, host: SceneHost, background: Back
         on_poi_moved=on_poi_moved,
         page_of_client=host.page_of_client,
     )
+    background.spawn(view.run())
     workspace = Workspace(library, hub, view, spawn=background.spawn, stage=view.vehicles, sights=view.sights)
     return workspace

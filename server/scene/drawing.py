@@ -14,6 +14,8 @@ from server.scene.mesh import drawn_alt_dsm_m, filled
 from server.scene.payload import F64, HeightGrid, SceneState, TerrainScene
 from server.scene.unknown import plates
 
+_LARGEST_BODY_M = 0.9
+
 
 class _Place(Protocol):
     @property
@@ -47,6 +49,11 @@ class Drawing:
     def mark_m(self) -> float:
         """Radius of a mark that is seen from afar and does not hide what it marks."""
         return 0.011 * self.frame.half_diagonal_m
+
+    @property
+    def body_m(self) -> float:
+        """Radius of a solid mark where the flight comes near it: it must not hide what flies past."""
+        return min(self.mark_m, _LARGEST_BODY_M)
 
     def places_xy_m(self, places: Sequence[_Place]) -> F64:
         """(N, 2) projected"""

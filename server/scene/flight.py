@@ -11,9 +11,10 @@ from server.scene import palette
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node
 from server.scene.payload import F64, U8, PlanScene
-from server.scene.shapes import BALL, GEM, label_node, line_node, many_node, raised, shape_node
+from server.scene.shapes import GEM, dots_node, label_node, line_node, raised, shape_node
 
 _MOST_WAYPOINT_MARKS = 1500
+_WAYPOINT_PX, _WORST_PX = 6.0, 13.0
 _CURTAIN_OPACITY = 0.42
 _WORST_POLE = 6.0
 """In radii of a mark: lifts the words above those of the points of interest."""
@@ -83,7 +84,7 @@ def _flown(drawing: Drawing, plan: PlanScene) -> list[Node]:
     nodes = [line_node("/flown", points, _colors(drawing, plan.flown_distance_m, plan), width_px=2.0)]
     if len(points) <= _MOST_WAYPOINT_MARKS:
         rgb = tuple(palette.dimmed(palette.POI, stale=drawing.state.plan_is_stale).tolist())
-        nodes.append(many_node("/waypoints", BALL, points, 0.3 * drawing.mark_m, rgb))
+        nodes.append(dots_node("/waypoints", points, rgb, size_px=_WAYPOINT_PX))
     return nodes
 
 
@@ -104,7 +105,8 @@ def _worst(drawing: Drawing, plan: PlanScene) -> list[Node]:
     color = tuple(_colors(drawing, np.array([nearest_m]), plan)[0].tolist())
     return [
         line_node("/worst_pole", np.stack([at, top]), color, width_px=4.0),
-        shape_node("/worst", GEM, at, 1.4 * drawing.mark_m, color),
+        shape_node("/worst", GEM, at, drawing.body_m, color),
+        dots_node("/worst_dot", at[None], color, size_px=_WORST_PX),
         # To the right of its pole: seen from above the label of a point of interest may stand on the same place.
         label_node("/worst_label", _distance_words(nearest_m), top, anchor="center-left"),
     ]

@@ -9,13 +9,14 @@ from server.scene import palette
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node, Ready
 from server.scene.payload import F64
-from server.scene.shapes import BALL, CONE, label_node, line_node, many_node, shape_node
+from server.scene.shapes import BALL, CONE, Rgb, dots_node, label_node, line_node, many_node, shape_node
 from server.schemas import PlanDoc
 
 GIZMO = "/gizmo"
 """The selected point of interest hangs below it, so that browsers move it with the pointer themselves."""
 _GIZMO_PX = 130.0
 _MOST_LABELS = 150
+_POINT_PX, _SELECTED_PX = 9.0, 11.0
 _EDGE_POINTS = 48
 
 
@@ -33,7 +34,7 @@ def poi_nodes(drawing: Drawing, moved: Ready) -> list[Node]:
     ids, places = poi_places(drawing)
     chosen = drawing.state.selection.poi_id
     others = [index for index, poi_id in enumerate(ids) if poi_id != chosen]
-    nodes = [many_node("/pois", BALL, places[others], drawing.mark_m, palette.POI)] if others else []
+    nodes = _points("/pois", places[others], drawing, palette.POI) if others else []
     for index, poi_id in enumerate(ids):
         if poi_id == chosen:
             nodes += _selected(drawing, poi_id, places[index], moved)
@@ -42,16 +43,26 @@ def poi_nodes(drawing: Drawing, moved: Ready) -> list[Node]:
     return nodes
 
 
+def _points(name: str, places: F64, drawing: Drawing, color: Rgb) -> list[Node]:
+    """Balls for who is near, dots for who is far."""
+    return [
+        many_node(name, BALL, places, drawing.body_m, color),
+        dots_node(f"{name}_dots", places, color, size_px=_POINT_PX),
+    ]
+
+
 def _selected(drawing: Drawing, poi_id: str, at: F64, moved: Ready) -> list[Node]:
     origin, text = np.zeros(3), _label(drawing, poi_id)
     if drawing.state.selection.tool == "select":
         return [
             _gizmo(at, moved),
-            shape_node(f"{GIZMO}/ball", BALL, origin, 1.15 * drawing.mark_m, palette.ACCENT),
+            shape_node(f"{GIZMO}/ball", BALL, origin, drawing.body_m, palette.ACCENT),
+            dots_node(f"{GIZMO}/dot", origin[None], palette.ACCENT, size_px=_SELECTED_PX),
             label_node(f"{GIZMO}/label", text, 2 * _above(drawing), size=1.15),
         ]
     return [
-        shape_node("/selected", BALL, at, 1.15 * drawing.mark_m, palette.ACCENT),
+        shape_node("/selected", BALL, at, drawing.body_m, palette.ACCENT),
+        dots_node("/selected_dot", at[None], palette.ACCENT, size_px=_SELECTED_PX),
         label_node("/selected_label", text, at + _above(drawing), size=1.15),
     ]
 
@@ -103,7 +114,8 @@ def _home(drawing: Drawing) -> list[Node]:
     if at is None:
         return []
     return [
-        shape_node("/home", CONE, at, 1.2 * drawing.mark_m, palette.HOME),
+        shape_node("/home", CONE, at, 1.2 * drawing.body_m, palette.HOME),
+        dots_node("/home_dot", at[None], palette.HOME, size_px=_POINT_PX),
         label_node("/home_label", "Home", at + 2.4 * _above(drawing)),
     ]
 
@@ -128,7 +140,7 @@ def _polygon(drawing: Drawing) -> list[Node]:
     corners = corners[np.isfinite(corners).all(axis=1)]
     if document.source != "survey" or not len(corners):
         return []
-    nodes = [many_node("/polygon_corners", BALL, drawing.on_ground(corners), 0.8 * drawing.mark_m, palette.SURVEY)]
+    nodes = _points("/polygon_corners", drawing.on_ground(corners), drawing, palette.SURVEY)
     if len(corners) > 1:
         outline = _smoothed(drawing.on_ground(_outline(corners)), 0.3 * drawing.mark_m)
         nodes.append(line_node("/polygon", outline, palette.SURVEY, width_px=4.0))

@@ -42,6 +42,11 @@ class Canvas:
             self._draw(before.get(node.name), node)
         self._layers[layer] = after
 
+    @property
+    def nodes(self) -> list[Node]:
+        """All that is drawn, parents before their children."""
+        return [node for layer in self._layers.values() for node in layer.values()]
+
     def handle(self, name: str) -> Any | None:
         return self._handles.get(name)
 

@@ -56,7 +56,7 @@ def conflict_nodes(
     at = drawing.frame.scene_from_model(placing.model_from_enu(np.array(first.enu_m)))[0]
     top = raised(at, 4.0 * drawing.mark_m)
     return [
-        shape_node(f"{prefix}/conflict", GEM, at, 0.7 * drawing.mark_m, palette.INSIDE),
+        shape_node(f"{prefix}/conflict", GEM, at, drawing.body_m, palette.INSIDE),
         line_node(f"{prefix}/conflict_pole", np.stack([at, top]), palette.INSIDE, width_px=2.0),
         label_node(f"{prefix}/conflict_words", _conflict_words(first), top),
     ]

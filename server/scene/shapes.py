@@ -35,6 +35,18 @@ def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> No
     return Node(name, "line_segments", props)
 
 
+def dots_node(name: str, at: F64, color: Rgb | U8, *, size_px: float) -> Node:
+    """Dots at (N, 3) scene points, equally large from near and far; ``color`` is one, or (N, 3)."""
+    ends = np.stack([at, raised(at, 0.01)], axis=1).astype(np.float32)
+    colors = linear_light(np.broadcast_to(np.asarray(color, dtype=np.uint8), (len(ends), 3)))
+    pair = np.repeat(colors[:, None], 2, axis=1)
+    return Node(
+        name,
+        "line_segments",
+        {"points": ends, "colors": pair, "thickness": size_px, "thickness_units": "screen"},
+    )
+
+
 def shape_node(name: str, shape: tuple[F32, U32], at: F64, size: float, color: Rgb) -> Node:
     props = {"vertices": shape[0], "faces": shape[1], "scale": size, "color": color, "position": _triple(at)}
     return Node(name, "mesh_simple", {**props, **_UNSHADED})

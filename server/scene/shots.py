@@ -10,30 +10,22 @@ from server.scene.camera import OBLIQUE, TOP, Pose, fitted
 from server.scene.drawing import Drawing
 from server.scene.payload import F64
 
-Target = Literal["terrain", "plan", "top", "worst", "poi", "vehicle"]
+Target = Literal["terrain", "plan", "top", "worst", "poi", "chase"]
 
 _OUTLINE_CELLS = 40
 _CLOSE_UP = 0.16
 """Half the side of a close-up, in half diagonals of the model."""
-_VEHICLE_SHARE = 0.08
-"""The same for the vehicle: it, the ground below and what it flies towards."""
 
 
-def shot(drawing: Drawing, target: Target, *, aspect: float, vehicle_m: F64 | None = None) -> Pose:
-    """What cannot be shown (no plan, nothing selected, no vehicle) gives way to the terrain.
-
-    ``vehicle_m``: (3,) x, y, alt_dsm of the vehicle on show.
-    """
-    if target == "vehicle" and vehicle_m is not None:
-        points = _around(drawing, drawing.frame.scene_from_model(vehicle_m), _VEHICLE_SHARE)
-    else:
-        points = _points(drawing, target)
+def shot(drawing: Drawing, target: Target, *, aspect: float) -> Pose:
+    """What cannot be shown (no plan, nothing selected) gives way to the terrain; what is chased, to the plan."""
+    points = _points(drawing, target)
     return fitted(points, TOP if target == "top" else OBLIQUE, aspect=aspect)
 
 
 def _points(drawing: Drawing, target: Target) -> F64:
     plan, points = drawing.state.plan, None
-    if target == "plan":
+    if target in ("plan", "chase"):
         points = _plan_points(drawing)
     elif target == "worst" and plan is not None and np.isfinite(plan.worst_m).all():
         points = _around(drawing, drawing.frame.scene_from_model(plan.worst_m))

@@ -53,7 +53,7 @@ def _track(drawing: Drawing, placing: EnuPlacing, track: Track, at_enu_m: F64, n
     velocity = np.array([*track.velocity_enu_m_s, 0.0])
     at, *corners = _scene(drawing, placing, np.vstack([at_enu_m, ring]))
     nodes = [
-        shape_node(f"{name}/at", GEM, at, 0.4 * drawing.mark_m, color),
+        shape_node(f"{name}/at", GEM, at, drawing.body_m, color),
         line_node(f"{name}/ellipse", np.array(corners), color, width_px=_STILL_PX),
         label_node(f"{name}/words", _words(track), raised(at, drawing.mark_m)),
     ]
@@ -63,7 +63,7 @@ def _track(drawing: Drawing, placing: EnuPlacing, track: Track, at_enu_m: F64, n
     if track.dangerous and track.closest_in_s > 0:
         there = _scene(drawing, placing, np.stack([at_enu_m, at_enu_m + velocity * track.closest_in_s]))
         nodes += [
-            many_node(f"{name}/closest", GEM, there[1:], 0.7 * drawing.mark_m, color),
+            many_node(f"{name}/closest", GEM, there[1:], drawing.body_m, color),
             label_node(f"{name}/closest_words", _closest_words(track), raised(there[1], drawing.mark_m)),
         ]
     return nodes

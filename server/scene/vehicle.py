@@ -17,11 +17,13 @@ from server.scene import palette
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node
 from server.scene.payload import F64
-from server.scene.shapes import CONE, Rgb, label_node, line_node, shape_node
+from server.scene.shapes import CONE, Rgb, dots_node, label_node, line_node, shape_node
 from server.schemas import Source
 
-_SIZE = 2.6
-"""Half the quadrotor's width, in radii of a mark: seen from where the whole model is seen."""
+VEHICLE_M = 1.6
+"""Half the drawn quadrotor's width: larger than most, so that it is seen among voxels of a metre."""
+_DOT_PX = 11.0
+"""Of the dot in its middle, which is seen from where the whole model is seen."""
 _CHUNK_SEGMENTS = 256
 _ROTOR_AT = 0.72
 
@@ -58,11 +60,12 @@ def vehicle_nodes(drawing: Drawing, source: Source, pose: VehiclePose | None) ->
         return []
     style, name = _STYLES[source], f"/vehicle_{source}"
     at = drawing.frame.scene_from_model(pose.place_m)
-    size, middle = _SIZE * drawing.mark_m, np.zeros(3)
+    size, middle = VEHICLE_M, np.zeros(3)
     return [
         Node(name, "frame", {"show_axes": False, "position": _triple(at), "wxyz": scene_wxyz(pose)}),
         shape_node(f"{name}/body", _BODY, middle, size, style.body),
         shape_node(f"{name}/nose", _NOSE, middle, size, style.nose),
+        dots_node(f"{name}/dot", middle[None], style.body, size_px=_DOT_PX),
         *([label_node(f"{name}/label", style.label, np.array([0.0, 0.0, 0.9 * size]))] if style.label else []),
         _plumb(drawing, name, pose, at, style),
         *_home(drawing, name, pose, style),
@@ -104,7 +107,7 @@ def _home(drawing: Drawing, name: str, pose: VehiclePose, style: _Style) -> list
     if pose.home_m is None:
         return []
     at = drawing.on_ground(pose.home_m[None, :2])
-    return [shape_node(f"{name}_home", CONE, at[0], 0.8 * drawing.mark_m, style.body)] if len(at) else []
+    return [shape_node(f"{name}_home", CONE, at[0], drawing.body_m, style.body)] if len(at) else []
 
 
 def _quadrotor() -> trimesh.Trimesh:

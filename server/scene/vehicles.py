@@ -11,7 +11,7 @@ from planning.dsm import Dsm
 from server.scene.drawing import Drawing
 from server.scene.nodes import Node
 from server.scene.payload import F64
-from server.scene.vehicle import VehiclePose, track_nodes, vehicle_nodes
+from server.scene.vehicle import VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
 from server.schemas import Source
 
 _SOURCES: tuple[Source, ...] = get_args(Source)
@@ -31,10 +31,15 @@ class Vehicles:
     def dsm(self) -> Dsm | None:
         return None if self._drawing is None else self._drawing.dsm
 
-    def place_m(self) -> F64 | None:
-        """(3,) x, y, alt_dsm of the replayed vehicle if there is one, else of the live one."""
-        pose = self._poses["replay"] or self._poses["live"]
-        return None if pose is None else pose.place_m
+    def pose(self, source: Source) -> VehiclePose | None:
+        return self._poses[source]
+
+    def marks(self) -> list[tuple[F64, float]]:
+        """(3,) in the scene, and radius, of every vehicle that is drawn."""
+        if self._drawing is None:
+            return []
+        places = (pose.place_m for pose in self._poses.values() if pose is not None)
+        return [(self._drawing.frame.scene_from_model(place_m), VEHICLE_M) for place_m in places]
 
     def move(self, source: Source, pose: VehiclePose | None) -> None:
         """None: the vehicle is nowhere on this model."""

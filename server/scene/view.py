@@ -13,7 +13,8 @@ import numpy as np
 import viser
 
 from planning.dsm import Dsm
-from server.scene.camera import FOV_RAD, Lens, Pose, nearest_on_path
+from server.scene.camera import FOV_RAD, nearest_on_path
+from server.scene.cameras import CAMERAS_EVERY_S, Cameras, lens_of, move, planes
 from server.scene.drawing import Drawing
 from server.scene.layers import POIS, Key, layers, unchanged
 from server.scene.marks import cursor_nodes
@@ -23,6 +24,7 @@ from server.scene.picking import PlaceHit, PoiHit, pick
 from server.scene.shots import Target, shot
 from server.scene.sights import Sights
 from server.scene.vehicles import Vehicles
+from server.schemas import Source
 
 _POINTER_REACH_PX = 24.0
 _SHOTS_DUE_MAX = 100
@@ -50,6 +52,7 @@ class SceneView:
         self._canvas = Canvas(server.scene)
         self.vehicles = Vehicles(self._put)
         self.sights = Sights(server, self._put)
+        self._cameras = Cameras(self._client, self._page_ids, self.vehicles)
         self._layers = layers(self._watch_gizmo)
         self._keys: dict[str, Key] = {}
         self._wanted: tuple[Dsm | None, SceneState] | None = None
@@ -58,7 +61,7 @@ class SceneView:
         self._cursor_m: F64 | None = None
         self._one_at_a_time = asyncio.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._shots_due: dict[str, Target] = {}
+        self._shots_due: dict[str, tuple[Target, Source]] = {}
         """Asked for by pages whose view had not connected yet."""
         server.on_client_connect(self._joined)
         server.scene.world_axes.visible = False
@@ -80,18 +83,34 @@ class SceneView:
         self._cursor_m = None if at_m is None or not np.isfinite(at_m).all() else np.asarray(at_m, dtype=np.float64)
         self._put({"cursor": self._cursor_nodes()})
 
-    async def frame(self, page_id: str, target: Target) -> None:
-        """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, vehicle."""
+    async def frame(self, page_id: str, target: Target, source: Source = "live") -> None:
+        """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, behind a vehicle."""
         client = self._client(page_id)
         if client is None:
             self._shots_due.pop(page_id, None)
-            self._shots_due[page_id] = target
+            self._shots_due[page_id] = target, source
             while len(self._shots_due) > _SHOTS_DUE_MAX:
                 del self._shots_due[next(iter(self._shots_due))]
-        elif self._drawn is not None:
-            vehicle_m = self.vehicles.place_m()
-            pose = shot(self._drawn, target, aspect=client.camera.aspect, vehicle_m=vehicle_m)
-            _move(client, pose, self._drawn)
+            return
+        self._cameras.free(page_id)
+        if self._drawn is None:
+            return
+        if target == "chase" and self._cameras.chase(page_id, source):
+            self._cameras.follow(self._drawn)
+        else:
+            move(client, shot(self._drawn, target, aspect=client.camera.aspect), self._drawn)
+
+    def hold_camera(self, page_id: str, *, held: bool) -> None:
+        """A hand is on the page's camera, or off it again."""
+        self._cameras.hold(page_id, held=held)
+
+    async def run(self) -> None:
+        """Cameras that follow, and labels that give way; until cancelled."""
+        while True:
+            await asyncio.sleep(CAMERAS_EVERY_S)
+            if self._drawn is not None:
+                self._cameras.follow(self._drawn)
+                self._cameras.tidy(self._canvas.nodes)
 
     def sample_under(self, page_id: str, x: float, y: float) -> float | None:
         """The distance flown ``s_m`` at the path's place under a page's pointer; None when it points elsewhere.
@@ -104,7 +123,7 @@ class SceneView:
             return None
         path = drawn.frame.scene_from_model(plan.path_m)
         pointer = np.array([x, y])
-        return nearest_on_path(_lens(client), path, plan.path_s_m, pointer, within_px=_POINTER_REACH_PX)
+        return nearest_on_path(lens_of(client), path, plan.path_s_m, pointer, within_px=_POINTER_REACH_PX)
 
     async def _draw(self, drawing: Drawing | None) -> None:
         if drawing is None:
@@ -152,15 +171,19 @@ class SceneView:
         pose = shot(drawing, "terrain", aspect=1.6)
         camera = self._server.initial_camera
         camera.position, camera.look_at = tuple(pose.position), tuple(pose.look_at)
-        camera.near, camera.far = _planes(drawing)
+        camera.near, camera.far = planes(drawing)
         for client in self._server.get_clients().values():
-            _move(client, shot(drawing, "terrain", aspect=client.camera.aspect), drawing)
+            move(client, shot(drawing, "terrain", aspect=client.camera.aspect), drawing)
 
     def _client(self, page_id: str) -> viser.ClientHandle | None:
         """The newest client of a page: a reloaded view may leave an old one behind for a moment."""
         clients = self._server.get_clients()
         own = [client_id for client_id in clients if self._page_of_client(client_id) == page_id]
         return clients[max(own)] if own else None
+
+    def _page_ids(self) -> set[str]:
+        """Of the pages whose view is connected."""
+        return {page for client in self._server.get_clients() if (page := self._page_of_client(client)) is not None}
 
     # Clicks and drags: on viser's thread up to ``_hand_over``
 
@@ -193,9 +216,9 @@ class SceneView:
             await self._hand_over(self._catch_up(page_id))
 
     async def _catch_up(self, page_id: str) -> None:
-        target = self._shots_due.pop(page_id, None)
-        if target is not None:
-            await self.frame(page_id, target)
+        due = self._shots_due.pop(page_id, None)
+        if due is not None:
+            await self.frame(page_id, *due)
 
     def _watch_gizmo(self, gizmo: viser.TransformControlsHandle) -> None:
         async def on_update(event: viser.TransformControlsEvent) -> None:
@@ -225,22 +248,3 @@ class SceneView:
         self._keys.pop(POIS, None)
         async with self._one_at_a_time:
             await self._draw(self._drawn)
-
-
-def _planes(drawing: Drawing) -> tuple[float, float]:
-    """Near and far plane: the far default of viser, 1 km, cuts large models off."""
-    return 0.002 * drawing.frame.half_diagonal_m, 60.0 * drawing.frame.half_diagonal_m
-
-
-def _move(client: viser.ClientHandle, pose: Pose, drawing: Drawing) -> None:
-    with client.atomic():
-        client.camera.near, client.camera.far = _planes(drawing)
-        client.camera.max_orbit_distance = 20.0 * drawing.frame.half_diagonal_m
-        client.camera.position = tuple(pose.position)
-        client.camera.look_at = tuple(pose.look_at)
-    client.flush()
-
-
-def _lens(client: viser.ClientHandle) -> Lens:
-    camera = client.camera
-    return Lens.of(camera.wxyz, camera.position, camera.fov, camera.aspect)

@@ -295,13 +295,24 @@ class SetSelection(Strict):
 
 
 class FrameView(Strict):
-    """Move this page's camera: to the whole terrain, the plan, from above, the worst point, or the vehicle."""
+    """Move this page's camera: to the whole terrain, the plan, from above, the worst point, or behind a vehicle.
+
+    "chase" follows the vehicle until another target is asked for.
+    """
 
     type: Literal["frame_view"] = "frame_view"
-    target: Literal["terrain", "plan", "top", "worst", "poi", "vehicle"]
+    target: Literal["terrain", "plan", "top", "worst", "poi", "chase"]
+    source: Source = "live"
+
+
+class HoldCamera(Strict):
+    """A hand is on this page's camera: what follows a vehicle waits."""
+
+    type: Literal["hold_camera"] = "hold_camera"
+    held: bool
 
 
 ClientMessage = Annotated[
-    HoverProfile | HoverView | SetView | SetSelection | FrameView,
+    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera,
     Field(discriminator="type"),
 ]

@@ -11,8 +11,8 @@ from playwright.sync_api import Page, WebSocketRoute, expect
 from server.schemas import LinkMessage, ObstaclesMessage
 from server.schemas.obstacles import AlertDoc, ObstaclesState
 from telemetry.messages import Candidate, LinkStatus
-from tests.e2e.stations import Station
-from tests.e2e.steps import enter, visit
+from tests.e2e.stations import SimulatedVehicle, Station
+from tests.e2e.steps import connect, enter, open_demo, visit
 from tests.server.obstacle_messages import alert, approach, obstacle
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
@@ -47,6 +47,26 @@ def test_an_alert_that_is_over_shrinks_to_a_chip_with_a_count(station: Station, 
     page.get_by_test_id("alert-shrink").click()
     expect(chip).to_be_visible()
     expect(banner).to_have_count(0)
+
+
+def test_fly_follows_its_vehicle_and_one_press_leads_elsewhere_and_back(
+    station: Station, page: Page, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, station)
+    connect(page, vehicle)
+    follow = page.get_by_test_id("view-vehicle")
+    expect(follow).to_have_attribute("aria-pressed", "true")
+    for elsewhere in ("view-fit", "view-top"):
+        page.get_by_test_id(elsewhere).click()
+        expect(follow).to_have_attribute("aria-pressed", "false")
+        follow.click()
+        expect(follow).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("t")
+    expect(follow).to_have_attribute("aria-pressed", "false")
+    page.keyboard.press("v")
+    expect(follow).to_have_attribute("aria-pressed", "true")
+    page.get_by_test_id("tab-plan").click()
+    expect(follow).to_have_attribute("aria-pressed", "false")
 
 
 def _with_two_that_are_over(page_side: WebSocketRoute) -> None:

@@ -15,7 +15,6 @@ from viser import transforms
 from server.scene.drawing import Drawing
 from server.scene.payload import ReviewScene
 from server.scene.review import review_nodes
-from server.scene.shots import shot
 from server.scene.vehicle import VehiclePose, scene_wxyz, track_nodes, vehicle_nodes
 from server.scene.view import SceneView
 from tests.server.scene_fixtures import exaggerated, hill, state_over
@@ -159,13 +158,3 @@ def test_another_height_scale_draws_it_again_and_another_model_forgets_it(server
         assert view.vehicles.dsm is None
 
     asyncio.run(scenario())
-
-
-def test_the_camera_closes_in_on_the_vehicle_and_shows_the_terrain_without_one() -> None:
-    scene, pose = drawing(), over(40, 30)
-    near = shot(scene, "vehicle", aspect=1.6, vehicle_m=pose.place_m)
-    far = shot(scene, "vehicle", aspect=1.6)
-    at = scene.frame.scene_from_model(pose.place_m)
-    assert near.look_at == pytest.approx(at, abs=0.2 * scene.frame.half_diagonal_m)
-    assert np.linalg.norm(near.position - at) < 0.5 * np.linalg.norm(far.position - at)
-    assert far.look_at == pytest.approx(shot(scene, "terrain", aspect=1.6).look_at)

@@ -15,6 +15,7 @@ describe("keys", () => {
     [press("Delete"), "delete"],
     [press("f"), "fit"],
     [press("t"), "top"],
+    [press("v"), "chase"],
     [press("k"), "acknowledge"],
     [press("M"), "sound"],
     [press("?", false, true), "help"],

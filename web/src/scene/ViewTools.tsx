@@ -1,13 +1,9 @@
-import { computed } from "@preact/signals";
-import { heard } from "../store/flying";
 import { Button } from "../ui/Button";
 import type { ViewDoc } from "../messages";
 import { result, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
-import { frame, setView } from "../store/stream";
-
-/** Flown or replayed, it is somewhere. Told once: its values change twenty times a second. */
-const hasVehicle = computed(() => (heard.live.value ?? heard.replay.value)?.message.state?.lat_deg != null);
+import { follows, frame, setView } from "../store/stream";
+import { chase, followed } from "./following";
 
 type Layer = "show_surface" | "show_path" | "show_unknown" | "show_traversability";
 
@@ -46,6 +42,16 @@ export function ViewTools() {
         ))}
       </div>
       <div class="overlay cameras" role="group" aria-label="Camera">
+        {followed.value && (
+          <Button
+            kind="quiet"
+            icon="drone"
+            title="Follow the vehicle (V)"
+            pressed={follows.value}
+            testid="view-vehicle"
+            onClick={chase}
+          />
+        )}
         <Button
           kind="quiet"
           icon="fit"
@@ -73,15 +79,6 @@ export function ViewTools() {
           </svg>
           <span>N up</span>
         </button>
-        {hasVehicle.value && (
-          <Button
-            kind="quiet"
-            icon="drone"
-            title="Show the vehicle"
-            testid="view-vehicle"
-            onClick={() => frame("vehicle")}
-          />
-        )}
         {result.value?.worst && (
           <Button
             kind="quiet"

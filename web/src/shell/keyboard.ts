@@ -2,6 +2,7 @@ import { setSection } from "../ui/Section";
 import { redo, removeSelectedPoi, undo } from "../plan/commands";
 import { acknowledgeFirst } from "../obstacles/commands";
 import { switchSound } from "../obstacles/sound";
+import { chase } from "../scene/following";
 import { seekBy, togglePlaying } from "../review/commands";
 import { takeFiles } from "../store/files";
 import { sound } from "../store/prefs";
@@ -63,6 +64,8 @@ function act(hit: Hit): void {
       return void frame("plan");
     case "top":
       return void frame("top");
+    case "chase":
+      return chase();
     case "section":
       return toggleSection(hit.section ?? 0);
     case "view":

@@ -9,6 +9,7 @@ export const SHORTCUTS = [
   { id: "delete", keys: "Delete", text: "Delete the selected point" },
   { id: "fit", keys: "F", text: "Fit the plan into the view" },
   { id: "top", keys: "T", text: "Look from above, north up" },
+  { id: "chase", keys: "V", text: "Follow the vehicle" },
   {
     id: "section",
     keys: "1 to 7",
@@ -101,6 +102,7 @@ function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
     delete: "delete",
     f: "fit",
     t: "top",
+    v: "chase",
     k: "acknowledge",
     m: "sound",
     "?": "help",

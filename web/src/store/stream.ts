@@ -1,4 +1,5 @@
-import type { ClientMessage, SelectionDoc, ViewDoc } from "../messages";
+import { signal } from "@preact/signals";
+import type { ClientMessage, FrameView, SelectionDoc, ViewDoc } from "../messages";
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
 import { receive } from "./reduce";
@@ -29,6 +30,17 @@ export function setSelection(fields: Partial<SelectionDoc>): void {
   send({ type: "set_selection", selection: selection.value, change: nextChange() });
 }
 
-export type FrameTarget = "terrain" | "plan" | "top" | "worst" | "poi" | "vehicle";
+export type FrameTarget = FrameView["target"];
 
-export const frame = (target: FrameTarget) => send({ type: "frame_view", target });
+/** Whether this page's camera follows a vehicle. */
+export const follows = signal(false);
+
+/** Where this page's camera goes; `source`: of the vehicle that it follows. */
+export function frame(target: FrameTarget, source: FrameView["source"] = "live"): boolean {
+  follows.value = target === "chase";
+  return send({ type: "frame_view", target, source });
+}
+
+export const holdCamera = (held: boolean) => {
+  if (follows.peek()) send({ type: "hold_camera", held });
+};
