@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay, KDTree
 
 from planning.dsm import Dsm
 from planning.model import F64, SampledPath, Surfaces
@@ -132,12 +132,16 @@ def _between(values: F64, at: NDArray[np.intp], count: int) -> F64:
     after = np.clip(np.searchsorted(at, line), 1, len(at) - 1)
     share = ((line - at[after - 1]) / (at[after] - at[after - 1]))[:, None]
     low, high = values[after - 1], values[after]
-    return np.where(share == 0, low, np.where(share == 1, high, low + share * (high - low)))
+    straight = np.where(share == 0, low, np.where(share == 1, high, low + share * (high - low)))
+    return straight
 
 
 def _centres(safe: Dsm, row: NDArray[np.intp], col: NDArray[np.intp]) -> F64:
     west, _, _, north = safe.bounds_m
-    return np.column_stack([west + (col + 0.5) * safe.resolution_m, north - (row + 0.5) * safe.resolution_m])
+    return np.asarray(
+        np.column_stack([west + (col + 0.5) * safe.resolution_m, north - (row + 0.5) * safe.resolution_m]),
+        dtype=np.float64,
+    )
 
 
 def _on_surface(surfaces: Surfaces, xy_m: F64) -> F64:
@@ -163,7 +167,7 @@ def _following_path(points_m: F64, path: SampledPath) -> tuple[F64, NDArray[np.i
         )
         points_m = np.unique(np.vstack([points_m, _samples(path, more)]), axis=0)
         mesh = Delaunay(points_m[:, :2] - origin_m[:2])
-    return points_m, mesh.simplices
+    return points_m, mesh.simplices.astype(np.intp)
 
 
 def _height_m(mesh: Delaunay, points_m: F64, xy: F64) -> F64:
@@ -171,7 +175,7 @@ def _height_m(mesh: Delaunay, points_m: F64, xy: F64) -> F64:
 
     Walks from the triangle of the nearest point towards each place: scipy's own search inverts every triangle first.
     """
-    at = mesh.vertex_to_simplex[cKDTree(mesh.points).query(xy)[1]].astype(np.intp)
+    at = mesh.vertex_to_simplex[KDTree(mesh.points).query(xy)[1]].astype(np.intp)
     height_m, walking = np.full(len(xy), np.nan), np.arange(len(xy))
     for _ in range(_STEPS_MAX):
         share = _shares(mesh.points[mesh.simplices[at[walking]]], xy[walking])
@@ -198,9 +202,9 @@ def _cross(a: F64, b: F64) -> F64:
 
 def _worst_of_each_run(error: F64) -> NDArray[np.intp]:
     """Index of the largest value of each run of values above zero."""
-    runs, count = ndimage.label(error > 0)
-    found = ndimage.maximum_position(error, runs, np.arange(1, count + 1))
-    return np.array([at[0] for at in found], dtype=np.intp)
+    above = np.concatenate([[False], error > 0, [False]])
+    begins, ends = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
+    return np.array([a + int(np.argmax(error[a:b])) for a, b in zip(begins, ends, strict=True)], dtype=np.intp)
 
 
 def _over_known(safe: Dsm, points_m: F64, triangles: NDArray[np.intp]) -> NDArray[np.intp]:
