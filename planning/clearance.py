@@ -21,15 +21,17 @@ from pyproj import Proj
 
 import planning
 from planning.certificate.as_json import certificate_json
-from planning.certificate.columns import FREE_RISE_M, FREE_SLOPE, column_obstacle
 from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
+from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
+from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.places import distance_flown, places_along
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (
-    column_reasons,
     height_reason,
+    home_reason,
+    landing_reason,
     line_reasons,
     near_return_reason,
     return_reason,
@@ -44,6 +46,7 @@ from planning.model import (
     Certificate,
     ClearanceParams,
     FlownLine,
+    HomeStand,
     LegClearance,
     Reason,
     WorstPoint,
@@ -66,22 +69,25 @@ def certify(
     line: FlownLine,
     params: ClearanceParams,
     *,
+    ground: Dsm | None = None,
     trend_step_m: float = 1.0,
     assumptions: dict[str, object] | None = None,
 ) -> Certificate:
     """Certificate of a flown line against the whole of a surface model.
 
+    ``ground`` is the model before its small holes were filled, if it had any: home and landing are judged on it,
+    for a filled hole has the height of its rim's highest cell, maybe a wall's, and heights would be counted from it.
     ``assumptions`` are added to those written down here. Distances are exact to the rounding of float64.
     Raises ParameterError on a clearance, radius or step that is no positive number and MissionError on
     a line with a point that is not finite.
     """
     _check(line, params, trend_step_m)
     with threads_for(dsm.cells.elevation_m.size):
-        certificate = _judged(dsm, line, params, trend_step_m)
+        certificate = _judged(dsm, dsm if ground is None else ground, line, params, trend_step_m)
     return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))
 
 
-def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Certificate:
+def _judged(dsm: Dsm, ground: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Certificate:
     pyramid = cells_pyramid(dsm.cells)
     points_m = dsm.cells.layout.in_frame(line.points_m)
     start_m, end_m = points_m[:-1], points_m[1:]
@@ -91,9 +97,19 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
     worst = _worst_point(dsm, line, distance_m, share)
     trend_places, trend_s_m = places_along(points_m, trend_step_m)
     trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
-    needed_m, needed_from = _return_height(pyramid, dsm, line, params)
-    near_m, near_from = _near_return(pyramid, dsm, line, params)
-    home_obstacle, landing_obstacle = _columns(dsm, line, params)
+    at_home = ground_at_home(ground, line.home_xy_m, params)
+    stand = home_stand(at_home, line, params)
+    low_line = lowered(line, stand)
+    low_points_m = dsm.cells.layout.in_frame(low_line.points_m)
+    needed_m, needed_from = _return_height(pyramid, dsm, low_line, params)
+    near_m, near_from = _near_return(pyramid, dsm, low_line, params)
+    nearest_low = _nearest_low(pyramid, line, low_points_m, stand, distance_m)
+    stand = _with_distance(stand, nearest_low)
+    home_problem = home_reason(at_home, stand, nearest_low, params)
+    if home_problem is not None:
+        spare_m = float(distance_m.min()) - params.required_clearance_m
+        stand = replace(stand, better=better_home(ground, line.home_xy_m, params, spare_m=spare_m))
+        home_problem = home_reason(at_home, stand, nearest_low, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
     too_near = not float(distance_m.min()) >= params.required_clearance_m
@@ -101,9 +117,10 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
     found = [
         *unjudged_reasons(line),
         *line_reasons(legs, worst, params, worst_is_unknown=worst_is_unknown),
+        home_problem,
         return_reason(needed_m, needed_from, dsm, params),
         near_return_reason(near_m, near_from, needed_m, dsm, params),
-        *column_reasons(home_obstacle, landing_obstacle),
+        landing_reason(_landing_obstacle(ground, line, params)),
         height_reason(float(highest_m[highest_leg]), highest_leg, int(line.leg_item[highest_leg]), params),
         scale_reason(scale, SCALE_TOLERANCE),
     ]
@@ -116,13 +133,14 @@ def _judged(dsm: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: fl
         worst=worst,
         legs=legs,
         rtl_height_needed_m=needed_m,
-        home_column_clear=home_obstacle is None,
+        home_column_clear=at_home.obstacle is None,
         max_height_above_ground_m=float(highest_m.max()),
         reasons=reasons,
         trend_s_m=trend_s_m,
         trend_distance_m=trend_m,
         assumptions=_assumptions(dsm, line, params, scale),
         budget=params.budget,
+        home=stand,
     )
 
 
@@ -216,12 +234,25 @@ def _needed(
     return max(0.0, altitude_m - line.home_alt_dsm_m), places_m[place]
 
 
-def _columns(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[str | None, str | None]:
-    radius_m = params.vehicle_radius_m + params.position_error_m
-    home = column_obstacle(dsm, line.home_xy_m, radius_m)
+def _nearest_low(
+    pyramid: MaxPyramid, line: FlownLine, low_points_m: F64, stand: HomeStand, distance_m: F64
+) -> LegClearance:
+    """The leg that comes nearest when the vehicle stands as low as it may at home."""
+    low_m = distance_m
+    if stand.drop_m > 0.0:
+        low_m, _ = nearest_distances(pyramid, low_points_m[:-1], low_points_m[1:])
+    leg = int(np.argmin(low_m))
+    return LegClearance(leg, int(line.leg_item[leg]), float(low_m[leg]), math.nan, math.nan)
+
+
+def _with_distance(stand: HomeStand, nearest: LegClearance) -> HomeStand:
+    return replace(stand, min_distance_m=nearest.min_distance_m) if math.isfinite(stand.drop_m) else stand
+
+
+def _landing_obstacle(ground: Dsm, line: FlownLine, params: ClearanceParams) -> str | None:
     if line.landing_xy_m is None or line.landing_xy_m == line.home_xy_m:
-        return home, None
-    return home, column_obstacle(dsm, line.landing_xy_m, radius_m)
+        return None
+    return ground_at(ground, line.landing_xy_m, params).obstacle
 
 
 def _scale(dsm: Dsm, worst: WorstPoint) -> float:
@@ -254,9 +285,14 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
         "earth": "straight lines in the model's projected CRS",
         "following": _following_words(params),
         "home_alt_dsm_m": line.home_alt_dsm_m,
+        "home_height": (
+            "the lowest cell within that reach, or what the vehicle tells better; returns, and the line once more,"
+            " are judged from there"
+        ),
         "takeoff_and_landing": "vertical columns, left out of the distances",
         "column_rule": (
-            f"cells within vehicle radius + position error are known and rise at most {FREE_RISE_M} m"
+            f"cells within vehicle radius + position error + {params.set_down_m:g} m of home are known, and those"
+            f" within the vehicle's radius of each other differ by at most {FREE_STEP_M:g} m"
             f" or {FREE_SLOPE:.2f} of their distance"
         ),
         "return": (

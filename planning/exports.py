@@ -40,8 +40,8 @@ def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: 
         ),
         "certificate.json": lambda: json.dumps(
             {
-                **plan_summary(plan, source),
                 **certificate_json(plan.certificate),
+                **plan_summary(plan, source),
                 "seconds": seconds,
                 "created_utc": created_utc,
             },

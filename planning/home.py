@@ -1,18 +1,22 @@
-"""Home: where it lies on the surface model, and how heights are counted from it."""
+"""Home: where it lies on the surface model, where it is put for want of one, and how heights are counted from it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
+from pyproj import Geod
 
+from planning.certificate.home_stand import better_home, ground_at
+from planning.certificate.reasons import direction
 from planning.dsm import Dsm, is_amsl
 from planning.errors import DatumError, MissionError, PoiError
 from planning.mission_items import FRAME_AMSL, FRAME_RELATIVE, Heights
-from planning.model import FlownLine, Home, MissionParams, SampledPath, Unjudged
+from planning.model import BetterHome, ClearanceParams, Home, MissionParams, SampledPath
 
 START_TOLERANCE_M = 0.5
+HOME_DECIMALS = 9
+"""As files carry degrees: home's height is taken where they say it is."""
 
 
 def home_from_dsm(dsm: Dsm, lat_lon_deg: tuple[float, float]) -> Home:
@@ -30,17 +34,39 @@ def home_from_dsm(dsm: Dsm, lat_lon_deg: tuple[float, float]) -> Home:
     return Home(lat_deg, lon_deg, alt_m, dsm.vertical_datum)
 
 
-def home_on_ground(line: FlownLine, unfilled: Dsm) -> FlownLine:
-    """The line, named unjudged when home lies on a cell that was unknown before holes were filled.
+def default_home(
+    ground: Dsm, first_lat_lon_deg: tuple[float, float], params: ClearanceParams, *, most_drop_m: float
+) -> tuple[Home, str]:
+    """Home at the first point of interest, or at the nearest place where a vehicle can start; and why not at it.
 
-    A filled hole has the height of its rim's highest cell, maybe a wall's; the vehicle counts its altitudes
-    from the true ground there, and the whole flight would be lower by the difference.
+    A vehicle there stands at most ``most_drop_m`` lower than its cell, or as little as it may around. ``ground`` is
+    the model before its holes were filled. Raises ``PoiError`` where nothing around is known.
     """
-    if math.isfinite(float(unfilled.elevation_at(np.array([line.home_xy_m]))[0])):
-        return line
-    why = "Home lies in a hole of the surface model that was filled: its true height is unknown."
-    unjudged = Unjudged(why, "Put home on ground that the surface model knows.")
-    return replace(line, unjudged=(*line.unjudged, unjudged))
+    xy_m = ground.xy_from_lat_lon(np.array([first_lat_lon_deg]))[0]
+    here = ground_at(ground, (float(xy_m[0]), float(xy_m[1])), params)
+    drop_m = here.alt_dsm_m - here.low_dsm_m if here.obstacle is None else math.inf
+    if drop_m <= most_drop_m:
+        return home_from_dsm(ground, first_lat_lon_deg), ""
+    better = better_home(ground, (float(xy_m[0]), float(xy_m[1])), params, spare_m=most_drop_m)
+    if better is None or better.drop_m >= drop_m:
+        return home_from_dsm(ground, first_lat_lon_deg), ""
+    why = here.obstacle or f"a vehicle may stand {drop_m:.2f} m lower than the model's ground"
+    return home_there(ground, better), why
+
+
+def home_there(ground: Dsm, better: BetterHome) -> Home:
+    """Home at a place that was found to do."""
+    return home_from_dsm(ground, (round(better.lat_deg, HOME_DECIMALS), round(better.lon_deg, HOME_DECIMALS)))
+
+
+def moved_note(first_lat_lon_deg: tuple[float, float], home: Home, why: str) -> str:
+    """Says that home was put beside the first point, and why."""
+    lat_deg, lon_deg = first_lat_lon_deg
+    bearing_deg, _, away_m = Geod(ellps="WGS84").inv(lon_deg, lat_deg, home.lon_deg, home.lat_deg)
+    return (
+        f"Home was put {away_m:.1f} m to the {direction(bearing_deg % 360.0)} of the first point, at"
+        f" {home.lat_deg:.7f}, {home.lon_deg:.7f}: at the point itself {why}."
+    )
 
 
 def item_heights(home: Home, params: MissionParams, dsm: Dsm) -> Heights:

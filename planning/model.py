@@ -21,6 +21,9 @@ from planning.margins.following_error import Firmware, Way
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
+SET_DOWN_M = 0.1
+"""What is planned holds for a vehicle that stands up to so far beside the planned home."""
+
 
 @dataclass(frozen=True, slots=True)
 class Poi:
@@ -262,6 +265,10 @@ class ClearanceParams:
     max_height_above_ground_m: float | None = None
     budget: ClearanceBudget | None = None
     """What the required clearance is for; None: it is not known, and the line is taken to be flown exactly."""
+    set_down_m: float = SET_DOWN_M
+    """How far from home's place the vehicle may be set down, beside its position error."""
+    home_known_dsm_m: tuple[float, float] | None = None
+    """(lowest, highest) that the ground at home may be, where the vehicle tells it better than the surface model."""
 
     @property
     def following_m(self) -> float:
@@ -303,6 +310,41 @@ class Reason:
 
 
 @dataclass(frozen=True, slots=True)
+class BetterHome:
+    """The nearest place where home would do, or do better."""
+
+    lat_deg: float
+    lon_deg: float
+    away_m: float
+    bearing_deg: float
+    """From home, clockwise from north."""
+    drop_m: float
+    """How much lower than its own cell a vehicle there may stand."""
+    does: bool
+    """The line keeps its required clearance from there as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class HomeStand:
+    """How high a vehicle at home may really stand: all heights are counted from there."""
+
+    alt_dsm_m: float
+    """What the line counts on."""
+    low_dsm_m: float
+    """Lowest that it may be; NaN where the surface model does not know all the ground in reach."""
+    high_dsm_m: float
+    drop_m: float
+    """By how much the whole line may be lower than planned; NaN when not known."""
+    reach_m: float
+    """Vehicle radius + position error + how far beside home the vehicle may be set down."""
+    told_by: Literal["model", "vehicle"]
+    min_distance_m: float
+    """Smallest 3-D distance of the line lowered by ``drop_m``; NaN when that is not known."""
+    better: BetterHome | None = None
+    """Only where home does not do."""
+
+
+@dataclass(frozen=True, slots=True)
 class Certificate:
     """The proof of clearance of one flown line against one surface model."""
 
@@ -315,8 +357,10 @@ class Certificate:
     worst: WorstPoint
     legs: tuple[LegClearance, ...]
     rtl_height_needed_m: float
-    """Above home, smallest height from which every way home is clear; inf over unknown terrain."""
+    """Above home, smallest height from which every way home is clear wherever home may really stand; inf over
+    unknown terrain."""
     home_column_clear: bool
+    """A vehicle can stand at home and start from there."""
     max_height_above_ground_m: float
     reasons: tuple[Reason, ...]
     trend_s_m: F64
@@ -326,6 +370,7 @@ class Certificate:
     assumptions: dict[str, object] = field(default_factory=dict)
     budget: ClearanceBudget | None = None
     """What the required clearance is for, term by term."""
+    home: HomeStand | None = None
 
     @property
     def following_m(self) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.certificate.home_stand import DROP_M
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
@@ -20,10 +21,11 @@ from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
 from planning.holes import HoleReport, fill_holes
-from planning.home import home_from_dsm
+from planning.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.margins.words import uncovered_words
 from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import (
+    BetterHome,
     Certificate,
     FlownLine,
     Home,
@@ -37,7 +39,7 @@ from planning.model import (
 from planning.path import sampled_path
 from planning.poi import check_pois
 from planning.request import PlanRequest, check_request, check_size, effective_profile
-from planning.surface import safe_surface, safe_surface_at
+from planning.surface import FLOOR_SHARE, safe_surface, safe_surface_at
 from planning.survey_coverage import SurveyCoverage, survey_coverage
 from planning.timing import path_timing
 
@@ -48,7 +50,6 @@ PATH_STEP = "Laying the path"
 CERTIFICATE_STEP = "Proving the clearance"
 
 _READ_BACK_TOLERANCE_M = 0.001
-_HOME_DECIMALS = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +95,46 @@ def plan_mission(
     report(SURFACE_STEP, 0.0)
     filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
     check_pois(request.pois, filled)
-    # On the model as it came: a filled hole has its rim's height, and every altitude would be counted from it.
-    home = _home(dsm, request)
-    vertices_xy_m, vertex_poi = _vertices(filled, request)
+    job = _Job(request, dsm, filled, holes, report, assumptions or {})
+    home, why = _home(dsm, request)
+    plan = _planned(job, home, why)
+    better = _better_default(plan)
+    if better is None:
+        return plan
+    return _planned(job, home_there(dsm, better), why or "a vehicle may stand too low for the line's clearance")
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """What stays the same wherever home is put."""
+
+    request: PlanRequest
+    dsm: Dsm
+    """As it came: a filled hole has its rim's height, and every altitude would be counted from it."""
+    filled: Dsm
+    holes: HoleReport
+    report: Progress
+    assumptions: Mapping[str, object]
+
+
+def _planned(job: _Job, home: Home, why_moved: str) -> Plan:
+    """``why_moved``: what is wrong with home at the first point; empty when it is there or was given."""
+    request, filled, holes = job.request, job.filled, job.holes
+    first = request.pois[0]
+    home_notes = [moved_note((first.lat_deg, first.lon_deg), home, why_moved)] if why_moved else []
+    vertices_xy_m, vertex_poi = _vertices(filled, request, home)
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
     surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
-    report(PATH_STEP, 0.5)
+    job.report(PATH_STEP, 0.5)
     path = sampled_path(filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path)
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
-    built = _mission(filled, request, profile, path, home)
+    built = _mission(job, profile, path, home)
     built = replace(built, mission=replace(built.mission, planned_for=request.planned_for))
-    report(CERTIFICATE_STEP, 0.8)
+    job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
-    assumed = {**_assumptions(request, surfaces, holes), **(assumptions or {})}
-    certificate = certify(filled, line, request.clearance(), assumptions=assumed)
+    assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}
+    certificate = certify(filled, line, request.clearance(), ground=job.dsm, assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
     coverage = _coverage(filled, request, line)
     return Plan(
@@ -123,8 +149,16 @@ def plan_mission(
         predicted=predicted,
         coverage=coverage,
         feasibility=_feasibility(built.mission, profile, predicted, coverage),
-        warnings=(*built.warnings, *_warnings(request)),
+        warnings=(*home_notes, *built.warnings, *_warnings(request)),
     )
+
+
+def _better_default(plan: Plan) -> BetterHome | None:
+    """Where home does better than at the place that was chosen for want of one; None: nowhere, or it was given."""
+    stand = plan.certificate.home
+    if plan.request.home_lat_lon_deg is not None or stand is None or stand.better is None:
+        return None
+    return stand.better if stand.better.does else None
 
 
 def read_back(mission: Mission, dsm: Dsm) -> FlownLine:
@@ -164,30 +198,41 @@ def plan_trade(plan: Plan) -> list[Choice]:
     return decimation_trade(plan.path, plan.mission.home, params, profile, plan.dsm, request.pois)
 
 
-def _vertices(dsm: Dsm, request: PlanRequest) -> tuple[np.ndarray, tuple[int | None, ...]]:
+def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, tuple[int | None, ...]]:
     lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in request.pois])
     xy_m = dsm.xy_from_lat_lon(lat_lon)
     poi_index: tuple[int | None, ...] = tuple(range(len(xy_m)))
-    if request.home_lat_lon_deg is None:
-        return xy_m, poi_index
-    home_xy = dsm.xy_from_lat_lon(np.array([request.home_lat_lon_deg]))
+    home_xy = dsm.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))
     if np.hypot(*(home_xy[0] - xy_m[0])) < request.path.step_m:
         return xy_m, poi_index
     return np.vstack([home_xy, xy_m]), (None, *poi_index)
 
 
-def _home(dsm: Dsm, request: PlanRequest) -> Home:
-    """Rounded as files carry it, before its height is taken: at a cell's edge the rounding may change the cell."""
+def _home(dsm: Dsm, request: PlanRequest) -> tuple[Home, str]:
+    """Home, and why it is not at the first point, where it was chosen.
+
+    Rounded as files carry it, before its height is taken: at a cell's edge the rounding may change the cell.
+    """
     lat_deg, lon_deg = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
-    return home_from_dsm(dsm, (round(lat_deg, _HOME_DECIMALS), round(lon_deg, _HOME_DECIMALS)))
+    place = (round(lat_deg, HOME_DECIMALS), round(lon_deg, HOME_DECIMALS))
+    if request.home_lat_lon_deg is not None:
+        return home_from_dsm(dsm, place), ""
+    return default_home(dsm, place, request.clearance(), most_drop_m=_expected_spare_m(request))
+
+
+def _expected_spare_m(request: PlanRequest) -> float:
+    """Clearance beyond what is required, before there is a line: the surface's floor lies 0.8 H above the model."""
+    floor_m = FLOOR_SHARE * request.surface.height_m if request.surface.floor else 0.0
+    return max(DROP_M, floor_m - request.clearance().required_clearance_m)
 
 
 def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.ndarray:
     return np.array([0.0 if i is None else request.pois[i].loiter_s for i in vertex_poi])
 
 
-def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: SampledPath, home: Home) -> BuiltMission:
+def _mission(job: _Job, profile: VehicleProfile, path: SampledPath, home: Home) -> BuiltMission:
     """Items of the mission; a landing at home first learns how high the way back must be."""
+    request, dsm = job.request, job.filled
 
     def build(params: MissionParams, needed_m: float | None = None) -> BuiltMission:
         return build_mission(path, home, params, profile, dsm, request.pois, rtl_height_needed_m=needed_m)
@@ -195,7 +240,7 @@ def _mission(dsm: Dsm, request: PlanRequest, profile: VehicleProfile, path: Samp
     if request.mission.end == "rtl" or request.mission.land_transit_height_m is not None:
         return build(request.mission)
     scout = build(replace(request.mission, end="rtl")).mission
-    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance()).rtl_height_needed_m
+    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance(), ground=job.dsm).rtl_height_needed_m
     return build(request.mission, needed_m if math.isfinite(needed_m) else profile.rtl_height_m)
 
 

@@ -24,6 +24,7 @@ _CERTIFICATE_KEYS = (
     "worst",
     "rtl_height_needed_m",
     "home_column_clear",
+    "home",
     "max_height_above_ground_m",
     "reasons",
 )
@@ -55,6 +56,7 @@ def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
     return {
         **certificate_summary(plan.certificate),
         **feasibility_json(plan.feasibility),
+        "home": _home(plan),
         "rtl_height_m": request.profile.rtl_height_m,
         "length_m": float(plan.path.s_m[-1]),
         "duration_s": plan.predicted.total_s,
@@ -78,6 +80,15 @@ def survey_summary(coverage: SurveyCoverage) -> dict[str, Any]:
         key: finite_or_none(value) if isinstance(value, float) else value for key, value in asdict(coverage).items()
     }
     return {**figures, "faults": list(coverage.faults())}
+
+
+def _home(plan: Plan) -> dict[str, Any] | None:
+    """Where home is, whether it was chosen for want of one, and how high a vehicle may really stand there."""
+    home, stand = plan.mission.home, certificate_json(plan.certificate)["home"]
+    if stand is None:
+        return None
+    place = {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg, "chosen": plan.request.home_lat_lon_deg is None}
+    return place | stand
 
 
 def crs_name(dsm: Dsm) -> str:

@@ -6,7 +6,7 @@ edit asks about the same one.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -31,7 +31,7 @@ from server.library.terrains import load_terrain
 from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
 from server.scene.terrain_payload import Shading, build_terrain_scene
-from server.schemas import PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
+from server.schemas import BetterHomeDoc, HomeDoc, PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
 from server.stopwatch import READ_STEP, StepTimer
 
 PRODUCT_VERSION = __version__
@@ -140,11 +140,11 @@ def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, D
     else:
         source, columns = _terrain_with_seen(directory, document.seen_id)
     request = request_from_doc(document, source)
-    if document.seen_id is not None:
-        first = [(poi.lat_deg, poi.lon_deg) for poi in request.pois[:1]]
-        for home in [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else first:
-            _check_home(directory, document.seen_id, home)
+    if document.seen_id is not None and request.home_lat_lon_deg is not None:
+        _check_home(directory, document.seen_id, request.home_lat_lon_deg)
     plan = plan_mission(source, request, report=timer)
+    if document.seen_id is not None and request.home_lat_lon_deg is None:
+        _check_home(directory, document.seen_id, (plan.mission.home.lat_deg, plan.mission.home.lon_deg))
     return (plan if not columns else with_seen(plan, columns)), source, timer.seconds()
 
 
@@ -167,12 +167,28 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns:
         survey=None if summary["survey"] is None else SurveyResult(**summary["survey"]),
         gsd_min_cm=gsd_min,
         gsd_max_cm=gsd_max,
+        home=_home_doc(plan),
         home_alt_dsm_m=plan.line.home_alt_dsm_m,
         vertical_datum=source.vertical_datum,
         seen_columns=seen_columns,
         trade=[],
         chart=chart(plan),
         seconds=seconds,
+    )
+
+
+def _home_doc(plan: Plan) -> HomeDoc | None:
+    stand, home = plan.certificate.home, plan.mission.home
+    if stand is None:
+        return None
+    return HomeDoc(
+        lat_deg=home.lat_deg,
+        lon_deg=home.lon_deg,
+        chosen=plan.request.home_lat_lon_deg is None,
+        drop_m=finite_or_none(stand.drop_m),
+        reach_m=stand.reach_m,
+        min_distance_m=finite_or_none(stand.min_distance_m),
+        better=None if stand.better is None else BetterHomeDoc(**asdict(stand.better)),
     )
 
 

@@ -138,6 +138,8 @@ def _gps_raw(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
         "hdop": scaled(message.eph, 100, UINT16_MAX),
         "horizontal_accuracy_m": accuracy(message.h_acc),
         "vertical_accuracy_m": accuracy(message.v_acc),
+        "gnss_alt_amsl_m": scaled(message.alt, 1000, 0),
+        "gnss_alt_ellipsoid_m": scaled(message.alt_ellipsoid, 1000, 0),
     }
 
 

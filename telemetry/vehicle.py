@@ -71,6 +71,9 @@ class VehicleState:
     horizontal_accuracy_m: float | None = None
     """As the receiver claims (one sigma)."""
     vertical_accuracy_m: float | None = None
+    gnss_alt_amsl_m: float | None = None
+    """Of the antenna, as the receiver itself says: above its own geoid."""
+    gnss_alt_ellipsoid_m: float | None = None
 
     home_lat_deg: float | None = None
     home_lon_deg: float | None = None

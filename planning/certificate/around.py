@@ -17,7 +17,7 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class CellsAround:
-    """The (N,) cells of which a part lies within a radius of a place."""
+    """The (R, C) block of cells that holds every one of which a part lies within a radius of a place."""
 
     height_m: F64
     """NaN where unknown"""
@@ -30,15 +30,14 @@ class CellsAround:
 
 
 def cells_around(cells: Cells, xy_m: tuple[float, float], radius_m: float) -> CellsAround:
-    """Every cell within ``radius_m`` of a projected place."""
+    """The cells within ``radius_m`` of a projected place, and those between them."""
     x, y = cells.layout.in_frame(np.array([xy_m]))[0]
     place = np.array(xy_m)
     rows, columns = cells.layout.reach(place - radius_m, place + radius_m)
     height_m = cells.elevation_m[rows, columns].astype(np.float64)
     near_m, far_m = np.empty(height_m.shape), np.empty(height_m.shape)
     _distances(cells.layout.lattice, rows.start, columns.start, x, y, near_m, far_m)
-    reached = near_m <= radius_m
-    return CellsAround(height_m[reached], near_m[reached], far_m[reached], _holds(cells, place, radius_m))
+    return CellsAround(height_m, near_m, far_m, _holds(cells, place, radius_m))
 
 
 def _holds(cells: Cells, xy_m: F64, radius_m: float) -> bool:

@@ -6,11 +6,14 @@ import math
 
 import numpy as np
 
+from planning.certificate.home_ground import HomeGround
+from planning.certificate.home_search import FARTHEST_M
 from planning.dsm import Dsm
 from planning.margins.words import is_by_hand
-from planning.model import ClearanceParams, LegClearance, Reason, WorstPoint
+from planning.model import ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 
 RTK_ERROR_M = 0.1
+WINDS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 FILL_OR_AVOID = (
     "Keep the line farther inside the surface model and away from its holes, fill the holes,"
     " or use a model that covers the whole flight."
@@ -108,16 +111,61 @@ def near_return_reason(
     return Reason("return_near_home", text, mend)
 
 
-def column_reasons(home_obstacle: str | None, landing_obstacle: str | None) -> list[Reason]:
-    mend = "Choose another place on open ground, or lower the position error."
-    reasons = []
-    if home_obstacle is not None:
-        text = f"The column over home is not clear: {home_obstacle}."
-        reasons.append(Reason("home_column", text, mend))
-    if landing_obstacle is not None:
-        text = f"The column over the landing place is not clear: {landing_obstacle}."
-        reasons.append(Reason("landing_column", text, mend))
-    return reasons
+def home_reason(ground: HomeGround, stand: HomeStand, nearest: LegClearance, params: ClearanceParams) -> Reason | None:
+    """Why no vehicle can start at home, or what the flight would come to if it stood as low as it may there.
+
+    ``nearest`` is the leg that comes nearest to the surface then.
+    """
+    obstacle = ground.obstacle
+    if obstacle is not None and not ground.on_top:
+        return Reason("home_column", f"The column over home is not clear: {obstacle}.", _other_home(stand))
+    missing_m = _up(params.required_clearance_m - stand.min_distance_m, 0.01)
+    if obstacle is not None:
+        text = (
+            f"Home lies on top of something: {obstacle}. All heights are counted from there; a vehicle that stands"
+            f" beside it flies the whole mission up to {_up(stand.drop_m, 0.01):.2f} m lower, and comes within"
+            f" {_down(stand.min_distance_m, 0.01):.2f} m of the surface."
+        )
+        return Reason("home_on_top", text, _other_home(stand))
+    if stand.drop_m == 0.0 or not stand.min_distance_m < params.required_clearance_m:
+        return None
+    source = f"the surface model is so low within {stand.reach_m:.2f} m of it"
+    if stand.told_by == "vehicle":
+        source = "so low it may be by its own account"
+    text = (
+        f"A vehicle at home may stand {_up(stand.drop_m, 0.01):.2f} m lower than heights are counted from: {source}."
+        f" It then comes within {_down(stand.min_distance_m, 0.01):.2f} m of the surface on {_leg(nearest)}:"
+        f" {missing_m:.2f} m less than the required {params.required_clearance_m:.2f} m."
+    )
+    return Reason("home_drop", text, f"Raise H by at least {missing_m:.2f} m. {_other_home(stand)}")
+
+
+def _other_home(stand: HomeStand) -> str:
+    better = stand.better
+    if better is None:
+        return (
+            f"No place within {FARTHEST_M:.0f} m would do: choose a home on open ground, lower the position error"
+            " (RTK), or remove what does not stand there from the surface model."
+        )
+    place = f"{better.lat_deg:.7f}, {better.lon_deg:.7f}, {better.away_m:.1f} m to the {direction(better.bearing_deg)}"
+    if better.does:
+        return f"The nearest home that would do is {place}."
+    return (
+        f"The most level home within {FARTHEST_M:.0f} m is {place}; a vehicle may stand {better.drop_m:.2f} m lower"
+        " than the model's ground there."
+    )
+
+
+def direction(bearing_deg: float) -> str:
+    """One of the eight winds."""
+    return WINDS[round(bearing_deg / 45.0) % 8]
+
+
+def landing_reason(obstacle: str | None) -> Reason | None:
+    if obstacle is None:
+        return None
+    text = f"The column over the landing place is not clear: {obstacle}."
+    return Reason("landing_column", text, "Choose another place on open ground, or lower the position error.")
 
 
 def height_reason(highest_m: float, leg: int, item: int, params: ClearanceParams) -> Reason | None:

@@ -17,7 +17,6 @@ from planning.flown import flown_line
 from planning.formats.commands import has_position
 from planning.formats.detect import read_flight
 from planning.holes import HoleReport, fill_holes
-from planning.home import home_on_ground
 from planning.margins.words import uncovered_words
 from planning.model import Certificate, Mission, VehicleProfile
 from planning.plan import CERTIFICATE_STEP, hole_assumptions
@@ -87,7 +86,7 @@ def certify(
         timer(CERTIFICATE_STEP, None)
         filled, holes = fill_holes(source, max_area_m2=max_hole_m2)
         made |= {**hole_assumptions(holes, max_hole_m2), "vehicle_profile": vehicle.name}
-        certificate = certify_line(filled, home_on_ground(flown_line(flight, filled), source), params, assumptions=made)
+        certificate = certify_line(filled, flown_line(flight, filled), params, ground=source, assumptions=made)
         feasibility = _feasibility(flight, vehicle, filled, is_named=profile is not None)
         summary = _summary(certificate, flight, vehicle, source, holes)
         summary |= {**feasibility_json(feasibility), "seconds": timer.seconds()}

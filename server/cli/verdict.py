@@ -19,7 +19,7 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
         f"  height above it: at least {_least(summary['min_vertical_m'])}",
         f"  nearest {_place(summary['worst'])}",
         f"  way home: {_way_home(summary)}",
-        f"  column over home: {'clear' if summary['home_column_clear'] else 'NOT clear'}",
+        f"  home: {_home(summary)}",
     ]
     if (survey := summary.get("survey")) is not None:
         lines.append(f"  photos: {_photos(survey)}")
@@ -69,6 +69,16 @@ def _place(worst: dict[str, Any]) -> str:
         return f"on leg {worst['leg'] + 1}, beyond the range of the map grid"
     place = f"at {worst['lat_deg']:.7f}, {worst['lon_deg']:.7f}"
     return f"{place}, {worst['alt_rel_home_m']:.2f} m above home, on leg {worst['leg'] + 1}"
+
+
+def _home(summary: dict[str, Any]) -> str:
+    """Whether a vehicle can stand there, and what the line keeps if it stands as low as it may."""
+    clear = "clear" if summary["home_column_clear"] else "NOT clear"
+    home = summary["home"]
+    if home is None or home["drop_m"] is None:
+        return f"column {clear}, the ground around it is not all known"
+    low = f"as low as {metres_up(home['drop_m'])} below where heights are counted from"
+    return f"column {clear}; the vehicle may stand {low}: the line then keeps {_least(home['min_distance_m'])}"
 
 
 def _way_home(summary: dict[str, Any]) -> str:

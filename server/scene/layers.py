@@ -9,7 +9,7 @@ from typing import Any
 from server.scene.drawing import Drawing
 from server.scene.flight import flight_nodes
 from server.scene.ground import surface_nodes, terrain_nodes, unknown_nodes
-from server.scene.marks import place_nodes, poi_nodes
+from server.scene.marks import is_first_home, place_nodes, poi_nodes
 from server.scene.nodes import Node, Ready
 from server.scene.payload import OverlayScene, PlanScene, ReviewScene, TerrainScene
 from server.scene.review import review_nodes
@@ -69,5 +69,11 @@ def _sites_key(drawing: Drawing) -> Key:
 
 def _pois_key(drawing: Drawing) -> Key:
     document = drawing.state.document
-    home = document.home is None
-    return drawing.terrain, drawing.frame, document.pois, document.source, home, drawing.state.selection
+    return (
+        drawing.terrain,
+        drawing.frame,
+        document.pois,
+        document.source,
+        is_first_home(drawing),
+        drawing.state.selection,
+    )

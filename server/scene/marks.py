@@ -10,7 +10,6 @@ from server.scene.drawing import Drawing
 from server.scene.nodes import Node, Ready
 from server.scene.payload import F64
 from server.scene.shapes import BALL, CONE, Rgb, dots_node, label_node, line_node, many_node, shape_node
-from server.schemas import PlanDoc
 
 GIZMO = "/gizmo"
 """The selected point of interest hangs below it, so that browsers move it with the pointer themselves."""
@@ -18,6 +17,8 @@ _GIZMO_PX = 130.0
 _MOST_LABELS = 150
 _POINT_PX, _SELECTED_PX = 9.0, 11.0
 _EDGE_POINTS = 48
+_SAME_PLACE_M = 0.2
+"""Beyond it home has a mark of its own."""
 
 
 def poi_places(drawing: Drawing) -> tuple[list[str], F64]:
@@ -87,11 +88,18 @@ def _label(drawing: Drawing, poi_id: str) -> str:
     """Number in flying order and name; the number alone where the name repeats it."""
     number, poi = next((n, p) for n, p in enumerate(drawing.state.document.pois, 1) if p.id == poi_id)
     text = f"{number}  {poi.name}" if poi.name not in ("", str(number), f"P{number}") else poi.name or str(number)
-    return f"{text}  (home)" if number == 1 and _first_is_home(drawing.state.document) else text
+    return f"{text}  (home)" if number == 1 and is_first_home(drawing) else text
 
 
-def _first_is_home(document: PlanDoc) -> bool:
-    return document.home is None and document.source == "pois"
+def is_first_home(drawing: Drawing) -> bool:
+    """Whether the plan begins at its first point: a plan without a home may have put it beside."""
+    document, plan = drawing.state.document, drawing.state.plan
+    if document.home is not None or document.source != "pois":
+        return False
+    if plan is None or not document.pois:
+        return True
+    first = drawing.places_xy_m(document.pois[:1])[0]
+    return bool(np.hypot(*(first - plan.home_m[:2])) < _SAME_PLACE_M)
 
 
 def _above(drawing: Drawing) -> F64:
@@ -107,7 +115,7 @@ def _home(drawing: Drawing) -> list[Node]:
     home, plan = drawing.state.document.home, drawing.state.plan
     if home is not None:
         at = drawing.ground_of(home)
-    elif plan is not None and not _first_is_home(drawing.state.document):
+    elif plan is not None and not is_first_home(drawing):
         at = drawing.on_ground(plan.home_m[None, :2])[0]
     else:
         at = None

@@ -71,9 +71,11 @@ from server.schemas.plan import (
     SurveyDoc,
 )
 from server.schemas.results import (
+    BetterHomeDoc,
     Chart,
     Computation,
     ErrorDoc,
+    HomeDoc,
     PlanState,
     ReasonDoc,
     ResultDoc,
@@ -144,6 +146,7 @@ __all__ = [
     "AlertDoc",
     "AlertMessage",
     "AnsweredMessage",
+    "BetterHomeDoc",
     "CameraDoc",
     "Chart",
     "CheckRow",
@@ -161,6 +164,7 @@ __all__ = [
     "FrameView",
     "Histogram",
     "HoldCamera",
+    "HomeDoc",
     "HoverProfile",
     "HoverView",
     "Imported",

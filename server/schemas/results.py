@@ -119,6 +119,33 @@ class SurveyResult(Strict):
     faults: list[str]
 
 
+class BetterHomeDoc(Strict):
+    """The nearest place where home would do, or do better."""
+
+    lat_deg: float
+    lon_deg: float
+    away_m: float
+    bearing_deg: float
+    drop_m: float
+    does: bool
+    """The line keeps its required clearance from there as well."""
+
+
+class HomeDoc(Strict):
+    """How high a vehicle at home may really stand: all heights are counted from there."""
+
+    lat_deg: float
+    lon_deg: float
+    chosen: bool
+    """For want of one in the plan: the first point, or the nearest place to it that does."""
+    drop_m: float | None
+    """By how much the whole line may be lower than planned."""
+    reach_m: float
+    min_distance_m: float | None
+    """Smallest distance of the line lowered by ``drop_m``."""
+    better: BetterHomeDoc | None
+
+
 class ResultDoc(Strict):
     certified: bool
     feasible: bool | None = None
@@ -133,6 +160,7 @@ class ResultDoc(Strict):
     rtl_height_needed_m: float | None
     rtl_height_m: float
     home_column_clear: bool
+    home: HomeDoc | None = None
     max_height_above_ground_m: float | None
     reasons: list[ReasonDoc]
     warnings: list[str]

@@ -9,7 +9,7 @@ from typing import Literal
 from planning.dsm import is_amsl
 from planning.flown import AMSL_FRAMES
 from planning.formats.commands import has_position
-from planning.model import Certificate, ClearanceParams, Home, Mission, VehicleProfile
+from planning.model import Certificate, ClearanceParams, Home, HomeStand, Mission, VehicleProfile
 from telemetry.flight.parameters import ReturnSettings
 from telemetry.messages import OnboardMission
 from telemetry.vehicle import GnssFix, VehicleState
@@ -20,6 +20,7 @@ State = Literal["good", "accept", "bad", "unknown"]
 AWAY_M = 3.0
 """A vehicle this far from the planned home is said to stand elsewhere."""
 LARGEST_AMSL_OFFSET_M = 0.3
+WORTH_A_WORD_M = 0.05
 RETURN_REASONS = ("return_height", "return_near_home", "return_unknown")
 TYPICAL_ACCURACY_M: dict[GnssFix, float] = {"3d": 2.5, "dgps": 1.0, "rtk_float": 0.5, "rtk_fixed": 0.1}
 """Of receivers that do not say how accurate they are."""
@@ -63,7 +64,14 @@ def clearance_row(certificate: Certificate | None, problem: str, *, has_surface:
     return Row("clearance", "good", text)
 
 
-def home_row(away_m: float, shift_m: float | None, *, needs: bool, rereferenced_m: float | None) -> Row:
+def home_row(
+    away_m: float,
+    shift_m: float | None,
+    *,
+    needs: bool,
+    rereferenced_m: float | None,
+    stand: HomeStand | None = None,
+) -> Row:
     where = f"The vehicle stands {away_m:.1f} m from the plan's home" if away_m > AWAY_M else "The vehicle is at home"
     if shift_m is None:
         return Row("home", "unknown", f"{where}; the ground at the planned home is not known.", "Plan again from here.")
@@ -74,8 +82,17 @@ def home_row(away_m: float, shift_m: float | None, *, needs: bool, rereferenced_
     if rereferenced_m is not None:
         moved = "down" if rereferenced_m > 0 else "up"
         text = f"{where}; heights were moved {moved} by {abs(rereferenced_m):.2f} m to suit its ground."
-        return Row("home", "good", text)
-    return Row("home", "good", f"{where}; its ground is {abs(shift_m):.2f} m {direction} than planned.")
+        return Row("home", "good", text + _lower_end(stand))
+    text = f"{where}; its ground is {abs(shift_m):.2f} m {direction} than planned."
+    return Row("home", "good", text + _lower_end(stand))
+
+
+def _lower_end(stand: HomeStand | None) -> str:
+    """How low the vehicle may really stand: the clearance is judged from there."""
+    if stand is None or not stand.drop_m >= WORTH_A_WORD_M:
+        return ""
+    by_whom = "by its own RTK height" if stand.told_by == "vehicle" else f"by the model within {stand.reach_m:.2f} m"
+    return f" It may stand {_up(stand.drop_m)} m lower than that {by_whom}; the clearance is judged from there."
 
 
 def amsl_row(mission: Mission | None, state: VehicleState, home: Home) -> Row | None:

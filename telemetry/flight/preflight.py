@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.certificate.home_stand import ground_at
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.errors import MissionError
@@ -15,10 +16,10 @@ from planning.flight_time.predict import predict_duration
 from planning.flown import AMSL_FRAMES, flown_line
 from planning.formats.commands import has_position
 from planning.holes import fill_holes
-from planning.home import home_on_ground
 from planning.model import Certificate, ClearanceParams, Firmware, Home, Mission, VehicleProfile
 from telemetry.flight import checks
 from telemetry.flight.checks import Row
+from telemetry.flight.own_height import narrowed, own_ground
 from telemetry.flight.parameters import return_settings
 from telemetry.mavlink.items import mission_from_onboard
 from telemetry.messages import OnboardMission
@@ -85,13 +86,14 @@ def check(
     mission = _mission(onboard, firmware, home, dsm)
     surface = fill_holes(dsm, max_area_m2=SMALL_HOLE_M2)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
-    demanded = replace(clearance, rtl_height_m=height_m)
+    demanded = replace(clearance, rtl_height_m=height_m, set_down_m=0.0)
+    demanded = replace(demanded, home_known_dsm_m=_own_ground(home, state, dsm, demanded))
     certificate, problem = _certificate(mission, dsm, surface, demanded)
     needs = _needs_rereference(shift_m, mission)
     rows = (
         checks.mission_row(onboard),
         checks.clearance_row(certificate, problem, has_surface=dsm is not None),
-        _home_row(home, planned_home, state, dsm, shift_m, mission, needs, rereferenced_m),
+        _home_row(home, planned_home, state, dsm, shift_m, mission, needs, rereferenced_m, certificate),
         checks.gnss_row(state, profile),
         checks.return_row(certificate, settings, clearance),
         checks.battery_row(state, profile, _predicted_s(mission, profile, surface)),
@@ -113,6 +115,17 @@ def actual_home(state: VehicleState, dsm: Dsm | None) -> Home | None:
                 alt_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[lat_deg, lon_deg]])))[0])
             return Home(lat_deg, lon_deg, alt_m, dsm.vertical_datum if dsm is not None else None)
     return None
+
+
+def _own_ground(
+    home: Home | None, state: VehicleState, dsm: Dsm | None, demanded: ClearanceParams
+) -> tuple[float, float] | None:
+    """(lowest, highest) that the ground under the vehicle may be by its own account; None: the model tells more."""
+    if home is None or dsm is None or state.armed or not math.isfinite(home.alt_dsm_m):
+        return None
+    x_m, y_m = dsm.xy_from_lat_lon(np.array([[home.lat_deg, home.lon_deg]]))[0]
+    around = ground_at(dsm, (float(x_m), float(y_m)), demanded)
+    return narrowed(own_ground(state, dsm.vertical_datum), around)
 
 
 def _shift(home: Home | None, planned: Home | None, dsm: Dsm | None) -> float | None:
@@ -143,8 +156,7 @@ def _certificate(
     if mission is None or dsm is None or surface is None:
         return None, ""
     try:
-        line = home_on_ground(flown_line(mission, surface), dsm)
-        return certify(surface, line, demanded), ""
+        return certify(surface, flown_line(mission, surface), demanded, ground=dsm), ""
     except MissionError as error:
         return None, f"{error.what} {error.advice}".strip()
 
@@ -167,6 +179,7 @@ def _home_row(
     mission: Mission | None,
     needs: bool,
     rereferenced_m: float | None,
+    certificate: Certificate | None,
 ) -> Row:
     if dsm is None:
         return Row("home", "accept", "Without a surface model the ground at the vehicle's home cannot be checked.")
@@ -186,4 +199,5 @@ def _home_row(
     if planned is not None:
         places = np.array([[home.lat_deg, home.lon_deg], [planned.lat_deg, planned.lon_deg]])
         away_m = float(np.linalg.norm(np.diff(dsm.xy_from_lat_lon(places), axis=0)))
-    return checks.home_row(away_m, shift_m, needs=needs, rereferenced_m=rereferenced_m)
+    stand = None if certificate is None else certificate.home
+    return checks.home_row(away_m, shift_m, needs=needs, rereferenced_m=rereferenced_m, stand=stand)

@@ -14,7 +14,6 @@ from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.flown import AMSL_FRAMES, flown_line
 from planning.formats.commands import has_position
-from planning.home import home_on_ground
 from planning.mission_items import MIN_TAKEOFF_M
 from planning.model import Certificate, ClearanceParams, Mission, MissionItem
 from telemetry.errors import NotAllowedError
@@ -79,7 +78,7 @@ def plan_resumption(
     least_m = math.ceil(10 * max(needed_m + HEADROOM_M, own_m, MIN_TAKEOFF_M)) / 10
     height_m = least_m if climb_to_m is None else climb_to_m
     rest = _rest(mission, number, height_m)
-    certificate = certify(dsm, home_on_ground(flown_line(rest, dsm), dsm), clearance)
+    certificate = certify(dsm, flown_line(rest, dsm), clearance)
     if not certificate.certified:
         reason = certificate.reasons[0]
         what = f"It is not clear at {height_m:.1f} m above home: {reason.text}"

@@ -200,7 +200,7 @@ def test_near_home_the_return_height_is_not_reached():
 
 @pytest.mark.parametrize(
     ("row", "col", "rise_m", "clear"),
-    [(20, 20, 0.0, True), (20, 21, 0.9, True), (20, 21, 1.4, False), (21, 21, 1.4, True), (20, 22, 30.0, True)],
+    [(20, 20, 0.0, True), (20, 21, 0.9, True), (20, 21, 1.4, False), (21, 21, 1.4, False), (20, 22, 30.0, True)],
 )
 def test_the_home_column_takes_slopes_but_no_walls(row, col, rise_m, clear):
     cells = flat()

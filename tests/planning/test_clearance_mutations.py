@@ -82,8 +82,10 @@ def test_no_mutation_that_brute_force_finds_unsafe_is_certified():
     """Promise: hundreds of random changes to a certified mission, and none is wrongly certified."""
     cells = hilly()
     dsm, mission = dsm_of(cells), hugging_mission(hilly())
-    scout = certify(dsm, flown_line(mission, dsm), PARAMS)
-    tight = replace(PARAMS, required_clearance_m=scout.min_distance_m - 0.02)
+    home_m = float(cells[30, 12])
+    measured = replace(PARAMS, home_known_dsm_m=(home_m, home_m))
+    scout = certify(dsm, flown_line(mission, dsm), measured)
+    tight = replace(measured, required_clearance_m=scout.min_distance_m - 0.02)
     needed_m = certify(dsm, flown_line(mission, dsm), tight).rtl_height_needed_m
     params = replace(tight, rtl_height_m=needed_m + 0.02)
     assert certify(dsm, flown_line(mission, dsm), params).certified

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ from planning.model import ClearanceParams, Home, Mission, MissionItem
 from tests.reference import clearance as oracle
 
 DEFAULT_RTL_M = 15.0
-PARAMS = ClearanceParams(3.35, vehicle_radius_m=0.35, position_error_m=2.5, rtl_height_m=70.0)
+PARAMS = ClearanceParams(3.35, 0.35, 2.5, rtl_height_m=70.0, home_known_dsm_m=(803.15, 803.15))
+"""What the mission's authors asked for, and the height at which their vehicle stood."""
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +61,15 @@ def test_the_recorded_figures_come_out(without_holes, mission):
     assert 28 <= certificate.legs[certificate.worst.leg].item <= 31  # near sequence 30
 
 
+def test_where_its_vehicle_did_not_tell_nobody_knows_how_high_home_is(without_holes, mission):
+    line = flown_line(mission, without_holes)
+    refused = certify(without_holes, line, replace(PARAMS, home_known_dsm_m=None))
+    assert [reason.code for reason in refused.reasons] == ["home_on_top", "return_near_home"]
+    assert refused.home.drop_m == pytest.approx(6.62, abs=0.005)
+    assert refused.min_distance_m == pytest.approx(4.92, abs=0.005)
+    assert refused.home.min_distance_m == 0.0
+
+
 def test_holes_beside_the_route_are_not_certified(with_holes, mission):
     certificate = certify(with_holes, flown_line(mission, with_holes), PARAMS)
     assert not certificate.certified
@@ -84,10 +95,10 @@ def test_the_default_return_height_leads_into_the_trees(without_holes, mission):
     line = flown_line(mission, without_holes)
     needed_m = certify(without_holes, line, PARAMS).rtl_height_needed_m
     assert DEFAULT_RTL_M < needed_m < PARAMS.rtl_height_m
-    low = ClearanceParams(3.35, 0.35, 2.5, rtl_height_m=DEFAULT_RTL_M)
+    low = replace(PARAMS, rtl_height_m=DEFAULT_RTL_M)
     refused = certify(without_holes, line, low)
     assert [reason.code for reason in refused.reasons] == ["return_height"]
-    enough = ClearanceParams(3.35, 0.35, 2.5, rtl_height_m=needed_m)
+    enough = replace(PARAMS, rtl_height_m=needed_m)
     assert certify(without_holes, line, enough).certified
 
 

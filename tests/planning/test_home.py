@@ -9,9 +9,8 @@ from pyproj import CRS
 
 from planning.dsm import Dsm
 from planning.errors import DatumError, MissionError, PoiError
-from planning.holes import fill_holes
-from planning.home import home_from_dsm, home_on_ground, item_heights
-from planning.model import FlownLine, MissionParams
+from planning.home import home_from_dsm, item_heights
+from planning.model import MissionParams
 
 elevation = np.full((50, 50), 321.5, dtype=np.float32)
 elevation[:, 40:] = np.nan
@@ -54,16 +53,3 @@ def test_a_home_without_height_is_refused() -> None:
     home = replace(home_from_dsm(DSM, place(10)), alt_dsm_m=float("nan"))
     with pytest.raises(MissionError):
         item_heights(home, MissionParams(), DSM)
-
-
-def test_a_home_on_a_filled_hole_cannot_be_judged() -> None:
-    """The hole takes a wall's height, the vehicle counts from the ground at the wall's foot: 8 m lower."""
-    cells = np.zeros((50, 50), dtype=np.float32)
-    cells[20:30, 12:20] = 8.0
-    cells[25, 11] = np.nan
-    holed = DSM.with_elevation(cells)
-    filled, _ = fill_holes(holed)
-    assert filled.elevation_m[25, 11] == 8.0
-    line = FlownLine(np.zeros((2, 3)), np.zeros(1, np.int64), (500_011.5, 5_000_024.5), 8.0, 13.0, True)
-    assert "filled" in home_on_ground(line, holed).unjudged[0].why
-    assert home_on_ground(line, filled) is line

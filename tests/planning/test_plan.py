@@ -257,7 +257,7 @@ def test_trade_falls(plan: Plan) -> None:
     assert plan.built.waypoints in [choice.waypoints for choice in trade if choice.excess_height_m == 1.0]
 
 
-def test_home_in_a_filled_hole_is_refused() -> None:
+def test_home_in_a_filled_hole_is_refused_and_never_chosen() -> None:
     """The hole takes the roof's height; counted from there, the whole flight would be eight metres too low."""
     heights = np.zeros((200, 200), np.float32)
     heights[96:104, 104:112] = 8.0
@@ -265,5 +265,10 @@ def test_home_in_a_filled_hole_is_refused() -> None:
     dsm = Dsm(heights, Affine(0.5, 0, 5e5, 0, -0.5, 5e6), CRS.from_epsg(32633), None, "0" * 64)
     xy_m = np.array([(5e5 + 51.2, 5e6 - 50.2), (5e5 + 25, 5e6 - 70), (5e5 + 30, 5e6 - 30)])
     pois = tuple(Poi(float(lat), float(lon)) for lat, lon in dsm.lat_lon_from_xy(xy_m))
+    request = PlanRequest(pois, VehicleProfile("x", position_error_m=0.1))
     with pytest.raises(PoiError, match="home"):
-        plan_mission(dsm, PlanRequest(pois, VehicleProfile("x", position_error_m=0.1)))
+        plan_mission(dsm, replace(request, home_lat_lon_deg=(pois[0].lat_deg, pois[0].lon_deg)))
+    plan = plan_mission(dsm, request)
+    assert plan.certificate.certified
+    assert plan.line.home_alt_dsm_m == 0.0
+    assert "unknown cells within" in plan.warnings[0]

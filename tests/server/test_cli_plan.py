@@ -17,12 +17,14 @@ from tests.server.cli_runs import Run, hedgehop
 
 KEYS = {
     "certified", "min_distance_m", "min_vertical_m", "required_clearance_m", "worst", "rtl_height_needed_m",
-    "home_column_clear", "length_m", "duration_s", "samples", "items", "dsm", "seconds", "reasons",
+    "home_column_clear", "home", "length_m", "duration_s", "samples", "items", "dsm", "seconds", "reasons",
 }  # fmt: skip
 FILES = {
     "trajectory.csv", "trajectory.kml", "mission.waypoints", "mission.plan", "mission.geojson", "certificate.json",
     "report.html",
 }  # fmt: skip
+SURVEYED = ("--position-error-m", 0.1)
+"""The first point lies on the edge of bush: with standalone GNSS no place nearby would do for home."""
 
 
 @pytest.fixture(scope="module")
@@ -36,11 +38,11 @@ def hillside(shared_data: Path) -> tuple[Path, Path]:
 @pytest.fixture(scope="module")
 def flight(hillside: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
     out = tmp_path_factory.mktemp("flight")
-    return hedgehop("plan", *hillside, "--out", out, "--rtl-height-m", 70, "--json"), out
+    return hedgehop("plan", *hillside, "--out", out, "--rtl-height-m", 70, *SURVEYED, "--json"), out
 
 
 def planned(hillside: tuple[Path, Path], out: Path, *options: object) -> Run:
-    return hedgehop("plan", *hillside, "--out", out, "--rtl-height-m", 70, "--json", *options)
+    return hedgehop("plan", *hillside, "--out", out, "--rtl-height-m", 70, *SURVEYED, "--json", *options)
 
 
 def test_certified(flight: tuple[Run, Path]) -> None:
@@ -52,8 +54,8 @@ def test_certified(flight: tuple[Run, Path]) -> None:
     assert set(summary["seconds"]) == {"read", "surface", "path", "certificate", "total"}
     assert summary["certified"] is True
     assert summary["reasons"] == []
-    assert 5.0 <= summary["min_distance_m"] <= summary["min_vertical_m"] < 6.5
-    assert summary["required_clearance_m"] == pytest.approx(4.612, abs=0.001)
+    assert 4.9 <= summary["min_distance_m"] <= summary["min_vertical_m"] < 6.5
+    assert summary["required_clearance_m"] == pytest.approx(2.212, abs=0.001)
     budget = summary["clearance_budget"]
     assert sum(term["value_m"] for term in budget["terms"]) == pytest.approx(summary["required_clearance_m"])
     assert {term["code"] for term in budget["terms"]} == {
@@ -63,8 +65,8 @@ def test_certified(flight: tuple[Run, Path]) -> None:
     assert summary["tube"]["radius_m"] == 1.1
     assert summary["tube"]["min_distance_m"] == pytest.approx(summary["min_distance_m"] - 1.1)
     assert summary["rtl_height_needed_m"] == pytest.approx(50.5, abs=0.2)
-    assert summary["length_m"] == pytest.approx(208.4, abs=0.1)
-    assert summary["samples"] == pytest.approx(2087, abs=5)
+    assert summary["length_m"] == pytest.approx(212.0, abs=0.1)
+    assert summary["samples"] == pytest.approx(2124, abs=6)
     assert 75 < summary["duration_s"] < 300
 
 
@@ -150,12 +152,30 @@ def test_certify_takes_vehicle_and_demands_from_the_missions_own_file(
 
 
 def test_return_height_too_low(hillside: tuple[Path, Path], tmp_path: Path) -> None:
-    run = hedgehop("plan", *hillside, "--out", tmp_path, "--rtl-height-m", 30)
+    run = hedgehop("plan", *hillside, "--out", tmp_path, "--rtl-height-m", 30, *SURVEYED)
     assert run.code == 1
     assert run.out.startswith("NOT CERTIFIED, FEASIBLE\n")
     assert "way home: NOT clear at the return height of 30.00 m above home, needed 50." in run.out
     assert "Set the return height to at least 51 m (ArduPilot: RTL_ALT 5100 cm" in run.out
     assert json.loads((tmp_path / "certificate.json").read_text())["reasons"][0]["code"] == "return_height"
+
+
+def test_without_a_home_one_is_chosen_that_does_and_the_plan_says_so(
+    hillside: tuple[Path, Path], flight: tuple[Run, Path], tmp_path: Path
+) -> None:
+    run, _ = flight
+    assert run.json["warnings"][0].startswith("Home was put 3.6 m to the north-east of the first point")
+    assert "Home was put" in run.err
+    assert run.json["home"]["chosen"] is True
+    assert run.json["home"]["drop_m"] < 1.0
+    assert run.json["home"]["min_distance_m"] > 3.35
+    given = planned(hillside, tmp_path, "--home", "-37.12445073,175.68928790")
+    assert given.code == 1
+    assert given.json["home"]["chosen"] is False
+    assert given.json["reasons"][0]["code"] == "home_on_top"
+    better = given.json["home"]["better"]
+    moved = planned(hillside, tmp_path, "--home", f"{better['lat_deg']},{better['lon_deg']}")
+    assert moved.code == 0
 
 
 def test_files(flight: tuple[Run, Path]) -> None:
@@ -173,7 +193,7 @@ def test_mission_read_by_pymavlink(flight: tuple[Run, Path]) -> None:
     waypoints = [item for item in items[1:] if item.command == 16]
     assert {item.frame for item in waypoints} == {3}
     assert [item.param1 for item in waypoints if item.param1] == [2, 3, 2]
-    assert items[0].z == pytest.approx(803.15)
+    assert items[0].z == pytest.approx(803.07)
 
 
 def test_plan_file_is_what_qgroundcontrol_reads(flight: tuple[Run, Path]) -> None:
@@ -221,7 +241,7 @@ def test_report_runs_nothing_and_loads_nothing(flight: tuple[Run, Path]) -> None
 @pytest.mark.parametrize("name", ["mission.waypoints", "mission.plan"])
 def test_certify_agrees_with_plan(flight: tuple[Run, Path], hillside: tuple[Path, Path], name: str) -> None:
     run, out = flight
-    again = hedgehop("certify", hillside[0], out / name, "--rtl-height-m", 70, "--json")
+    again = hedgehop("certify", hillside[0], out / name, "--rtl-height-m", 70, *SURVEYED, "--json")
     assert again.code == 0
     for key in ("min_distance_m", "min_vertical_m", "rtl_height_needed_m", "required_clearance_m"):
         assert again.json[key] == pytest.approx(run.json[key], abs=0.01)
@@ -231,8 +251,13 @@ def test_certify_agrees_with_plan(flight: tuple[Run, Path], hillside: tuple[Path
 
 def test_certify_the_recorded_mission(hillside: tuple[Path, Path]) -> None:
     mission = hillside[1].parent / "mission.waypoints"
-    run = hedgehop("certify", hillside[0], mission, "--json", "--rtl-height-m", 70)
-    assert run.code == 0
+    run = hedgehop("certify", hillside[0], mission, "--json", "--rtl-height-m", 70, *SURVEYED)
+    assert run.code == 1
+    assert [reason["code"] for reason in run.json["reasons"]] == ["home_on_top"]
+    better = run.json["home"]["better"]
+    assert better["does"]
+    assert better["away_m"] < 5.0
+    assert f"{better['lat_deg']:.7f}, {better['lon_deg']:.7f}" in run.json["reasons"][0]["mend"]
     assert run.json["min_vertical_m"] == pytest.approx(4.93, abs=0.005)
     assert run.json["min_distance_m"] == pytest.approx(4.92, abs=0.005)
     assert hedgehop("certify", hillside[0], mission).code == 1
@@ -240,8 +265,10 @@ def test_certify_the_recorded_mission(hillside: tuple[Path, Path]) -> None:
 
 def test_certify_shows_every_leg(flight: tuple[Run, Path], hillside: tuple[Path, Path]) -> None:
     mission = flight[1] / "mission.plan"
-    text = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, "--verbose").out
-    legs = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, "--verbose", "--json").json["legs"]
+    text = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, *SURVEYED, "--verbose").out
+    legs = hedgehop("certify", hillside[0], mission, "--rtl-height-m", 70, *SURVEYED, "--verbose", "--json").json[
+        "legs"
+    ]
     assert text.startswith("CERTIFIED, FEASIBLE\n")
     assert len([line for line in text.splitlines() if line.startswith("  leg ")]) == len(legs) > 5
     assert min(leg["min_distance_m"] for leg in legs) == flight[0].json["min_distance_m"]
@@ -255,7 +282,7 @@ def test_certify_shows_every_leg(flight: tuple[Run, Path], hillside: tuple[Path,
         ("--profile", "x500-rtk-px4", "--end", "land"),
         ("--on-steep", "slow"),
         ("--paper",),
-        ("--home", "-37.1240,175.6890"),
+        ("--home", "-37.1244232,175.6893094"),
         ("--remove-spikes",),
     ],
 )

@@ -307,3 +307,77 @@ def test_the_rest_is_certified_as_the_certificate_would() -> None:
     rest = replace(PLANNED, items=(PLANNED.items[0], *PLANNED.items[2:]))
     whole = certify(PLAIN, flown_line(rest, PLAIN), CLEARANCE)
     assert found.certificate.min_distance_m == pytest.approx(whole.min_distance_m, abs=0.01)
+
+
+def dented(by_m: float, *, datum: str | None = None) -> Dsm:
+    """The plain with one cell beside the vehicle lower, or the vehicle's own cell higher."""
+    cells = np.array(PLAIN.elevation_m)
+    row, col = (int(v[0]) for v in PLAIN.fractional_cell(PLAIN.xy_from_lat_lon(degrees([HOME]))))
+    cells[row, col if by_m > 0 else col + 1] += by_m
+    return replace(PLAIN.with_elevation(cells), vertical_datum=datum)
+
+
+def test_a_vehicle_on_a_spike_of_the_model_may_not_start_and_hears_where_it_may() -> None:
+    found = checked(dsm=dented(5.0), planned_home=None)
+    clearance = row(found, "clearance")
+    assert clearance.state == "bad"
+    assert "Home lies on top of something: the surface falls 5.0 m" in clearance.text
+    assert "The nearest home that would do is" in clearance.mend
+    assert found.certificate is not None
+    assert found.certificate.home is not None
+    assert found.certificate.home.better is not None
+    there = found.certificate.home.better
+    moved = checked(state_at(lat_deg=there.lat_deg, lon_deg=there.lon_deg), dsm=dented(5.0))
+    assert row(moved, "clearance").state == "good"
+
+
+def test_the_clearance_is_judged_from_where_the_vehicle_may_really_stand() -> None:
+    found = checked(dsm=dented(-0.875), clearance=replace(CLEARANCE, required_clearance_m=11.5))
+    assert found.min_distance_m == pytest.approx(12.0, abs=0.01)
+    assert row(found, "clearance").state == "bad"
+    assert "0.88 m lower" in row(found, "clearance").text
+    assert "It may stand 0.88 m lower than that by the model within 1.35 m" in row(found, "home").text
+    assert row(checked(dsm=dented(-0.875)), "clearance").state == "good"
+
+
+@pytest.mark.parametrize(
+    ("changes", "drop_m", "told_by"),
+    [
+        ({}, 0.26, "vehicle"),
+        ({"gnss_fix": "3d"}, 0.875, "model"),
+        ({"vertical_accuracy_m": None}, 0.875, "model"),
+        ({"vertical_accuracy_m": 1.5}, 0.875, "model"),
+        ({"gnss_alt_ellipsoid_m": None}, 0.875, "model"),
+        ({"gnss_alt_ellipsoid_m": 104.0}, 0.875, "model"),
+    ],
+)
+def test_the_vehicles_own_height_counts_where_it_is_better(changes, drop_m, told_by) -> None:
+    surveyed = {"vertical_accuracy_m": 0.02, "gnss_alt_ellipsoid_m": 100.3, "gnss_alt_amsl_m": 53.0}
+    found = checked(state_at(**(surveyed | changes)), dsm=dented(-0.875, datum="WGS 84 ellipsoid"))
+    assert found.certificate is not None
+    assert found.certificate.home is not None
+    assert found.certificate.home.told_by == told_by
+    assert found.certificate.home.drop_m == pytest.approx(drop_m, abs=1e-4)
+
+
+def test_a_height_above_the_sea_knows_its_geoid_to_half_a_metre() -> None:
+    surveyed = state_at(vertical_accuracy_m=0.02, gnss_alt_amsl_m=100.3, gnss_alt_ellipsoid_m=147.0)
+    drops_m = []
+    for datum in ("EGM2008 height", None):
+        home = checked(surveyed, dsm=dented(-1.0, datum=datum)).certificate.home  # type: ignore[union-attr]
+        assert home is not None
+        drops_m.append(home.drop_m)
+    assert drops_m == pytest.approx([0.76, 1.0], abs=1e-4)
+
+
+def test_a_plan_that_is_clear_is_clear_at_the_vehicle_beside_it() -> None:
+    """Planned "clear", refused 0.03 m away: a wall just beyond the plan's reach was just within the check's."""
+    cells = np.array(PLAIN.elevation_m)
+    row_px, col_px = (int(v[0]) for v in PLAIN.fractional_cell(PLAIN.xy_from_lat_lon(degrees([HOME]))))
+    for wall in range(1, 6):
+        walled = cells.copy()
+        walled[row_px - 3 : row_px + 4, col_px + wall] += 3.2
+        dsm = PLAIN.with_elevation(walled)
+        planned = certify(dsm, flown_line(PLANNED, dsm), CLEARANCE)
+        if planned.home_column_clear:
+            assert row(checked(state_at((HOME[0] + 0.03, HOME[1])), dsm=dsm), "clearance").state == "good"

@@ -351,6 +351,8 @@ export interface VehicleState {
   hdop: number | null;
   horizontal_accuracy_m: number | null;
   vertical_accuracy_m: number | null;
+  gnss_alt_amsl_m: number | null;
+  gnss_alt_ellipsoid_m: number | null;
   home_lat_deg: number | null;
   home_lon_deg: number | null;
   home_alt_amsl_m: number | null;
@@ -604,6 +606,31 @@ export interface SurveyResult {
   faults: string[];
 }
 
+/** The nearest place where home would do, or do better. */
+export interface BetterHomeDoc {
+  lat_deg: number;
+  lon_deg: number;
+  away_m: number;
+  bearing_deg: number;
+  drop_m: number;
+  /** The line keeps its required clearance from there as well. */
+  does: boolean;
+}
+
+/** How high a vehicle at home may really stand: all heights are counted from there. */
+export interface HomeDoc {
+  lat_deg: number;
+  lon_deg: number;
+  /** For want of one in the plan: the first point, or the nearest place to it that does. */
+  chosen: boolean;
+  /** By how much the whole line may be lower than planned. */
+  drop_m: number | null;
+  reach_m: number;
+  /** Smallest distance of the line lowered by ``drop_m``. */
+  min_distance_m: number | null;
+  better: BetterHomeDoc | null;
+}
+
 export interface ResultDoc {
   certified: boolean;
   /** Whether the vehicle can fly it; null: not all is known. */
@@ -618,6 +645,7 @@ export interface ResultDoc {
   rtl_height_needed_m: number | null;
   rtl_height_m: number;
   home_column_clear: boolean;
+  home: HomeDoc | null;
   max_height_above_ground_m: number | null;
   reasons: ReasonDoc[];
   warnings: string[];

@@ -1,0 +1,161 @@
+"""The ground under a vehicle that starts or lands at a place: what it may stand on, and whether it gets up from there.
+
+The vehicle's centre is within ``centre_m`` of the place, its hull within ``radius_m`` of its centre. Every cell
+within both together must be known, and the lowest and highest of them bound the height it may really stand at.
+
+Two cells within the hull's reach of each other may differ by 1 m, which stands beside or under a vehicle's legs
+(grass, a bush, stones, a kerb), or by what a slope of 35 degrees rises from one's middle to the other's, whichever
+is more. Any plane slope up to 35 degrees passes at any resolution; a wall, a mast or a tree does not, wherever in
+reach it begins, nor does what stands on the ground and has the place on its top: a spike, a boulder, a crown, a
+roof's edge. The rule knows no cell of reference: a place passes whenever a larger ``centre_m`` around a place nearby
+does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from planning.certificate.around import CellsAround, cells_around
+from planning.dsm import Dsm
+
+FREE_STEP_M = 1.0
+FREE_SLOPE = math.tan(math.radians(35.0))
+_ROUNDING_M = 1e-4
+"""Of float32 elevations some kilometres high."""
+_TILES_PER_RADIUS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class HomeGround:
+    """The surface model around a place where a vehicle stands."""
+
+    alt_dsm_m: float
+    """Of the place's own cell; NaN where unknown or outside."""
+    low_dsm_m: float
+    """Of the cells in reach; NaN when one of them is unknown."""
+    high_dsm_m: float
+    reach_m: float
+    obstacle: str | None
+    """Why no vehicle can start there, in words that go on from "the column is not clear:"; None: it can."""
+    on_top: bool = False
+    """The obstacle is what the place itself lies on."""
+
+
+def home_ground(
+    dsm: Dsm, xy_m: tuple[float, float], *, centre_m: float, radius_m: float, stands_dsm_m: float | None = None
+) -> HomeGround:
+    """The ground around the projected place ``xy_m``.
+
+    ``stands_dsm_m``: the vehicle is known to stand so high, and only what rises above that is in its way.
+    """
+    reach_m, alt_m = centre_m + radius_m, float(dsm.elevation_at(np.array([xy_m]))[0])
+    around = cells_around(dsm.cells, xy_m, reach_m)
+    if not around.inside:
+        return _unknown(alt_m, reach_m, f"the surface model ends within {reach_m:.2f} m")
+    reached = around.height_m[around.near_m <= reach_m]
+    if not np.isfinite(reached).all():
+        return _unknown(alt_m, reach_m, f"the surface model has unknown cells within {reach_m:.2f} m")
+    if stands_dsm_m is None:
+        lattice = dsm.cells.layout.lattice
+        sides = (float(lattice.height_m), float(lattice.width_m))
+        steep = _steep(around.height_m, around.near_m, *sides, centre_m, reach_m, radius_m)
+        words, on_top = _obstacle(around, alt_m, *steep)
+    else:
+        words, on_top = _risen(around, reach_m, stands_dsm_m), False
+    return HomeGround(alt_m, float(reached.min()), float(reached.max()), reach_m, words, on_top)
+
+
+def _unknown(alt_m: float, reach_m: float, words: str) -> HomeGround:
+    return HomeGround(alt_m, math.nan, math.nan, reach_m, words)
+
+
+def _risen(around: CellsAround, reach_m: float, stands_dsm_m: float) -> str | None:
+    """The highest cell that rises too much above where the vehicle stands, in words."""
+    rise_m = around.height_m - stands_dsm_m
+    free_m = np.maximum(FREE_STEP_M, FREE_SLOPE * around.far_m) + _ROUNDING_M
+    blocked = (around.near_m <= reach_m) & (rise_m > free_m)
+    if not blocked.any():
+        return None
+    worst = np.unravel_index(np.argmax(np.where(blocked, rise_m, -np.inf)), rise_m.shape)
+    return f"the surface rises {rise_m[worst]:.1f} m at {around.near_m[worst]:.1f} m from it"
+
+
+def _obstacle(around: CellsAround, alt_m: float, high_m: float, low_m: float) -> tuple[str | None, bool]:
+    """What the steepest pairs' highest and lowest cells are to the place; None when there is no such pair."""
+    if high_m < low_m:
+        return None, False
+    rise_m, fall_m = high_m - alt_m, alt_m - low_m
+    on_top = fall_m > rise_m
+    away_m = float(around.near_m[around.height_m == (low_m if on_top else high_m)].min())
+    verb, step_m = ("falls", fall_m) if on_top else ("rises", rise_m)
+    return f"the surface {verb} {step_m:.1f} m at {away_m:.1f} m from it", on_top
+
+
+@njit(cache=True, nogil=True)
+def free_step_m(rows, cols, high, wide):
+    """By how much cells so many rows and columns apart, each ``high`` by ``wide`` metres, may differ."""
+    return max(FREE_STEP_M, FREE_SLOPE * math.hypot(rows * high, cols * wide)) + _ROUNDING_M
+
+
+@njit(cache=True, nogil=True)
+def gap_m(rows, cols, high, wide):
+    """Distance between the nearest points of cells so many rows and columns apart."""
+    return math.hypot(high * max(0, abs(rows) - 1), wide * max(0, abs(cols) - 1))
+
+
+@njit(cache=True, nogil=True)
+def _tile_ranges(cells, near_m, reach_m, tile):
+    """Highest and lowest reached cell of each square of ``tile`` cells; -inf and inf where none is reached."""
+    shape = ((cells.shape[0] + tile - 1) // tile, (cells.shape[1] + tile - 1) // tile)
+    high, low = np.full(shape, -np.inf), np.full(shape, np.inf)
+    for r in range(cells.shape[0]):
+        for c in range(cells.shape[1]):
+            if near_m[r, c] <= reach_m:
+                i, j = r // tile, c // tile
+                high[i, j] = max(high[i, j], cells[r, c])
+                low[i, j] = min(low[i, j], cells[r, c])
+    return high, low
+
+
+@njit(cache=True, nogil=True)
+def _steep_between(cells, near_m, tall, wide, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low):
+    """Highest and lowest cell of the pairs too steep, the first in tile (i, j), the second in (p, q)."""
+    for r in range(i * tile, min(cells.shape[0], (i + 1) * tile)):
+        for c in range(j * tile, min(cells.shape[1], (j + 1) * tile)):
+            if near_m[r, c] > centre_m:
+                continue
+            for s in range(p * tile, min(cells.shape[0], (p + 1) * tile)):
+                for d in range(q * tile, min(cells.shape[1], (q + 1) * tile)):
+                    if near_m[s, d] > reach_m or gap_m(s - r, d - c, tall, wide) > radius_m:
+                        continue
+                    a, b = np.float64(cells[r, c]), np.float64(cells[s, d])
+                    if abs(b - a) > free_step_m(s - r, d - c, tall, wide):
+                        high, low = max(high, max(a, b)), min(low, min(a, b))
+    return high, low
+
+
+@njit(cache=True, nogil=True)
+def _steep(cells, near_m, tall, wide, centre_m, reach_m, radius_m):
+    """Highest and lowest cell of all pairs that are too steep; (-inf, inf) when there is none.
+
+    Squares of cells that differ by no more than is free anyway are passed over together.
+    """
+    side = min(tall, wide)
+    tile = max(1, int(radius_m / side / _TILES_PER_RADIUS))
+    tile_high, tile_low = _tile_ranges(cells, near_m, reach_m, tile)
+    around = math.ceil(radius_m / (tile * side)) + 1
+    high, low = -np.inf, np.inf
+    for i in range(tile_high.shape[0]):
+        for j in range(tile_high.shape[1]):
+            for p in range(max(0, i - around), min(tile_high.shape[0], i + around + 1)):
+                for q in range(max(0, j - around), min(tile_high.shape[1], j + around + 1)):
+                    most = max(tile_high[p, q] - tile_low[i, j], tile_high[i, j] - tile_low[p, q])
+                    if most > FREE_STEP_M:
+                        high, low = _steep_between(
+                            cells, near_m, tall, wide, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low
+                        )
+    return high, low
