@@ -82,6 +82,21 @@ function Return({ result }: { result: ResultDoc }) {
         value={result.home_column_clear ? "clear" : "blocked"}
         level={result.home_column_clear ? "good" : "bad"}
       />
+      {result.home && (
+        <>
+          <Figure
+            label="Ground at home may be lower by"
+            value={result.home.drop_m === null ? "unknown" : metres(result.home.drop_m, 2)}
+            testid="home-drop"
+          />
+          <Figure
+            label="Smallest distance from there"
+            value={result.home.min_distance_m === null ? "unknown" : clearance(result.home.min_distance_m)}
+            level={clearanceLevel(result.home.min_distance_m, result.required_clearance_m)}
+            testid="home-distance"
+          />
+        </>
+      )}
       <Figure label="Highest above ground" value={metres(result.max_height_above_ground_m)} />
     </dl>
   );

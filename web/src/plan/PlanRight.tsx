@@ -1,7 +1,9 @@
 import { useEffect, useState } from "preact/hooks";
-import { age, count, duration, length, metres, number, percent } from "../format";
+import { age, count, duration, latLon, length, metres, number, percent } from "../format";
 import type { ResultDoc } from "../messages";
+import { edit } from "../store/plan";
 import { Bar } from "../ui/Bar";
+import { Button } from "../ui/Button";
 import { ErrorPanel } from "../ui/ErrorBox";
 import { Icon } from "../ui/Icon";
 import { computation, isFresh, known, result } from "../store/state";
@@ -47,8 +49,29 @@ function AgainstSeen({ result: { seen_columns: columns } }: { result: ResultDoc 
   );
 }
 
+const OF_HOME = new Set(["home_column", "home_on_top", "home_drop"]);
+
+/** One press puts home where it would do. */
+function MoveHome({ result: { home } }: { result: ResultDoc }) {
+  const better = home?.better;
+  if (!better) return null;
+  const { lat_deg, lon_deg } = better;
+  const move = () => edit("Move home", "points", (doc) => ({ ...doc, home: { lat_deg, lon_deg } }));
+  return (
+    <Button
+      icon="home"
+      testid="move-home"
+      title={`${metres(better.away_m)} away, at ${latLon(better)}`}
+      onClick={move}
+    >
+      {better.does ? "Move home there" : "Move home there anyway"}
+    </Button>
+  );
+}
+
 /** Why it is not certified, and why the vehicle cannot fly it. */
-function Reasons({ result: { reasons, feasibility } }: { result: ResultDoc }) {
+function Reasons({ result }: { result: ResultDoc }) {
+  const { reasons, feasibility } = result;
   const all = [...reasons, ...(feasibility ?? []).filter((row) => row.state === "fails")];
   if (all.length === 0) return null;
   return (
@@ -59,6 +82,7 @@ function Reasons({ result: { reasons, feasibility } }: { result: ResultDoc }) {
           <div>
             <p>{reason.text}</p>
             {reason.mend && <p class="mend">{reason.mend}</p>}
+            {OF_HOME.has(reason.code) && <MoveHome result={result} />}
           </div>
         </li>
       ))}

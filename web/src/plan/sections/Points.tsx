@@ -68,12 +68,12 @@ function Home({ plan }: { plan: PlanDoc }) {
       });
       return;
     }
-    edit(place ? "Move home" : "Home at the first point", "points", (doc) => ({ ...doc, home: place }));
+    edit(place ? "Move home" : "Home near the first point", "points", (doc) => ({ ...doc, home: place }));
   };
   return (
     <TextField
       label="Home"
-      placeholder="the first point"
+      placeholder="chosen near the first point"
       testid="home-input"
       value={plan.home ? latLon(plan.home) : ""}
       onChange={set}
