@@ -24,8 +24,8 @@ def stand(
     height, width = cells.shape
     if min(x, y, width * res - x, height * res - y) < reach_m:
         return False, math.nan, math.nan
-    every = list(np.ndindex(height, width))
-    near = {at: nearest_m(*at, x, y, res) for at in every}
+    every = list(itertools.product(range(height), range(width)))
+    near = {(r, c): nearest_m(r, c, x, y, res) for r, c in every}
     reached = [at for at in every if near[at] <= reach_m]
     heights = np.array([cells[at] for at in reached], dtype=np.float64)
     if np.isnan(heights).any():
