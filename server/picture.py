@@ -16,6 +16,7 @@ from server.errors import JobCancelledError, NotFoundError, reported
 from server.jobs import Lane
 from server.library import Library
 from server.scene.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
+from server.scene.plain import plain_scene
 from server.scene.shots import Target
 from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, Source, ViewDoc
 
@@ -55,7 +56,7 @@ class Picture:
         self._view, self._library, self._lane = view, library, lane
         self._changed, self._failed = changed, failed
         self.held: Callable[[], bool] = lambda: False
-        self._review: tuple[str, ReviewScene] | None = None
+        self._review: tuple[str | None, ReviewScene] | None = None
         self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
         self._wake = asyncio.Event()
         self._terrain: TerrainScene | None = None
@@ -80,8 +81,9 @@ class Picture:
         self._wake.set()
 
     def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
-        """A recorded flight over its surface model; without either, the plan again."""
-        self._review = None if terrain_id is None or scene is None else (terrain_id, scene)
+        """A recorded flight over its surface model, or on its own plain ground; without either, the plan again."""
+        drawable = scene is not None and (terrain_id is not None or scene.ground is not None)
+        self._review = (terrain_id, scene) if drawable and scene is not None else None
         self.again()
 
     def lay_over(self, overlay: OverlayScene | None, sites: tuple[SiteMark, ...]) -> None:
@@ -93,7 +95,7 @@ class Picture:
         self._wake.set()
 
     @property
-    def review(self) -> tuple[str, ReviewScene] | None:
+    def review(self) -> tuple[str | None, ReviewScene] | None:
         """What is drawn instead of the plan, and over which surface model."""
         if self._review is None or self._wish is None:
             return None
@@ -121,7 +123,10 @@ class Picture:
             photo_id = document.orthophoto_id if document.terrain_id == terrain_id else None
             document, selection = PlanDoc(terrain_id=terrain_id, orthophoto_id=photo_id), SelectionDoc()
             plan, stale = None, False
-        await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
+        if review is not None and review.ground is not None:
+            await self._load_plain(review.ground)
+        else:
+            await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
         overlay, sites = self._overlay
         if overlay is None or overlay.terrain_id != document.terrain_id:
             overlay, sites = None, ()
@@ -137,6 +142,11 @@ class Picture:
             sites=sites,
         )
         await self._view.show(self._dsm, state)
+
+    async def _load_plain(self, ground: Dsm) -> None:
+        if self._dsm is not ground:
+            self._terrain, self._dsm, self._terrain_key = await asyncio.to_thread(plain_scene, ground), ground, None
+            self._changed()
 
     async def _load_terrain(self, terrain_id: str | None, orthophoto_id: str | None, shading: str) -> None:
         """Another shading of the same model replaces the old one only when it is ready."""

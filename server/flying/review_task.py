@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planning.dsm import Dsm
 from planning.following.reference import Reference
 from planning.plan import plan_mission
 from server.documents import request_from_doc
@@ -19,6 +20,7 @@ from server.jobs import Progress
 from server.library.terrain_of import FlownOver
 from server.library.terrains import load_terrain
 from server.scene.payload import ReviewScene
+from server.scene.plain import plain_ground
 from server.schemas import PlanDoc, RecordingDoc, ReviewDoc
 
 if TYPE_CHECKING:
@@ -81,21 +83,27 @@ def review(
     doc = judged(log, recording, dsm=dsm, mission=mission, terrain_name="" if terrain is None else terrain.name)
     if plan is not None:
         doc = doc.model_copy(update={"plan_name": plan.name})
-    flight = None if dsm is None else placed_flight(log, dsm=dsm, mission=mission)
+    flight = placed_flight(log, dsm=dsm, mission=mission)
     reference = None if flight is None else flight.reference
+    ground = None
+    if flight is not None and dsm is None:
+        ground = plain_ground(flight.dsm, np.vstack([flight.track.xyz_m, _planned_m(reference)]))
     return Reviewed(
         doc=doc,
         start_utc_s=log.start_utc_s,
         terrain_id=None if terrain is None else terrain.terrain_id,
-        scene=None if flight is None else _scene(flight.track.xyz_m, reference),
-        reference=reference,
+        scene=None if flight is None else _scene(flight.track.xyz_m, reference, ground),
+        reference=None if dsm is None else reference,
     )
 
 
-def _scene(flown_m: np.ndarray, reference: Reference | None) -> ReviewScene:
+def _scene(flown_m: np.ndarray, reference: Reference | None, ground: Dsm | None) -> ReviewScene:
     every = max(1, len(flown_m) // _DRAWN_POINTS)
-    planned_m = np.zeros((0, 3)) if reference is None else reference.points_m
-    return ReviewScene(planned_m=planned_m, flown_m=flown_m[::every])
+    return ReviewScene(planned_m=_planned_m(reference), flown_m=flown_m[::every], ground=ground)
+
+
+def _planned_m(reference: Reference | None) -> np.ndarray:
+    return np.zeros((0, 3)) if reference is None else reference.points_m
 
 
 @lru_cache(maxsize=1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.dsm import Dsm
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
 
 F32 = NDArray[np.float32]
@@ -81,6 +82,8 @@ class ReviewScene:
     """(K, 3) waypoints of the plan that was flown; K is 0 when it is unknown"""
     flown_m: F64
     """(N, 3)"""
+    ground: Dsm | None = None
+    """Level ground to draw it on where its surface model is not known."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ import { result, terrain, view } from "../store/state";
 
 function HeightScale() {
   const { legend_min_m, legend_max_m } = view.value;
-  if (legend_min_m === null || legend_max_m === null) return null;
+  // Plain ground has no heights to tell.
+  if (legend_min_m === null || legend_max_m === null || legend_min_m === legend_max_m) return null;
   const datum = terrain.value?.vertical_datum ?? "the model's own datum";
   return (
     <span class="height-scale number" title={`Heights in ${datum}`}>
@@ -28,8 +29,7 @@ function Key({ kind, label, title }: { kind: string; label: string; title?: stri
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
 export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
-  // A recording over no known surface model is not drawn: the plan stays in view.
-  const isReview = Boolean(review.value?.terrain_name);
+  const isReview = review.value !== null;
   const planned = result.value !== null && !isReview;
   const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;

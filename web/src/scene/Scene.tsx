@@ -6,6 +6,7 @@ import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
 import { Toasts } from "../shell/Notices";
+import { review } from "../store/review";
 import { document_, pageId, selection, terrain, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
 import { MapKey } from "../traversability/MapKey";
@@ -47,7 +48,8 @@ function ToolHint() {
 /** The 3D view with what lies on it. */
 export function Scene() {
   const id = pageId.value;
-  const hasTerrain = terrain.value !== null;
+  // A recording brings a ground of its own where no surface model is known.
+  const hasTerrain = terrain.value !== null || review.value !== null;
   return (
     <section class={`scene tool-${selection.value.tool}`} aria-label="3D view" data-testid="scene">
       {id && (
