@@ -48,7 +48,10 @@ class GuidedScript:
         firmware: Firmware,
         target: tuple[int, int],
         own: tuple[int, int] = GROUND_STATION,
+        note: str = "",
     ) -> None:
+        """``note``: said of the flight while there is nothing else to say."""
+        self._note = note
         self._request, self._ends, self._orders = request, Ends(target, own), Orders(firmware, target)
         self._watch, self._punctuality = ModeWatch(), Punctuality()
         self.phase: Phase = "idle"
@@ -97,7 +100,7 @@ class GuidedScript:
             targets=self._request.targets[-1].item,
             since_utc_s=since_utc_s,
             broke_off_at=self.broke_off_at,
-            hint=self.hint or self._stands or late,
+            hint=self.hint or self._stands or late or (self._note if self.phase in ("taking_off", "flying") else ""),
         )
 
     def start(self, now_s: float) -> list[Action]:
@@ -249,8 +252,9 @@ class GuidedScript:
             home_alt_amsl_m=self._home_alt_amsl_m,
             heading_rad=target.heading_rad,
         )
-        speed = [] if target.speed_m_s == self._speed_m_s else self._set_speed(target.speed_m_s, now_s)
-        return [*speed, *self._go_to(place, now_s)]
+        # ArduPilot forgets the speed with the first place after a take-off or a hold: the place comes first.
+        actions = self._go_to(place, now_s)
+        return actions if target.speed_m_s == self._speed_m_s else [*actions, *self._set_speed(target.speed_m_s, now_s)]
 
     def _set_speed(self, speed_m_s: float, now_s: float) -> list[Action]:
         self._speed_m_s = speed_m_s

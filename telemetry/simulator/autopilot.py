@@ -130,6 +130,15 @@ class Autopilot(Pilot):
             self.face(goal_neu, at_least_m=0.3)
         return "accepted"
 
+    def fly_at(self, v_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
+        """Only in GUIDED and in the air."""
+        if not isinstance(self.mode, Guided) or not self.flying:
+            return "failed"
+        self.mode.fly_at(self, v_neu)
+        if heading_rad is not None:
+            self.turn_to(heading_rad)
+        return "accepted"
+
     def set_current(self, seq: int) -> Answer:
         if not 0 <= seq < len(self.mission.steps):
             return "denied"

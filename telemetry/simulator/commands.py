@@ -22,7 +22,11 @@ WITHOUT_MOTION = {181, 183, 195, 197, 201, 203, 204, 205, 206, 211, 530, 531, 53
 """Cameras, gimbals, servos and regions of interest: accepted, and nothing moves."""
 FARTHEST_M = 100_000.0
 """A target beyond this is a mistake."""
-NO_POSITION, NO_YAW = 0b111, 1 << 10
+FASTEST_M_S = 100.0
+"""A velocity beyond this, too."""
+NO_POSITION, NO_VELOCITY, NO_YAW = 0b111, 0b111 << 3, 1 << 10
+OF_THE_BODY = (8, 9)
+"""MAV_FRAME_BODY_NED and MAV_FRAME_BODY_OFFSET_NED"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +91,27 @@ class Commands:
         return self._pilot.set_mode(name)
 
     def position_target(self, message: Any) -> None:
-        """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED; only places are flown to, velocities are left alone."""
+        """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED: a place is flown to; without one, a velocity is flown."""
+        heading_rad = None if message.type_mask & NO_YAW else _heading(message.yaw)
         if message.type_mask & NO_POSITION:
+            if not message.type_mask & NO_VELOCITY and (velocity := self._velocity(message)):
+                self._pilot.fly_at(velocity, heading_rad=heading_rad)
             return
         if message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
             goal = self._place(message.lat_int / 1e7, message.lon_int / 1e7, message.alt, message.coordinate_frame)
         else:
             goal = self._local(message)
         if goal:
-            self._pilot.go_to(goal, heading_rad=None if message.type_mask & NO_YAW else _heading(message.yaw))
+            self._pilot.go_to(goal, heading_rad=heading_rad)
+
+    def _velocity(self, message: Any) -> Vec3 | None:
+        """North, east, up; frames of the body turn with the vehicle's nose."""
+        vx, vy, vz = message.vx, message.vy, message.vz
+        if not all(abs(value) < FASTEST_M_S for value in (vx, vy, vz)):
+            return None
+        turn = self._pilot.heading_goal_rad if message.coordinate_frame in OF_THE_BODY else 0.0
+        c, s = math.cos(turn), math.sin(turn)
+        return vx * c - vy * s, vx * s + vy * c, -vz
 
     def _arm(self, order: Order) -> Answer:
         force = whole(order.params[1]) == FORCE

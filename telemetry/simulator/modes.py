@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 from planning.flight_time.scurve import Axes
 from telemetry.simulator.frame import Vec3
-from telemetry.simulator.legs import Motion, Track
+from telemetry.simulator.legs import REST, Motion, Track
 from telemetry.simulator.pilot import Pilot
 from telemetry.simulator.shaping import BRAKING_SHARE, Shaped, approach_speed, stopping_point
 
@@ -20,6 +20,8 @@ TAKEN_OFF_M = 0.02
 PAUSE_SHARE = 0.6
 """Deceleration of a pause over the highest acceleration."""
 SLOWEST_PAUSED_M_S = 0.5
+STRAIGHT_LEGS = 64
+"""GUID_OPTIONS: places of GUIDED are flown to as waypoints are, in a straight line."""
 
 
 class Mode(Protocol):
@@ -92,22 +94,54 @@ class Guided:
         self._stopping = Hold(self.name, armable=True)
         self._stopping.enter(pilot)
         self._place: Vec3 | None = None
+        self._path: Path | None = None
+        self._velocity_neu: Vec3 | None = None
+        self._told_s = 0.0
+        self._is_sent = False
+        """From place to place: neither taking off, nor stopping, nor at a velocity."""
         self.goal: Vec3 | None = None
         return None
 
     def take_off(self, pilot: Pilot, up_m: float) -> None:
         """``up_m``: height in the frame."""
         self.stage = "takeoff"
+        self._path, self._velocity_neu, self._is_sent = None, None, False
         self.goal = self._place = (pilot.p_neu[0], pilot.p_neu[1], up_m)
 
     def go_to(self, pilot: Pilot, goal_neu: Vec3) -> None:
+        """The first place after a take-off or a stop is gone to at the vehicle's own speed, whatever was set before:
+        recorded."""
+        if not self._is_sent:
+            pilot.speed_m_s, self._is_sent = None, True
+        self._shaped = shaped_from(pilot)
+        self._velocity_neu, self._path = None, self._leg(pilot, goal_neu)
         self.goal = self._place = goal_neu
         self.stage = "flight"
+
+    def fly_at(self, pilot: Pilot, v_neu: Vec3) -> None:
+        """At this velocity, until it has not been told again for too long."""
+        self._shaped = shaped_from(pilot)
+        self._velocity_neu, self._told_s, self._is_sent = v_neu, pilot.now_s, False
+        self.goal = self._place = self._path = None
+        self.stage = "flight"
+
+    def _leg(self, pilot: Pilot, goal_neu: Vec3) -> Path | None:
+        if not int(pilot.parameters["GUID_OPTIONS"]) & STRAIGHT_LEGS:
+            return None
+        path = Path(pilot)
+        path.go_on(goal_neu, pilot.axes(pilot.speed_m_s), None)
+        return path
 
     def update(self, pilot: Pilot, dt_s: float) -> Motion:
         if not pilot.flying:
             self._shaped = Shaped(pilot.p_neu)
             return pilot.target
+        if self._velocity_neu is not None:
+            told = pilot.now_s - self._told_s <= pilot.parameters["GUID_TIMEOUT"]
+            self._shaped.moving(self._velocity_neu if told else REST, pilot.axes(), dt_s)
+            return self._shaped.motion
+        if self._path is not None:
+            return self._path.update(pilot, dt_s)
         if self._place is None:
             motion = self._stopping.update(pilot, dt_s)
             self._shaped = shaped_from(pilot)

@@ -47,6 +47,8 @@ SPECS: dict[str, Spec] = {
     "FS_GCS_ENABLE": Spec("int8", 0, 0, 7),
     "FS_GCS_TIMEOUT": Spec("float", 5, 2, 120),
     "FS_THR_ENABLE": Spec("int8", 1),
+    "GUID_OPTIONS": Spec("int32", 0, 0),
+    "GUID_TIMEOUT": Spec("float", 3, 0.1, 5),
     "LAND_ALT_LOW": Spec("float", 1000, 100, 10000),
     "LAND_SPEED": Spec("float", 50, 30, 200),
     "LAND_SPEED_HIGH": Spec("float", 0, 0, 500),

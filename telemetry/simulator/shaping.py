@@ -56,6 +56,11 @@ class Shaped:
         up_m_s = self._vertical_speed(goal_neu[2] - self.p_neu[2], axes)
         self._step(self._flat_velocity(goal_neu, axes), up_m_s, axes, dt_s)
 
+    def moving(self, v_neu: Vec3, axes: Axes, dt_s: float) -> None:
+        """One step at this velocity, or as fast as the limits allow."""
+        north, east = _limited(v_neu[0], v_neu[1], axes.speed_m_s)
+        self._step((north, east), max(-axes.descent_m_s, min(axes.climb_m_s, v_neu[2])), axes, dt_s)
+
     def sinking(self, over_neu: Vec3, speed_m_s: float, axes: Axes, dt_s: float) -> None:
         """One step down at this speed over a place, whatever its height."""
         self._step(self._flat_velocity(over_neu, axes), -speed_m_s, axes, dt_s)

@@ -227,6 +227,27 @@ def test_the_navigation_script_is_paused_resumed_and_flown_to_its_end() -> None:
     run(whole)
 
 
+def test_a_vehicle_that_flies_curves_in_guided_is_told_with_the_setting_that_mends_it() -> None:
+    async def whole(options: float) -> str:
+        async with simulated(parameters=(*QUICKLY_DOWN, ("GUID_OPTIONS", options))) as (bench, _):
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await start(bench, StartGuided(ME, TARGETS, 10.0))
+            await phase(bench, "taking_off")
+            hint = bench.flight.hint
+            await bench.link.handle(ReturnHome(ME))
+            return hint
+
+    for options, words in ((0.0, "Set GUID_OPTIONS 64"), (1.0, "Set GUID_OPTIONS 65"), (64.0, "")):
+        hints: list[str] = []
+
+        async def one(options: float = options, hints: list[str] = hints) -> None:
+            hints.append(await whole(options))
+
+        run(one)
+        assert words in hints[0]
+        assert bool(hints[0]) is bool(words)
+
+
 def test_the_way_home_ends_the_script_and_tells_where() -> None:
     async def whole() -> None:
         async with simulated() as (bench, _):

@@ -154,12 +154,55 @@ def test_holding_stops_where_it_comes_to_rest(mode: int) -> None:
 def test_a_commanded_heading_and_speed_are_kept() -> None:
     bench = hovering()
     assert bench.command(YAW, 225, 0, 0, 0) == ACCEPTED
+    go_to(bench, LAT + 10000, LON, 10.0)
     assert bench.command(SPEED, 1, 2.0) == ACCEPTED
     assert bench.command(SPEED, 1, -1) == FAILED
-    go_to(bench, LAT + 10000, LON, 10.0)
+    go_to(bench, LAT + 12000, LON, 10.0)
     bench.advance(12)
     assert math.degrees(bench.vehicle.truth.heading_rad) == pytest.approx(225, abs=2)
     assert bench.vehicle.truth.v_neu[0] == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_speed_that_is_commanded_before_the_first_place_is_forgotten_with_it() -> None:
+    bench = hovering()
+    assert bench.command(SPEED, 1, 2.0) == ACCEPTED
+    go_to(bench, LAT + 10000, LON, 10.0)
+    bench.advance(8)
+    assert bench.vehicle.truth.v_neu[0] > 5.0
+
+
+def velocity(bench: Bench, frame: int, north: float, east: float, down: float, *, mask: int = 0b110111000111) -> None:
+    bench.send(
+        wire.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, frame, mask, 0, 0, 0, north, east, down, 0, 0, 0, math.pi / 2, 0
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("frame", "mask", "flown"),
+    [
+        (wire.MAV_FRAME_LOCAL_NED, 0b110111000111, (1.0, -0.5, 0.3)),
+        (wire.MAV_FRAME_LOCAL_OFFSET_NED, 0b100111000111, (1.0, -0.5, 0.3)),
+        (wire.MAV_FRAME_BODY_OFFSET_NED, 0b110111000111, (0.5, 1.0, 0.3)),
+        (wire.MAV_FRAME_LOCAL_NED, 0b110111111111, (0.0, 0.0, 0.0)),
+    ],
+)
+def test_guided_flies_velocities_until_they_are_not_told_any_more(
+    frame: int, mask: int, flown: tuple[float, float, float]
+) -> None:
+    bench = hovering()
+    bench.command(YAW, 90, 0, 0, 0)
+    bench.advance(5)
+    for _ in range(8):
+        velocity(bench, frame, 1.0, -0.5, -0.3, mask=mask)
+        bench.advance(0.5)
+    assert bench.vehicle.truth.v_neu == pytest.approx(flown, abs=0.08)
+    bench.advance(7)  # GUID_TIMEOUT is 3 s
+    assert math.hypot(*bench.vehicle.truth.v_neu) < 0.1
+    go_to(bench, LAT, LON, 15.0)
+    bench.advance(15)
+    assert bench.vehicle.truth.p_neu[2] == pytest.approx(15.0, abs=0.1)
 
 
 def test_landing_disarms() -> None:

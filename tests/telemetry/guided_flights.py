@@ -1,0 +1,99 @@
+"""The navigation script against the simulated vehicle, without sockets: where the vehicle was on every leg."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planning.formats.wpl import read_wpl
+from planning.model import F64
+from telemetry.flight.guided import GuidedScript
+from telemetry.flight.targets import guided_plan
+from telemetry.mavlink.actions import Action, Send
+from telemetry.reduce import reduce
+from telemetry.requests import Operator, StartGuided
+from telemetry.simulator.frame import Frame
+from telemetry.simulator.parameters import Parameters
+from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.vehicle import VehicleState
+from tests.telemetry.simulator_bench import SLICE_S, Bench
+
+STREAMS_HZ = {33: 20, 245: 4, 87: 2}
+"""GLOBAL_POSITION_INT, EXTENDED_SYS_STATE and POSITION_TARGET_GLOBAL_INT, as the link asks for them."""
+
+
+class ScriptedFlight:
+    """``track``: (N, 4) time, north, east, up while targets were flown; ``line``: (K, 3) of the targets."""
+
+    def __init__(self, mission: Path, **parameters: float) -> None:
+        plan = guided_plan(replace(read_wpl(mission.read_bytes()), firmware="ardupilot"))
+        home = read_wpl(mission.read_bytes()).home
+        self.frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
+        self.bench = Bench(
+            SimulatedVehicle(
+                self.frame, gnss="perfect", boot_s=0.5, parameters=Parameters(BATT_CAPACITY=60000, **parameters)
+            )
+        )
+        self.line = np.array(
+            [(*self.frame.neu_from_geodetic(t.lat_deg, t.lon_deg, 0)[:2], t.alt_rel_home_m) for t in plan.targets]
+        )
+        self._state: VehicleState | None = None
+        self._heard = 0
+        self.bench.until(lambda: self.bench.vehicle.autopilot.position_ok)
+        for message_id, rate_hz in STREAMS_HZ.items():
+            self.bench.stream(message_id, rate_hz)
+        self._listen()
+        while self._state is None or self._state.alt_amsl_m is None:
+            self._advance()
+        asked = StartGuided(Operator("Ann", 1), plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
+        self.script = GuidedScript(asked, self._state, firmware="ardupilot", target=(1, 1))
+        self.track = self._fly()
+
+    def _fly(self) -> F64:
+        track = []
+        self._perform(self.script.start(self.bench.now_s))
+        while self.script.phase in ("arming", "taking_off", "flying"):
+            self._advance()
+            self._perform(self.script.on_tick(self.bench.now_s))
+            if self.script.phase == "flying":
+                track.append((self.bench.now_s, *self.bench.vehicle.truth.p_neu))
+        assert self.script.phase == "returning", self.script.status()
+        return np.array(track)
+
+    def _advance(self) -> None:
+        self.bench.advance(SLICE_S)
+        self._listen()
+
+    def _listen(self) -> None:
+        heard, self._heard = self.bench.heard[self._heard :], len(self.bench.heard)
+        for one in heard:
+            self._hear(one.message)
+
+    def _hear(self, message: Any) -> None:
+        now_s, before = self.bench.now_s, self._state
+        self._state = reduce(before, message, t_mono_s=now_s, t_utc_s=now_s)
+        if not hasattr(self, "script"):
+            return
+        self._perform(self.script.on_message(message, now_s))
+        if self._state is not None and self._state is not before:
+            self._perform(self.script.on_state(self._state, now_s))
+
+    def _perform(self, actions: list[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Send):
+                self.bench.send(action.message)  # what it answers is heard with the rest
+
+
+def off_line(points: F64, line: F64) -> tuple[F64, F64]:
+    """Beside and above a line (K, 3) of each point (N, 3), at the leg that is nearest in space."""
+    start, step = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((step[:, :2] ** 2).sum(axis=1), 1e-12)
+    along = np.einsum("nkd,kd->nk", points[:, None, :2] - start[None, :, :2], step[:, :2]) / square
+    foot = start[None] + np.clip(along, 0, 1)[..., None] * step[None]
+    best = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
+    rows = np.arange(len(points))
+    away = points - foot[rows, best]
+    return np.linalg.norm(away[:, :2], axis=1), away[:, 2]
