@@ -38,7 +38,7 @@ CARROT_S, LEAST_CARROT_M = 3.0, 4.0
 """So far along the line ahead lies what it steers for."""
 BACK_M, BACK_S = 0.7, 0.6
 """So near to the line and for so long with nothing in the way, it is handed back to it."""
-PASSED_M = 0.7
+PASSED_M, SAME_M_S = 0.7, 1e-6
 STANDS_M_S, STUCK_S, GIVEN_UP_S = 0.2, 4.0, 20.0
 SPEED_STEP_M_S = 0.25
 """Speeds are ordered in steps: every order waits for its answer."""
@@ -110,8 +110,11 @@ class Aside:
         if length_m < PASSED_M:
             return False
         scene = self._scene(state, targets[0].speed_m_s, now_s)
-        found = self._steered(scene, towards * (targets[0].speed_m_s / length_m), _velocity(state))
-        return found is not None and bool(found.evades) and math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S
+        wanted = towards * (targets[0].speed_m_s / length_m)
+        found = self._steered(scene, wanted, _velocity(state))
+        if found is None or _is_wanted(found, wanted):
+            return False
+        return math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S
 
     def _is_new(self) -> bool:
         assert self._tracks is not None
@@ -156,7 +159,7 @@ class Aside:
         found = self._steered(scene, wanted, _velocity(state))
         if found is None or math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
             return self._stand(state, "No velocity leads past: it holds. Resume goes on, or return home.", now_s)
-        is_free = not found.evades
+        is_free = _is_wanted(found, wanted)
         if not (is_free and aside_m <= BACK_M):
             self._free_since_s = None
         elif self._free_since_s is None:
@@ -267,12 +270,17 @@ class Aside:
         assert tracks is not None
         try:
             straight = steer(scene.obstacles, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
-            if straight is None or not straight.evades:
+            if straight is None or _is_wanted(straight, wanted):
                 return straight
             everything = with_ground(scene.obstacles, tracks.room_m, farthest_m=scene.horizon_m)
             return steer(everything, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
         except ParameterError:
             return None
+
+
+def _is_wanted(found: Proposal, wanted: F64) -> bool:
+    """What is found may evade nothing and be another velocity all the same: the present one, where that is free."""
+    return math.dist(found.velocity_enu_m_s, wanted) < SAME_M_S
 
 
 def _radius_m(track: Track, settings: PerceptionSettings) -> float:

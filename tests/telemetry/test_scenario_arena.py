@@ -89,6 +89,17 @@ def test_a_pole_straight_ahead_is_passed_by_what_avoids_live(nearest_only, radar
     assert len(way.errors) > 10
 
 
+def test_while_its_present_velocity_is_free_and_the_wanted_is_not_it_flies_on_and_not_to_the_line():
+    """A way on which it flew to its line through a pole that it remembered beside it."""
+    random = np.random.default_rng([31, 5])
+    ways = approaches(78, random)
+    for _ in range(61):
+        random.integers(2**31)  # the seeds of the ways before it
+    way = fly(ways[61], random, settings=arena_settings(nearest_only=False), radar="model")
+    assert way.nearest_gap_m > 0.2
+    assert way.arrived
+
+
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
     """What shows that the poles are really in the way, and that nothing but the radar's tracks avoids them."""
     monkeypatch.setattr(Position2Go, "frame", lambda self, true, random: np.empty((0, 3)))
