@@ -218,6 +218,8 @@ class Mission:
     """What a reader noticed: swapped coordinates, items it had to drop, guessed values."""
     planned_for: PlannedFor | None = None
     """None: the file does not say."""
+    surface_sha256: str = ""
+    """Of the surface model's file that it was planned over; empty: the file does not say."""
 
 
 @dataclass(frozen=True, slots=True)

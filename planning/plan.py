@@ -130,7 +130,9 @@ def _planned(job: _Job, home: Home, why_moved: str) -> Plan:
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
     built = _mission(job, profile, path, home)
-    built = replace(built, mission=replace(built.mission, planned_for=request.planned_for))
+    built = replace(
+        built, mission=replace(built.mission, planned_for=request.planned_for, surface_sha256=job.dsm.sha256)
+    )
     job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}

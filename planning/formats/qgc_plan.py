@@ -78,6 +78,7 @@ def _provenance(mission: Mission) -> dict[str, object]:
         "note": home_altitude_note(home),
         "cruise_speed_m_s": mission.cruise_speed_m_s,
         "pois": [_poi(poi) for poi in mission.pois],
+        "surface_model": mission.surface_sha256 or None,
         "planned_for": None if mission.planned_for is None else planned_for_json(mission.planned_for),
     }
 

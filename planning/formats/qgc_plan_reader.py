@@ -12,6 +12,7 @@ from planning.formats.qgc_words import ALTITUDE_MODE, COMPUTED_ABOVE_TERRAIN, FI
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
 from planning.model import Firmware, Home, Mission, MissionItem, Poi
+from planning.other_surface import surface_digest
 
 Json = dict[str, Any]
 
@@ -37,7 +38,8 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
     raw = ours.get("planned_for")
     planned = None if raw is None else read_planned_for(raw, _at(file, "$.hedgehop.planned_for"), warnings)
     firmware, speed = _firmware(mission), _speed(mission, ours)
-    return Mission(home, tuple(items), firmware, _pois(ours, file), speed, said_once(warnings), planned)
+    surface = surface_digest(ours.get("surface_model"))
+    return Mission(home, tuple(items), firmware, _pois(ours, file), speed, said_once(warnings), planned, surface)
 
 
 def _at(file: str, path: str) -> str:

@@ -20,6 +20,7 @@ from planning.formats.planned_for import planned_for_line, read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
 from planning.formats.swapped import swapped_against_home
 from planning.model import Home, Mission, MissionItem, PlannedFor
+from planning.other_surface import surface_digest
 
 HEADER = "QGC WPL 110"
 _NOTE = re.compile(r"#\s*([a-z_]+):\s*(.*)")
@@ -50,6 +51,7 @@ def _notes(mission: Mission) -> list[str]:
         f"# firmware: {mission.firmware}",
         *([f"# cruise_speed_m_s: {speed:g}"] if speed is not None else []),
         *([f"# planned_for: {planned_for_line(planned)}"] if (planned := mission.planned_for) is not None else []),
+        *([f"# surface_model: {mission.surface_sha256}"] if mission.surface_sha256 else []),
         f"# note: row 0 is home, {home_altitude_note(home)}",
     ]
 
@@ -83,7 +85,16 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
     home = home_or_first_place(home, items, warnings)
     firmware = "px4" if notes.get("firmware") == "px4" else "ardupilot"
     planned = _planned_for(lines, warnings)
-    return Mission(home, tuple(items), firmware, (), _speed(notes), tuple(warnings), planned)
+    return Mission(
+        home,
+        tuple(items),
+        firmware,
+        (),
+        _speed(notes),
+        tuple(warnings),
+        planned,
+        surface_digest(notes.get("surface_model")),
+    )
 
 
 def _check_header(where: str, line: str) -> None:

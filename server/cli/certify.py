@@ -19,6 +19,7 @@ from planning.formats.detect import read_flight
 from planning.holes import HoleReport, fill_holes
 from planning.margins.words import uncovered_words
 from planning.model import Certificate, Mission, VehicleProfile
+from planning.other_surface import other_surface
 from planning.plan import CERTIFICATE_STEP, hole_assumptions
 from planning.poi_files import warn_swapped
 from planning.request import check_hole_area
@@ -75,6 +76,9 @@ def certify(
         params = request.clearance()
         timer = StepTimer(progress)
         source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
+        other = other_surface(flight, source)
+        if other is not None:
+            say(f"Note: {other}")
         uncovered = uncovered_words(params.budget, params.required_clearance_m)
         warnings = [
             *flight.warnings,
@@ -91,7 +95,8 @@ def certify(
         summary = _summary(certificate, flight, vehicle, source, holes)
         summary |= {**feasibility_json(feasibility), "seconds": timer.seconds()}
         end_progress()
-        _answer(summary | {"warnings": warnings}, certificate, as_json=as_json, verbose=verbose)
+        summary = {"other_surface": other, **summary, "warnings": warnings}
+        _answer(summary, certificate, as_json=as_json, verbose=verbose)
         raise typer.Exit(DONE if certificate.certified and feasibility.feasible is not False else FAILED)
 
 
@@ -122,4 +127,5 @@ def _answer(summary: dict[str, Any], certificate: Certificate, *, as_json: bool,
     if as_json:
         print_json(summary | {key: whole[key] for key in ("legs", "assumptions") if key in whole})
         return
-    typer.echo("\n".join([*verdict_lines(summary), *leg_lines(whole.get("legs", []))]))
+    other = [summary["other_surface"]] if summary["other_surface"] is not None else []
+    typer.echo("\n".join([*other, *verdict_lines(summary), *leg_lines(whole.get("legs", []))]))

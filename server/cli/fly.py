@@ -20,6 +20,7 @@ import typer
 from planning.dsm import Dsm
 from planning.formats.detect import read_mission
 from planning.model import Mission
+from planning.other_surface import other_surface
 from server.cli import options as o
 from server.cli.files import check_directory, read_small
 from server.cli.flight_progress import FlightProgress
@@ -103,7 +104,8 @@ def fly(
         request = demands_of(flight, vehicle, way=mode, required_m=required_clearance_m, highest_m=None)
         model_options = ModelOptions(crs, z_scale, vertical_datum)
         model = read_model(dsm, StepTimer(progress), model_options)[0] if dsm else None
-        for warning in flight.warnings:
+        other = None if model is None else other_surface(flight, model)
+        for warning in (*([other] if other is not None else []), *flight.warnings):
             say(f"Note: {warning}")
         if model is None:
             say("Note: without --dsm neither the ground at home nor the clearance is checked.")
