@@ -16,7 +16,7 @@ from server.errors import JobCancelledError, NotFoundError, reported
 from server.jobs import Lane
 from server.library import Library
 from server.scene.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
-from server.scene.plain import plain_scene
+from server.scene.plain import plain_around, plain_scene
 from server.scene.shots import Target
 from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, Source, ViewDoc
 
@@ -56,6 +56,9 @@ class Picture:
         self._view, self._library, self._lane = view, library, lane
         self._changed, self._failed = changed, failed
         self.held: Callable[[], bool] = lambda: False
+        self.live_home: Callable[[], tuple[float, float] | None] = lambda: None
+        """(lat_deg, lon_deg) of the vehicle; without a surface model plain ground around it is drawn."""
+        self._plain: Dsm | None = None
         self._review: tuple[str | None, ReviewScene] | None = None
         self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
         self._wake = asyncio.Event()
@@ -123,8 +126,9 @@ class Picture:
             photo_id = document.orthophoto_id if document.terrain_id == terrain_id else None
             document, selection = PlanDoc(terrain_id=terrain_id, orthophoto_id=photo_id), SelectionDoc()
             plan, stale = None, False
-        if review is not None and review.ground is not None:
-            await self._load_plain(review.ground)
+        ground = self._live_ground(document.terrain_id) if review is None else review.ground
+        if ground is not None:
+            await self._load_plain(ground)
         else:
             await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
         overlay, sites = self._overlay
@@ -142,6 +146,15 @@ class Picture:
             sites=sites,
         )
         await self._view.show(self._dsm, state)
+
+    def _live_ground(self, terrain_id: str | None) -> Dsm | None:
+        """The same for as long as home stays on it: another one would forget the path flown so far."""
+        home = self.live_home()
+        if terrain_id is not None or home is None:
+            return None
+        if self._plain is None or np.isnan(self._plain.elevation_at(self._plain.xy_from_lat_lon(np.array([home])))[0]):
+            self._plain = plain_around(*home)
+        return self._plain
 
     async def _load_plain(self, ground: Dsm) -> None:
         if self._dsm is not ground:

@@ -151,6 +151,7 @@ class Flying:
         """To be run by the application's task group until it ends."""
         self._workspace.changed = self._on_plan_changed
         self._workspace.picture.held = lambda: self.armed
+        self._workspace.picture.live_home = lambda: self._home
         starts = [self._start(demo=demo), *([self._start_demo()] if demo else [])]
         return [
             *self._relay().loops(),
@@ -177,6 +178,13 @@ class Flying:
     @property
     def armed(self) -> bool:
         return self.live.state is not None and self.live.state.armed
+
+    @property
+    def _home(self) -> tuple[float, float] | None:
+        state = self.live.state
+        if state is None or state.home_lat_deg is None or state.home_lon_deg is None:
+            return None
+        return state.home_lat_deg, state.home_lon_deg
 
     async def _start(self, *, demo: bool) -> None:
         await self._obstacles.start()
@@ -224,9 +232,9 @@ class Flying:
         return relay
 
     def _on_state(self, state: VehicleState) -> None:
-        was_armed = self.armed
+        was_armed, home = self.armed, self._home
         self.live.on_state(state)
-        if self.armed != was_armed:
+        if self.armed != was_armed or self._home != home:
             self._workspace.picture.again()
         if was_armed and not state.armed:
             self.desk.on_disarmed()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from affine import Affine
 
 from planning.dsm import Dsm
+from planning.following.reference import level_model
+from planning.model import Home, Mission
 from server.scene.payload import F64, U8, HeightGrid, TerrainScene
 
-_MARGIN_M = 60.0
+_MARGIN_M, _REACH_M = 60.0, 400.0
 _CELLS, _TEXTURE_PX, _LINES_MAX = 60, 1600, 80
 _GROUND, _LINE, _TENTH_LINE = (58, 64, 74), (92, 100, 114), (140, 150, 166)
 
@@ -24,6 +27,12 @@ def plain_ground(like: Dsm, points_m: F64) -> Dsm:
     columns, rows = (int(count) for count in np.ceil((high - low) / cell_m))
     level = np.full((rows, columns), like.elevation_m[0, 0], dtype=np.float32)
     return replace(like, elevation_m=level, transform=Affine(cell_m, 0.0, low[0], 0.0, -cell_m, high[1]))
+
+
+def plain_around(lat_deg: float, lon_deg: float) -> Dsm:
+    """For a vehicle that flies from there; heights count from home."""
+    level = level_model(Mission(Home(lat_deg, lon_deg, math.nan), ()))
+    return plain_ground(level, np.array([[-_REACH_M, -_REACH_M, 0.0], [_REACH_M, _REACH_M, 0.0]]))
 
 
 def plain_scene(ground: Dsm) -> TerrainScene:

@@ -12,14 +12,17 @@ from planning.dsm import Dsm
 from planning.following.reference import level_model
 from planning.model import Home, Mission
 from server.picture import Picture
+from server.placing import Placer
 from server.scene.drawing import Drawing
 from server.scene.payload import ReviewScene, SceneState
 from server.scene.plain import plain_ground, plain_scene
 from server.scene.review import review_nodes
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
+from telemetry.vehicle import VehicleState
 from tests.server.scene_fixtures import hill, plan_over, state_over
 
 LEVEL = level_model(Mission(Home(37.7, 15.0, 812.5), ()))
+HOVERING = VehicleState(1, 1, lat_deg=38.5001, lon_deg=15.0, alt_rel_home_m=12.0, home_lat_deg=38.5, home_lon_deg=15.0)
 FLOWN_M = np.array([[0.0, 0.0, 812.5], [0.0, 0.0, 830.0], [240.0, -35.0, 832.0]])
 
 
@@ -75,6 +78,42 @@ def test_a_recording_is_drawn_on_it_and_the_plan_comes_back_afterwards() -> None
         await _until(lambda: drawn[-1][1].review is None)
         assert drawn[-1][0] is dsm
         assert drawn[-1][1].plan is not None
+        loop.cancel()
+
+    asyncio.run(play())
+
+
+def test_a_vehicle_flies_over_plain_ground_where_no_model_is_open() -> None:
+    drawn: list[tuple[Dsm | None, SceneState]] = []
+
+    async def show(dsm: Dsm | None, state: SceneState) -> None:
+        drawn.append((dsm, state))
+
+    view: Any = SimpleNamespace(show=show)
+    library: Any = SimpleNamespace(orthophotos=list)
+    lane: Any = SimpleNamespace()
+    home: list[tuple[float, float]] = []
+
+    async def play() -> None:
+        picture = Picture(view, library, lane, changed=lambda: None, failed=lambda error: None)
+        picture.live_home = lambda: home[-1] if home else None
+        loop = asyncio.create_task(picture.run())
+        picture.want(PlanDoc(), SelectionDoc(), ViewDoc(), None, stale=False)
+        await _until(lambda: len(drawn) == 1)
+        assert drawn[-1][0] is None
+        for place in ((37.7, 15.0), (37.70001, 15.0), (38.5, 15.0)):
+            home.append(place)
+            picture.again()
+            before = len(drawn)
+            await _until(lambda before=before: len(drawn) > before)
+        first, moved, elsewhere = (ground for ground, _ in drawn[1:])
+        assert first is moved
+        assert elsewhere is not None
+        assert elsewhere is not first
+        place_m = Placer(elsewhere).place(HOVERING)
+        assert place_m is not None
+        assert place_m[2] == 12.0
+        assert Drawing.of(*drawn[-1]) is not None
         loop.cancel()
 
     asyncio.run(play())

@@ -1,4 +1,5 @@
 import { listenInside } from "./frame_events";
+import { followed } from "./following";
 import { EmptyState } from "./EmptyState";
 import { Legend } from "./Legend";
 import { Loading } from "./Loading";
@@ -6,6 +7,7 @@ import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
 import { Toasts } from "../shell/Notices";
+import { activeView } from "../shell/views";
 import { review } from "../store/review";
 import { document_, pageId, selection, terrain, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
@@ -48,8 +50,9 @@ function ToolHint() {
 /** The 3D view with what lies on it. */
 export function Scene() {
   const id = pageId.value;
-  // A recording brings a ground of its own where no surface model is known.
-  const hasTerrain = terrain.value !== null || review.value !== null;
+  // Without a surface model a recording, and a vehicle that flies, stand on plain ground of their own.
+  const isFlown = review.value !== null || (activeView.value.id === "fly" && followed.value !== null);
+  const hasTerrain = terrain.value !== null || isFlown;
   return (
     <section class={`scene tool-${selection.value.tool}`} aria-label="3D view" data-testid="scene">
       {id && (
