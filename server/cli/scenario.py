@@ -10,7 +10,7 @@ import typer
 from planning.errors import ParameterError
 from server.cli import options as o
 from server.cli.files import check_directory
-from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing
+from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
 from server.errors import StorageError
 from telemetry.scenarios.catalogue import NAMES, run_scenario
 from telemetry.scenarios.result import ScenarioResult, tally, tally_json
@@ -46,6 +46,9 @@ def scenario(
             help="Keep the flight (.mcap) with frames, maps and alerts here; of foliage the radar log (.npz).",
         ),
     ] = None,
+    plots: Annotated[
+        Path | None, typer.Option("--plots", metavar="DIR", help="Of foliage: draw the ROC of both rules (roc.png).")
+    ] = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Fly one of the papers' field tests in simulation and measure what the sensors' maps and alerts are worth.
@@ -55,6 +58,7 @@ def scenario(
     with refusing(as_json=as_json):
         _check(name, record, seeds)
         own = _own(name, radar, figures or [])
+        _check_plots(name, plots)
         results: list[ScenarioResult] = []
         for number in range(seed, seed + seeds):
             progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
@@ -62,11 +66,34 @@ def scenario(
             end_progress()
             if not as_json:
                 typer.echo("\n".join(results[-1].lines()))
+        if plots is not None:
+            _draw(plots, seed)
         if as_json:
             print_json(results[0].as_json() if seeds == 1 else tally_json(results))
         elif seeds > 1:
             typer.echo("\n".join(tally(results)))
         raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
+
+
+def _draw(plots: Path, seed: int) -> None:
+    """Loaded only now: drawing is rarely asked for."""
+    from server.cli.foliage_plots import write_roc
+    from telemetry.scenarios.foliage_roc import rocs
+
+    progress("Drawing the ROC", None)
+    path = write_roc(plots, rocs(seed), seed)
+    end_progress()
+    say(f"Drawn: {path}")
+
+
+def _check_plots(name: str, plots: Path | None) -> None:
+    if plots is None:
+        return
+    if name != "foliage":
+        raise ParameterError(
+            f"There is nothing to draw of {name}.", where="--plots", advice="Leave --plots away, or run foliage."
+        )
+    check_directory(plots)
 
 
 def _check(name: str, record: Path | None, seeds: int) -> None:

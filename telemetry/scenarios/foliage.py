@@ -19,8 +19,9 @@ from planning.traversable import UwbScans
 from telemetry.scenarios.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
 from telemetry.scenarios.foliage_drive import lawn_drive
 from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, Rates, cleared_by, driven, rates, seconds_per_scan
+from telemetry.scenarios.foliage_roc import echoes_m2
 from telemetry.scenarios.foliage_rural import route
-from telemetry.scenarios.foliage_trials import CELL_M, TRIAL_1, TRIAL_2, Printed, trial_site
+from telemetry.scenarios.foliage_trials import BRANCHES_WIDE_M, CELL_M, TRIAL_1, TRIAL_2, Printed, trial_site
 from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
 from telemetry.scenarios.wanted import Wanted
 from telemetry.sensors.uwb_log import write_uwb_log
@@ -83,8 +84,16 @@ def _calibration(thresholds: Thresholds) -> FlightResult:
             Figure("Fig. 6, bricks behind five layers over T_d", five.bricks, most=0.5, unit=" counts"),
         ),
         [f"{name}: P(z|occ) {table[name]:.4f}, printed {printed:.4f}" for name, printed in PRINTED.items()]
+        + [_behind(row.layers) for row in layers if row.layers]
         + [f"{row.layers} layers: foliage {row.leaves:.1f}, bricks {row.bricks:.1f} counts over T_d" for row in layers],
     )
+
+
+def _behind(layers: int) -> str:
+    """Why thick foliage cannot be cleared by power alone without what stands behind it."""
+    branches, *things = echoes_m2(layers, BRANCHES_WIDE_M).items()
+    behind = ", ".join(f"{name} {m2:.3f}" for name, m2 in things)
+    return f"{layers} layers of {BRANCHES_WIDE_M:g} m echo as {branches[1]:.3f} m2; of what stands behind: {behind} m2"
 
 
 def _worst(off: Mapping[str, float], *, small: bool) -> float:

@@ -92,6 +92,12 @@ def labels(drive: Drive) -> tuple[Bools, Bools]:
     return blocked & drive.obstacle, blocked & ~drive.obstacle
 
 
+def placed_cells(site: Site) -> Bools:
+    """(rows, cols) At the things on the lawn and beside them."""
+    near = [_near(site, thing) for thing in site.targets if thing.name in PLACED]
+    return np.logical_or.reduce([np.zeros((round(site.side_m / CELL_M),) * 2, np.bool_), *near])
+
+
 def _near(site: Site, thing: Target) -> Bools:
     cells = np.zeros((round(site.side_m / CELL_M),) * 2, np.bool_)
     part, covered = disc_cells(site, thing.xy_m, BEFORE_M)

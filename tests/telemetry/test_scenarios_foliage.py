@@ -7,18 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mapping.uwb import Cleared, UwbParams
 from planning.errors import ParameterError
 from planning.geotiff import read_dsm
 from planning.traversable import cleared_ground, traversable_ground
+from server.cli.foliage_plots import write_roc
 from telemetry.scenarios import foliage
 from telemetry.scenarios.foliage_drive import KEEP_M, SCAN_S, SPEED_M_S, drive, lawn_drive, things_on_lawn
 from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, rates, seconds_per_scan
+from telemetry.scenarios.foliage_roc import Roc, curve, echoes_m2
 from telemetry.scenarios.foliage_rural import connected, route
 from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
 from telemetry.scenarios.wanted import Wanted
 from telemetry.sensors.uwb_log import read_uwb_log
+from telemetry.simulator.sensors.uwb import UwbModel
 
 # On one worker: two would each drive for themselves.
 pytestmark = pytest.mark.xdist_group("foliage")
@@ -138,3 +142,31 @@ def test_a_world_of_ones_own_and_a_recording_of_another_kind_are_refused(tmp_pat
         foliage.run(Wanted(0, world=tmp_path / "own.json"))
     with pytest.raises(ParameterError, match=r"ends with \.npz"):
         foliage.run(Wanted(0, record=tmp_path / "drive.mcap"))
+
+
+def test_the_roc_goes_through_the_rates_of_both_rules(sparse: Drive, cleared: Cleared) -> None:
+    ours = curve(sparse, "our rule", UwbParams())
+    assert ours.usual[0] == pytest.approx(rates(sparse, cleared).foliage.rate)
+    for values in (ours.tnr, ours.fnr):
+        assert (values[0], values[-1]) == (0.0, 1.0)
+        assert np.all(np.diff(values) >= 0.0)
+    assert ours.usual[1] - 0.03 <= ours.fnr_at(ours.usual[0]) <= ours.usual[1]
+    paper = curve(sparse, "the paper's rule", PAPERS_RULE)
+    assert paper.fnr_at(0.9) >= 0.0
+    assert paper.usual[0] < ours.usual[0]
+
+
+def test_thick_branches_echo_more_than_what_they_hide() -> None:
+    sparse, three, four = (echoes_m2(layers, 1.2) for layers in (1, 3, 4))
+    assert sparse["branches"] < 0.01 < sparse["Stone"] < sparse["3 bricks"]
+    assert three["2 bricks"] < three["branches"]
+    assert four["branches"] > 5 * four["3 bricks"] > 5 * four["2 bricks"] > 5 * four["Stone"]
+    assert four["2 bricks"] < UwbModel().least_m2, "at 10 m it answers nothing at all"
+
+
+def test_the_roc_is_drawn(sparse: Drive, tmp_path: Path) -> None:
+    ours = curve(sparse, "our rule", UwbParams())
+    path = write_roc(tmp_path / "plots", [Roc("1 c", (0.9, 0.1), (ours, ours)), Roc("2 f", (0.6, 0.1), (ours,))], 3)
+    with Image.open(path) as image:
+        assert image.size[0] > 1000
+        assert len(set(image.convert("L").get_flattened_data())) > 20

@@ -1,0 +1,83 @@
+"""The whole trade between clearing foliage and keeping obstacles: a curve over all limits of probability (fig. 9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.uwb import UwbParams
+from telemetry.scenarios.foliage_drive import lawn_drive
+from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, placed_cells
+from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
+from telemetry.simulator.sensors.uwb import ECHO_M2_PER_M, LAYERS, transmission
+from telemetry.simulator.sensors.uwb_scene import TABLE_II
+
+F64 = NDArray[np.float64]
+
+TRIALS = ((1, "c"), (2, "e"), (2, "f"))
+"""Sparse foliage, and the thick that is hardest to tell."""
+RULES = {"the paper's rule": PAPERS_RULE, "our rule": UwbParams()}
+THINGS = ("3 bricks", "2 bricks", "Stone")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What clearing every cell below a limit comes to, for all limits; shares of cells in view for more than 2 s."""
+
+    rule: str
+    tnr: F64
+    """(K,) of the foliage, ascending"""
+    fnr: F64
+    """(K,) of the things on the lawn, which the foliage hides: fences, sheds and trees stand free"""
+    usual: tuple[float, float]
+    """TNR and FNR at the limit in use, 0.5."""
+
+    def fnr_at(self, tnr: float) -> float:
+        """The share of those things that must be cleared, too, for so much of the foliage."""
+        return float(self.fnr[min(int(np.searchsorted(self.tnr, tnr)), len(self.fnr) - 1)])
+
+
+@dataclass(frozen=True, slots=True)
+class Roc:
+    trial: str
+    paper: tuple[float, float]
+    """TNR and FNR as printed; the paper's FNR is that of all obstacles."""
+    curves: tuple[Curve, ...]
+
+
+def rocs(seed: int) -> tuple[Roc, ...]:
+    """Of the trials that tell most, both rules on the same scans."""
+    found = []
+    for trial, letter in TRIALS:
+        printed = (TRIAL_1 if trial == 1 else TRIAL_2)[letter][1]
+        there = driven(trial_site(trial, letter), lawn_drive(), seed)
+        curves = tuple(curve(there, name, params) for name, params in RULES.items())
+        found.append(Roc(there.site.name, (printed.tnr or 0.0, printed.fnr), curves))
+    return tuple(found)
+
+
+def curve(there: Drive, rule: str, params: UwbParams) -> Curve:
+    result = cleared_by(there, params)[0]
+    obstacle, foliage = labels(there)
+    leaves = np.sort(result.probability[foliage & result.seen].astype(np.float64))
+    things = np.sort(result.probability[obstacle & placed_cells(there.site) & result.seen].astype(np.float64))
+    limits = np.unique(np.concatenate([[0.0, 1.1], leaves, things]))
+    tnr, fnr = (_below(values, limits) for values in (leaves, things))
+    at_half = np.array([0.5])
+    return Curve(rule, tnr, fnr, (float(_below(leaves, at_half)[0]), float(_below(things, at_half)[0])))
+
+
+def _below(values: F64, limits: F64) -> F64:
+    return np.searchsorted(values, limits) / max(1, len(values))
+
+
+def echoes_m2(layers: float, wide_m: float) -> dict[str, float]:
+    """What a screen of branches echoes, and what is left of each thing behind it: cross sections in m2.
+
+    From fig. 6 and Table II. A detector that is told no more than power cannot keep what is weaker than what it clears.
+    """
+    left = float(transmission(np.array([layers]))[0])
+    leaves = float(np.interp(layers, LAYERS, ECHO_M2_PER_M)) * wide_m
+    return {"branches": leaves, **{name: TABLE_II[name][0] * left for name in THINGS}}
