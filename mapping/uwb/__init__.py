@@ -1,7 +1,7 @@
 """UWB radar against foliage: which untraversable cells of a traversability map are soft vegetation (Ahtiainen)."""
 
 from mapping.uwb.clearing import Cleared, UwbClearing, UwbPose, clear
-from mapping.uwb.params import UwbGeometry, UwbParams
+from mapping.uwb.params import Rule, UwbGeometry, UwbParams, in_words, of_rule
 from mapping.uwb.sensor_model import BinEvidence, bin_evidence, occupied
 from mapping.uwb.thresholds import Learning, Thresholds
 
@@ -9,6 +9,7 @@ __all__ = [
     "BinEvidence",
     "Cleared",
     "Learning",
+    "Rule",
     "Thresholds",
     "UwbClearing",
     "UwbGeometry",
@@ -16,5 +17,7 @@ __all__ = [
     "UwbPose",
     "bin_evidence",
     "clear",
+    "in_words",
     "occupied",
+    "of_rule",
 ]

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from mapping.errors import ParameterError
+
+Rule = Literal["explained", "paper"]
+"""How echoes are fused: ours, where an echo that a likely obstacle accounts for says little of other cells, or the
+paper's, where every cell at its range is to blame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,3 +84,28 @@ class UwbParams:
                 f"Cells that are {self.explained_apart_m:g} m apart cannot explain each other's echoes.",
                 advice="Give a distance above 0, or infinity for the paper's own rule.",
             )
+
+
+def of_rule(rule: Rule, **numbers: float | None) -> UwbParams:
+    """That rule with the paper's numbers, but for those that are given. Raises ParameterError.
+
+    P_C3 follows P_C2, 0.1 above it as in fig. 9, unless it is given itself.
+    """
+    given = {name: value for name, value in numbers.items() if value is not None}
+    for name, value in given.items():
+        if not math.isfinite(value):
+            raise ParameterError(f"{name} is {value:g}.", where="UWB radar", advice="Give a number.")
+    if "free_before" in given:
+        given.setdefault("free_behind", given["free_before"] + 0.1)
+    usual = UwbParams(explained_apart_m=math.inf) if rule == "paper" else UwbParams()
+    return replace(usual, **given)
+
+
+def in_words(params: UwbParams) -> str:
+    """For operators: which rule, and its numbers."""
+    rule = "the paper's rule" if math.isinf(params.explained_apart_m) else "echoes explained"
+    p = params
+    return (
+        f"{rule}; P_O {p.most_occupied:g}, P_C2 {p.free_before:g}, P_C3 {p.free_behind:g}, c_th "
+        f"{p.least_headroom:g}, {p.nearest_m:g} to {p.farthest_m:g} m, prior {p.prior:g}"
+    )

@@ -9,11 +9,34 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
+from pydantic import Field
 
+from mapping.uwb import UwbParams, of_rule
 from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
 from server.api.terrain import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
-from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState
+from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
+
+
+class UwbClear(UwbRule):
+    """Of a radar log that is sent."""
+
+    name: Annotated[str, Field(max_length=1000)]
+
+
+def uwb_params(asked: UwbRule) -> UwbParams:
+    """Raises ParameterError for numbers that contradict each other."""
+    return of_rule(
+        asked.rule,
+        most_occupied=asked.p_o,
+        free_before=asked.p_c2,
+        free_behind=asked.p_c3,
+        least_headroom=asked.c_th,
+        nearest_m=asked.nearest_m,
+        farthest_m=asked.farthest_m,
+        prior=asked.prior,
+    )
+
 
 router = APIRouter(
     prefix="/api/traversability", dependencies=[SignedIn], tags=["traversability"], responses=ERROR_RESPONSES
@@ -27,11 +50,11 @@ async def work_out(body: TraversabilityBody, workspace: Work) -> Response:
 
 
 @router.post("/uwb", response_model=JobDoc, status_code=202, openapi_extra=RAW_BODY)
-async def clear_foliage(request: Request, workspace: Work, name: Annotated[str, Query(max_length=1000)]) -> Response:
+async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbClear, Query()]) -> Response:
     """A UWB radar log as raw bytes: what it shows to be foliage is cleared."""
-    shown = display_name(name)
+    params, shown = uwb_params(asked), display_name(asked.name)
     upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(shown)))
-    return answer(workspace.traversability.clear_foliage(upload, shown), 202)
+    return answer(workspace.traversability.clear_foliage(upload, shown, params), 202)
 
 
 @router.post("/sites", response_model=TraversabilityState)

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from mapping.uwb import Cleared
+from mapping.uwb import Cleared, Rule, in_words, of_rule
 from planning.errors import ParameterError
 from planning.geotiff import write_dsm
 from planning.landing_sites import CAUTION, LandingSites
@@ -45,6 +45,23 @@ def traversability(
     uwb: Annotated[
         Path | None, typer.Option("--uwb", metavar="LOG", help="UWB radar log (.npz) that clears foliage.")
     ] = None,
+    uwb_rule: Annotated[
+        Rule,
+        typer.Option("--uwb-rule", help="paper: every cell at an echo's range is to blame for it; explained: ours."),
+    ] = "explained",
+    p_o: Annotated[float | None, typer.Option("--p-o", help="Most that an echo says; default: 0.8.")] = None,
+    p_c2: Annotated[
+        float | None, typer.Option("--p-c2", help="1 minus the most that free space says; default: 0.2.")
+    ] = None,
+    p_c3: Annotated[
+        float | None, typer.Option("--p-c3", help="The same behind an echo; default: 0.1 above --p-c2.")
+    ] = None,
+    c_th: Annotated[float | None, typer.Option("--c-th", help="Least of T_max - T_d (eq. 1); default: 3.")] = None,
+    nearest_m: Annotated[float | None, typer.Option("--nearest-m", help="R_min; default: 3.5.")] = None,
+    farthest_m: Annotated[float | None, typer.Option("--farthest-m", help="R_max; default: 10.")] = None,
+    prior: Annotated[
+        float | None, typer.Option("--prior", help="That an untraversable cell is an obstacle; default: 0.9.")
+    ] = None,
     near: Annotated[
         str | None, typer.Option("--near", metavar="LAT,LON", help="Find the five best landing sites near this point.")
     ] = None,
@@ -68,6 +85,16 @@ def traversability(
     """
     with refusing(as_json=as_json):
         place = parse_place(near, "--near")
+        params = of_rule(
+            uwb_rule,
+            most_occupied=p_o,
+            free_before=p_c2,
+            free_behind=p_c3,
+            least_headroom=c_th,
+            nearest_m=nearest_m,
+            farthest_m=farthest_m,
+            prior=prior,
+        )
         _check_out(out)
         scans = None if uwb is None else read_uwb_log(o.existing(uwb) or uwb, uwb.name)
         timer = StepTimer(progress)
@@ -75,11 +102,14 @@ def traversability(
         timer(WORK_STEP, None)
         ground = traversable_ground(source, resolution_m)
         timer(RADAR_STEP, None)
-        cleared = None if scans is None else cleared_ground(ground, scans)
+        cleared = None if scans is None else cleared_ground(ground, scans, params)
         found = None if place is None else sites_near(ground, place, rotor_span_m, radius_m)
         _write(out, ground, cleared, found)
         end_progress()
-        summary = _summary(ground, scans, cleared, found) | {"seconds": round(timer.seconds()["total"], 3)}
+        summary = _summary(ground, scans, cleared, found)
+        if cleared is not None:
+            summary["uwb_rule"] = in_words(params)
+        summary |= {"seconds": round(timer.seconds()["total"], 3)}
         _answer(summary, out, as_json=as_json)
         raise typer.Exit(FAILED if found is not None and not found.sites else DONE)
 
@@ -176,7 +206,7 @@ def _answer(summary: dict[str, Any], out: Path, *, as_json: bool) -> None:
     if "scans" in summary:
         lines.append(
             f"  {summary['cleared']:,} of them cleared as soft vegetation by {summary['scans']:,} scans: "
-            "a rover may pass, a rotor may not touch"
+            f"a rover may pass, a rotor may not touch ({summary['uwb_rule']})"
         )
     for site in summary.get("sites", ()):
         place = f"{site['lat_deg']:.7f}, {site['lon_deg']:.7f}"

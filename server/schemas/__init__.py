@@ -133,6 +133,7 @@ from server.schemas.traversability import (
     LayerName,
     TraversabilityBody,
     TraversabilityState,
+    UwbRule,
 )
 from server.schemas.view import (
     SelectionDoc,
@@ -247,6 +248,7 @@ __all__ = [
     "TraversabilityMessage",
     "TraversabilityState",
     "UploadPlan",
+    "UwbRule",
     "VehicleMessage",
     "VelocitySettingsBody",
     "ViewDoc",

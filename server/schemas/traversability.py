@@ -49,6 +49,8 @@ class TraversabilityState(Strict):
     """Cells that were in the radar's view for more than 2 s."""
     uwb_log: str = ""
     """Name of the radar log that cleared it; empty: none."""
+    uwb_rule: str = ""
+    """How it was fused, and with which numbers."""
     scans: int = 0
     legend: list[str] = Field(default_factory=list)
     """What the colours of the layer on show mean, from the lowest to the highest."""
@@ -66,6 +68,21 @@ class TraversabilityBody(Strict):
 
     resolution_m: Annotated[float, Field(ge=0.1, le=10)] | None = None
     """Of the grid; null: 0.3 m, or the model's own where that is coarser."""
+
+
+class UwbRule(Strict):
+    """How a radar log is fused; numbers that are left out are the paper's (Ahtiainen, section III)."""
+
+    rule: Literal["explained", "paper"] = "explained"
+    """explained: an echo that a likely obstacle accounts for says little of other cells; paper: all are to blame."""
+    p_o: Annotated[float, Field(gt=0.5, lt=1)] | None = None
+    p_c2: Annotated[float, Field(gt=0, lt=0.5)] | None = None
+    p_c3: Annotated[float, Field(gt=0, lt=0.5)] | None = None
+    """At least P_C2; left out: 0.1 above it."""
+    c_th: Annotated[float, Field(gt=0, le=100)] | None = None
+    nearest_m: Annotated[float, Field(gt=0, le=50)] | None = None
+    farthest_m: Annotated[float, Field(gt=0, le=100)] | None = None
+    prior: Annotated[float, Field(gt=0.5, lt=1)] | None = None
 
 
 class LandingSitesBody(Strict):

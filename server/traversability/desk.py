@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
+from mapping.uwb import UwbParams
 from planning.landing_sites import CAUTION
 from server.errors import BusyError, JobCancelledError, NotFoundError, NotReadyError, error_doc
 from server.job_board import JobBoard
@@ -83,7 +84,7 @@ class TraversabilityDesk:
 
         return self._start("Traversability", "Working out slope and roughness", terrain_id, work, made=target)
 
-    def clear_foliage(self, upload: Path, name: str) -> JobDoc:
+    def clear_foliage(self, upload: Path, name: str, params: UwbParams | None = None) -> JobDoc:
         """Takes in a radar log, which is deleted afterwards; works the map out first if there is none yet."""
         try:
             terrain_id, target = self._open_terrain(), self._library.new_upload(".npz")
@@ -95,7 +96,9 @@ class TraversabilityDesk:
         async def work(lane: Lane, progress: Progress) -> Worked:
             kept = self._told.kept
             source = None if kept is None or kept.terrain_id != terrain_id else kept.file
-            return await lane.call(task.clear_foliage, directory, source, target, upload, name, progress=progress)
+            return await lane.call(
+                task.clear_foliage, directory, source, target, upload, name, params, progress=progress
+            )
 
         return self._start(f"Reading {name}", "Clearing foliage", terrain_id, work, made=target, used_up=upload)
 

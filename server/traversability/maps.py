@@ -31,6 +31,8 @@ class Radar:
     log: str
     """Its name."""
     scans: int
+    rule: str = ""
+    """How it was fused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,7 @@ def write_maps(path: Path, maps: Maps) -> None:
             "seen": radar.maps.seen,
             "log": np.array(radar.log),
             "scans": np.array(radar.scans),
+            "rule": np.array(radar.rule),
         }
     with storage_errors(path):
         write_durably(path, lambda file: np.savez(file, **arrays))  # pyright: ignore[reportArgumentType]
@@ -122,4 +125,5 @@ def _ground(arrays: np.lib.npyio.NpzFile) -> TraversableGround:
 
 def _radar(arrays: np.lib.npyio.NpzFile) -> Radar:
     cleared = Cleared(arrays["probability"], arrays["time_in_view_s"], arrays["cleared"], arrays["seen"])
-    return Radar(cleared, str(arrays["log"]), int(arrays["scans"]))
+    rule = str(arrays["rule"]) if "rule" in arrays.files else ""
+    return Radar(cleared, str(arrays["log"]), int(arrays["scans"]), rule)

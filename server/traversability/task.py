@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.uwb import UwbParams, in_words
 from planning.geotiff import write_dsm
 from planning.traversable import cleared_ground, traversable_ground
 from server.errors import NotReadyError
@@ -46,6 +47,7 @@ class Worked:
     west_m: float
     north_m: float
     cell_m: float
+    uwb_rule: str = ""
 
     def overlay(self, terrain_id: str, layer: LayerName) -> OverlayScene:
         """A layer of the radar's is the map before clearing as long as there is no log."""
@@ -64,7 +66,14 @@ def work_out(directory: Path, target: Path, resolution_m: float | None, *, repor
 
 
 def clear_foliage(
-    directory: Path, source: Path | None, target: Path, log: Path, name: str, *, report: Progress
+    directory: Path,
+    source: Path | None,
+    target: Path,
+    log: Path,
+    name: str,
+    params: UwbParams | None = None,
+    *,
+    report: Progress,
 ) -> Worked:
     """The map at ``source``, or a new one, cleared with a radar log and kept at ``target``.
 
@@ -78,7 +87,9 @@ def clear_foliage(
     else:
         maps = read_maps(source)
     report("Clearing foliage", None)
-    cleared = replace(maps, radar=Radar(cleared_ground(maps.ground, scans), name, len(scans.t_s)))
+    params = params or UwbParams()
+    radar = Radar(cleared_ground(maps.ground, scans, params), name, len(scans.t_s), in_words(params))
+    cleared = replace(maps, radar=radar)
     report("Storing", None)
     write_maps(target, cleared)
     return _worked(cleared)
@@ -131,6 +142,7 @@ def _worked(maps: Maps) -> Worked:
         west_m=dsm.transform.c,
         north_m=dsm.transform.f,
         cell_m=factor * dsm.resolution_m,
+        uwb_rule="" if radar is None else radar.rule,
     )
 
 

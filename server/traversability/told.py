@@ -32,6 +32,7 @@ class Kept:
             cleared=worked.cleared,
             seen=worked.seen,
             uwb_log=worked.uwb_log,
+            uwb_rule=worked.uwb_rule,
             scans=worked.scans,
         )
 

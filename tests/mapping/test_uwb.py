@@ -21,7 +21,9 @@ from mapping.uwb import (
     UwbPose,
     bin_evidence,
     clear,
+    in_words,
     occupied,
+    of_rule,
 )
 from mapping.uwb.sensor_model import DETECTED, FREE_BEFORE, FREE_BEHIND, UNTOLD
 from tests.reference import uwb as slow
@@ -241,6 +243,18 @@ def test_time_is_counted_between_scans_and_not_across_pauses() -> None:
     for t_s in (0.0, 0.1, 0.2, 60.0, 60.0, 59.0):
         made.step(scan, replace(AT, t_s=t_s), learn=False)
     assert made.time_in_view_s[BUSH] == pytest.approx(0.1 + 0.1 + 0.5)
+
+
+def test_the_papers_rule_and_its_numbers_can_be_chosen() -> None:
+    assert of_rule("explained") == UwbParams()
+    assert of_rule("paper") == PAPERS_RULE
+    chosen = of_rule("paper", free_before=0.3, prior=0.6, farthest_m=None)
+    assert (chosen.free_behind, chosen.prior, chosen.farthest_m) == (pytest.approx(0.4), 0.6, 10.0)
+    assert "the paper's rule; P_O 0.8, P_C2 0.3, P_C3 0.4" in in_words(chosen)
+    assert "echoes explained" in in_words(UwbParams())
+    for wrong in ({"most_occupied": math.nan}, {"free_before": 0.45}, {"nearest_m": 11.0}):
+        with pytest.raises(ParameterError):
+            of_rule("explained", **wrong)
 
 
 def test_wrong_scans_poses_and_parameters_are_refused() -> None:

@@ -161,13 +161,15 @@ class FakeTraversability:
     def __init__(self, calls: list[str]) -> None:
         self.calls = calls
         self.uploads: dict[str, bytes] = {}
+        self.uwb_params: object = None
 
     def work_out(self, body: TraversabilityBody) -> JobDoc:
         self.calls.append(f"work out {body.resolution_m}")
         return JobDoc(id="j3", label="Traversability", state="running")
 
-    def clear_foliage(self, upload: Path, name: str) -> JobDoc:
+    def clear_foliage(self, upload: Path, name: str, params: object = None) -> JobDoc:
         self.uploads[name] = upload.read_bytes()
+        self.uwb_params = params
         upload.unlink()
         return JobDoc(id="j4", label=f"Reading {name}", state="running")
 

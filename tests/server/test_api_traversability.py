@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import httpx
 import pytest
 
+from mapping.uwb import UwbParams
 from server.schemas import JobDoc, TraversabilityState
 from tests.server.running import Running
 
@@ -44,6 +47,20 @@ def test_a_log_arrives_as_it_is_under_a_plain_name(served: Running) -> None:
     assert served.workspace.traversability.uploads["trial a.npz"] == b"PK\x03\x04"
     assert served.http.post(f"{PATH}/uwb", params={"name": "a.npz"}, content=b"", headers=RAW).status_code == 422
     assert served.http.post(f"{PATH}/uwb", content=b"PK", headers=RAW).status_code == 422
+
+
+def test_how_a_log_is_fused_is_asked_with_it(served: Running) -> None:
+    def sent(**query: object) -> httpx.Response:
+        params = {"name": "a.npz", **{key: str(value) for key, value in query.items()}}
+        return served.http.post(f"{PATH}/uwb", params=params, content=b"PK\x03\x04", headers=RAW)
+
+    assert sent(rule="paper", p_o=0.7, p_c2=0.1).is_success
+    fused = served.workspace.traversability.uwb_params
+    assert fused == UwbParams(explained_apart_m=math.inf, most_occupied=0.7, free_before=0.1, free_behind=0.2)
+    assert sent().is_success
+    assert served.workspace.traversability.uwb_params == UwbParams()
+    for query in ({"rule": "best"}, {"p_o": 0.2}, {"p_c2": 0.4, "p_c3": 0.1}, {"nearest_m": 12}, {"p_o": "nan"}):
+        assert sent(**query).status_code == 422, query
 
 
 def test_sites_are_answered_at_once(served: Running) -> None:

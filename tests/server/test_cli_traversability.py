@@ -55,6 +55,18 @@ def test_all_layers_and_sites(site: Path, tmp_path: Path) -> None:
     assert [place["properties"]["rank"] for place in places] == [1, 2, 3, 4, 5]
 
 
+def test_the_papers_rule_clears_less_and_wrong_numbers_are_refused(site: Path, tmp_path: Path) -> None:
+    arguments = ("traversability", site.with_suffix(".tif"), "--uwb", site, "--resolution-m", 0.1, "--json")
+    ours = hedgehop(*arguments, "--out", tmp_path / "ours.tif")
+    paper = hedgehop(*arguments, "--out", tmp_path / "paper.tif", "--uwb-rule", "paper")
+    assert 0 < paper.json["cleared"] < ours.json["cleared"]
+    assert "the paper's rule" in paper.json["uwb_rule"]
+    for option, value in (("--p-o", 0.3), ("--p-c2", 0.6), ("--nearest-m", 20), ("--prior", 1.5)):
+        wrong = hedgehop(*arguments, "--out", tmp_path / "no.tif", option, value)
+        assert wrong.code == 2, option
+        assert not (tmp_path / "no.tif").exists()
+
+
 def test_words_for_people_and_one_file(tmp_path: Path) -> None:
     model, _ = write_demo(tmp_path)
     run = hedgehop("traversability", model, "--out", tmp_path / "slope.tif", "--near", middle(model))

@@ -188,7 +188,8 @@ def test_a_log_clears_the_map_that_is_there_and_leaves_the_sites(tmp_path: Path)
         await it.desk.sites(LandingSitesBody(lat_deg=37.0, lon_deg=15.0))
         it.desk.clear_foliage(it.log(), "walk.npz")
         await it.over()
-        _, directory, source, target, log, name = it.lane.asked[-1]
+        _, directory, source, target, log, name, params = it.lane.asked[-1]
+        assert params is None, "the usual ones"
         assert (directory.name, source, target.name, log.name) == ("hill", tmp_path / KEPT, "map2.npz", "upload.npz")
         assert name == "walk.npz"
         assert (it.state.cleared, it.state.uwb_log, it.state.sites) == (5, "walk.npz", [SITE])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapping.errors import CapacityError
-from mapping.uwb import Cleared, UwbGeometry
+from mapping.uwb import Cleared, UwbGeometry, of_rule
 from planning.errors import FormatError
 from planning.geotiff import read_dsm
 from planning.traversable import UwbScans, traversable_ground
@@ -161,6 +161,12 @@ def test_a_log_is_taken_in_whether_or_not_there_is_a_map_yet(terrain: Path, tmp_
     assert (first.uwb_log, first.scans, first.seen) == (again.uwb_log, again.scans, again.seen) == ("walk.npz", 60, 0)
     assert "to be soft vegetation" in first.text
     assert first.codes["time_in_view"].any()
+    assert "echoes explained" in first.uwb_rule
+    paper = task.clear_foliage(
+        terrain, tmp_path / "a.npz", tmp_path / "c.npz", log, "walk.npz", of_rule("paper"), report=quiet
+    )
+    assert "the paper's rule" in paper.uwb_rule
+    assert task.read_again(tmp_path / "c.npz", report=quiet).uwb_rule == paper.uwb_rule
 
 
 def test_what_is_no_log_is_named_as_the_operator_knows_it(terrain: Path, tmp_path: Path) -> None:

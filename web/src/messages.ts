@@ -1234,6 +1234,8 @@ export interface TraversabilityState {
   seen: number;
   /** Name of the radar log that cleared it; empty: none. */
   uwb_log: string;
+  /** How it was fused, and with which numbers. */
+  uwb_rule: string;
   scans: number;
   /** What the colours of the layer on show mean, from the lowest to the highest. */
   legend: string[];
@@ -1250,6 +1252,20 @@ export interface TraversabilityState {
 export interface TraversabilityBody {
   /** Of the grid; null: 0.3 m, or the model's own where that is coarser. */
   resolution_m?: number | null;
+}
+
+/** How a radar log is fused; numbers that are left out are the paper's (Ahtiainen, section III). */
+export interface UwbRule {
+  /** explained: an echo that a likely obstacle accounts for says little of other cells; paper: all are to blame. */
+  rule?: "explained" | "paper";
+  p_o?: number | null;
+  p_c2?: number | null;
+  /** At least P_C2; left out: 0.1 above it. */
+  p_c3?: number | null;
+  c_th?: number | null;
+  nearest_m?: number | null;
+  farthest_m?: number | null;
+  prior?: number | null;
 }
 
 export interface LandingSitesBody {

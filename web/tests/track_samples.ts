@@ -73,6 +73,7 @@ export const ground = (fields: Partial<TraversabilityState> = {}): Traversabilit
   cleared: 0,
   seen: 0,
   uwb_log: "",
+  uwb_rule: "",
   scans: 0,
   legend: ["Hard", "Untraversable"],
   legend_colors: ["#a696d6", "#3a1c78"],

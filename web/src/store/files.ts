@@ -1,5 +1,5 @@
 import { signal } from "@preact/signals";
-import type { Imported, JobDoc, RecordingDoc } from "../messages";
+import type { Imported, JobDoc, RecordingDoc, UwbRule } from "../messages";
 import { ApiError, asErrorDoc, request, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
 import { folderOf } from "./dropped";
@@ -127,11 +127,16 @@ export async function sendRecording(file: File, then: (recording: RecordingDoc) 
 export const radarLog = signal<string | null>(null);
 
 /** A UWB radar's log, to clear the foliage; whether the server took it. */
-export async function sendRadarLog(file: File): Promise<boolean> {
+export async function sendRadarLog(file: File, rule: UwbRule): Promise<boolean> {
   setError("traversability", null);
   radarLog.value = file.name;
   try {
-    await sendFile(`/api/traversability/uwb?${new URLSearchParams({ name: file.name })}`, file);
+    const set = Object.entries(rule).filter(([, value]) => value !== null && value !== undefined);
+    const query = new URLSearchParams([
+      ["name", file.name],
+      ...set.map(([key, value]) => [key, String(value)]),
+    ]);
+    await sendFile(`/api/traversability/uwb?${query}`, file);
     return true;
   } catch (error) {
     report("traversability", error);

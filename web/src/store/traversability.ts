@@ -14,6 +14,7 @@ const NOTHING: TraversabilityState = {
   cleared: 0,
   seen: 0,
   uwb_log: "",
+  uwb_rule: "",
   scans: 0,
   legend: [],
   legend_colors: [],

@@ -13,6 +13,7 @@ import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { AutoField } from "../ui/fields";
 import { Figures, Files, Layers } from "./GroundMap";
+import { Fusion } from "./Fusion";
 import { LandingSites } from "./LandingSites";
 import { TRAVERSABILITY, putAway, resolution_m, takeRadarLogs, workOut } from "./commands";
 
@@ -53,6 +54,8 @@ function RadarLog({ state, isBusy }: { state: TraversabilityState; isBusy: boole
           <span class="muted">No radar log: foliage counts as hard.</span>
         )}
       </p>
+      {state.uwb_rule !== "" && <p class="hint">{state.uwb_rule}</p>}
+      <Fusion />
       <Button
         class="wide"
         icon="import"

@@ -1,5 +1,5 @@
 import { effect, signal } from "@preact/signals";
-import type { LandingSitesBody, PlaceDoc, TraversabilityBody, ViewDoc } from "../messages";
+import type { LandingSitesBody, PlaceDoc, TraversabilityBody, UwbRule, ViewDoc } from "../messages";
 import { sendRadarLog } from "../store/files";
 import { order } from "../store/outcomes";
 import { document_, selection } from "../store/state";
@@ -26,10 +26,14 @@ export async function workOut(): Promise<void> {
   if (answer) setView({ show_traversability: true });
 }
 
+/** How the next radar log is fused; null: the paper's number. */
+export const uwbRule = signal<UwbRule>({ rule: "explained" });
+
 /** A radar log clears the foliage: what it cleared is shown at once. */
 export async function clearWith(log: File): Promise<void> {
   tellGroundErrors();
-  if (await sendRadarLog(log)) setView({ show_traversability: true, traversability_layer: "cleared" });
+  if (await sendRadarLog(log, uwbRule.value))
+    setView({ show_traversability: true, traversability_layer: "cleared" });
 }
 
 /** Chosen or dropped: shown where they belong. One map takes one log. */
