@@ -246,6 +246,8 @@ class PerceptionSettings:
     """Its elevations."""
     climb_m_s: float = 1.5
     """By itself, over what stands in the way (V2)."""
+    comes_down: bool = True
+    """After a climb the rest is planned again with what was seen, and flown at its proper height once certified."""
     climb_ceiling_m: float = 30.0
     """The most that it climbs, or a prepared way leads, above the plan."""
     vehicle_radius_m: float = 0.5

@@ -177,6 +177,17 @@ class FlyManoeuvre:
     height_offset_m: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class FlyRest:
+    """The rest of a flight that goes on higher, planned again past what was seen and certified, is flown instead.
+
+    ``targets`` begin where the vehicle was when it was planned. -> None; NotAllowedError when it does not go on higher
+    """
+
+    operator: Operator
+    targets: tuple[GuidedTarget, ...]
+
+
 LinkRequest = (
     Connect
     | Disconnect
@@ -195,6 +206,7 @@ LinkRequest = (
     | Land
     | SetAvoidance
     | FlyManoeuvre
+    | FlyRest
 )
 
 

@@ -17,6 +17,8 @@ from server.flying.relay import Relay
 from server.jobs import Lane
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
+from server.obstacles.coming_down import ComingDown
+from server.obstacles.coming_down_task import plan_rest
 from server.obstacles.desk import ObstacleDesk
 from server.obstacles.drawing import MapDrawing
 from server.obstacles.ground import KnownGround
@@ -72,6 +74,13 @@ class Obstacles:
         self._manoeuvres = Manoeuvres(
             watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: live.state
         )
+        self._coming_down = ComingDown(
+            watch,
+            link,
+            situation=lambda: self._situation(None, None),
+            plan=lambda situation: lane.call(plan_rest, situation),
+            operator=server_operator,
+        )
         self._ground = KnownGround(library, lambda notice: bus.publish(Topic.GROUND, notice))
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres, self.tracks)
@@ -103,7 +112,13 @@ class Obstacles:
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         whole = [self._ask_for_whole(sensor) for sensor in SENSORS]
-        return [self._drawing.run(), self._manoeuvres.run(), *self.sensor_nodes.loops(), *whole]
+        return [
+            self._drawing.run(),
+            self._manoeuvres.run(),
+            self._coming_down.run(),
+            *self.sensor_nodes.loops(),
+            *whole,
+        ]
 
     async def start(self) -> None:
         await self.desk.start()

@@ -70,7 +70,7 @@ class Watch:
         self.avoidance = AvoidanceStatus()
         self.manoeuvres: Sequence[ManoeuvreDoc] = ()
         self.seen_in_plan = 0
-        self.busy = ""
+        self.busy = self.stays_higher = ""
         self.begins: Callable[[ObstacleAlert], None] = lambda alert: None
         """Called with every alert that was not there before."""
         self.ends: Callable[[str], None] = lambda alert_id: None
@@ -85,6 +85,7 @@ class Watch:
             maps=list(self._maps_drawn),
             seen_in_plan=self.seen_in_plan,
             busy=self.busy,
+            stays_higher=self.stays_higher,
         )
 
     # What is heard

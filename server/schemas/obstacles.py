@@ -75,6 +75,8 @@ class ObstaclesState(Strict):
     """Columns of the open plan's surface model that were raised by what was seen; 0: it is as it was read."""
     busy: str = ""
     """What is being done right now: "Looking for a way around" ..."""
+    stays_higher: str = ""
+    """After a climb: why the rest is not flown at its proper height."""
 
 
 # Bodies of requests
@@ -146,6 +148,7 @@ class PerceptionSettingsBody(Strict):
     """Its elevations: what stands at the vehicle's own height must be seen."""
     climb_m_s: Annotated[float, Field(ge=0.3, le=5)] | None = None
     """By itself, over what stands in the way."""
+    comes_down: bool | None = None
     climb_ceiling_m: Annotated[float, Field(ge=2, le=120)] | None = None
     """Above the plan."""
     vehicle_radius_m: Annotated[float, Field(ge=0.1, le=5)] | None = None

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoiding_words import status_of
+from telemetry.flight.coming_down import joined
 from telemetry.flight.detour import Detour, DetourParams
 from telemetry.flight.helm import GUIDED, STOP_MODES, Helm
 from telemetry.flight.pilot_watch import PilotWatch
@@ -20,9 +21,9 @@ from telemetry.flight.rest import RETURNS, Rest
 from telemetry.flight.slowing import Slowing
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.ends import GROUND_STATION
-from telemetry.messages import FlightStatus
+from telemetry.messages import FlightStatus, GuidedTarget
 from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.requests import FlyManoeuvre
+from telemetry.requests import FlyManoeuvre, FlyRest
 from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
@@ -146,13 +147,19 @@ class Avoiding:
             request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
         )
 
+    def fly_rest(self, request: FlyRest, now_s: float) -> list[Action]:
+        """At the request's heights. Raises NotAllowedError when it does not go on higher, or something is ahead."""
+        state, detour = self._state, self.detour
+        _check_targets(request.targets)
+        if state is None or self.released or not detour.goes_higher:
+            raise NotAllowedError("No flight goes on higher than planned.", advice="Nothing is to be done.")
+        if self.regions.occupied(now_s) or not self.regions.fresh(now_s):
+            raise NotAllowedError("The way ahead is not seen to be clear.", advice="It is planned again.")
+        return detour.come_down(joined(request.targets, state), state, now_s)
+
     def _check_way(self, request: FlyManoeuvre) -> None:
-        if not request.targets:
-            raise NotAllowedError("The way has no places.", advice="Prepare it again.")
-        numbers = [
-            n for t in request.targets for n in (t.lat_deg, t.lon_deg, t.alt_rel_home_m, t.speed_m_s, t.loiter_s)
-        ]
-        if not all(map(math.isfinite, (*numbers, request.height_offset_m))):
+        _check_targets(request.targets)
+        if not math.isfinite(request.height_offset_m):
             raise NotAllowedError("The way has a place that is no number.", advice="Prepare it again.")
         if request.height_offset_m > self._params.ceiling_m + LOW_M:
             what = f"It is {request.height_offset_m:.0f} m above the plan; {self._params.ceiling_m:g} m are the most."
@@ -309,6 +316,14 @@ class Avoiding:
         was_engaged = self.is_engaged
         self.stop()
         return self._helm.stop(now_s) if was_engaged and state.mode == GUIDED else []
+
+
+def _check_targets(targets: tuple[GuidedTarget, ...]) -> None:
+    if not targets:
+        raise NotAllowedError("The way has no places.", advice="Prepare it again.")
+    numbers = [n for t in targets for n in (t.lat_deg, t.lon_deg, t.alt_rel_home_m, t.speed_m_s, t.loiter_s)]
+    if not all(map(math.isfinite, numbers)):
+        raise NotAllowedError("The way has a place that is no number.", advice="Prepare it again.")
 
 
 def _is_flying(state: VehicleState) -> bool:

@@ -99,7 +99,11 @@ def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
     if detour.phase in ("going", "ending"):
         if detour.is_manoeuvre:
             return "On the way past it."
-        return f"Goes on {detour.offset_m:.1f} m higher than planned." if detour.offset_m else "Goes on in GUIDED."
+        if detour.offset_m:
+            return f"Goes on {detour.offset_m:.1f} m higher than planned."
+        return (
+            "Goes on at its proper height, certified past what was seen." if detour.came_down else "Goes on in GUIDED."
+        )
     seen = avoiding.regions.occupied(now_s)
     what = f"{SENSOR_WORDS[seen[0].sensor]}, {seen[0].distance_m or 0.0:.0f} m ahead" if seen else ""
     if detour.phase in ("stopping", "taking"):

@@ -60,6 +60,7 @@ class Detour:
         """It holds."""
         self.rest = Rest((), "hold")
         self.offset_m = 0.0
+        self.came_down = False
         self._witnesses = Witnesses(self._regions)
         self._lookouts: frozenset[Sensor] = frozenset()
         """Who is counted on along a prepared way: those who saw what it leads past, else all that work."""
@@ -152,6 +153,17 @@ class Detour:
         assert self._legs is not None
         self.phase = "going"
         return self._legs.go(state, now_s) or self._on_going(state, now_s)
+
+    @property
+    def goes_higher(self) -> bool:
+        """On the rest of the flight, above the plan."""
+        return self.phase == "going" and not self.is_manoeuvre and self.offset_m > 0.0
+
+    def come_down(self, targets: tuple[GuidedTarget, ...], state: VehicleState, now_s: float) -> list[Action]:
+        """The rest at heights of its own, which are certified past what was seen."""
+        self.rest, self.offset_m, self.came_down = replace(self.rest, targets=targets), 0.0, True
+        self._legs = Legs(self._helm, targets)
+        return self._legs.go(state, now_s)
 
     @property
     def goes_over(self) -> bool:

@@ -35,6 +35,7 @@ class Answering:
             requests.Land: self._land,
             requests.SetAvoidance: self._set_avoidance,
             requests.FlyManoeuvre: self._fly_manoeuvre,
+            requests.FlyRest: self._fly_rest,
         }
 
     async def answer(self, request: requests.LinkRequest) -> object:
@@ -108,6 +109,11 @@ class Answering:
         what = "past a moving object" if request.kind == "sidestep" else f"{request.kind} an obstacle"
         await self._record(request, f"fly {what}, {len(request.targets)} places")
         await pilot.fly_manoeuvre(request)
+
+    async def _fly_rest(self, request: requests.FlyRest) -> None:
+        _, pilot, _ = self._link.need_vehicle()
+        await self._record(request, f"fly the rest at its proper height, {len(request.targets)} places")
+        pilot.avoidance.fly_rest(request)
 
     async def _set_avoidance(self, request: requests.SetAvoidance) -> None:
         _, pilot, _ = self._link.need_vehicle(live=request.enabled)

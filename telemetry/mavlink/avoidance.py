@@ -14,7 +14,7 @@ from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.modes import commanded_mode
 from telemetry.messages import FlightStatus
 from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.requests import FlyManoeuvre
+from telemetry.requests import FlyManoeuvre, FlyRest
 from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
@@ -88,6 +88,9 @@ class Avoidance:
 
     def fly(self, request: FlyManoeuvre, rest: Rest) -> None:
         self._perform(self._avoiding.fly(request, rest, time.monotonic()))
+
+    def fly_rest(self, request: FlyRest) -> None:
+        self._perform(self._avoiding.fly_rest(request, time.monotonic()))
 
     def pause(self) -> None:
         self._perform(self._avoiding.pause(time.monotonic()))

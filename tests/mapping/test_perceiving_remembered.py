@@ -80,8 +80,8 @@ def test_beside_the_beam_it_is_hidden_and_behind_the_vehicle_it_is_not_in_the_wa
 def test_the_oldest_columns_are_forgotten_first() -> None:
     remembered = Remembered(1.0)
     for north in range(0, 2 * MOST_COLUMNS, 500):
-        rows = np.arange(north, north + 500) + 0.5
-        remembered.remember(np.column_stack([np.full(500, 0.5), rows, np.zeros(500)]))
+        rows = np.arange(north, north + 500, dtype=np.float64) + np.float64(0.5)
+        remembered.remember(np.column_stack([np.full(500, 0.5), rows, np.zeros(500)]).astype(np.float64))
     assert not len(remembered.look(pose(0.0, 0.0), WAY, FIELD.sees, nothing))
     assert len(remembered.look(pose(2 * MOST_COLUMNS - 1.0, 0.0), WAY, FIELD.sees, nothing))
 

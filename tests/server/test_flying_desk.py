@@ -346,7 +346,10 @@ def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
         assert row_of(bench).text.startswith("Avoidance is off")
         bench.avoidance = AvoidanceStatus(enabled=True, state="blind")
         bench.desk.refresh()
-        assert row_of(bench).state == bench.told[-1].preflight.rows[-1].state == "accept"
+        assert row_of(bench).state == "accept"
+        shown = bench.told[-1].preflight
+        assert shown is not None
+        assert shown.rows[-1] == row_of(bench)
         with pytest.raises(CheckNeededError, match="no sensor sees ahead"):
             await bench.desk.start(ME, start)
         bench.avoidance = replace(bench.avoidance, state="watching", eyes=(Eye("radar", 1.0, 30.0, 9.0),))

@@ -68,7 +68,7 @@ def test_targets_after_the_climb_are_the_missions_raised_by_the_offset() -> None
     assert 8.0 < offset_m < 12.0
     speeds = [(m.param1, m.param2) for m in it.sent("COMMAND_LONG") if m.command == 178]
     slowed = [(1.0, 2.7)]  # a region of 7 m
-    assert speeds == [*slowed, (2.0, 1.5), *slowed]  # mission, climb, rest
+    assert speeds[:3] == [*slowed, (2.0, 1.5), *slowed]  # mission, climb, rest
     assert any("Climbing" in text for text in it.texts)
     assert any("higher than planned" in text for text in it.texts)
 

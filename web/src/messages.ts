@@ -153,6 +153,7 @@ export interface PerceptionSettings {
   radar_low_deg: number;
   radar_high_deg: number;
   climb_m_s: number;
+  comes_down: boolean;
   climb_ceiling_m: number;
   vehicle_radius_m: number;
   position_error_m: number;
@@ -1114,6 +1115,8 @@ export interface ObstaclesState {
   seen_in_plan: number;
   /** What is being done right now: "Looking for a way around" ... */
   busy: string;
+  /** After a climb: why the rest is not flown at its proper height. */
+  stays_higher: string;
 }
 
 export interface SetAvoidanceBody {
@@ -1178,6 +1181,7 @@ export interface PerceptionSettingsBody {
   radar_high_deg?: number | null;
   /** By itself, over what stands in the way. */
   climb_m_s?: number | null;
+  comes_down?: boolean | null;
   /** Above the plan. */
   climb_ceiling_m?: number | null;
   vehicle_radius_m?: number | null;

@@ -9,7 +9,7 @@ import { Check } from "../ui/fields";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
-import { AVOIDANCE, switchAvoidance, wantsConsent } from "./commands";
+import { AVOIDANCE, setPerception, switchAvoidance, wantsConsent } from "./commands";
 import { avoidanceWords, isTooFast } from "./words";
 
 const isSimulated = () => nodes.value.some((node) => node.name === "simulator" && node.state === "running");
@@ -138,6 +138,28 @@ function Speed() {
   );
 }
 
+/** What follows when the obstacle is behind. */
+function AfterClimb() {
+  const { settings, stays_higher, avoidance } = obstacles.live.value;
+  if (!avoidance.enabled) return null;
+  return (
+    <>
+      <Check
+        label="Comes down after a climb, once certified past what was seen"
+        checked={settings.comes_down}
+        disabled={whyNot() !== null}
+        testid="comes-down"
+        onChange={(comes_down) => void setPerception({ comes_down }, AVOIDANCE)}
+      />
+      {stays_higher && (
+        <p class="avoidance-note" data-testid="stays-higher">
+          It stays higher: {stays_higher}
+        </p>
+      )}
+    </>
+  );
+}
+
 /** What is done about obstacles without asking, and the switch for it. */
 export function Avoidance() {
   const [asks, setAsks] = useState(false);
@@ -170,6 +192,7 @@ export function Avoidance() {
       <p class="avoidance-note">
         {note} <Speed />
       </p>
+      <AfterClimb />
       {consents && <Consent by={by} onDone={close} />}
       <Outcome place={AVOIDANCE} />
     </section>

@@ -52,6 +52,7 @@ const NOTHING: ObstaclesState = {
     radar_low_deg: 0,
     radar_high_deg: 20,
     climb_m_s: 1.5,
+    comes_down: true,
     climb_ceiling_m: 30,
     vehicle_radius_m: 0.5,
     position_error_m: 0.3,
@@ -93,6 +94,7 @@ const NOTHING: ObstaclesState = {
   maps: [],
   seen_in_plan: 0,
   busy: "",
+  stays_higher: "",
 };
 
 export const obstacles: BySource<Signal<ObstaclesState>> = {

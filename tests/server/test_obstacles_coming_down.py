@@ -1,0 +1,151 @@
+"""After a climb: the rest is planned again past what was seen, certified and flown, or it stays higher and says why."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planning.dsm import Dsm
+from planning.formats.wpl import read_wpl
+from planning.model import VehicleProfile
+from server.documents import doc_from_profile
+from server.obstacles import coming_down
+from server.obstacles.coming_down import ComingDown
+from server.obstacles.coming_down_task import SHADOW_M, RestPlanned, burned, plan_rest, with_shadow
+from server.obstacles.manoeuvre_task import Situation
+from server.obstacles.watch import Watch
+from server.schemas import PlanDoc, SurfaceDoc
+from telemetry.errors import NotAllowedError
+from telemetry.messages import GuidedTarget, PlanRecord
+from telemetry.obstacles import AvoidanceStatus, PerceptionSettings
+from telemetry.requests import FlyRest, Operator
+from tests.server.test_obstacles_manoeuvre_task import planned, situation  # noqa: F401
+
+Planned = tuple[Dsm, PlanRecord, Path]
+
+
+def rest_of(there: Situation) -> RestPlanned:
+    return plan_rest(there, report=lambda step, share: None)
+
+
+def underway(there: Situation) -> Situation:
+    """Climbed beside the wall, and going on higher."""
+    state = replace(there.state, landed="in_air", heading_rad=np.pi / 2, v_east_m_s=3.0, v_north_m_s=0.0)
+    document = PlanDoc(
+        terrain_id=there.record.terrain_id,
+        profile=doc_from_profile(VehicleProfile("quad", position_error_m=0.1)),
+        surface=SurfaceDoc(radius_m=4.0, height_m=3.0),
+    )
+    record = replace(there.record, plan_json=document.model_dump_json())
+    return replace(there, state=state, height_offset_m=12.0, record=record)
+
+
+def test_the_rest_is_planned_over_the_wall_and_its_shadow_and_down_to_its_proper_height(planned: Planned) -> None:  # noqa: F811
+    there = underway(situation(planned, 6))
+    rest = rest_of(there)
+    assert rest.why == ""
+    model = burned(planned[0], there)
+    mission = read_wpl(there.record.mission_wpl)
+    places = model.xy_from_lat_lon(np.array([[t.lat_deg, t.lon_deg] for t in rest.targets]))
+    ups = np.array([t.alt_rel_home_m for t in rest.targets])
+    required_m = 0.5
+    line = np.concatenate(
+        [
+            np.column_stack([np.linspace(a, b, 200), np.linspace(x, y, 200)])
+            for a, b, x, y in zip(places[:-1], places[1:], ups[:-1], ups[1:], strict=True)
+        ]
+    )
+    ground_m = model.elevation_at(line[:, :2]) - mission.home.alt_dsm_m
+    assert (line[:, 2] - ground_m).min() > required_m
+    raised = model.elevation_m > planned[0].elevation_m + 0.5
+    columns = np.flatnonzero(raised.any(axis=0)) * model.resolution_m
+    assert columns.max() - columns.min() >= SHADOW_M, "what nobody saw is behind the wall"
+    items = [t.item for t in rest.targets]
+    assert items == sorted(items)
+    assert items[-1] <= len(mission.items)
+    assert ups[-1] < ups.max() - 2.0, "behind the wall it is lower again"
+
+
+def test_what_cannot_be_certified_stays_higher_and_says_why(planned: Planned) -> None:  # noqa: F811
+    there = underway(situation(planned, 6))
+    on_ground = replace(there, state=replace(there.state, landed="on_ground"))
+    assert rest_of(on_ground) == RestPlanned(why="No mission is being flown.")
+    unknown = replace(there, record=replace(there.record, plan_json=""))
+    assert rest_of(unknown).why == "The plan that is flown is not known here."
+    lost = replace(there, state=replace(there.state, lat_deg=0.0, lon_deg=0.0))
+    assert rest_of(lost).targets == ()
+    assert rest_of(lost).why
+
+
+def test_a_shadow_is_as_high_as_what_casts_it_and_lies_ahead() -> None:
+    from planning.seen import Columns
+
+    cast = with_shadow(Columns(np.array([[0.0, 0.0]]), np.array([7.0]), 1.0), np.array([0.0, 1.0]))
+    assert cast.xy_m[:, 1].max() == pytest.approx(SHADOW_M)
+    assert set(cast.top_alt_dsm_m) == {7.0}
+    assert np.abs(cast.xy_m[:, 0]).max() == 0.0
+
+
+TARGETS = (GuidedTarget(2, 37.7, 15.0, 30.0, 3.0), GuidedTarget(3, 37.7, 15.1, 20.0, 3.0))
+HIGHER = AvoidanceStatus(enabled=True, state="offset", height_offset_m=9.0)
+
+
+class Link:
+    def __init__(self, watch: Watch, error: Exception | None = None) -> None:
+        self.watch, self.error, self.asked = watch, error, list[Any]()
+
+    async def call(self, request: Any) -> Any:
+        self.asked.append(request)
+        if self.error is not None:
+            raise self.error
+        self.watch.on_avoidance(replace(HIGHER, height_offset_m=0.0))
+
+
+def run(answer: RestPlanned, *, comes_down: bool = True, error: Exception | None = None) -> tuple[Watch, list[Any]]:
+    watch = Watch("live", lambda message: None)
+    watch.on_settings(PerceptionSettings(comes_down=comes_down))
+    watch.on_avoidance(HIGHER)
+    link, plans = Link(watch, error), list[Any]()
+
+    async def plan(there: Any) -> RestPlanned:
+        plans.append(there)
+        return answer
+
+    down = ComingDown(watch, link, situation=lambda: object(), plan=plan, operator=lambda: Operator("server", 3))  # type: ignore[arg-type,return-value]
+
+    async def whole() -> None:
+        task = asyncio.ensure_future(down.run())
+        await asyncio.sleep(0.2)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(whole())
+    return watch, link.asked
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(coming_down, "LOOK_S", 0.01)
+
+
+def test_a_certified_rest_is_flown_once() -> None:
+    watch, asked = run(RestPlanned(TARGETS))
+    assert asked == [FlyRest(Operator("server", 3), TARGETS)]
+    assert watch.state.stays_higher == ""
+
+
+def test_who_chose_to_stay_higher_does(planned: Planned) -> None:  # noqa: F811
+    assert run(RestPlanned(TARGETS), comes_down=False)[1] == []
+
+
+@pytest.mark.parametrize("error", [None, NotAllowedError("The way ahead is not seen to be clear.")])
+def test_why_it_stays_higher_is_told(error: Exception | None) -> None:
+    answer = RestPlanned(why="The way ahead is not seen to be clear.") if error is None else RestPlanned(TARGETS)
+    watch, asked = run(answer, error=error)
+    assert watch.state.stays_higher == "The way ahead is not seen to be clear."
+    assert len(asked) == (error is not None)
