@@ -111,10 +111,10 @@ class SampledPosition2Go:
     def frame(self, truth: SimTruth) -> RadarFrame:
         """Its strengths are told as the radar that flies live would hear the same cross sections."""
         found, beam = self._sensor.frame(truth), POSITION2GO_IQ.beam
-        xyz_m, snr_db = rows(found.xyz_m, 3), rows(found.snr_db, 1)[:, 0]
+        xyz_m, snr_db = rows(found.xyz_m, 3).astype(np.float64), rows(found.snr_db, 1)[:, 0]
         range_m = np.linalg.norm(xyz_m, axis=1)
         area_m2 = 10 ** (snr_db / 10) / beam.rated_snr * (range_m / beam.range_m) ** 4
-        speed_m_s = rows(found.radial_speed_m_s, 1)[:, 0]
+        speed_m_s = rows(found.radial_speed_m_s, 1)[:, 0].astype(np.float64)
         return _frame(truth, found.number, xyz_m, speed_m_s, _snr_db(area_m2, range_m))
 
 
