@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.certificate.home_search import FARTHEST_M
 from planning.certificate.home_stand import DROP_M
 from planning.clearance import certify
 from planning.dsm import Dsm
@@ -36,6 +37,7 @@ from planning.model import (
     Timing,
     VehicleProfile,
 )
+from planning.part import GROWTH, least_margin_m, needed_part, was_enough
 from planning.path import sampled_path
 from planning.poi import check_pois
 from planning.request import PlanRequest, check_request, check_size, effective_profile
@@ -58,7 +60,7 @@ class Plan:
 
     request: PlanRequest
     dsm: Dsm
-    """The surface model with its small holes filled."""
+    """The surface model, or the part of a large one that the plan needs, with its small holes filled."""
     surfaces: Surfaces
     path: SampledPath
     timing: Timing
@@ -87,15 +89,37 @@ def plan_mission(
     """Plans, decimates and certifies one mission.
 
     ``assumptions`` say what was done to the model before; they join those of the certificate.
-    Raises ParameterError, PoiError, DatumError or MissionError; a plan that is merely too close to the
-    ground is returned with a certificate that says so.
+    Of a large model only the part that the plan needs is looked at; it grows until the certificate is that
+    over the whole model. Raises ParameterError, PoiError, DatumError or MissionError; a plan that is merely
+    too close to the ground is returned with a certificate that says so.
     """
     check_request(request)
     check_size(request, dsm)
+    if request.survey is not None:  # its photos see ground far from its lines
+        return _planned_over(dsm, request, report, assumptions or {})
+    points_xy_m = _points(dsm, request)
+    margin_m = least_margin_m(request)
+    while True:
+        part = needed_part(dsm, points_xy_m, margin_m)
+        plan = _planned_over(part, request, report, assumptions or {})
+        home_settled = margin_m >= FARTHEST_M or (plan.certificate.certified and _is_home_as_asked(plan))
+        if part is dsm or (home_settled and was_enough(part, dsm, plan.line, plan.certificate)):
+            return plan
+        margin_m *= GROWTH
+
+
+def _is_home_as_asked(plan: Plan) -> bool:
+    """Whether no place for home was looked for, which may lie beyond the part."""
+    first = plan.request.home_lat_lon_deg or (plan.request.pois[0].lat_deg, plan.request.pois[0].lon_deg)
+    home = plan.mission.home
+    return (home.lat_deg, home.lon_deg) == tuple(round(degrees, HOME_DECIMALS) for degrees in first)
+
+
+def _planned_over(dsm: Dsm, request: PlanRequest, report: Progress, assumptions: Mapping[str, object]) -> Plan:
     report(SURFACE_STEP, 0.0)
     filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
     check_pois(request.pois, filled)
-    job = _Job(request, dsm, filled, holes, report, assumptions or {})
+    job = _Job(request, dsm, filled, holes, report, assumptions)
     home, why = _home(dsm, request)
     plan = _planned(job, home, why)
     better = _better_default(plan)
@@ -208,6 +232,13 @@ def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, t
     if np.hypot(*(home_xy[0] - xy_m[0])) < request.path.step_m:
         return xy_m, poi_index
     return np.vstack([home_xy, xy_m]), (None, *poi_index)
+
+
+def _points(dsm: Dsm, request: PlanRequest) -> np.ndarray:
+    """(N, 2) projected places that were asked for, home among them where it was given."""
+    places = [(poi.lat_deg, poi.lon_deg) for poi in request.pois]
+    home = [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else []
+    return dsm.xy_from_lat_lon(np.array([*places, *home]))
 
 
 def _home(dsm: Dsm, request: PlanRequest) -> tuple[Home, str]:

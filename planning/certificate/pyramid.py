@@ -77,7 +77,7 @@ def _all_boxes(lattice: Lattice, shape: tuple[int, int], levels: int) -> F64:
     while len(sides) < levels:
         sides.append(np.stack([_halved(sides[-1][..., k]) for k in range(4)], axis=2))
     flat = np.concatenate([side.reshape(-1, 4) for side in sides])
-    return np.concatenate([-flat[:, :2], flat[:, 2:]], axis=1)
+    return np.concatenate([-flat[:, :2], flat[:, 2:]], axis=1, dtype=np.float64)
 
 
 @njit(cache=True, parallel=True, nogil=True)
