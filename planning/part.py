@@ -12,7 +12,7 @@ from planning.request import PlanRequest
 
 LARGE_PX = 4_000_000
 """Smaller models are taken whole."""
-MARGIN_M = 40.0
+MARGIN_M = 10.0
 """Around the points, beside what the ball and the Gaussian reach."""
 GROWTH = 3.0
 
@@ -21,8 +21,8 @@ def least_margin_m(request: PlanRequest) -> float:
     """Beyond the points' bounding box: what the safe surface feels, and where the certificate should find ground."""
     surface = request.surface
     sigma_m = surface.radius_m / 10 if surface.smooth_sigma_m is None else surface.smooth_sigma_m
-    reach_m = 2.0 * surface.radius_m + 8.0 * sigma_m + 2.0 * surface.height_m
-    return reach_m + 2.0 * request.clearance().required_clearance_m + MARGIN_M
+    felt_m = 1.5 * surface.radius_m + 5.0 * sigma_m + surface.height_m  # with the blocks of the fast form
+    return felt_m + request.clearance().required_clearance_m + MARGIN_M
 
 
 def needed_part(dsm: Dsm, xy_m: F64, margin_m: float) -> Dsm:
