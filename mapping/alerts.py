@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapping.obstacles import Found
 
 Kind = Literal["obstacle", "divergence", "sensor"]
@@ -93,6 +96,19 @@ class AlertBook:
             return self._again(entry, t_mono_s)
         self._open.remove(entry)
         return [AlertEvent(entry.id, kind, "ends", t_mono_s, text)]
+
+    def move(self, R_new_old: NDArray[np.float64], shift_m: NDArray[np.float64]) -> None:
+        """The map's frame is laid elsewhere, (3, 3) a turn about z and (3,) a shift: open alerts go with it."""
+        for entry in self._open:
+            if entry.low:
+                corners = [
+                    (x, y, z)
+                    for x in (entry.low[0], entry.high[0])
+                    for y in (entry.low[1], entry.high[1])
+                    for z in (entry.low[2], entry.high[2])
+                ]
+                moved = np.array(corners) @ R_new_old.T + shift_m
+                entry.low, entry.high = moved.min(axis=0).tolist(), moved.max(axis=0).tolist()
 
     def end_all(self, t_mono_s: float) -> list[AlertEvent]:
         """The map was emptied, or the flight is over."""

@@ -132,6 +132,14 @@ class PoseTrack:
         """Of the newest position that was believed."""
         return self._positions.newest_t_s
 
+    def heading_at(self, t_mono_s: float) -> float | None:
+        """Clockwise from north, from attitudes alone; None while there is none for this moment."""
+        around = self._attitudes.around(t_mono_s)
+        if around is None:
+            return None
+        before, after, share = around
+        return quaternions.heading(quaternions.rotation(quaternions.slerp(before.value, after.value, share)))
+
     @property
     def attitude_t_mono_s(self) -> float | None:
         """Of the newest attitude."""

@@ -78,9 +78,10 @@ class Obstacle:
     time_to_contact_s: float | None
     """At the present velocity; None while it is not getting nearer."""
     enu_m: tuple[float, float, float]
-    lat_deg: float
-    lon_deg: float
-    alt_amsl_m: float
+    lat_deg: float | None
+    """None, as the height: the map stands in the camera's own frame, and nobody knows where that is."""
+    lon_deg: float | None
+    alt_amsl_m: float | None
     voxels: int
     size_m: tuple[float, float, float]
 
@@ -189,6 +190,8 @@ class PerceptionStatus:
     """Median of the last frames, from measuring to done."""
     basis: Basis | None = None
     """None when no frame was worked on."""
+    placed: bool = True
+    """Whether anybody knows where the map lies; until then bearings and distances hold, places do not."""
 
 
 @dataclass(frozen=True, slots=True)

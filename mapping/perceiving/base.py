@@ -145,8 +145,13 @@ class Perception:
         return WITHIN_M + max(0.0, self.settings.position_error_m - USUAL_ERROR_M)
 
     @property
+    def placed(self) -> bool:
+        """Whether the map lies in the vehicle's own positions: otherwise ground and mission say nothing about it."""
+        return True
+
+    @property
     def _known_ground(self) -> GroundGrid | None:
-        return None if self.settings.paper_bare else self._ground
+        return None if self.settings.paper_bare or not self.placed else self._ground
 
     # Frames
 
@@ -248,7 +253,7 @@ class Perception:
     def _in_corridor(self, pose: Pose) -> tuple[float, F64]:
         """(length, (N, 3) centres) of the corridor along the mission ahead; 0 and none without a mission."""
         s = self.settings
-        if self._line is None or s.paper_bare or not self._flying:
+        if self._line is None or s.paper_bare or not self._flying or not self.placed:
             return 0.0, np.empty((0, 3))
         place = self._line.place(pose.position_enu_m - self.offset_enu_m)
         if place is None:

@@ -135,6 +135,8 @@ class FrameResult:
     sweep_m: tuple[float | None, ...] = ()
     alerts: tuple[AlertEvent, ...] = ()
     divergence_m: float | None = None
+    placed: bool = True
+    """Whether anybody knows where the map lies; not while it stands in the camera's own frame alone."""
 
     def with_alerts(self, more: list[AlertEvent], *, divergence_m: float | None) -> FrameResult:
         """The same, with what else is to be told."""

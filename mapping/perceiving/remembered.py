@@ -51,6 +51,9 @@ class Remembered:
 
     def __init__(self, edge_m: float) -> None:
         self._edge_m = edge_m
+        self._empty()
+
+    def _empty(self) -> None:
         self._row: dict[tuple[int, int], int] = {}
         self._xy_m: F64 = np.empty((0, 2))
         self._free_from_m: F64 = np.empty(0)
@@ -68,6 +71,21 @@ class Remembered:
         self._looks = np.concatenate([self._looks, np.zeros(len(fresh), np.int64)])
         if len(self._row) > MOST_COLUMNS:
             self._drop_oldest()
+
+    def move(self, R_new_old: F64, shift_m: F64) -> None:
+        """The map's frame is laid elsewhere, (3, 3) a turn about z and (3,) a shift: the columns go with it."""
+        xy_m = self._xy_m @ R_new_old[:2, :2].T + shift_m[:2]
+        free_from_m, looks = self._free_from_m + shift_m[2], self._looks
+        self._empty()
+        self.remember(np.column_stack([xy_m, np.zeros(len(xy_m))]))
+        self._looks[:] = np.iinfo(np.int64).max
+        self._free_from_m[:] = -np.inf
+        # Where two columns have become one, the one of which less is known to be free counts.
+        rows = [self._row.get(cell, -1) for cell in map(tuple, np.floor(xy_m / self._edge_m).astype(int).tolist())]
+        for row, free_m, looked in zip(rows, free_from_m, looks, strict=True):
+            if row >= 0:
+                self._free_from_m[row] = max(self._free_from_m[row], free_m)
+                self._looks[row] = min(self._looks[row], looked)
 
     def look(self, pose: Pose, way: Way, sees: Callable[[F64, F64], Bools], occupied: Callable[[F64], Bools]) -> F64:
         """(K,) distances of columns in the way that cannot be seen now, nor have been seen free at this height.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -33,6 +34,10 @@ OFFSET_SMOOTHING_S = 0.5
 class VisionPerception(Perception):
     """The camera's map. Its path is laid over the vehicle's own positions once; from then on SLAM alone positions it.
 
+    Until there is such a position the map stands in SLAM's own frame (Bigazzi 2022: vision needs no geolocation),
+    turned by the compass where the vehicle tells its heading. Region and alerts are as good there; neither known ground
+    nor the mission can be laid under it. When the first position comes, what is known moves with the frame.
+
     How far the two paths have parted since is measured, and told when it is more than drift. Known ground and the
     mission are given in the vehicle's own positions: they are laid under this map by the measured difference, which
     stays as it is while there is no GNSS.
@@ -45,6 +50,7 @@ class VisionPerception(Perception):
         self._camera = PoseTrack()
         self._tracking: str = "good"
         self._aligned: tuple[F64, F64] | None = None
+        self._placed = False
         self._points = -1
         self._offset_t_s = -math.inf
         self._flown_m = 0.0
@@ -89,10 +95,14 @@ class VisionPerception(Perception):
             return f"camera: {seen}"
         own = self.track.at(t_mono_s) if self._has_fix else "no GNSS position"
         if self._aligned is None:
-            own = own if isinstance(own, Pose) else self._last or own
-            if isinstance(own, str):
-                return own
-            self._aligned = self._align(seen, own)
+            if self._placed and isinstance(own, Pose):
+                self._aligned = self._align(seen, own)
+            elif self._last is not None:
+                self._aligned = self._align(seen, self._last)
+            else:
+                self._aligned = self._turned_by_compass(seen)
+        if not self._placed and isinstance(own, Pose):
+            self._place(self._aligned, self._align(seen, own))
         q_map_slam, shift = self._aligned
         R = quaternions.rotation(q_map_slam)
         velocity = own.velocity_enu_m_s if isinstance(own, Pose) else R @ seen.velocity_enu_m_s
@@ -100,6 +110,25 @@ class VisionPerception(Perception):
         pose = Pose(t_mono_s, R @ seen.position_enu_m + shift, velocity, q)
         self._measure(pose, own)
         return pose
+
+    @property
+    def placed(self) -> bool:
+        return self._placed
+
+    def _turned_by_compass(self, seen: Pose) -> tuple[F64, F64]:
+        """SLAM's own frame, its north where the vehicle's compass has it; as it is without one."""
+        heading_rad = self.track.heading_at(seen.t_mono_s)
+        turn = 0.0 if heading_rad is None else heading_rad - seen.heading_rad
+        return quaternions.from_attitude(turn, 0.0, 0.0), np.zeros(3)
+
+    def _place(self, before: tuple[F64, F64], aligned: tuple[F64, F64]) -> None:
+        """The first position: what was found in SLAM's own frame goes where it really is."""
+        (q_old, old_m), (q_new, new_m) = before, aligned
+        R_new_old = quaternions.rotation(q_new) @ quaternions.rotation(q_old).T
+        shift_m = new_m - R_new_old @ old_m
+        self.alerts.move(R_new_old, shift_m)
+        self._remembered.move(R_new_old, shift_m)
+        self._aligned, self._placed = aligned, True
 
     def _align(self, seen: Pose, own: Pose) -> tuple[F64, F64]:
         """Lay SLAM's frame over the map's: z is up in both, so a turn about it and a shift are all.
@@ -119,7 +148,7 @@ class VisionPerception(Perception):
         if self._last is not None:
             self._flown_m += float(np.linalg.norm(pose.position_enu_m - self._last.position_enu_m))
         self._last = pose
-        if isinstance(own, str):
+        if isinstance(own, str) or not self._placed:
             return
         apart = pose.position_enu_m - own.position_enu_m
         share = 1 - math.exp(-(pose.t_mono_s - self._offset_t_s) / OFFSET_SMOOTHING_S)
@@ -133,7 +162,7 @@ class VisionPerception(Perception):
         self._diverged = apart_m > limit_m * (CLOSER_AGAIN if self._diverged else 1.0)
         text = f"vision: the camera's path and GNSS are {apart_m:.1f} m apart. One of them is wrong."
         said = self.alerts.say("divergence", self._diverged, text, result.t_mono_s)
-        return result.with_alerts(said, divergence_m=self.divergence_m)
+        return replace(result.with_alerts(said, divergence_m=self.divergence_m), placed=self._placed)
 
     def _points_enu(self, cloud: Cloud, pose: Pose) -> F64:
         """(N, 3) believable points in the map's frame."""
@@ -160,7 +189,7 @@ class VisionPerception(Perception):
         if self._tracking == "lost":
             return "blind", "The camera has lost its way: too dark, or nothing fixed in view."
         if self._aligned is None:
-            return "frozen", "Neither position nor camera path yet to lay the camera's map over."
+            return "frozen", "No path of the camera's own SLAM yet: its map has no place."
         if 0 <= self._points < BLIND_POINTS:
             return "blind", "The camera sees nothing: too dark, or nothing in view within 40 m."
         return "running", ""

@@ -229,7 +229,9 @@ def _apart_m(key: ChunkKey, place_enu_m: tuple[float, float, float]) -> float:
 
 def _place(watch: Watch) -> tuple[float, float, float] | None:
     """Of the vehicle, in the maps' frame."""
-    return next((status.region.enu_m for status in watch.statuses.values() if status.region is not None), None)
+    return next(
+        (status.region.enu_m for status in watch.statuses.values() if status.region is not None and status.placed), None
+    )
 
 
 def _origin(watch: Watch) -> MapOrigin | None:

@@ -40,7 +40,7 @@ def region_nodes(
         return []
     nodes = []
     for sensor, status in statuses.items():
-        if status.region is not None and status.state == "running":
+        if status.region is not None and status.state == "running" and status.placed:
             nodes += _region(drawing, placing, sensor, status.region, f"{prefix}/region_{sensor}")
     return nodes
 

@@ -35,8 +35,10 @@ def region_of(region: SearchedRegion) -> Region:
     )
 
 
-def obstacle_of(found: Found, frame: LocalFrame) -> Obstacle:
-    lat_deg, lon_deg, alt_amsl_m = (float(v) for v in frame.to_geodetic([found.enu_m])[0])
+def obstacle_of(found: Found, frame: LocalFrame | None) -> Obstacle:
+    """``frame`` None: nobody knows where the map lies."""
+    place = (None, None, None) if frame is None else frame.to_geodetic([found.enu_m])[0].tolist()
+    lat_deg, lon_deg, alt_amsl_m = place
     return Obstacle(
         region=found.region,
         distance_m=found.distance_m,
@@ -56,7 +58,7 @@ def obstacle_of(found: Found, frame: LocalFrame) -> Obstacle:
 def alert_of(
     event: AlertEvent, sensor: Sensor, frame: LocalFrame | None, *, utc_minus_mono_s: float, done_t_mono_s: float
 ) -> ObstacleAlert:
-    """``frame`` None: the map has no place yet; then there are no obstacles in it either."""
+    """``frame`` None: nobody knows where the map lies."""
     return ObstacleAlert(
         id=event.id,
         sensor=sensor,
@@ -66,5 +68,5 @@ def alert_of(
         t_utc_s=event.t_mono_s + utc_minus_mono_s,
         done_t_mono_s=done_t_mono_s,
         text=event.text,
-        obstacle=None if event.obstacle is None or frame is None else obstacle_of(event.obstacle, frame),
+        obstacle=None if event.obstacle is None else obstacle_of(event.obstacle, frame),
     )

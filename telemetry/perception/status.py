@@ -7,6 +7,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 from mapping.alerts import AlertEvent
+from mapping.frames import LocalFrame
 from mapping.perceiving import FrameResult
 from telemetry.obstacles import Basis, MissionConflict, ObstacleAlert, PerceptionStatus
 from telemetry.perception.convert import alert_of, counts, obstacle_of, region_of
@@ -15,6 +16,7 @@ from telemetry.perception.whereabouts import Whereabouts
 
 _LATENCIES = 50
 _SAY_BEGUN_S = 10.0
+NO_PLACE = "No position of the vehicle yet: what the camera sees is told, but not drawn."
 _FAR_S = 60.0
 """A refused frame that says it is from farther away in time is told of at the present one."""
 
@@ -60,8 +62,9 @@ class Teller:
     ) -> Outcome:
         if result.accepted:
             self._latencies.append(done_s - result.t_mono_s)
-        frame, the_map = where.frame, perception.map
+        frame, the_map = where.frame if perception.placed else None, perception.map
         t_mono_s = result.t_mono_s if abs(result.t_mono_s - done_s) < _FAR_S else done_s  # also when it is no number
+        self.note("place", "" if perception.placed or not result.accepted else NO_PLACE)
         self.note("memory", full_text(the_map) if the_map.is_full else "")
         status = PerceptionStatus(
             sensor=self._kind.sensor,
@@ -82,21 +85,22 @@ class Teller:
             region=None if result.region is None else region_of(result.region),
             corridor_m=result.corridor_m,
             corridor_occupied=result.corridor_occupied,
-            obstacles=() if frame is None else tuple(obstacle_of(found, frame) for found in result.obstacles),
+            obstacles=tuple(obstacle_of(found, frame) for found in result.obstacles),
             sweep_m=result.sweep_m,
             conflict=conflict,
             divergence_m=result.divergence_m,
             latency_s=median(self._latencies) if self._latencies else None,
             basis=basis,
+            placed=perception.placed,
         )
         events, self.ended = [*self.ended, *result.alerts], []
-        return Outcome(status, tuple(self._alert(event, where, done_s) for event in events), result.accepted)
+        return Outcome(status, tuple(self._alert(event, frame, done_s) for event in events), result.accepted)
 
-    def _alert(self, event: AlertEvent, where: Whereabouts, done_s: float) -> ObstacleAlert:
+    def _alert(self, event: AlertEvent, frame: LocalFrame | None, done_s: float) -> ObstacleAlert:
         return alert_of(
             event,
             self._kind.sensor,
-            where.frame,
+            frame,
             utc_minus_mono_s=self._utc_minus_mono_s,
             done_t_mono_s=done_s,
         )

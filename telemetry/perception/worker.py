@@ -113,6 +113,8 @@ class Worker:
         where, line, settings = self.perceiver.where, self.perceiver.flown.line, self.perceiver.settings
         if where.origin is None or where.position is None or line is None or settings.paper_bare:
             return None
+        if not self.perceiver.perception.placed:
+            return None
         radius_m = settings.vehicle_radius_m + settings.position_error_m
         reach_up = math.tan(math.radians(settings.radar_high_deg))
         return Flight(line, where.origin, where.position, where.speed_m_s, radius_m, reach_up)
@@ -137,7 +139,8 @@ class Worker:
         if now_s < self._delta_s + DELTA_S:
             return
         perceiver = self.perceiver
-        deltas = self._changes.changes(perceiver.perception.map, perceiver.where.origin, self._frame_t_s or now_s)
+        origin = perceiver.where.origin if perceiver.perception.placed else None
+        deltas = self._changes.changes(perceiver.perception.map, origin, self._frame_t_s or now_s)
         self._delta_s = now_s
         if deltas:
             self._tell_map(deltas)

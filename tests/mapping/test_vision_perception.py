@@ -156,11 +156,64 @@ def test_darkness_is_said() -> None:
     assert "dark" in result.text
 
 
-def test_before_any_position_the_map_waits() -> None:
+def test_before_any_path_of_the_camera_the_map_waits() -> None:
     vision = VisionPerception(Settings(depth_m=7.0, resolution_m=0.5))
-    vision.feed_camera(CameraPose(1.0, (0, 0, 0), (1, 0, 0, 0)))
     result = vision.on_frame(Cloud(1.0, 1, pole(5.0)), 1.0)
-    assert (result.state, result.dropped_because) == ("frozen", "no position")
+    assert (result.state, result.dropped_because) == ("frozen", "camera: no position")
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.3])
+def test_without_a_first_fix_map_region_and_alerts_stand_in_slam_s_own_frame(turn: float) -> None:
+    flight = flying()
+    flight.perception.set_line([[0, 0, 0], [0, 200, 0]])
+    for _ in range(40):
+        flight.move(has_fix=False)
+        result = flight.camera(
+            np.vstack([pole(18.0), floor(flight.north_m)]), slam=slam_of(flight, turn=turn, drift=np.zeros(3))
+        )
+        assert result.accepted
+        assert not result.placed
+    result = flight.results[-1]
+    assert len(flight.perception.map.occupied()) > 20
+    assert flight.begun() == ["obstacle"]
+    assert result.region is not None
+    first = next(r for r in flight.results if r.alerts)
+    assert first.obstacles[0].distance_m == pytest.approx(7.0, abs=0.8)
+    assert abs(first.obstacles[0].off_nose_rad) < 0.2
+    # The compass is told: bearings are true before any position is.
+    assert first.obstacles[0].bearing_rad == pytest.approx(flight.heading_rad, abs=0.2)
+    assert result.corridor_m == 0.0, "nobody knows where the mission lies in this frame"
+    assert not len(flight.perception.map.occupied(explained=True)), "nor the ground"
+
+
+def test_with_the_first_fix_what_was_found_goes_where_it_really_is() -> None:
+    """No alert begins a second time, and none ends: the obstacle is the same one."""
+    flight = flying()
+    flight.speed_m_s = 0.0
+    things = np.vstack([pole(6.0), floor(0.0)])
+    for k in range(60):
+        flight.move(has_fix=k > 30)
+        result = flight.camera(things, slam=slam_of(flight, turn=2.0, drift=np.zeros(3)))
+        assert result.placed == (k > 30)
+    assert [e.phase for r in flight.results for e in r.alerts if e.phase != "goes_on"] == ["begins"]
+    seen = flight.perception.map.occupied(explained=False)
+    np.testing.assert_allclose(seen[:, :2], [[0.25, 6.25]] * len(seen), atol=0.51)
+    assert len(flight.perception.map.occupied(explained=True)) > 100
+
+
+def test_a_path_lost_before_the_first_fix_goes_on_where_it_ended() -> None:
+    flight = flying()
+    for _ in range(6):
+        flight.move(has_fix=False)
+        flight.camera(pole(18.0), slam=slam_of(flight, turn=0.4, drift=np.zeros(3)))
+    before = flight.results[-1]
+    flight.move(has_fix=False)
+    flight.camera(pole(18.0), slam=CameraPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost"))
+    flight.move(has_fix=False)
+    after = flight.camera(pole(18.0), slam=slam_of(flight, turn=-2.0, drift=np.zeros(3)))
+    assert before.pose is not None
+    assert after.pose is not None
+    np.testing.assert_allclose(after.pose.position_enu_m, before.pose.position_enu_m, atol=1.0)
 
 
 def test_noise_along_the_line_of_sight_does_not_lift_a_hillside_off_the_ground() -> None:
@@ -218,3 +271,20 @@ def test_garbage_never_raises(points: list[tuple[float, ...]], place: tuple, tur
         result = flight.perception.on_frame(cloud, flight.t_s)  # type: ignore[attr-defined]
         assert result.accepted or result.dropped_because
     assert flight.perception.map.occupied_count <= len(points)
+
+
+def test_what_cannot_be_seen_any_more_stays_hidden_when_the_map_finds_its_place() -> None:
+    """It came near before the first fix, and stands nearer now than the camera sees."""
+    flight = flying()
+    flight.speed_m_s = 0.0
+    for k in range(40):
+        flight.move(has_fix=k > 30)
+        near = np.empty((0, 3)) if k > 20 else pole(5.0)
+        drift = np.array([0.0, 4.8, 0.0]) * (k > 20)
+        flight.camera(np.vstack([near, floor(8.0)]), slam=slam_of(flight, turn=2.0, drift=drift))
+    before, after = flight.results[25], flight.results[-1]
+    assert (before.placed, after.placed) == (False, True)
+    assert before.region is not None
+    assert after.region is not None
+    assert before.region.hidden_m is not None
+    assert after.region.hidden_m == pytest.approx(before.region.hidden_m, abs=0.8)

@@ -70,6 +70,9 @@ def test_a_wall_is_mapped_alerted_and_told_with_its_place_on_earth(sensor: str) 
     assert status.region.occupied
     obstacle = status.obstacles[0]
     assert obstacle.distance_m == pytest.approx(flights.WALL_NORTH_M - 33.0, abs=1.5)
+    assert obstacle.lat_deg is not None
+    assert obstacle.lon_deg is not None
+    assert obstacle.alt_amsl_m is not None
     place = flights.FRAME.to_enu(obstacle.lat_deg, obstacle.lon_deg, obstacle.alt_amsl_m)[0]
     assert place == pytest.approx(obstacle.enu_m, abs=0.01)
     assert flight.alerts[0] == ("obstacle", "begins")
@@ -204,6 +207,21 @@ def test_without_gnss_the_radar_map_stands_still() -> None:
     status = flight.fly(2.0, 3.5, gnss_fix="no_fix").status
     assert status.state == "frozen"
     assert flight.perceiver.perception.map.revision == revision
+
+
+def test_without_a_first_position_the_camera_s_obstacles_are_told_without_a_place() -> None:
+    flight = Flight("vision")
+    flying = {"lat_deg": None, "lon_deg": None, "home_lat_deg": None}
+    outcomes = [flight.fly(0.1 * k, 0.1 * k + 0.1, **flying) for k in range(40)]
+    status = outcomes[-1].status
+    assert (status.state, status.placed, status.origin) == ("running", False, None)
+    assert status.frames > 5
+    assert "No position of the vehicle yet" in status.text
+    assert status.region is not None
+    placed = flight.fly(4.1, 5.0)
+    assert placed.status.placed
+    assert placed.status.origin is not None
+    assert "No position" not in placed.status.text
 
 
 def test_the_corridor_follows_the_mission_only_while_it_is_flown_and_as_high() -> None:

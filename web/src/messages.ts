@@ -120,9 +120,9 @@ export interface Obstacle {
   height_difference_m: number;
   time_to_contact_s: number | null;
   enu_m: [number, number, number];
-  lat_deg: number;
-  lon_deg: number;
-  alt_amsl_m: number;
+  lat_deg: number | null;
+  lon_deg: number | null;
+  alt_amsl_m: number | null;
   voxels: number;
   size_m: [number, number, number];
 }
@@ -195,6 +195,7 @@ export interface PerceptionStatus {
   divergence_m: number | null;
   latency_s: number | null;
   basis: Basis | null;
+  placed: boolean;
 }
 
 export interface RecorderStatus {
