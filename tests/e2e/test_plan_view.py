@@ -131,3 +131,22 @@ def _export_all(page: Page) -> bytes:
     with page.expect_download() as download:
         page.get_by_test_id("export-all.zip").click()
     return Path(download.value.path()).read_bytes()
+
+
+def test_home_is_moved_by_one_press_to_where_it_would_do(own_station: Station, page: Page, shared_data: Path) -> None:
+    """The first point lies on the edge of bush, and so does home when it is put there."""
+    _sign_in(page, own_station)
+    _load_model(page, shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
+    page.get_by_test_id("empty-add").or_(page.get_by_test_id("tool-add_poi")).first.wait_for()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_test_id("points-import").click()
+    chooser.value.set_files(shared_data / "logs" / "arducopter" / "pois.csv")
+    expect(page.get_by_test_id("poi-row")).not_to_have_count(0)
+    home = page.get_by_test_id("home-input")
+    home.fill("-37.12445073, 175.68928790")
+    home.press("Enter")
+    reasons = page.get_by_test_id("reasons")
+    expect(reasons).to_contain_text("Home lies on top of something", timeout=60_000)
+    page.get_by_test_id("move-home").click()
+    expect(reasons.get_by_text("Home lies on top of something")).to_have_count(0, timeout=60_000)
+    expect(home).not_to_have_value(re.compile("175.6892879"))

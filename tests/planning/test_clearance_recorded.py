@@ -65,6 +65,7 @@ def test_where_its_vehicle_did_not_tell_nobody_knows_how_high_home_is(without_ho
     line = flown_line(mission, without_holes)
     refused = certify(without_holes, line, replace(PARAMS, home_known_dsm_m=None))
     assert [reason.code for reason in refused.reasons] == ["home_on_top", "return_near_home"]
+    assert refused.home is not None
     assert refused.home.drop_m == pytest.approx(6.62, abs=0.005)
     assert refused.min_distance_m == pytest.approx(4.92, abs=0.005)
     assert refused.home.min_distance_m == 0.0
