@@ -63,6 +63,7 @@ export function perception(fields: Partial<PerceptionStatus> = {}): PerceptionSt
   return {
     sensor: "radar",
     state: "running",
+    placed: true,
     text: "",
     t_mono_s: 100,
     t_utc_s: 1000,

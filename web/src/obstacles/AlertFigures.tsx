@@ -5,10 +5,17 @@ import { notifyText } from "../store/state";
 import { Icon } from "../ui/Icon";
 import { bearingWord, distance, heightDifference, timeTo } from "./words";
 
+/** Where it is; before the first position of the vehicle nobody knows. */
+export function Place({ obstacle: { lat_deg, lon_deg, alt_amsl_m } }: { obstacle: Obstacle }) {
+  if (lat_deg === null || lon_deg === null) {
+    return <span class="alert-place muted">Place unknown: no position of the vehicle yet</span>;
+  }
+  return <Copied text={latLon({ lat_deg, lon_deg })} alt_amsl_m={alt_amsl_m} />;
+}
+
 /** The place as text that a click copies, all 7 decimals of it. */
-export function Place({ obstacle }: { obstacle: Obstacle }) {
+function Copied({ text, alt_amsl_m }: { text: string; alt_amsl_m: number | null }) {
   const [copied, setCopied] = useState(false);
-  const text = latLon(obstacle);
   const copy = async () => {
     try {
       await navigator.clipboard.writeText(text);
@@ -28,7 +35,7 @@ export function Place({ obstacle }: { obstacle: Obstacle }) {
     >
       <Icon name={copied ? "check" : "copy"} size={16} />
       <span class="number">{text}</span>
-      <span class="muted number">{metres(obstacle.alt_amsl_m)} AMSL</span>
+      <span class="muted number">{metres(alt_amsl_m)} AMSL</span>
       {copied && <span class="visually-hidden">Copied</span>}
     </button>
   );
