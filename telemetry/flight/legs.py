@@ -58,8 +58,9 @@ class Legs:
             self._turning = place.heading_rad, now_s
             return self._helm.go_to(replace(here_of(state), heading_rad=place.heading_rad), now_s, radius_m=RADIUS_M)
         self._turning = None
-        speed = self._helm.set_speed(target.speed_m_s, now_s)
-        return [*speed, *self._helm.go_to(place, now_s, radius_m=RADIUS_M)]
+        # The place first: ArduCopter forgets a speed that was ordered before its first place in GUIDED.
+        there = self._helm.go_to(place, now_s, radius_m=RADIUS_M)
+        return [*there, *self._helm.set_speed(target.speed_m_s, now_s)]
 
     def on_look(self, state: VehicleState, now_s: float) -> list[Action]:
         if self.is_over:
