@@ -128,7 +128,7 @@ class Picture:
             plan, stale = None, False
         ground = self._live_ground(document.terrain_id) if review is None else review.ground
         if ground is not None:
-            await self._load_plain(ground)
+            await self._load_own(ground, None if review is None else review.drawn)
         else:
             await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
         overlay, sites = self._overlay
@@ -156,9 +156,11 @@ class Picture:
             self._plain = plain_around(*home)
         return self._plain
 
-    async def _load_plain(self, ground: Dsm) -> None:
+    async def _load_own(self, ground: Dsm, drawn: TerrainScene | None) -> None:
+        """Ground that is not of the library."""
         if self._dsm is not ground:
-            self._terrain, self._dsm, self._terrain_key = await asyncio.to_thread(plain_scene, ground), ground, None
+            drawn = drawn or await asyncio.to_thread(plain_scene, ground)
+            self._terrain, self._dsm, self._terrain_key = drawn, ground, None
             self._changed()
 
     async def _load_terrain(self, terrain_id: str | None, orthophoto_id: str | None, shading: str) -> None:

@@ -59,7 +59,7 @@ def review(
         timer("Reading the recording", None)
         log = read_flight_log(recording)
         timer("Judging the flight", None)
-        doc = judge(log, recording_of(log, recording), dsm=model, mission=flown, truth=truth)
+        doc = judge(log, recording_of(log, recording), dsm=model or log.ground, mission=flown, truth=truth)
         end_progress()
         for note in doc.notes:
             say(f"Note: {note}")

@@ -19,7 +19,7 @@ from server.documents import request_from_doc
 from server.jobs import Progress
 from server.library.terrain_of import FlownOver
 from server.library.terrains import load_terrain
-from server.scene.payload import ReviewScene
+from server.scene.payload import ReviewScene, TerrainScene
 from server.scene.plain import plain_ground
 from server.schemas import PlanDoc, RecordingDoc, ReviewDoc
 
@@ -48,7 +48,7 @@ class Reviewed:
     terrain_id: str | None
     scene: ReviewScene | None
     reference: Reference | None
-    """In the coordinates of that surface model; None without one, or without a plan."""
+    """In the coordinates of that surface model, or of the recording's own; None without one, or without a plan."""
 
 
 def flown_over(path: Path, *, report: Progress) -> FlownOver:
@@ -59,6 +59,8 @@ def flown_over(path: Path, *, report: Progress) -> FlownOver:
     places = tuple((float(log.track.lat_deg[row]), float(log.track.lon_deg[row])) for row in rows)
     if log.plan is None:
         return FlownOver(places=places)
+    if log.ground is not None:
+        return FlownOver(log.plan.terrain_id, log.plan.terrain_sha256)  # any other one would be worse than its own
     return FlownOver(log.plan.terrain_id, log.plan.terrain_sha256, places)
 
 
@@ -74,32 +76,48 @@ def review(
 
     report("Reading the recording", None)
     log = _log(path, path.stat().st_mtime_ns)
-    dsm = None if terrain is None else load_terrain(terrain.directory)
+    dsm = log.ground if terrain is None else load_terrain(terrain.directory)
     mission = None
-    if plan is not None and dsm is not None:
+    if plan is not None and terrain is not None and dsm is not None:
         report("Computing the plan", None)
         mission = plan_mission(dsm, request_from_doc(plan, dsm)).mission
     report("Judging the flight", None)
-    doc = judged(log, recording, dsm=dsm, mission=mission, terrain_name="" if terrain is None else terrain.name)
+    doc = judged(log, recording, dsm=dsm, mission=mission, terrain_name=_name(log, terrain))
     if plan is not None:
         doc = doc.model_copy(update={"plan_name": plan.name})
     flight = placed_flight(log, dsm=dsm, mission=mission)
     reference = None if flight is None else flight.reference
-    ground = None
+    ground = drawn = None
     if flight is not None and dsm is None:
         ground = plain_ground(flight.dsm, np.vstack([flight.track.xyz_m, _planned_m(reference)]))
+    elif terrain is None and dsm is not None:
+        ground, drawn = dsm, _drawn(dsm)
     return Reviewed(
         doc=doc,
         start_utc_s=log.start_utc_s,
         terrain_id=None if terrain is None else terrain.terrain_id,
-        scene=None if flight is None else _scene(flight.track.xyz_m, reference, ground),
+        scene=None if flight is None else _scene(flight.track.xyz_m, reference, ground, drawn),
         reference=None if dsm is None else reference,
     )
 
 
-def _scene(flown_m: np.ndarray, reference: Reference | None, ground: Dsm | None) -> ReviewScene:
+def _name(log: FlightLog, terrain: FlownTerrain | None) -> str:
+    if terrain is not None:
+        return terrain.name
+    return "" if log.ground is None else "the recording's own surface model"
+
+
+def _drawn(ground: Dsm) -> TerrainScene:
+    from server.scene.terrain_payload import build_terrain_scene
+
+    return build_terrain_scene("", ground, shading="height", orthophoto=None)
+
+
+def _scene(
+    flown_m: np.ndarray, reference: Reference | None, ground: Dsm | None, drawn: TerrainScene | None
+) -> ReviewScene:
     every = max(1, len(flown_m) // _DRAWN_POINTS)
-    return ReviewScene(planned_m=_planned_m(reference), flown_m=flown_m[::every], ground=ground)
+    return ReviewScene(planned_m=_planned_m(reference), flown_m=flown_m[::every], ground=ground, drawn=drawn)
 
 
 def _planned_m(reference: Reference | None) -> np.ndarray:

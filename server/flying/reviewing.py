@@ -165,9 +165,12 @@ class Reviewing:
         return FlownTerrain(terrain_id, doc.name, directory)
 
     def _followed(self, reviewed: Reviewed) -> Followed | None:
-        if reviewed.terrain_id is None or reviewed.reference is None:
+        if reviewed.reference is None:
             return None
-        return Followed.over(reviewed.reference, self._library.load_terrain(reviewed.terrain_id))
+        if reviewed.terrain_id is not None:
+            return Followed.over(reviewed.reference, self._library.load_terrain(reviewed.terrain_id))
+        own = None if reviewed.scene is None else reviewed.scene.ground
+        return None if own is None else Followed.over(reviewed.reference, own)
 
     def _show(self, opened: _Open, follower: Follower) -> None:
         self._open, self._last = opened, None

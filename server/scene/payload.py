@@ -83,7 +83,9 @@ class ReviewScene:
     flown_m: F64
     """(N, 3)"""
     ground: Dsm | None = None
-    """Level ground to draw it on where its surface model is not known."""
+    """To draw it on where the library has no surface model of it: the recording's own, or level ground."""
+    drawn: TerrainScene | None = None
+    """The recording's own surface model; None: level ground, or the library's model."""
 
 
 @dataclass(frozen=True, slots=True)

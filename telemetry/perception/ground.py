@@ -30,13 +30,16 @@ class GroundError(TelemetryError):
     code = "known_ground"
 
 
-def ground_around(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
+def ground_around(
+    notice: GroundNotice, origin: MapOrigin, elevation_m: NDArray[np.float32] | None = None
+) -> GroundGrid:
     """The model within a kilometre of home, placed so that it has the height 0 at home: home stands on it.
 
-    Fine cells are taken together by their highest and lowest part. Reads only that window of the file.
+    Fine cells are taken together by their highest and lowest part. Reads only that window of the file, or of
+    ``elevation_m`` where the heights are at hand.
     Raises GroundError when the file is not what the notice says, or home lies off the model or on unknown ground.
     """
-    elevation = _opened(notice)
+    elevation = _opened(notice) if elevation_m is None else elevation_m
     enu_to_cell = _enu_to_cell(notice, origin)
     home_alt_dsm_m = _height_at(elevation, enu_to_cell[:, 2], notice)
     window, shifted = _window(elevation, enu_to_cell)

@@ -17,6 +17,7 @@ from mapping.ground import GroundGrid
 from mapping.perceiving.limits import check_gate
 from mapping.radar_targets import Variant
 from mapping.voxels.checks import checked_size
+from planning.dsm import Dsm
 from telemetry.errors import RecordingError
 from telemetry.messages import FlightStatus, PlanRecord, Published, Topic
 from telemetry.obstacles import Basis, GroundNotice, PerceptionSettings, PerceptionStatus
@@ -27,6 +28,7 @@ from telemetry.perception.inbox import HOLD_S
 from telemetry.perception.kinds import AnyFrame, SensorKind
 from telemetry.perception.perceiver import GroundWanted, Perceiver
 from telemetry.perception.status import full_text
+from telemetry.recording.carried_ground import carried_ground
 from telemetry.recording.reader import Entry, Recording, open_recording
 from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose
 from telemetry.vehicle import VehicleState
@@ -104,7 +106,13 @@ def rebuild(
             what = f"The recording holds no frames of the {kind.sensor}."
             raise RecordingError(what, where=path.name, advice="Choose another sensor, or another recording.")
         has_bases = _has_bases(recording, kind)
-        run = _Run(kind, other, has_bases=has_bases, mono_minus_utc_s=recording.mono_minus_utc_s)
+        run = _Run(
+            kind,
+            other,
+            has_bases=has_bases,
+            mono_minus_utc_s=recording.mono_minus_utc_s,
+            carried=carried_ground(recording),
+        )
         span_s = max(recording.end_utc_s - recording.start_utc_s, 1e-9)
         for entry in recording.entries(run.topics):
             run.take(entry)
@@ -116,8 +124,10 @@ def rebuild(
 class _Run:
     """Frames, states and camera poses wait until the status of a frame says which of them it was made with."""
 
-    def __init__(self, kind: SensorKind, other: OtherMap, *, has_bases: bool, mono_minus_utc_s: float) -> None:
-        self._kind, self._other = kind, other
+    def __init__(
+        self, kind: SensorKind, other: OtherMap, *, has_bases: bool, mono_minus_utc_s: float, carried: Dsm | None
+    ) -> None:
+        self._kind, self._other, self._carried = kind, other, carried
         self._has_bases, self._mono_minus_utc_s = has_bases, mono_minus_utc_s
         self.topics = {kind.frames, kind.status, Topic.VEHICLE, Topic.SLAM_POSE, Topic.PLAN, Topic.FLIGHT}
         self.topics |= {Topic.PERCEPTION_SETTINGS, Topic.GROUND}
@@ -258,8 +268,10 @@ class _Run:
     def _loaded(self, asked: GroundWanted) -> GroundGrid | None:
         if asked.notice is None or asked.origin is None:
             return None
+        is_carried = self._carried is not None and self._carried.sha256 == asked.notice.sha256
+        heights_m = self._carried.elevation_m if is_carried and self._carried is not None else None
         try:
-            return ground_around(asked.notice, asked.origin)
+            return ground_around(asked.notice, asked.origin, heights_m)
         except GroundError as error:
             self._notes[why_none(error)] = None
             return None

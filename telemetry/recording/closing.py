@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
+    AttachmentIndex,
     Channel,
     ChunkIndex,
     DataEnd,
@@ -52,6 +53,7 @@ class Closing:
         self.counts: dict[int, int] = {}
         self._chunks, self._chunk_count = RecordBuilder(), 0
         self._metadata, self._metadata_count = RecordBuilder(), 0
+        self._attachments, self._attachment_count = RecordBuilder(), 0
         self._start_ns, self._end_ns = 0, 0
 
     def add_chunk(self, place: ChunkPlace, counts: dict[int, int]) -> None:
@@ -77,6 +79,10 @@ class Closing:
         MetadataIndex(offset=offset, length=length, name=name).write(self._metadata)
         self._metadata_count += 1
 
+    def add_attachment(self, index: AttachmentIndex) -> None:
+        index.write(self._attachments)
+        self._attachment_count += 1
+
     def block(self, offset: int) -> bytes:
         """All that stands behind the last chunk of a finished file, to be written at ``offset``."""
         head = RecordBuilder()
@@ -84,6 +90,7 @@ class Closing:
         start = offset + head.count
         groups = ((Opcode.SCHEMA, self._written(self.schemas)), (Opcode.CHANNEL, self._written(self.channels)))
         groups += ((Opcode.STATISTICS, self._statistics()), (Opcode.CHUNK_INDEX, _copy(self._chunks)))
+        groups += ((Opcode.ATTACHMENT_INDEX, _copy(self._attachments)),)
         groups += ((Opcode.METADATA_INDEX, _copy(self._metadata)),)
         summary, offsets = bytearray(), RecordBuilder()
         for opcode, records in groups:
@@ -99,7 +106,7 @@ class Closing:
     def _statistics(self) -> bytes:
         builder = RecordBuilder()
         Statistics(
-            attachment_count=0,
+            attachment_count=self._attachment_count,
             channel_count=len(self.channels),
             channel_message_counts=self.counts,
             chunk_count=self._chunk_count,

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from planning.dsm import Dsm
 from planning.model import Mission
 from telemetry.messages import CommandRecord, PlanRecord, VehicleText
 from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
@@ -83,6 +84,8 @@ class FlightLog:
     """Obstacles as they were alerted, in the order of time: where each begins and where it ends."""
     avoidance: tuple[tuple[float, AvoidanceStatus], ...] = ()
     """(t_utc_s, what it said of itself) whenever its state changed."""
+    ground: Dsm | None = None
+    """The surface model that the recording itself carries."""
 
     @property
     def t_s(self) -> F64:

@@ -7,12 +7,14 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from planning.dsm import Dsm
 from planning.errors import FormatError
 from planning.formats.wpl import read_wpl
 from planning.model import Mission
 from telemetry.errors import RecordingError
 from telemetry.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
 from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
+from telemetry.recording.carried_ground import carried_ground
 from telemetry.recording.flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
 from telemetry.recording.reader import Recording
@@ -116,6 +118,7 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
     positions = parts.positions()
     if not positions:
         faults.append("The recording holds no position of the vehicle.")
+    ground = _ground(recording, faults)
     return FlightLog(
         kind="hedgehop",
         name=recording.name,
@@ -137,7 +140,16 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
         faults=tuple(faults),
         alerts=tuple(parts.alerts),
         avoidance=tuple(parts.avoidance),
+        ground=ground,
     )
+
+
+def _ground(recording: Recording, faults: list[str]) -> Dsm | None:
+    try:
+        return carried_ground(recording)
+    except RecordingError as error:
+        faults.append(f"{error.what} {error.advice}")
+        return None
 
 
 def _plan_flown(parts: _Parts) -> PlanRecord | None:

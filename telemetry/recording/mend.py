@@ -81,6 +81,9 @@ def _new_tail(data: Data, contents: Contents) -> tuple[int, bytes]:
     for name, offset, length in contents.metadata_places:
         if offset < keep:
             closing.add_metadata(name, offset, length)
+    for attachment in contents.attachments.values():
+        if attachment.offset < keep:
+            closing.add_attachment(attachment)
     return keep, index + closing.block(keep + len(index))
 
 

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Channel
+from mcap.records import Attachment, Channel
 
 from telemetry.errors import RecordingError
 from telemetry.messages import MESSAGE_TYPES, Published, RawFrame, Topic
 from telemetry.recording.chunks import chunk_content, messages
 from telemetry.recording.closing import ChunkPlace
 from telemetry.recording.files import foreign, is_mcap, opened
-from telemetry.recording.records import BROKEN
+from telemetry.recording.records import BROKEN, record_at, stream_of
 from telemetry.recording.scan import Contents, read_contents
 from telemetry.recording.schemas import codec_of
 from telemetry.recording.tlog import Data
@@ -110,6 +110,18 @@ class Recording:
         for number in range(bisect_right(chunks, until_ns, key=lambda chunk: chunk.start_ns) - 1, -1, -1):
             entries = self._chunk_entries(chunks[number], (topic,))
             yield [entry for entry in entries if round(entry.t_utc_s * 1e9) <= until_ns]
+
+    def attachment(self, name: str) -> bytes | None:
+        """The file of that name that was put into this one."""
+        index = self._contents.attachments.get(name)
+        if index is None:
+            return None
+        try:
+            record = record_at(self._data, index.offset, len(self._data))
+            return Attachment.read(stream_of(self._data, record)).data
+        except BROKEN as error:
+            self._fault(f"A damaged part was left out: {error}.")
+            return None
 
     def _chunk_entries(self, chunk: ChunkPlace, topics: Collection[str]) -> Iterator[Entry]:
         try:

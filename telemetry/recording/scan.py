@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass, field, replace
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
+from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
 
 from telemetry.recording.chunks import chunk_content, chunk_place
 from telemetry.recording.closing import ChunkPlace
@@ -30,6 +30,8 @@ class Contents:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """The last of each name."""
     metadata_places: list[tuple[str, int, int]] = field(default_factory=list)
+    attachments: dict[str, AttachmentIndex] = field(default_factory=dict)
+    """The last of each name."""
     start_ns: int = 0
     end_ns: int = 0
     """Both 0: without any message."""
@@ -173,3 +175,22 @@ def _take(data: Data, record: Record, contents: Contents) -> None:
         metadata = Metadata.read(stream_of(data, record))
         contents.metadata[metadata.name] = metadata.metadata
         contents.metadata_places.append((metadata.name, record.offset, record.end - record.offset))
+    elif record.opcode == Opcode.ATTACHMENT_INDEX:
+        index = AttachmentIndex.read(stream_of(data, record))
+        contents.attachments[index.name] = index
+    elif record.opcode == Opcode.ATTACHMENT:
+        index = attachment_index(Attachment.read(stream_of(data, record)), record.offset, record.end - record.offset)
+        contents.attachments[index.name] = index
+
+
+def attachment_index(attachment: Attachment, offset: int, length: int) -> AttachmentIndex:
+    """Of an attachment whose record stands there."""
+    return AttachmentIndex(
+        offset=offset,
+        length=length,
+        log_time=attachment.log_time,
+        create_time=attachment.create_time,
+        data_size=len(attachment.data),
+        name=attachment.name,
+        media_type=attachment.media_type,
+    )

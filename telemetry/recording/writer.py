@@ -16,7 +16,7 @@ from typing import Any
 
 import zstandard
 from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, Chunk, Header, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 
 from planning import __version__
 from telemetry.messages import MESSAGE_TYPES, PlanRecord, Published, RawFrame
@@ -24,6 +24,7 @@ from telemetry.recording.closing import ChunkPlace, Closing
 from telemetry.recording.files import MCAP_MAGIC
 from telemetry.recording.foxglove import Standards, standard_schema
 from telemetry.recording.message_index import message_index
+from telemetry.recording.scan import attachment_index
 from telemetry.recording.schemas import codec_of
 from telemetry.recording.sink import Sink, Write
 from telemetry.recording.topics import RAW_ENCODING, raw_channel_topic
@@ -113,6 +114,15 @@ class RecordingWriter:
             self._closing.add_chunk(place, {channel: len(entries) for channel, entries in self._index.items()})
         self.messages += self._new_messages
         self._clear()
+
+    def attach(self, name: str, media_type: str, data: bytes, t_utc_s: float) -> None:
+        """A file in the file, on disk at once."""
+        self.commit()
+        t_ns = round(t_utc_s * 1e9)
+        attachment = Attachment(create_time=t_ns, log_time=t_ns, name=name, media_type=media_type, data=data)
+        record, offset = _written(attachment), self._sink.size
+        self._sink.append(record)
+        self._closing.add_attachment(attachment_index(attachment, offset, len(record)))
 
     def close(self) -> None:
         """Finishes the file with its index, safely on disk. Without space for that it stays readable all the same."""
@@ -212,7 +222,7 @@ def _head() -> bytes:
     return MCAP_MAGIC + _written(Header(profile="", library=LIBRARY))
 
 
-def _written(record: Header | Channel | Schema | Metadata | Chunk) -> bytes:
+def _written(record: Header | Channel | Schema | Metadata | Attachment | Chunk) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()

@@ -55,6 +55,7 @@ class _Flight:
         """Of the radar's frames that are still on their way."""
         self._state = self._ready()
         plan = plan_record_of(setup)
+        self._publish(Topic.PERCEPTION_SETTINGS, setup.settings)
         self._publish(Topic.PLAN, plan)
         self._publish(Topic.GROUND, ground)
         self._perceiving: dict[Sensor, Perceiving] = {

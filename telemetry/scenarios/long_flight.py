@@ -82,17 +82,17 @@ def run(wanted: Wanted) -> ScenarioResult:
 def run_for(wanted: Wanted, seconds: float, every_s: float) -> ScenarioResult:
     with tempfile.TemporaryDirectory(prefix="hedgehop-long-flight-") as folder:
         path = wanted.record or Path(folder) / "flight.mcap"
-        recording = FlightRecording(path, NAME)
+        setup = _setup(wanted.seed, seconds)
+        recording = FlightRecording(path, NAME, setup.ground)
         growth = Growth(recording, path, every_s)
         try:
-            flight = _flown(wanted, seconds, growth.tell, growth)
+            flight = _flown(setup, seconds, growth.tell, growth)
         finally:
             recording.close()
     return ScenarioResult(NAME, wanted.seed, (flight,))
 
 
-def _flown(wanted: Wanted, seconds: float, tell: Tell, growth: Growth) -> FlightResult:
-    setup = _setup(wanted.seed, seconds)
+def _flown(setup: Setup, seconds: float, tell: Tell, growth: Growth) -> FlightResult:
     flown = fly(setup, tell)
     found = encounters(flown, setup.world, setup.settings)
     return FlightResult(

@@ -1,10 +1,12 @@
-"""Writes a scenario's flight as a recording that Review opens: states, frames, maps, alerts, all on virtual time."""
+"""Writes a scenario's flight as a recording that Review opens: ground, states, frames, maps, alerts; no clock."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from planning.dsm import Dsm
 from telemetry.messages import Published
+from telemetry.recording.carried_ground import MEDIA_TYPE, NAME, packed
 from telemetry.recording.topics import RECORDED
 from telemetry.recording.writer import RecordingWriter
 from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
@@ -13,10 +15,12 @@ from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
 class FlightRecording:
     """One file. Nothing reads a clock: the same flight gives the same file."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        """Raises RecordingError when it cannot be created."""
+    def __init__(self, path: Path, name: str, ground: Dsm) -> None:
+        """``ground``: what is known of it. Raises RecordingError when the file cannot be created."""
+        carried = packed(ground)
         self._virtual_s = 0.0
         self._writer = RecordingWriter(path, t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name=name, now=self._now)
+        self._writer.attach(NAME, MEDIA_TYPE, carried, T0_UTC_S)
 
     def tell(self, topic: str, message: Published, t_utc_s: float) -> None:
         if topic in RECORDED:

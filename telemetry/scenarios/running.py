@@ -52,7 +52,7 @@ def flown_of(setup: Setup, wanted: Wanted, *, part: str = "") -> Flown:
     if wanted.record is None:
         return fly(setup)
     path = wanted.record if not part else wanted.record.with_stem(f"{wanted.record.stem}-{part.replace(' ', '-')}")
-    recording = FlightRecording(path, setup.title)
+    recording = FlightRecording(path, setup.title, setup.ground)
     try:
         return fly(setup, recording.tell)
     finally:
