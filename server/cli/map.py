@@ -14,7 +14,7 @@ from planning.errors import DescribedError
 from server.cli import options as o
 from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
 from telemetry.perception.export import KINDS as FORMATS
-from telemetry.perception.export import Kind, exported
+from telemetry.perception.export import ExportError, Kind, exported
 from telemetry.perception.kinds import KINDS
 from telemetry.perception.limits import check_memory
 from telemetry.perception.rebuild import OtherMap, Rebuilt, rebuild
@@ -77,9 +77,20 @@ def build_map(
         end_progress()
         for note in built.notes:
             say(f"Note: {note}")
+        _check_not_empty(built, recording)
         out.write_bytes(exported(kind, built.folded))
         answer(built, out, time.monotonic() - began_s, as_json=as_json)
         raise typer.Exit(DONE)
+
+
+def _check_not_empty(built: Rebuilt, recording: Path) -> None:
+    if built.voxels_occupied == 0:
+        raise ExportError(
+            f"The map is empty: {built.frames:,} frames with {built.points:,} points went into it, "
+            f"{built.dropped:,} were not taken.",
+            where=recording.name,
+            advice="Choose another sensor, or a recording in which something was seen.",
+        )
 
 
 def _variant(name: str | None) -> Any:

@@ -35,6 +35,14 @@ from telemetry.vehicle import VehicleState
 
 _PATIENCE_S = 5.0
 """A frame of which no status has told by then was not worked on."""
+_PLACING = {
+    "home": "home_lat_deg",
+    "position": "lat_deg",
+    "time of the position": "position_t_mono_s",
+    "attitude": "attitude_t_mono_s",
+}
+"""Fields of ``VehicleState`` without which no frame has a place."""
+_RECORD_BOTH = "Record the sensor together with the vehicle's link, in one recording."
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +104,7 @@ def rebuild(
     other: OtherMap = AS_IN_FLIGHT,
     progress: Callable[[float], None] | None = None,
 ) -> Rebuilt:
-    """Raises RecordingError for what is no recording, or holds no frame of that sensor.
+    """Raises RecordingError for what is no recording, holds no frame of that sensor, or nothing to place them by.
 
     Raises ParameterError or CapacityError for another map that cannot be.
     """
@@ -105,6 +113,7 @@ def rebuild(
         if kind.frames not in recording.topics():
             what = f"The recording holds no frames of the {kind.sensor}."
             raise RecordingError(what, where=path.name, advice="Choose another sensor, or another recording.")
+        _check_poses(recording, kind)
         has_bases = _has_bases(recording, kind)
         run = _Run(
             kind,
@@ -118,7 +127,11 @@ def rebuild(
             run.take(entry)
             if progress is not None:
                 progress((entry.t_utc_s - recording.start_utc_s) / span_s)
-        return run.finished()
+        built = run.finished()
+    if built.frames == 0 and not kind.uses_camera and run.untold:
+        what = f"No frame of the {kind.sensor} could be placed: {Topic.VEHICLE} never tells the {_listed(run.untold)}."
+        raise RecordingError(what, where=path.name, advice=_RECORD_BOTH)
+    return built
 
 
 class _Run:
@@ -143,11 +156,14 @@ class _Run:
         self._ground: GroundGrid | None = None
         self._begun = self._frames_seen = self._points = 0
         self._notes: dict[str, None] = {}
+        self.untold = list(_PLACING)
+        """Of what places a frame: what no state of the vehicle has told."""
 
     def take(self, entry: Entry) -> None:
         message, t_mono_s = entry.message, entry.t_utc_s + self._mono_minus_utc_s
         if isinstance(message, VehicleState):
             self._states.append(message)
+            self.untold = [what for what in self.untold if getattr(message, _PLACING[what]) is None]
             self._newest_state_s = max(self._newest_state_s, message.t_utc_s)
         elif isinstance(message, SlamPose):
             self._cameras.append(message)
@@ -289,6 +305,18 @@ def _check(kind: SensorKind, wanted: PerceptionSettings) -> None:
     settings = kind.settings(wanted)
     checked_size(settings.resolution_m, kind.reach_m, settings.memory_limit_bytes)
     check_gate(settings)
+
+
+def _check_poses(recording: Recording, kind: SensorKind) -> None:
+    needed, who = (Topic.SLAM_POSE, "the camera") if kind.uses_camera else (Topic.VEHICLE, "the vehicle")
+    if needed in recording.topics():
+        return
+    what = f"Nothing says where {who} was: there are frames ({kind.frames}), but no {needed}."
+    raise RecordingError(what, where=recording.name, advice=_RECORD_BOTH)
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _has_bases(recording: Recording, kind: SensorKind) -> bool:
