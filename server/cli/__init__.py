@@ -18,6 +18,7 @@ from server.cli.fly import fly
 from server.cli.map import build_map
 from server.cli.plan import plan
 from server.cli.radar import radar
+from server.cli.radar_tracks import tracks
 from server.cli.review import review
 from server.cli.scenario import scenario
 from server.cli.serve import serve
@@ -57,6 +58,7 @@ app.command(epilog=examples.SCENARIO)(scenario)
 app.command("map", epilog=examples.MAP)(build_map)
 app.command(epilog=examples.TRAVERSABILITY)(traversability)
 app.command(epilog=examples.AGENT)(agent)
+radar.command("tracks", epilog=examples.RADAR_TRACKS)(tracks)
 app.add_typer(radar)
 app.command(epilog=examples.BENCH)(bench)
 

@@ -69,6 +69,10 @@ RADAR_PROCESS = _examples(
     ("The ODA data set, as a recording", "hedgehop radar process radar.csv --sensor position2go --out targets.mcap"),
     ("For a script", "hedgehop radar process cube.npy --sensor awr1843 --json > detections.json"),
 )  # fmt: skip
+RADAR_TRACKS = _examples(
+    ("Two poles, drawn as the paper draws them", "hedgehop radar tracks radar.csv optitrack.csv --pole 0.4,-2.5 "
+     "--pole -0.3,-4.5 --plots figures"),
+)  # fmt: skip
 TRAVERSABILITY = _examples(
     ("Where a rover can drive, as rasters", "hedgehop traversability dsm.tif --out ground"),
     ("Foliage cleared by a radar, landing sites near a point", "hedgehop traversability dsm.tif --uwb drive.npz "

@@ -1,0 +1,117 @@
+"""A radar's frames followed and held against poles whose places are known (Wessendorp 2021, IV-B and fig. 7)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.errors import RadarDataError
+from mapping.radar.detections import Detections
+from mapping.tracker import Tracker, TrackState
+from telemetry.scenarios.arena_radar import Position2Go
+from telemetry.sensors.optitrack import Capture
+
+F64 = NDArray[np.float64]
+NEAR_M = 1.0
+"""An object nearer to a pole than this, and nearest to it, is that pole."""
+
+
+class Seen(NamedTuple):
+    """Right of the radar and ahead of it, in metres."""
+
+    t_s: float
+    right_m: float
+    forward_m: float
+
+
+@dataclass(slots=True)
+class Pole:
+    """One that stands, and what was followed of it."""
+
+    place_en_m: tuple[float, float]
+    in_view: list[Seen] = field(default_factory=list)
+    """Where it truly was, of each frame with it in view."""
+    followed: list[Seen] = field(default_factory=list)
+    """Where its track had it."""
+    range_error_m: list[float] = field(default_factory=list)
+    bearing_error_rad: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Comparison:
+    poles: list[Pole]
+    others: list[Seen] = field(default_factory=list)
+    """Objects that were followed where no pole is."""
+    frames: int = 0
+    left_out: int = 0
+    """Frames of times that the capture does not cover."""
+    path_en_m: list[tuple[float, float]] = field(default_factory=list)
+
+
+def compared(
+    frames: Iterable[tuple[float, Detections]], capture: Capture, poles_en_m: F64, *, offset_s: float = 0.0
+) -> Comparison:
+    """``offset_s``: how long after the capture's first row the radar's first frame was. Raises RadarDataError."""
+    radar = Position2Go()
+    tracker = Tracker(radar.tracker().params())
+    found = Comparison([Pole((float(east), float(north))) for east, north in poles_en_m])
+    for t_radar_s, detections in frames:
+        t_s = t_radar_s + offset_s
+        if not capture.covers(t_s):
+            found.left_out += 1
+            continue
+        position, heading_rad = capture.position_at(t_s), capture.heading_at(t_s)
+        states = tracker.step(
+            t_s,
+            _in_view(radar, detections),
+            position_enu_m=position,
+            velocity_enu_m_s=capture.velocity_at(t_s),
+            heading_rad=heading_rad,
+        )
+        found.frames += 1
+        found.path_en_m.append((float(position[0]), float(position[1])))
+        _note(found, radar, [s for s in states if s.confirmed and s.seen], (t_s, position, heading_rad))
+    if not found.frames:
+        what = f"None of the radar's {found.left_out} frames lies within the {capture.t_s[-1]:.1f} s of the capture."
+        raise RadarDataError(what, advice="Give the time between the two files' beginnings: --offset-s.")
+    return found
+
+
+def _in_view(radar: Position2Go, found: Detections) -> F64:
+    kept = radar.sees(found.range_m, found.azimuth_rad)
+    return np.column_stack([found.range_m, found.azimuth_rad, found.radial_speed_m_s])[kept]
+
+
+def _note(found: Comparison, radar: Position2Go, states: list[TrackState], where: tuple[float, F64, float]) -> None:
+    t_s, position, heading_rad = where
+    places = [_from_nose(state.position_enu_m - position, heading_rad) for state in states]
+    true = [_from_nose(np.array(pole.place_en_m) - position, heading_rad) for pole in found.poles]
+    free = set(range(len(places)))
+    for pole, at in zip(found.poles, true, strict=True):
+        away_m = {k: math.dist(places[k], at) for k in free}
+        nearest = min(away_m, key=lambda k: away_m[k], default=-1)
+        followed = nearest >= 0 and away_m[nearest] <= NEAR_M
+        if followed:
+            free.discard(nearest)
+        range_m, bearing_rad = np.array([math.hypot(*at)]), np.array([math.atan2(*at)])
+        if not radar.sees(range_m, bearing_rad)[0]:
+            continue
+        pole.in_view.append(Seen(t_s, *at))
+        if followed:
+            place = places[nearest]
+            pole.followed.append(Seen(t_s, *place))
+            pole.range_error_m.append(math.hypot(*place) - float(range_m[0]))
+            pole.bearing_error_rad.append(math.remainder(math.atan2(*place) - float(bearing_rad[0]), math.tau))
+    found.others += [Seen(t_s, *places[k]) for k in sorted(free)]
+
+
+def _from_nose(away_en_m: F64, heading_rad: float) -> tuple[float, float]:
+    """Right and forward."""
+    east, north = (float(value) for value in away_en_m)
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    return east * cos - north * sin, east * sin + north * cos
