@@ -38,7 +38,7 @@ from planning.model import (
     VehicleProfile,
 )
 from planning.part import GROWTH, least_margin_m, needed_part, was_enough
-from planning.path import sampled_path
+from planning.path import MIN_SEGMENT_M, sampled_path
 from planning.poi import check_pois
 from planning.request import PlanRequest, check_request, check_size, effective_profile
 from planning.surface import FLOOR_SHARE, safe_surface, safe_surface_at
@@ -229,7 +229,7 @@ def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, t
     xy_m = dsm.xy_from_lat_lon(lat_lon)
     poi_index: tuple[int | None, ...] = tuple(range(len(xy_m)))
     home_xy = dsm.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))
-    if np.hypot(*(home_xy[0] - xy_m[0])) < request.path.step_m:
+    if np.hypot(*(home_xy[0] - xy_m[0])) < max(request.path.step_m, MIN_SEGMENT_M):
         return xy_m, poi_index
     return np.vstack([home_xy, xy_m]), (None, *poi_index)
 
