@@ -28,6 +28,9 @@ export const metres = (value: number | null | undefined, decimals = 1) => withUn
 export const clearance = (value_m: number | null | undefined) =>
   metres(known(value_m) ? Math.floor(value_m * 100 + 1e-6) / 100 : value_m, 2);
 
+/** A distance that is demanded, rounded up to centimetres: what is read is enough. */
+export const demanded = (value_m: number) => metres(Math.ceil(value_m * 100 - 1e-6) / 100, 2);
+
 /** Long lengths in kilometres. */
 export function length(value_m: number | null | undefined): string {
   if (!known(value_m)) return DASH;

@@ -94,6 +94,8 @@ describe("messages of the planner", () => {
 
 describe("clearances", () => {
   it("are rounded down, never up", () => {
+    expect(f.demanded(4.6101)).toBe("4.62\u00a0m");
+    expect(f.demanded(4.61)).toBe("4.61\u00a0m");
     expect(f.clearance(6.2599)).toBe("6.25\u00a0m");
     expect(f.clearance(6.26)).toBe("6.26\u00a0m");
     expect(f.clearance(-0.004)).toBe("\u22120.01\u00a0m");

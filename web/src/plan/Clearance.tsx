@@ -1,4 +1,4 @@
-import { clearance, latLon, metres } from "../format";
+import { clearance, demanded, latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -113,7 +113,7 @@ export function Clearance({ result }: { result: ResultDoc }) {
         </span>
         <span class="muted">smallest distance</span>
         <span class="required" data-testid="required-clearance">
-          {metres(result.required_clearance_m, 2)} required
+          {demanded(result.required_clearance_m)} required
         </span>
       </div>
       <dl class="figures-list">

@@ -1,4 +1,4 @@
-import { DASH, clearance, deviation, duration, metres, timecode, withUnit } from "../format";
+import { DASH, clearance, demanded, deviation, duration, metres, timecode, withUnit } from "../format";
 import type { ReviewDoc, ReviewFigures } from "../messages";
 import { Icon, type IconName } from "../ui/Icon";
 import { seek } from "./commands";
@@ -42,7 +42,7 @@ function Distance({ figures }: { figures: ReviewFigures }) {
         <span class="muted">smallest distance flown</span>
         <span class="required">
           {certified_distance_m === null ? "none certified" : `${clearance(certified_distance_m)} certified`}
-          {required_m !== null && `, ${metres(required_m, 2)} required`}
+          {required_m !== null && `, ${demanded(required_m)} required`}
         </span>
       </div>
       {min_distance_t_s !== null && (

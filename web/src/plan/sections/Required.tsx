@@ -1,4 +1,4 @@
-import { metres } from "../../format";
+import { demanded } from "../../format";
 import type { BudgetDoc, ClearanceDoc, PlanDoc, ProfileDoc } from "../../messages";
 import { editGroup } from "../../store/plan";
 import { isFresh, result } from "../../store/state";
@@ -15,7 +15,6 @@ const demand = (label: string, fields: Partial<ClearanceDoc>) =>
 const first = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Demands are rounded up, as everywhere. */
-const up = (value_m: number) => metres(Math.ceil(value_m * 100 - 1e-6) / 100, 2);
 
 /** Every term with where it comes from, their sum, and what a smaller clearance leaves out. */
 function Terms({ budget, isOld }: { budget: BudgetDoc; isOld: boolean }) {
@@ -25,13 +24,13 @@ function Terms({ budget, isOld }: { budget: BudgetDoc; isOld: boolean }) {
         {budget.terms.map((term) => (
           <div key={term.code} data-term={term.code}>
             <dt>{first(term.name)}</dt>
-            <dd>{up(term.value_m)}</dd>
+            <dd>{demanded(term.value_m)}</dd>
             <dd class="source">{term.source}</dd>
           </div>
         ))}
         <div class="sum">
           <dt>Sum</dt>
-          <dd data-testid="clearance-sum">{up(budget.total_m)}</dd>
+          <dd data-testid="clearance-sum">{demanded(budget.total_m)}</dd>
           <dd class="source">{budget.rule}</dd>
         </div>
       </dl>
@@ -39,7 +38,8 @@ function Terms({ budget, isOld }: { budget: BudgetDoc; isOld: boolean }) {
         <p class="uncovered" data-testid="clearance-uncovered" role="status">
           <Icon name="warning" size={16} />
           <span>
-            Not covered: {budget.uncovered.map((part) => `${up(part.missing_m)} of ${part.name}`).join(", ")}
+            Not covered:{" "}
+            {budget.uncovered.map((part) => `${demanded(part.missing_m)} of ${part.name}`).join(", ")}
           </span>
         </p>
       )}
@@ -108,7 +108,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
       id="required"
       title="Required clearance"
       icon="shield"
-      summary={required_m === null ? "" : up(required_m)}
+      summary={required_m === null ? "" : demanded(required_m)}
     >
       {budget ? (
         <Terms budget={budget} isOld={!isFresh.value} />
@@ -155,7 +155,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
       <Downwash profile={profile} />
       <AutoField
         label="Own required clearance"
-        auto={budget ? `(${up(budget.total_m)})` : ""}
+        auto={budget ? `(${demanded(budget.total_m)})` : ""}
         unit="m"
         min={0}
         max={500}
