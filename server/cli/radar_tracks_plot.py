@@ -38,9 +38,10 @@ def _over_ground(axes: Axes, found: Comparison) -> None:
     axes.plot(*path[0], "o", color="#444444", markersize=5, label="start")
     for number, pole in enumerate(found.poles):
         axes.plot(*pole.place_en_m, "o", color=_TRUE[number % 3], markersize=9, label=f"pole {number + 1}")
-    axes.set(title="True way and poles", xlabel="x [m]", ylabel="-z [m]", aspect="equal")
+    axes.set(title="True way and poles", xlabel="x [m]", ylabel="-z [m]")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="lower right")
 
 
 def _from_radar(axes: Axes, found: Comparison) -> None:
@@ -58,6 +59,7 @@ def _from_radar(axes: Axes, found: Comparison) -> None:
             followed[:, 1], followed[:, 2], ".", color=_FOLLOWED[number % 3], markersize=5,
             label=f"pole {number + 1}, followed",
         )  # fmt: skip
-    axes.set(title="From the radar", xlabel="right [m]", ylabel="forward [m]", aspect="equal")
+    axes.set(title="From the radar", xlabel="right [m]", ylabel="forward [m]")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
