@@ -30,6 +30,8 @@ from telemetry.simulator.sensors import SlamDrift, StereoModel, StereoSensor, ra
 _log = logging.getLogger(__name__)
 
 RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
+REST_HZ = 4.0
+"""The radar's, while the vehicle is not armed."""
 FRESH_S = 0.5
 """Older truths are looked from no more: the simulator has stopped."""
 _LOOK_EVERY_S = 0.5
@@ -82,10 +84,10 @@ class _Newest:
         self.truth: SimTruth | None = None
         self.came = asyncio.Event()
 
-    def fresh(self) -> SimTruth | None:
-        """Only while the vehicle is armed: at rest there is nothing to look out for."""
+    def fresh(self, *, at_rest: bool = False) -> SimTruth | None:
+        """While the vehicle is armed, or ``at_rest`` as well."""
         truth = self.truth
-        if truth is None or not truth.armed or time.monotonic() - truth.t_mono_s > FRESH_S:
+        if truth is None or not (truth.armed or at_rest) or time.monotonic() - truth.t_mono_s > FRESH_S:
             return None
         return truth
 
@@ -136,7 +138,8 @@ def _world(options: SensorOptions, frame: Frame) -> World:
 
 
 async def _radar(bus: Bus, suite: _Suite, newest: _Newest) -> None:
-    beat = _Beat(RADAR_HZ)
+    """At rest, too, as real ones do: before a start it must be seen that they work."""
+    beat = _Beat(RADAR_HZ, rest_hz=REST_HZ)
     while True:
         truth = await beat.next(newest)
         bus.publish(Topic.RADAR_FRAME, await asyncio.to_thread(suite.radar.frame, truth))
@@ -159,16 +162,19 @@ async def _slam(bus: Bus, suite: _Suite, newest: _Newest) -> None:
 class _Beat:
     """Waits for a new truth once a period has passed; a period that was missed is not made up for."""
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, *, rest_hz: float | None = None) -> None:
+        """``rest_hz``: of a vehicle that is not armed; None: then nobody looks out."""
         self._period_s = 1.0 / rate_hz
+        self._rest_period_s = None if rest_hz is None else 1.0 / rest_hz
         self._due_s = -np.inf
         self._last_t_mono_s = -np.inf
 
     async def next(self, newest: _Newest) -> SimTruth:
         while True:
-            now_s, truth = time.monotonic(), newest.fresh()
+            now_s, truth = time.monotonic(), newest.fresh(at_rest=self._rest_period_s is not None)
             if now_s >= self._due_s and truth is not None and truth.t_mono_s > self._last_t_mono_s:
-                self._due_s = max(self._due_s + self._period_s, now_s)
+                rest_s = 0.0 if truth.armed or self._rest_period_s is None else self._rest_period_s - self._period_s
+                self._due_s = max(self._due_s + self._period_s, now_s) + rest_s
                 self._last_t_mono_s = truth.t_mono_s
                 return truth
             await asyncio.sleep(max(_TICK_S, self._due_s - now_s))
