@@ -128,4 +128,4 @@ def _own(name: str, radar: RadarKind | None, figures: list[str]) -> dict[str, di
                 f'"{figure}" sets nothing.', where="--set", advice="Write tracker.NAME=VALUE or velocities.NAME=VALUE."
             )
         out[part][what] = value
-    return out
+    return {part: values for part, values in out.items() if values}
