@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.formats.wpl import read_wpl
 from planning.model import Firmware, Mission
+from telemetry.errors import NotAllowedError
 from telemetry.flight.targets import guided_plan
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.codec import Packer, Parser
@@ -140,7 +141,9 @@ class ReplayedLink:
         if self.now_s - self._ticked_s >= TICK_S:
             self._ticked_s = self.now_s
             if self._avoids and self.link.pilot is not None:  # it had been switched on before the recording began
-                self.link.pilot.avoidance.enable()
+                # The vehicle obeyed the avoidance of then: today's may take what it did for the pilot's doing.
+                with contextlib.suppress(NotAllowedError):
+                    self.link.pilot.avoidance.enable()
                 self._avoids = False
             self.link._on_tick()
             await self._turn()
