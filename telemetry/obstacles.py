@@ -247,6 +247,8 @@ class PerceptionSettings:
     radar_low_deg: float = 0.0
     radar_high_deg: float = 20.0
     """Its elevations."""
+    cloud_voxel_m: float = 0.0
+    """Edge of the voxels of which one point each is used of the camera's clouds; 0: all points are."""
     climb_m_s: float = 1.5
     """By itself, over what stands in the way (V2)."""
     comes_down: bool = True

@@ -10,6 +10,8 @@ from mapping.perceiving.model import Settings
 from mapping.roi import MOST_POINTS, checked_sector
 from mapping.voxels.checks import checked_size
 
+COARSEST_CLOUD = 0.5
+"""Of a voxel's edge: what is thinned more coarsely leaves voxels empty in which something was seen."""
 LEAST_GATE_DEG = 5.0
 """Elevations are measured to 7 degrees."""
 
@@ -21,11 +23,23 @@ def check_settings(settings: Settings, *, reach_m: float | None, reach_down: flo
     """
     s = settings
     check_gate(s)
+    check_thinning(s)
     checked_size(s.resolution_m, reach_m, s.memory_limit_bytes)
     checked_sector(
         depth_m=s.depth_m, fov_rad=s.fov_rad, height_m=s.height_m, resolution_m=min(ROI_STEP_M, s.resolution_m)
     )
     _check_corridor(s.vehicle_radius_m + s.position_error_m, s.resolution_m, reach_down)
+
+
+def check_thinning(s: Settings) -> None:
+    """Raises ParameterError."""
+    coarsest_m = COARSEST_CLOUD * s.resolution_m
+    if not 0.0 <= s.cloud_voxel_m <= coarsest_m:
+        raise ParameterError(
+            f"Clouds thinned to one point per {s.cloud_voxel_m:g} m leave gaps in a map of {s.resolution_m:g} m.",
+            where="cloud_voxel_m",
+            advice=f"Give 0 (all points) to {coarsest_m:g} m, half a voxel of the camera's map.",
+        )
 
 
 def check_gate(s: Settings) -> None:

@@ -34,6 +34,8 @@ class Settings:
     gate_low_rad: float = 0.0
     gate_high_rad: float = math.radians(20)
     """Where the radar's targets must be measured to be used: ``Gate``."""
+    cloud_voxel_m: float = 0.0
+    """Edge of the voxels of which one point each is used of a cloud; 0, as Bigazzi 2022: all points are."""
     vehicle_radius_m: float = 0.5
     position_error_m: float = 0.3
     braking: Braking = field(default_factory=Braking)

@@ -13,7 +13,9 @@ from mapping import quaternions
 from mapping.perceiving.base import Perception
 from mapping.perceiving.model import CameraPose, Cloud, FrameResult, Settings, State
 from mapping.poses import Pose, PoseTrack
+from mapping.thinning import thinned
 
+F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 NEAREST_M, FARTHEST_M = 0.3, 40.0
@@ -82,7 +84,7 @@ class VisionPerception(Perception):
             return self._drop(cloud, pose, now_mono_s)
         points = self._points_enu(cloud, pose)
         self.map.clear()
-        self._insert(points, pose, thinned=cloud.voxel_m > 0)
+        self._insert(points, pose, singly=cloud.voxel_m > 0 or self.settings.cloud_voxel_m > 0)
         self._points = len(points)
         return self._with_divergence(self._look(cloud.t_mono_s, now_mono_s, pose, len(points)))
 
@@ -168,13 +170,22 @@ class VisionPerception(Perception):
         """(N, 3) believable points in the map's frame."""
         with np.errstate(over="ignore"):  # what float32 cannot hold is absurd anyway
             xyz = np.ascontiguousarray(cloud.xyz_m, np.float32).reshape(-1, 3)
+            xyz = self._thinned(xyz)
         points, broken, absurd = _believable(xyz, pose.rotation_enu_body, pose.position_enu_m, NEAREST_M, FARTHEST_M)
         self._count("points: not finite", broken)
         self._count("points: absurd range", absurd)
         return points
 
-    def _insert(self, points: F64, pose: Pose, *, thinned: bool) -> None:
-        centres = voxel_centres(points, self.map.resolution_m, 1 if thinned else FEWEST_POINTS)
+    def _thinned(self, xyz_m: F32) -> F32:
+        """What is no number is left to be counted, not to be thinned."""
+        voxel_m = self.settings.cloud_voxel_m
+        if voxel_m <= 0.0:
+            return xyz_m
+        finite = np.isfinite(xyz_m).all(axis=1)
+        return np.concatenate([thinned(xyz_m[finite], voxel_m), xyz_m[~finite]])
+
+    def _insert(self, points: F64, pose: Pose, *, singly: bool) -> None:
+        centres = voxel_centres(points, self.map.resolution_m, 1 if singly else FEWEST_POINTS)
         ground = self._known_ground
         if ground is None:
             self.map.insert_hits(centres)

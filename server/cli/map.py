@@ -57,6 +57,14 @@ def build_map(
     high_deg: Annotated[
         float | None, typer.Option("--radar-high-deg", help="Up to this one; default: as in flight.")
     ] = None,
+    cloud_voxel_m: Annotated[
+        float | None,
+        typer.Option(
+            "--cloud-voxel-m",
+            metavar="M",
+            help="Of the camera's clouds one point per voxel of this edge, 0: all; default: as in flight.",
+        ),
+    ] = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Build a recording's map of obstacles again: exactly as it was in flight, or otherwise."""
@@ -70,7 +78,13 @@ def build_map(
             recording,
             KINDS[sensor],
             other=OtherMap(
-                resolution_m, _limit_bytes(memory_mb), _variant(radar_variant), azimuth_deg, low_deg, high_deg
+                resolution_m,
+                _limit_bytes(memory_mb),
+                _variant(radar_variant),
+                azimuth_deg,
+                low_deg,
+                high_deg,
+                cloud_voxel_m,
             ),
             progress=lambda share: progress("Building the map", share),
         )

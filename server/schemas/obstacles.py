@@ -146,6 +146,8 @@ class PerceptionSettingsBody(Strict):
     radar_low_deg: Annotated[float, Field(ge=-30, le=0)] | None = None
     radar_high_deg: Annotated[float, Field(ge=5, le=35)] | None = None
     """Its elevations: what stands at the vehicle's own height must be seen."""
+    cloud_voxel_m: Annotated[float, Field(ge=0, le=2)] | None = None
+    """Of the camera's clouds one point in each such voxel is used; 0: all."""
     climb_m_s: Annotated[float, Field(ge=0.3, le=5)] | None = None
     """By itself, over what stands in the way."""
     comes_down: bool | None = None

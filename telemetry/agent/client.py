@@ -17,9 +17,10 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus, InvalidURI
 from websockets.typing import Origin, Subprotocol
 
+from mapping.thinning import thinned
 from telemetry.agent.bandwidth import Bandwidth
 from telemetry.agent.clock import RemoteClock
-from telemetry.agent.thinning import sendable, thinned
+from telemetry.agent.thinning import sendable
 from telemetry.agent.wire import (
     NOTICE_LONGEST,
     PATH,

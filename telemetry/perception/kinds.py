@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -129,7 +129,7 @@ VISION = SensorKind(
     Topic.PERCEPTION_VISION,
     VisionPerception,
     _cloud,
-    lambda s: _settings(s, s.vision_depth_m, s.vision_resolution_m),
+    lambda s: replace(_settings(s, s.vision_depth_m, s.vision_resolution_m), cloud_voxel_m=s.cloud_voxel_m),
     reach_m=40.0,
     backlog=1,  # Its map is made of the newest frame alone.
 )

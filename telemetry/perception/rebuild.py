@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapping.ground import GroundGrid
-from mapping.perceiving.limits import check_gate
+from mapping.perceiving.limits import COARSEST_CLOUD, check_gate, check_thinning
 from mapping.radar_targets import Variant
 from mapping.voxels.checks import checked_size
 from planning.dsm import Dsm
@@ -55,15 +55,17 @@ class OtherMap:
     radar_azimuth_deg: float | None = None
     radar_low_deg: float | None = None
     radar_high_deg: float | None = None
+    cloud_voxel_m: float | None = None
 
     def applied(self, settings: PerceptionSettings) -> PerceptionSettings:
-        kept = ("memory_limit_bytes", "radar_variant", "radar_azimuth_deg", "radar_low_deg", "radar_high_deg")
-        other = {name: value for name in kept if (value := getattr(self, name)) is not None}
+        other = {name: value for name in _TAKEN_AS_IS if (value := getattr(self, name)) is not None}
         settings = replace(settings, **other)
         if self.resolution_m is None:
             return settings
         # Nothing is searched for the map's sake: what is fine and large needs no fine and large region.
         small_m = self.resolution_m
+        if self.cloud_voxel_m is None:
+            settings = replace(settings, cloud_voxel_m=min(settings.cloud_voxel_m, COARSEST_CLOUD * small_m))
         return replace(
             settings,
             radar_resolution_m=small_m,
@@ -75,6 +77,14 @@ class OtherMap:
         )
 
 
+_TAKEN_AS_IS = (
+    "memory_limit_bytes",
+    "radar_variant",
+    "radar_azimuth_deg",
+    "radar_low_deg",
+    "radar_high_deg",
+    "cloud_voxel_m",
+)
 AS_IN_FLIGHT = OtherMap()
 
 
@@ -305,6 +315,7 @@ def _check(kind: SensorKind, wanted: PerceptionSettings) -> None:
     settings = kind.settings(wanted)
     checked_size(settings.resolution_m, kind.reach_m, settings.memory_limit_bytes)
     check_gate(settings)
+    check_thinning(settings)
 
 
 def _check_poses(recording: Recording, kind: SensorKind) -> None:

@@ -167,6 +167,11 @@ def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page
 
 def _maps_begin_anew_when_held_for(page: Page) -> None:
     page.get_by_test_id("map-settings").locator("summary").click()
+    thin = page.get_by_test_id("perception-cloud_voxel_m")
+    expect(thin).to_have_value("0")
+    thin.fill("0.25")
+    thin.press("Enter")
+    expect(thin).to_have_value("0.25")
     edge, memory = page.get_by_test_id("perception-radar_resolution_m"), page.get_by_test_id("perception-memory_mb")
     anew = page.get_by_test_id("begins-anew")
     expect(edge).to_have_value("1")

@@ -84,6 +84,22 @@ def test_the_map_is_local() -> None:
     assert np.isnan(flight.perception.map.probability([[0.1, 12.0, 0.0]]))[0]
 
 
+def test_of_a_thinned_cloud_one_point_occupies_a_voxel_and_thin_things_stay() -> None:
+    full, thin = flying(), flying(cloud_voxel_m=0.25)
+    once = np.vstack([pole(12.0), floor(0.0)])
+    cloud = np.vstack([once, once + 0.01, once + 0.02, [[np.nan, 0.0, 0.0]]])
+    points = []
+    for flight in (full, thin):
+        flight.move()
+        points.append(flight.camera(cloud, voxel_m=0.0).points)
+    assert points[1] < 0.6 * points[0]
+    np.testing.assert_array_equal(
+        np.unique(thin.perception.map.occupied(explained=False)[:, 2]),
+        np.unique(full.perception.map.occupied(explained=False)[:, 2]),
+    )
+    assert thin.perception.dropped == full.perception.dropped == {"points: not finite": 1}
+
+
 def test_drift_moves_the_map_but_neither_the_ground_nor_the_mission() -> None:
     """SLAM 6 m too high and 4 m aside: its own ground must still count as known, its poles as obstacles."""
     flight = flying()

@@ -78,6 +78,7 @@ def test_the_one_in_charge_is_heard(
         ("settings", {"radar_azimuth_deg": 90}),
         ("settings", {"radar_high_deg": 60}),
         ("settings", {"climb_m_s": 0}),
+        ("settings", {"cloud_voxel_m": 3}),
         ("settings", {"climb_ceiling_m": 500}),
         ("avoidance", {}),
         ("seen", {"seen": True, "sensors": ["sonar"]}),
@@ -96,6 +97,7 @@ def test_what_makes_no_sense_is_refused(served: Running, pilot: httpx.Client, pa
         {"vehicle_radius_m": 1.2, "position_error_m": 0.0},
         {"radar_azimuth_deg": 30, "radar_low_deg": -5, "radar_high_deg": 25},
         {"climb_m_s": 2.5, "climb_ceiling_m": 15},
+        {"cloud_voxel_m": 0.25},
     ],
 )
 def test_the_maps_the_gate_and_the_climb_can_be_set(served: Running, pilot: httpx.Client, body: dict[str, Any]) -> None:

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapping.thinning import thinned
 from telemetry.agent.bandwidth import Bandwidth
 from telemetry.agent.client import sensor_url
 from telemetry.agent.clock import RemoteClock
-from telemetry.agent.thinning import sendable, thinned
+from telemetry.agent.thinning import sendable
 from telemetry.agent.wire import REACH_M, cloud, points_of
 from telemetry.errors import AddressError
 

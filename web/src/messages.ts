@@ -152,6 +152,7 @@ export interface PerceptionSettings {
   radar_azimuth_deg: number;
   radar_low_deg: number;
   radar_high_deg: number;
+  cloud_voxel_m: number;
   climb_m_s: number;
   comes_down: boolean;
   climb_ceiling_m: number;
@@ -1180,6 +1181,8 @@ export interface PerceptionSettingsBody {
   radar_low_deg?: number | null;
   /** Its elevations: what stands at the vehicle's own height must be seen. */
   radar_high_deg?: number | null;
+  /** Of the camera's clouds one point in each such voxel is used; 0: all. */
+  cloud_voxel_m?: number | null;
   /** By itself, over what stands in the way. */
   climb_m_s?: number | null;
   comes_down?: boolean | null;

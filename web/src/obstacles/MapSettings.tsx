@@ -9,9 +9,10 @@ import { NumberField } from "../ui/NumberField";
 import { type AnotherMap, BYTES_PER_MB, beginsAnew, differing } from "./another_map";
 import { MAP_SETTINGS, setPerception } from "./commands";
 
-const VEHICLE = [
+const AT_ONCE = [
   { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", min: 0.1, max: 5, step: 0.1 },
   { key: "position_error_m", label: "Position error", unit: "m", min: 0, max: 10, step: 0.1 },
+  { key: "cloud_voxel_m", label: "Camera's points: one per", unit: "m", min: 0, max: 2, step: 0.05 },
 ] as const;
 
 const VOXELS = [
@@ -60,7 +61,7 @@ export function MapSettings({ settings }: { settings: PerceptionSettings }) {
     <details class="details" data-testid="map-settings">
       <summary>Vehicle and maps</summary>
       <div class="field-grid">
-        {VEHICLE.map(({ key, ...field }) => (
+        {AT_ONCE.map(({ key, ...field }) => (
           <NumberField
             key={key}
             {...field}
@@ -94,7 +95,7 @@ export function MapSettings({ settings }: { settings: PerceptionSettings }) {
       </div>
       <p class="hint">
         Other voxels, or another memory, begin a map anew. The range finder's map has the camera's voxels. A
-        full map takes nothing new, and says so.
+        full map takes nothing new, and says so. Camera's points: 0 m uses all of them.
       </p>
       <ErrorBox place={MAP_SETTINGS} />
       <Anew body={differing(wanted, settings)} giveUp={giveUp} />

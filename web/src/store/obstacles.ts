@@ -51,6 +51,7 @@ const NOTHING: ObstaclesState = {
     radar_azimuth_deg: 45,
     radar_low_deg: 0,
     radar_high_deg: 20,
+    cloud_voxel_m: 0,
     climb_m_s: 1.5,
     comes_down: true,
     climb_ceiling_m: 30,
