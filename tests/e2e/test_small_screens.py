@@ -62,6 +62,34 @@ def test_the_ways_past_it_stand_beside_alert_and_instruments(
     expect(page.get_by_test_id("panel-right").get_by_test_id("manoeuvres")).to_have_count(0)
 
 
+@pytest.mark.parametrize("width", [1440, 1180, 1024, 820, 390])
+def test_nothing_sticks_out_of_panels_and_strip(station: Station, page: Page, width: int) -> None:
+    page.context.route_web_socket(re.compile(r"/ws$"), _with_something_ahead)
+    visit(page, station)
+    page.get_by_test_id("tab-fly").click()
+    page.set_viewport_size({"width": width, "height": 844})
+    for testid in ("chip-mode", "chip-gnss", "chip-battery", "hold-position", "return-home"):
+        expect(page.get_by_test_id(testid)).to_be_in_viewport(ratio=1)
+    for side, drawer in (("left", "drawer-left"), ("right", "drawer-facts")):
+        opens = page.get_by_test_id(drawer)
+        if opens.is_visible():
+            opens.click()
+        expect(page.get_by_test_id(f"panel-{side}")).to_be_in_viewport(ratio=1)
+        assert page.get_by_test_id(f"panel-{side}").evaluate(STICK_OUT) == []
+        if opens.is_visible():
+            opens.click()
+
+
+STICK_OUT = """(panel) => {
+  const sides = panel.getBoundingClientRect();
+  return [...panel.querySelectorAll(":not(.visually-hidden, .visually-hidden *, svg *)")].filter((part) => {
+    const box = part.getBoundingClientRect();
+    const seen = box.width > 0 && getComputedStyle(part).visibility !== "hidden";
+    return seen && (box.right > sides.right + 1 || box.left < sides.left - 1);
+  }).map((part) => `${part.className}: ${part.textContent}`);
+}"""
+
+
 def _with_something_ahead(page_side: WebSocketRoute) -> None:
     """What the station itself says of vehicles is left out."""
     server = page_side.connect_to_server()

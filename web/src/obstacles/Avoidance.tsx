@@ -32,19 +32,18 @@ const TITLES: Record<AvoidBy, string> = {
 };
 
 /** Chosen before it is switched on. */
-function How({ by, fixed, onChange }: { by: AvoidBy; fixed: boolean; onChange: (by: AvoidBy) => void }) {
+function How({ by, onChange }: { by: AvoidBy; onChange: (by: AvoidBy) => void }) {
   return (
     <select
       class="avoid-by"
       aria-label="How it avoids"
-      title={fixed ? `${TITLES[by]}. Switch off to choose` : TITLES[by]}
+      title={TITLES[by]}
       data-testid="avoid-by"
       value={by}
-      disabled={fixed}
       onChange={(event) => onChange(event.currentTarget.value as AvoidBy)}
     >
-      <option value="climb">Climb</option>
-      <option value="sidestep">Step aside</option>
+      <option value="climb">Climb over it</option>
+      <option value="sidestep">Step aside, else climb</option>
     </select>
   );
 }
@@ -140,8 +139,7 @@ function Speed() {
 
 /** What follows when the obstacle is behind. */
 function AfterClimb() {
-  const { settings, stays_higher, avoidance } = obstacles.live.value;
-  if (!avoidance.enabled) return null;
+  const { settings, stays_higher } = obstacles.live.value;
   return (
     <>
       <Check
@@ -186,13 +184,12 @@ export function Avoidance() {
           <span class="muted">Avoidance</span>
           <strong role="status">{word}</strong>
         </span>
-        <How by={by} fixed={status.enabled} onChange={setChosen} />
         {!consents && <Switch isOn={status.enabled} by={by} ask={() => setAsks(true)} />}
       </div>
       <p class="avoidance-note">
         {note} <Speed />
       </p>
-      <AfterClimb />
+      {status.enabled ? <AfterClimb /> : <How by={by} onChange={setChosen} />}
       {consents && <Consent by={by} onDone={close} />}
       <Outcome place={AVOIDANCE} />
     </section>

@@ -47,7 +47,7 @@ export function UndoRedo() {
   const undoTitle = `Undo ${state?.undo_label ?? ""}`.trim();
   const redoTitle = `Redo ${state?.redo_label ?? ""}`.trim();
   return (
-    <div class="group">
+    <div class="group undo-redo">
       <Button
         kind="quiet"
         icon="undo"

@@ -105,7 +105,7 @@ export function PoiList({ plan }: { plan: PlanDoc }) {
   return (
     <>
       <div class="poi-head" aria-hidden="true">
-        <span>Name, latitude, longitude</span>
+        <span>Name, position</span>
         <span>Loiter</span>
       </div>
       <ol class="poi-list">
