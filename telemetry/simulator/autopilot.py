@@ -100,7 +100,7 @@ class Autopilot(Pilot):
         if self.mode is self.auto and self.auto.state == "active":
             self.auto.state = "paused"
         self.mode = mode
-        self.speed_m_s = None
+        self.forget_speeds()
         self.facing_fixed = False
         self._idle_s = self.now_s
         self.tell(StateChanged())

@@ -109,10 +109,11 @@ class Guided:
         self.goal = self._place = (pilot.p_neu[0], pilot.p_neu[1], up_m)
 
     def go_to(self, pilot: Pilot, goal_neu: Vec3) -> None:
-        """The first place after a take-off or a stop is gone to at the vehicle's own speed, whatever was set before:
-        recorded."""
+        """The first place after a take-off or a stop is gone to at the vehicle's own speeds, over ground and up,
+        whatever was set before: recorded."""
         if not self._is_sent:
-            pilot.speed_m_s, self._is_sent = None, True
+            pilot.forget_speeds()
+            self._is_sent = True
         self._shaped = shaped_from(pilot)
         self._velocity_neu, self._path = None, self._leg(pilot, goal_neu)
         self.goal = self._place = goal_neu

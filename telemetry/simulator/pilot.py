@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from planning.flight_time.scurve import Axes
@@ -74,6 +74,8 @@ class Pilot:
         self.home_known = False
         self.speed_m_s: float | None = None
         """Replaces WPNAV_SPEED until the mode changes."""
+        self._vertical_m_s: dict[str, float] = {}
+        """Of Axes; replace WPNAV_SPEED_UP and _DN as long."""
         self.heading_goal_rad = 0.0
         self.facing_fixed = False
         """A heading was commanded: the next waypoint does not turn the vehicle."""
@@ -108,7 +110,12 @@ class Pilot:
         self.tell(Text(severity, text))
 
     def axes(self, speed_m_s: float | None = None) -> Axes:
-        return self.parameters.axes(speed_m_s)
+        return replace(self.parameters.axes(speed_m_s), **self._vertical_m_s)
+
+    def forget_speeds(self) -> None:
+        """Those that were ordered: the vehicle's own count again."""
+        self.speed_m_s = None
+        self._vertical_m_s.clear()
 
     def near(self, goal_neu: Vec3) -> bool:
         return math.dist(self.p_neu, goal_neu) <= self.parameters["WPNAV_RADIUS"] / 100
@@ -134,7 +141,7 @@ class Pilot:
         if not 0 < speed_m_s < math.inf:
             return "failed"
         if kind in (2, 3):
-            self.parameters.set("WPNAV_SPEED_UP" if kind == 2 else "WPNAV_SPEED_DN", 100 * speed_m_s)
+            self._vertical_m_s["climb_m_s" if kind == 2 else "descent_m_s"] = speed_m_s
         else:
             self.speed_m_s = min(speed_m_s, FASTEST_M_S)
         return "accepted"
