@@ -39,6 +39,8 @@ class Helm:
         self._handover: Handover | None = None
         self._state: VehicleState | None = None
         self._speed: tuple[float, float] | None = None
+        self._is_placed = False
+        """A place was sent in this mode."""
         self.failed = ""
         self.most_m_s = math.inf
         """Over ground, whatever is asked for."""
@@ -52,6 +54,7 @@ class Helm:
         """Nothing more is sent."""
         self._errand = Errand(self._ends, self._on_failed)
         self._handover, self._mode, self._speed, self.failed = None, "", None, ""
+        self._is_placed = False
 
     # What comes in.
 
@@ -84,7 +87,8 @@ class Helm:
         return self._command_mode(now_s, then)
 
     def _command_mode(self, now_s: float, then: Then | None = None) -> list[Action]:
-        mode, self._mode_s, self._speed = self._mode, now_s, None  # a speed is forgotten with a change of mode
+        mode, self._mode_s = self._mode, now_s
+        self._speed, self._is_placed = None, False  # a speed is forgotten with a change of mode
         self._asked(mode, now_s)
         message = self.orders.set_mode(mode)
         return self._errand.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
@@ -95,12 +99,18 @@ class Helm:
         return self._send_place(now_s)
 
     def set_speed(self, speed_m_s: float, now_s: float, kind: float = GROUND_SPEED) -> list[Action]:
-        """Once per speed; ``kind``: SPEED_TYPE."""
+        """Once per speed; ``kind``: SPEED_TYPE. ArduCopter forgets a speed from before its first place in GUIDED, so
+        it is ordered after that."""
         if kind == GROUND_SPEED:
             speed_m_s = min(speed_m_s, self.most_m_s)
         if self._speed == (kind, speed_m_s):
             return []
         self._speed = (kind, speed_m_s)
+        return [] if self._mode == GUIDED and not self._is_placed else self._order_speed(now_s)
+
+    def _order_speed(self, now_s: float) -> list[Action]:
+        assert self._speed is not None
+        kind, speed_m_s = self._speed
         return self._errand.begin(self.orders.change_speed(speed_m_s, kind), now_s)
 
     def slow_down(self, speed_m_s: float, now_s: float) -> list[Action]:
@@ -137,7 +147,9 @@ class Helm:
         assert self._handover is not None
         assert self._state is not None
         self._handover.sent(self._state, now_s)
-        return [Send(self.orders.go_to(self._handover.place))]
+        speed = [] if self._is_placed or self._speed is None else self._order_speed(now_s)
+        self._is_placed = True
+        return [Send(self.orders.go_to(self._handover.place)), *speed]
 
     def _on_failed(self, error: TelemetryError, now_s: float) -> list[Action]:
         mode, self._mode, self._speed = self._mode, "", None

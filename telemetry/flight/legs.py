@@ -58,7 +58,6 @@ class Legs:
             self._turning = place.heading_rad, now_s
             return self._helm.go_to(replace(here_of(state), heading_rad=place.heading_rad), now_s, radius_m=RADIUS_M)
         self._turning = None
-        # The place first: ArduCopter forgets a speed that was ordered before its first place in GUIDED.
         there = self._helm.go_to(place, now_s, radius_m=RADIUS_M)
         return [*there, *self._helm.set_speed(target.speed_m_s, now_s)]
 

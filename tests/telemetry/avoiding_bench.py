@@ -87,7 +87,7 @@ class Craft:
         self.orders: list[tuple[float, Any]] = []
         self.texts: list[str] = []
         self.states: list[str] = []
-        self._read = 0
+        self._read, self._hears = 0, False
         self._ticks = 0
         for name, rate_hz in ((33, 20), (30, 20), (42, 4), (245, 4), (242, 0.5)):
             self.bench.stream(name, rate_hz)
@@ -152,10 +152,15 @@ class Craft:
             self._hear()
 
     def _hear(self) -> None:
+        """One message after the other: what an order to one of them brings is heard after it."""
+        if self._hears:
+            return
+        self._hears = True
         while self._read < len(self.bench.heard):
             message = self.bench.heard[self._read].message
             self._read += 1
             self.hear(message)
+        self._hears = False
 
     def hear(self, message: Any) -> None:
         self.perform(self.avoiding.on_message(message, self.now_s))
