@@ -7,7 +7,7 @@ import { MapExports } from "../obstacles/MapExports";
 import { sendRecording } from "../store/files";
 import { hasSensors } from "../store/obstacles";
 import { pending } from "../store/outcomes";
-import { isPlaying, recordings, review } from "../store/review";
+import { isPlaying, opening, recordings, review } from "../store/review";
 import { library } from "../store/state";
 import { frame } from "../store/stream";
 import { Button } from "../ui/Button";
@@ -148,8 +148,9 @@ function Recordings() {
         </ul>
       )}
       {pending.value.has(RECORDINGS) && (
-        <p class="hint" role="status">
-          Working on it…
+        <p class="hint row" role="status">
+          <span class="spinner" aria-hidden="true" />
+          {opening.value ? "Reading and judging the flight…" : "Working on it…"}
         </p>
       )}
       <Import isFirst={all?.length === 0} />
@@ -219,7 +220,7 @@ function Play() {
   return (
     <footer class="primary-action">
       <Outcome place={PLAYING} />
-      {!isOpen && <p class="muted action-hint">Choose a recording first</p>}
+      {!isOpen && <p class="muted action-hint">{opening.value ? "Opening…" : "Choose a recording first"}</p>}
       <Button
         kind="primary"
         class="wide"

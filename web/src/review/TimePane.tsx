@@ -7,7 +7,7 @@ import { ResizeHandle } from "../chart/ResizeHandle";
 import type { Size } from "../chart/altitude";
 import type { Palette } from "../chart/palette";
 import { chartHeight_px } from "../store/prefs";
-import { isPlaying, playhead, playhead_s, replay, review, seeking } from "../store/review";
+import { isPlaying, opening, playhead, playhead_s, replay, review, seeking } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { HistogramChart } from "./HistogramChart";
 import { Transport } from "./Transport";
@@ -170,7 +170,9 @@ export function TimePane() {
         </div>
       ) : (
         <p class="chart-empty muted">
-          Altitude and cross-track error over time appear here. Choose a recording.
+          {opening.value
+            ? "Reading and judging the flight…"
+            : "Altitude and cross-track error over time appear here. Choose a recording."}
         </p>
       )}
     </section>

@@ -2,7 +2,7 @@ import { signal } from "@preact/signals";
 import type { PlayReview, RecordingDoc } from "../messages";
 import { asErrorDoc } from "../net/api";
 import { order } from "../store/outcomes";
-import { isPlaying, playhead, replay, review, seeking } from "../store/review";
+import { isPlaying, opening, playhead, replay, review, seeking } from "../store/review";
 import { notifyText, setError } from "../store/state";
 
 /** Recordings and the replay: what this page asks of the server. */
@@ -20,7 +20,9 @@ export async function openReview(recording_id: string): Promise<void> {
   const isSame = review.value?.recording.id === recording_id;
   if (!isSame) terrainChoice.value = null;
   const body = { recording_id, terrain_id: terrainChoice.value, use_open_plan: againstOpenPlan.value };
+  opening.value = recording_id;
   await order({ place: RECORDINGS, path: "/api/review/open", body });
+  opening.value = null;
 }
 
 export const closeReview = () => order({ place: RECORDINGS, path: "/api/review/close" });

@@ -16,6 +16,8 @@ export type ReviewingMessage = RecordingsMessage | ReviewMessage | ReplayMessage
 
 export const recordings = signal<readonly RecordingDoc[] | null>(null);
 export const review = signal<ReviewDoc | null>(null);
+/** The recording that is being read and judged: some seconds for a long one. */
+export const opening = signal<string | null>(null);
 export const replay = signal<{ status: ReplayStatus; received_ms: number } | null>(null);
 /** Where the operator drags or has jumped to (`isOver`), until the replay says that it has got there. */
 export const seeking = signal<{ at_s: number; isOver: boolean } | null>(null);
