@@ -41,6 +41,7 @@ class Topic(StrEnum):
     RANGE_FRAME = "sensor/ranges"  # RangeFrame, each arrives
     MAP_RADAR = "map/radar"  # MapDelta, each arrives
     MAP_VISION = "map/vision"
+    MAP_VISION_FLIGHT = "map/vision_flight"
     MAP_RANGES = "map/ranges"
     PERCEPTION_RADAR = "perception/radar"  # PerceptionStatus, latest wins
     PERCEPTION_VISION = "perception/vision"
@@ -339,6 +340,7 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.RANGE_FRAME: RangeFrame,
     Topic.MAP_RADAR: MapDelta,
     Topic.MAP_VISION: MapDelta,
+    Topic.MAP_VISION_FLIGHT: MapDelta,
     Topic.MAP_RANGES: MapDelta,
     Topic.PERCEPTION_RADAR: PerceptionStatus,
     Topic.PERCEPTION_VISION: PerceptionStatus,

@@ -17,6 +17,15 @@ from telemetry.track_settings import TrackerSettings, VelocitySettings
 Sensor = Literal["radar", "vision", "ranges"]
 SENSORS: tuple[Sensor, ...] = ("radar", "vision", "ranges")
 
+MapName = Literal["radar", "vision", "ranges", "vision_flight"]
+"""Each sensor's; vision_flight: all that the camera has seen on its way, beside its local map."""
+MAP_NAMES: tuple[MapName, ...] = (*SENSORS, "vision_flight")
+
+
+def sensor_of(name: MapName) -> Sensor:
+    """Whose map it is."""
+    return "vision" if name == "vision_flight" else name
+
 
 @dataclass(frozen=True, slots=True)
 class MapOrigin:
@@ -30,9 +39,9 @@ class MapOrigin:
 
 @dataclass(frozen=True, slots=True)
 class MapDelta:
-    """Voxels of one sensor's map that have changed. Cut into parts where it is large."""
+    """Voxels of one map that have changed. Cut into parts where it is large."""
 
-    sensor: Sensor
+    sensor: MapName
     t_mono_s: float
     """Of the newest frame in it."""
     t_utc_s: float
@@ -149,6 +158,18 @@ class Basis:
 
 
 @dataclass(frozen=True, slots=True)
+class FlightMapStatus:
+    """The camera's map of the whole flight."""
+
+    voxels_occupied: int
+    map_bytes: int
+    part: int = 1
+    """Another one begins, empty, where the camera's path breaks off."""
+    why: str = ""
+    """It began; empty for the first."""
+
+
+@dataclass(frozen=True, slots=True)
 class PerceptionStatus:
     """One sensor's node after each frame, and once a second when none comes."""
 
@@ -190,6 +211,8 @@ class PerceptionStatus:
     """Median of the last frames, from measuring to done."""
     basis: Basis | None = None
     """None when no frame was worked on."""
+    flight_map: FlightMapStatus | None = None
+    """Where the map is local."""
     placed: bool = True
     """Whether anybody knows where the map lies; until then bearings and distances hold, places do not."""
 

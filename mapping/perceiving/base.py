@@ -14,6 +14,7 @@ from mapping.alerts import AlertBook
 from mapping.corridor import MissionLine, length_m, tube_points
 from mapping.ground import GroundGrid
 from mapping.obstacles import Found, obstacles, sweep
+from mapping.perceiving.flight_map import FlightMap
 from mapping.perceiving.model import FrameResult, SearchedRegion, Settings, State
 from mapping.perceiving.remembered import Field, Remembered, Way
 from mapping.poses import Pose, PoseTrack
@@ -62,6 +63,8 @@ class Perception:
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         self.settings = settings
         self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
+        self.flight: FlightMap | None = None
+        """All that was seen on the flight, where ``map`` is local."""
         self.track = PoseTrack()
         self.alerts = AlertBook(self.name, prefix=alert_prefix)
         self.dropped: Counter[str] = Counter()
@@ -117,6 +120,9 @@ class Perception:
             self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
             self._forget()
         self.settings, self._sector = settings, sector
+
+    def accumulate(self) -> None:
+        """What of a frame can wait until it has been told."""
 
     def clear(self) -> None:
         """Empty the map."""

@@ -1,8 +1,12 @@
-"""Perception from the stereo camera: a local map, made anew from every cloud where the camera's own SLAM says it is."""
+"""Perception from the stereo camera: a local map, made anew from every cloud where the camera's own SLAM says it is.
+
+Beside it a map of the whole flight, for looking at: nothing is searched in it.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +15,8 @@ from numpy.typing import NDArray
 
 from mapping import quaternions
 from mapping.perceiving.base import Perception
+from mapping.perceiving.camera_path import Break, PathWatch
+from mapping.perceiving.flight_map import FlightMap
 from mapping.perceiving.model import CameraPose, Cloud, FrameResult, Settings, State
 from mapping.poses import Pose, PoseTrack
 from mapping.thinning import thinned
@@ -31,6 +37,8 @@ DIVERGED_M, DIVERGED_SHARE = 3.0, 0.02
 """The two paths have parted beyond what SLAM's drift, a share of the distance flown, explains."""
 CLOSER_AGAIN = 0.8
 OFFSET_SMOOTHING_S = 0.5
+MOST_BREAKS = 20
+"""Of the camera's path, ahead of its clouds."""
 
 
 class VisionPerception(Perception):
@@ -49,6 +57,9 @@ class VisionPerception(Perception):
 
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         super().__init__(settings, alert_prefix=alert_prefix)
+        self.flight = FlightMap(settings)
+        self._path = PathWatch()
+        self._breaks: deque[Break] = deque(maxlen=MOST_BREAKS)
         self._camera = PoseTrack()
         self._tracking: str = "good"
         self._aligned: tuple[F64, F64] | None = None
@@ -65,14 +76,34 @@ class VisionPerception(Perception):
         self._tracking = pose.tracking
         if pose.tracking == "lost":
             self._camera.clear()
+            self._path.clear()
+            self._breaks.clear()
             self._aligned = None
             return
+        believed = True
         for refused in (
             self._camera.add_position(pose.t_mono_s, pose.position_m),
             self._camera.add_attitude(pose.t_mono_s, pose.q_wxyz),
         ):
             if refused is not None:
+                believed = False
                 self.dropped[f"camera pose: {refused}"] += 1
+        if believed and (found := self._path.add(pose.t_mono_s, np.array(pose.position_m), np.array(pose.q_wxyz))):
+            self._breaks.append(found)
+
+    def set_settings(self, settings: Settings) -> None:
+        is_another = self.settings.makes_another_map(settings)
+        super().set_settings(settings)
+        if is_another:
+            self.flight = FlightMap(settings)
+
+    def accumulate(self) -> None:
+        """The last frame into the map of the whole flight."""
+        self.flight.put_in()
+
+    def _forget(self) -> None:
+        super()._forget()
+        self.flight.clear()
 
     def on_frame(self, cloud: Cloud, now_mono_s: float) -> FrameResult:
         """Take one cloud; never raises for what is in it."""
@@ -97,6 +128,7 @@ class VisionPerception(Perception):
             return f"camera: {seen}"
         own = self.track.at(t_mono_s) if self._has_fix else "no GNSS position"
         if self._aligned is None:
+            self.flight.begin_part("The camera had lost its way", t_mono_s)
             if self._placed and isinstance(own, Pose):
                 self._aligned = self._align(seen, own)
             elif self._last is not None:
@@ -130,6 +162,7 @@ class VisionPerception(Perception):
         shift_m = new_m - R_new_old @ old_m
         self.alerts.move(R_new_old, shift_m)
         self._remembered.move(R_new_old, shift_m)
+        self.flight.move(R_new_old, shift_m)
         self._aligned, self._placed = aligned, True
 
     def _align(self, seen: Pose, own: Pose) -> tuple[F64, F64]:
@@ -186,15 +219,27 @@ class VisionPerception(Perception):
 
     def _insert(self, points: F64, pose: Pose, *, singly: bool) -> None:
         centres = voxel_centres(points, self.map.resolution_m, 1 if singly else FEWEST_POINTS)
+        explained = self._explained(centres, pose)
+        self.map.insert_hits(centres, explained=explained)
+        if self._stands_on_one_path(pose.t_mono_s):
+            self.flight.take(centres, explained)
+
+    def _explained(self, centres: F64, pose: Pose) -> NDArray[np.bool_] | None:
+        """(N,) Which voxels are known ground; None: nothing is known of it."""
         ground = self._known_ground
         if ground is None:
-            self.map.insert_hits(centres)
-            return
+            return None
         beneath, eye = centres - self.offset_enu_m, pose.position_enu_m - self.offset_enu_m
         away = np.linalg.norm(beneath - eye, axis=1)
         share = SIGMAS * DEPTH_SIGMA_PER_M2 * away
         spread = share * away * (1 + 2 * share)  # sigma grows with the true distance, which may be the larger one
-        self.map.insert_hits(centres, explained=ground.explains_rays(eye, beneath, spread, self._within_m))
+        return ground.explains_rays(eye, beneath, spread, self._within_m)
+
+    def _stands_on_one_path(self, t_mono_s: float) -> bool:
+        """Not between the two poses of a break; after one the map of the flight begins a new part."""
+        while self._breaks and t_mono_s >= self._breaks[0].from_t_s:
+            self.flight.begin_part(self._breaks.popleft().why, t_mono_s)
+        return not self._breaks or t_mono_s <= self._breaks[0].after_t_s
 
     def _pose_state(self, now_mono_s: float) -> tuple[State, str]:
         if self._tracking == "lost":

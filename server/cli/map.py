@@ -65,6 +65,10 @@ def build_map(
             help="Of the camera's clouds one point per voxel of this edge, 0: all; default: as in flight.",
         ),
     ] = None,
+    whole_flight: Annotated[
+        bool,
+        typer.Option("--whole-flight", help="Of the camera: all that it saw on its way, not its last frame alone."),
+    ] = False,
     as_json: o.AsJson = False,
 ) -> None:
     """Build a recording's map of obstacles again: exactly as it was in flight, or otherwise."""
@@ -85,6 +89,7 @@ def build_map(
                 low_deg,
                 high_deg,
                 cloud_voxel_m,
+                whole_flight,
             ),
             progress=lambda share: progress("Building the map", share),
         )

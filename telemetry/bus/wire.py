@@ -22,6 +22,7 @@ EACH_ARRIVES = frozenset(
         Topic.RANGE_FRAME,
         Topic.MAP_RADAR,
         Topic.MAP_VISION,
+        Topic.MAP_VISION_FLIGHT,
         Topic.MAP_RANGES,
         Topic.ALERT,
     }

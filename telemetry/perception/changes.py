@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.voxels import VoxelMap
-from telemetry.obstacles import MapDelta, MapOrigin
+from telemetry.obstacles import MapDelta, MapName, MapOrigin
 from telemetry.perception.deltas import in_parts
-from telemetry.perception.kinds import SensorKind
 
 _NEVER = -1
 
 
 class ChangeTeller:
-    """Of one sensor's map, which may be exchanged for a new one at any time: then that is told whole."""
+    """Of one map, which may be exchanged for a new one at any time: then that is told whole."""
 
-    def __init__(self, kind: SensorKind, utc_minus_mono_s: float) -> None:
-        self._kind, self._utc_minus_mono_s = kind, utc_minus_mono_s
+    def __init__(self, name: MapName, utc_minus_mono_s: float) -> None:
+        self._name: MapName = name
+        self._utc_minus_mono_s = utc_minus_mono_s
         self._map: VoxelMap | None = None
         self._origin: MapOrigin | None = None
         self._told = _NEVER
@@ -53,7 +53,7 @@ class ChangeTeller:
         self, whole: bool, revision: int, since: int, origin: MapOrigin, resolution_m: float, t_mono_s: float
     ) -> MapDelta:
         return MapDelta(
-            sensor=self._kind.sensor,
+            sensor=self._name,
             t_mono_s=t_mono_s,
             t_utc_s=t_mono_s + self._utc_minus_mono_s,
             revision=revision,

@@ -47,6 +47,8 @@ class SensorKind:
     """What is seen out to there must fit into the map's memory at once; None: a frame is a handful of voxels."""
     backlog: int
     """Frames that wait at most; those before them are skipped."""
+    flight_maps: Topic | None = None
+    """Where the map is local: of that of the whole flight."""
 
     @property
     def uses_camera(self) -> bool:
@@ -132,6 +134,7 @@ VISION = SensorKind(
     lambda s: replace(_settings(s, s.vision_depth_m, s.vision_resolution_m), cloud_voxel_m=s.cloud_voxel_m),
     reach_m=40.0,
     backlog=1,  # Its map is made of the newest frame alone.
+    flight_maps=Topic.MAP_VISION_FLIGHT,
 )
 RANGES = SensorKind(
     "ranges",

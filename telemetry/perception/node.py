@@ -27,6 +27,7 @@ class PerceptionNode(NodeShell):
     def __init__(self, bus: Bus, context: NodeContext, kind: SensorKind) -> None:
         super().__init__(bus, context, kind)
         self._maps = MapSender(lambda delta: bus.publish(kind.maps, delta))
+        self._flight_maps = MapSender(lambda delta: bus.publish(kind.flight_maps or kind.maps, delta))
         self._ahead = Ahead(kind.sensor, run=self._run)
         self._unseen: list[MapDelta] = []
         """Changes that the look ahead does not know yet."""
@@ -37,6 +38,7 @@ class PerceptionNode(NodeShell):
             self._inbox,
             give=self._from_thread(self._publish),
             tell_map=self._from_thread(self._on_changes),
+            tell_flight_map=self._from_thread(self._on_flight_changes),
             ask_ground=self._from_thread(self._on_ground_wanted),
             look_ahead=self._from_thread(self._on_flight),
             run=self._run,
@@ -46,13 +48,14 @@ class PerceptionNode(NodeShell):
         """Until nobody needs it any more."""
         await asyncio.to_thread(warm_up, self._kind)
         await self._bus.serve(self._kind.sensor, self._handle, PerceptionRequest)
-        await self._work(self._worker.run, [self._maps.run(), self._keep_looking()])
+        await self._work(self._worker.run, [self._maps.run(), self._flight_maps.run(), self._keep_looking()])
 
     async def _handle(self, _: PerceptionRequest) -> None:
         done = self._loop.create_future()
         self._inbox.put(WHOLE, self._from_thread(lambda: done.done() or done.set_result(None)))
         await done
         await self._maps.sent()
+        await self._flight_maps.sent()
 
     def _on_recording(self) -> None:
         self._inbox.put(WHOLE, lambda: None)
@@ -64,6 +67,10 @@ class PerceptionNode(NodeShell):
             self._unseen.clear()
         self._unseen += deltas
         if not self._maps.put(deltas):
+            self._on_recording()
+
+    def _on_flight_changes(self, deltas: list[MapDelta]) -> None:
+        if not self._flight_maps.put(deltas):
             self._on_recording()
 
     def _on_flight(self, flight: Flight | None) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from mapping.ground import GroundGrid
 from mapping.perceiving.limits import COARSEST_CLOUD, check_gate, check_thinning
 from mapping.radar_targets import Variant
+from mapping.voxels import VoxelMap
 from mapping.voxels.checks import checked_size
 from planning.dsm import Dsm
 from telemetry.errors import RecordingError
@@ -25,7 +26,7 @@ from telemetry.perception.changes import ChangeTeller
 from telemetry.perception.deltas import FoldedMap
 from telemetry.perception.ground import GroundError, ground_around, why_none
 from telemetry.perception.inbox import HOLD_S
-from telemetry.perception.kinds import AnyFrame, SensorKind
+from telemetry.perception.kinds import AnyFrame, AnyPerception, SensorKind
 from telemetry.perception.perceiver import GroundWanted, Perceiver
 from telemetry.perception.status import full_text
 from telemetry.recording.carried_ground import carried_ground
@@ -56,6 +57,8 @@ class OtherMap:
     radar_low_deg: float | None = None
     radar_high_deg: float | None = None
     cloud_voxel_m: float | None = None
+    whole_flight: bool = False
+    """Of the camera: all that it saw, not its last frame alone."""
 
     def applied(self, settings: PerceptionSettings) -> PerceptionSettings:
         other = {name: value for name in _TAKEN_AS_IS if (value := getattr(self, name)) is not None}
@@ -205,21 +208,32 @@ class _Run:
         self._go_on(math.inf)
         self._frames_seen += len(self._frames)
         perception, where = self._perceiver.perception, self._perceiver.where
-        teller = ChangeTeller(self._kind, -self._mono_minus_utc_s)
-        folded = FoldedMap().folded(teller.changes(perception.map, where.origin, 0.0))
-        if perception.map.is_full:
-            self._notes[full_text(perception.map)] = None
+        teller = ChangeTeller(self._kind.sensor, -self._mono_minus_utc_s)
+        the_map = self._map_of(perception)
+        folded = FoldedMap().folded(teller.changes(the_map, where.origin, 0.0))
+        if the_map.is_full:
+            self._notes[full_text(the_map)] = None
         return Rebuilt(
             folded=folded,
             frames=perception.frames,
             dropped=max(0, self._frames_seen - perception.frames),
             points=self._points,
-            voxels_occupied=perception.map.occupied_count,
+            voxels_occupied=the_map.occupied_count,
             extent_m=_extent_m(folded),
-            resolution_m=perception.map.resolution_m,
-            left_out=perception.map.refused_updates,
+            resolution_m=the_map.resolution_m,
+            left_out=the_map.refused_updates,
             notes=tuple(self._notes),
         )
+
+    def _map_of(self, perception: AnyPerception) -> VoxelMap:
+        flight = perception.flight
+        if not self._other.whole_flight or flight is None:
+            return perception.map
+        if flight.part > 1:
+            self._notes[f"{flight.why}: this is part {flight.part} of the flight. Review shows the ones before it."] = (
+                None
+            )
+        return flight.map
 
     def _settle(self, message: Published) -> None:
         if isinstance(message, PerceptionSettings):
@@ -278,6 +292,7 @@ class _Run:
             self._begun, self._frames_seen, self._points = self._perceiver.begun, 0, 0
         self._lay_ground(wanted=ground)
         outcome = self._perceiver.work(frame, lambda: now_s)
+        self._perceiver.perception.accumulate()
         self._frames_seen += 1
         self._points += outcome.status.points if outcome.accepted else 0
 

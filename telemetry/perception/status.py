@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 from mapping.alerts import AlertEvent
 from mapping.frames import LocalFrame
 from mapping.perceiving import FrameResult
-from telemetry.obstacles import Basis, MissionConflict, ObstacleAlert, PerceptionStatus
+from mapping.perceiving.flight_map import FlightMap
+from telemetry.obstacles import Basis, FlightMapStatus, MissionConflict, ObstacleAlert, PerceptionStatus
 from telemetry.perception.convert import alert_of, counts, obstacle_of, region_of
 from telemetry.perception.kinds import SensorKind
 from telemetry.perception.whereabouts import Whereabouts
@@ -17,6 +18,7 @@ from telemetry.perception.whereabouts import Whereabouts
 _LATENCIES = 50
 _SAY_BEGUN_S = 10.0
 NO_PLACE = "No position of the vehicle yet: what the camera sees is told, but not drawn."
+_SAY_PART_S = 20.0
 _FAR_S = 60.0
 """A refused frame that says it is from farther away in time is told of at the present one."""
 
@@ -66,6 +68,7 @@ class Teller:
         t_mono_s = result.t_mono_s if abs(result.t_mono_s - done_s) < _FAR_S else done_s  # also when it is no number
         self.note("place", "" if perception.placed or not result.accepted else NO_PLACE)
         self.note("memory", full_text(the_map) if the_map.is_full else "")
+        self._note_flight_map(perception.flight, done_s)
         status = PerceptionStatus(
             sensor=self._kind.sensor,
             state=result.state,
@@ -91,10 +94,20 @@ class Teller:
             divergence_m=result.divergence_m,
             latency_s=median(self._latencies) if self._latencies else None,
             basis=basis,
+            flight_map=flight_map_status(perception.flight),
             placed=perception.placed,
         )
         events, self.ended = [*self.ended, *result.alerts], []
         return Outcome(status, tuple(self._alert(event, frame, done_s) for event in events), result.accepted)
+
+    def _note_flight_map(self, flight: FlightMap | None, now_s: float) -> None:
+        """A part that has just begun is said, so that nobody misses what was drawn before."""
+        if flight is None:
+            return
+        is_new = now_s - flight.since_t_s < _SAY_PART_S
+        said = f"{flight.why}: the camera's map of the flight begins a new part ({flight.part})."
+        self.note("part", said if is_new else "")
+        self.note("flight_memory", f"Whole flight: {full_text(flight.map)}" if flight.map.is_full else "")
 
     def _alert(self, event: AlertEvent, frame: LocalFrame | None, done_s: float) -> ObstacleAlert:
         return alert_of(
@@ -111,6 +124,12 @@ class Teller:
         if self._begun_s is not None and now_s - self._begun_s > _SAY_BEGUN_S:
             self.begun, self._begun_s = "", None
         return " ".join(text for text in (result.text, *self.notes.values(), self.begun) if text)
+
+
+def flight_map_status(flight: FlightMap | None) -> FlightMapStatus | None:
+    if flight is None:
+        return None
+    return FlightMapStatus(flight.map.occupied_count, flight.map.size_bytes, flight.part, flight.why)
 
 
 def full_text(the_map: Any) -> str:

@@ -23,7 +23,8 @@ def warm_up(kind: SensorKind) -> None:
         perceiver.work(_frame(kind, t_s, number), lambda t_s=t_s: t_s)
         perceiver.set_ground(ground_grid(np.zeros((40, 40), np.float32), [[-1.0, 0.0, 20.0], [0.0, 1.0, 20.0]]))
     perceiver.tick(lambda: 101.0, feed=True)
-    ChangeTeller(kind, 0.0).changes(perceiver.perception.map, perceiver.where.origin, 101.0)
+    perceiver.perception.accumulate()
+    ChangeTeller(kind.sensor, 0.0).changes(perceiver.perception.map, perceiver.where.origin, 101.0)
 
 
 def hovering(t_s: float) -> VehicleState:

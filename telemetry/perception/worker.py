@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from telemetry.messages import Published, Topic
-from telemetry.obstacles import MapDelta
+from telemetry.obstacles import MapDelta, MapOrigin
 from telemetry.perception.ahead import Flight
 from telemetry.perception.changes import ChangeTeller
 from telemetry.perception.inbox import Inbox
@@ -21,6 +21,8 @@ _log = logging.getLogger(__name__)
 
 TICK_S = 1.0
 DELTA_S = 0.1
+FLIGHT_DELTA_S = 1.0
+"""The map of the whole flight is for looking at: what one voxel goes through in a second is told once."""
 LOOK_S = 1.0
 _REFUSED_S = 0.1
 """Frames that are refused may come in floods: they are told of at most so often."""
@@ -50,6 +52,7 @@ class Worker:
         *,
         give: Give,
         tell_map: Callable[[list[MapDelta]], None],
+        tell_flight_map: Callable[[list[MapDelta]], None],
         ask_ground: Callable[[GroundWanted], None],
         look_ahead: Callable[[Flight | None], None],
         run: str,
@@ -57,11 +60,13 @@ class Worker:
         utc: Callable[[], float] = time.time,
     ) -> None:
         self._kind, self._inbox, self._clock = kind, inbox, clock
-        self._give, self._tell_map, self._ask_ground, self._look_ahead = give, tell_map, ask_ground, look_ahead
+        self._give, self._ask_ground, self._look_ahead = give, ask_ground, look_ahead
+        self._tell_map, self._tell_flight_map = tell_map, tell_flight_map
         utc_minus_mono_s = utc() - clock()
         self.perceiver = Perceiver(kind, run=run, utc_minus_mono_s=utc_minus_mono_s)
-        self._changes = ChangeTeller(kind, utc_minus_mono_s)
-        self._told_s = self._delta_s = self._looked_s = clock()
+        self._changes = ChangeTeller(kind.sensor, utc_minus_mono_s)
+        self._flight_changes = ChangeTeller("vision_flight", utc_minus_mono_s)
+        self._told_s = self._delta_s = self._flight_delta_s = self._looked_s = clock()
         self._frame_t_s = 0.0
         self._asked = GroundWanted(None, None)
         self._handlers: dict[str, Callable[[Any], None]] = {
@@ -97,10 +102,12 @@ class Worker:
             self._frame_t_s = frame.t_mono_s
             self._tell(self.perceiver.work(frame, self._clock))
             self._tell_changes()
+            self.perceiver.perception.accumulate()
         now_s = self._clock()
         if now_s >= self._told_s + TICK_S:
             self._tell(self.perceiver.tick(self._clock, feed=True))
         self._tell_changes()
+        self._tell_flight_changes(now_s)
         if now_s >= self._looked_s + LOOK_S:
             self._looked_s = now_s
             self._look_ahead(self._flight())
@@ -138,12 +145,23 @@ class Worker:
         now_s = self._clock()
         if now_s < self._delta_s + DELTA_S:
             return
-        perceiver = self.perceiver
-        origin = perceiver.where.origin if perceiver.perception.placed else None
-        deltas = self._changes.changes(perceiver.perception.map, origin, self._frame_t_s or now_s)
+        deltas = self._changes.changes(self.perceiver.perception.map, self._origin, self._frame_t_s or now_s)
         self._delta_s = now_s
         if deltas:
             self._tell_map(deltas)
+
+    def _tell_flight_changes(self, now_s: float) -> None:
+        flight = self.perceiver.perception.flight
+        if flight is None or now_s < self._flight_delta_s + FLIGHT_DELTA_S:
+            return
+        self._flight_delta_s = now_s
+        if deltas := self._flight_changes.changes(flight.map, self._origin, self._frame_t_s or now_s):
+            self._tell_flight_map(deltas)
+
+    @property
+    def _origin(self) -> MapOrigin | None:
+        """None while nobody knows where the maps lie."""
+        return self.perceiver.where.origin if self.perceiver.perception.placed else None
 
     def _on_flight(self, message: Any) -> None:
         self.perceiver.flown.flight = message
@@ -158,8 +176,11 @@ class Worker:
 
     def _on_whole(self, done: Callable[[], None]) -> None:
         self._changes.forget()
+        self._flight_changes.forget()
         self._delta_s = self._clock() - DELTA_S
+        self._flight_delta_s = self._clock() - FLIGHT_DELTA_S
         self._tell_changes()
+        self._tell_flight_changes(self._clock())
         done()
 
     def _on_conflict(self, message: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from telemetry.messages import MESSAGE_TYPES, Topic
 
-MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_RANGES})
+MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, Topic.MAP_RANGES})
 """Told in steps that build on each other: a replay adds them up."""
 
 FRAMES = frozenset({Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.RANGE_FRAME})

@@ -191,6 +191,8 @@ class _Flight:
         if self._is_told:
             for delta in self._perceiving[sensor].changes(status.t_mono_s):
                 self._tell(perceiver.kind.maps, delta, t_utc_s)
+            for delta in self._perceiving[sensor].flight_changes(status.t_mono_s):
+                self._tell(Topic.MAP_VISION_FLIGHT, delta, t_utc_s)
         self._keep(sensor, frame, outcome)
 
     def _keep(self, sensor: Sensor, frame: RadarFrame | CloudFrame | None, outcome: Outcome) -> None:

@@ -11,6 +11,7 @@ from telemetry.perception.ground import ground_around
 from telemetry.perception.kinds import KINDS
 from telemetry.perception.perceiver import GroundWanted, Perceiver
 from telemetry.perception.status import Outcome
+from telemetry.perception.worker import FLIGHT_DELTA_S
 from telemetry.scenarios.setup import PERCEPTION_S, Setup
 from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
 from telemetry.sensing import CloudFrame, RadarFrame, SlamPose
@@ -28,9 +29,10 @@ class Perceiving:
         self.perceiver.on_plan(plan)
         self.perceiver.on_ground(ground)
         self._laid: GroundWanted | None = None
-        self._changes = ChangeTeller(KINDS[sensor], T0_UTC_S - T0_MONO_S)
+        self._changes = ChangeTeller(sensor, T0_UTC_S - T0_MONO_S)
+        self._flight_changes = ChangeTeller("vision_flight", T0_UTC_S - T0_MONO_S)
         self._waiting: deque[RadarFrame | CloudFrame] = deque()
-        self._worked_s = 0.0
+        self._worked_s = self._flight_told_s = 0.0
 
     def on_message(self, message: Published) -> None:
         if isinstance(message, VehicleState):
@@ -51,6 +53,7 @@ class Perceiving:
         while self._waiting and self._waiting[0].t_mono_s + PERCEPTION_S <= now_s + 1e-9:
             frame = self._waiting.popleft()
             out.append((frame, self.perceiver.work(frame, lambda: now_s)))
+            self.perceiver.perception.accumulate()
             self._worked_s = now_s
         if now_s - self._worked_s >= TICK_S:
             out.append((None, self.perceiver.tick(lambda: now_s, feed=True)))
@@ -60,6 +63,14 @@ class Perceiving:
     def changes(self, now_s: float) -> list[MapDelta]:
         """What of the map has not been told yet, for a recording."""
         return self._changes.changes(self.perceiver.perception.map, self.perceiver.where.origin, now_s)
+
+    def flight_changes(self, now_s: float) -> list[MapDelta]:
+        """The same of the map of the whole flight."""
+        flight = self.perceiver.perception.flight
+        if flight is None or now_s < self._flight_told_s + FLIGHT_DELTA_S:
+            return []
+        self._flight_told_s = now_s
+        return self._flight_changes.changes(flight.map, self.perceiver.where.origin, now_s)
 
     def _lay_ground(self) -> None:
         wanted = self.perceiver.ground_wanted

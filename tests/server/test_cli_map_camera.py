@@ -28,6 +28,14 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_its_map_of_the_whole_flight_holds_more_than_its_last_frame(filmed: Path, tmp_path: Path) -> None:
+    local = run(filmed, "--sensor", "vision", "--out", tmp_path / "a.ply")[1]
+    code, whole = run(filmed, "--sensor", "vision", "--out", tmp_path / "b.ply", "--whole-flight")
+    assert code == 0
+    assert whole["points"] == local["points"]
+    assert int(str(whole["voxels_occupied"])) > int(str(local["voxels_occupied"]))
+
+
 def test_of_its_clouds_one_point_per_voxel_may_be_used(filmed: Path, tmp_path: Path) -> None:
     whole = run(filmed, "--sensor", "vision", "--out", tmp_path / "a.ply")[1]
     thin = run(filmed, "--sensor", "vision", "--out", tmp_path / "b.ply", "--cloud-voxel-m", "0.25")[1]

@@ -14,7 +14,6 @@ from telemetry.obstacles import MapDelta, MapOrigin
 from telemetry.perception import deltas as d
 from telemetry.perception.changes import ChangeTeller, told_probability
 from telemetry.perception.deltas import FoldedMap, in_parts
-from telemetry.perception.kinds import RADAR
 
 ORIGIN = MapOrigin(45.0, 10.0, 120.0)
 HEAD = MapDelta("radar", 1.0, 2.0, 3, True, 0, 1, ORIGIN, 0.5, b"", b"", b"")
@@ -54,7 +53,7 @@ def test_large_maps_are_cut_and_empty_ones_told() -> None:
 
 
 def test_what_is_told_adds_up_to_the_map() -> None:
-    the_map, teller, folded = VoxelMap(resolution_m=0.5), ChangeTeller(RADAR, 0.0), FoldedMap()
+    the_map, teller, folded = VoxelMap(resolution_m=0.5), ChangeTeller("radar", 0.0), FoldedMap()
     rng = np.random.default_rng(1)
     for step in range(12):
         if step == 6:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings
+from telemetry.obstacles import AvoidanceStatus, FlightMapStatus, PerceptionSettings
 from telemetry.perception.kinds import KINDS, RADAR, RANGES, VISION
 from telemetry.perception.perceiver import BROKEN, Perceiver
 from telemetry.perception.status import Outcome
@@ -104,6 +104,22 @@ def test_home_that_breathes_stays_where_it_was() -> None:
     status = flight.fly(1.0, 2.0, home_lat_deg=flights.HOME[0] + 1e-6, home_alt_amsl_m=120.2).status
     assert status.origin == origin
     assert status.frames == 20
+
+
+def test_the_camera_tells_of_its_map_of_the_flight_and_of_a_new_part() -> None:
+    flight = Flight("vision")
+    told = flight.fly(0.0, 1.0).status.flight_map
+    flight.perceiver.perception.accumulate()
+    assert told == FlightMapStatus(0, told.map_bytes if told else 0)
+    whole = flight.perceiver.perception.flight
+    assert whole is not None
+    whole.begin_part("The camera's path jumped by 3.0 m", T0_MONO_S + 1.0)
+    status = flight.fly(1.0, 2.0).status
+    assert status.flight_map is not None
+    assert status.flight_map.part == 2
+    assert "jumped by 3.0 m: the camera's map of the flight begins a new part (2)." in status.text
+    assert "jumped" not in flight.fly(2.0, 25.0).status.text
+    assert Flight("radar").fly(0.0, 1.0).status.flight_map is None
 
 
 def test_emptied_when_asked_and_told_when_full() -> None:

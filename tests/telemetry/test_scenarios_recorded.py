@@ -14,11 +14,12 @@ from server.cli import app
 from server.flying import review_task
 from server.review import recording_of
 from telemetry.errors import RecordingError
-from telemetry.obstacles import PerceptionSettings, Sensor
+from telemetry.messages import Topic
+from telemetry.obstacles import MapDelta, PerceptionSettings, Sensor
 from telemetry.perception.changes import ChangeTeller
 from telemetry.perception.deltas import FoldedMap
 from telemetry.perception.kinds import KINDS
-from telemetry.perception.rebuild import rebuild
+from telemetry.perception.rebuild import OtherMap, rebuild
 from telemetry.recording.carried_ground import carried_ground, packed
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.mend import mend
@@ -46,7 +47,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Flown, Path]
 def test_the_map_is_built_again_to_the_last_voxel(flown: tuple[Setup, Flown, Path], sensor: Sensor) -> None:
     _, flight, path = flown
     perceiver = flight.perceivers[sensor]
-    teller = ChangeTeller(KINDS[sensor], 0.0)
+    teller = ChangeTeller(sensor, 0.0)
     own = FoldedMap().folded(teller.changes(perceiver.perception.map, perceiver.where.origin, 0.0)).voxels
     built = rebuild(path, KINDS[sensor])
     assert built.notes == ()
@@ -56,6 +57,26 @@ def test_the_map_is_built_again_to_the_last_voxel(flown: tuple[Setup, Flown, Pat
     assert not own.explained.all()
     for one, other in ((again.keys, own.keys), (again.probability, own.probability), (again.explained, own.explained)):
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_cameras_map_of_the_whole_flight_is_built_again_and_was_recorded(
+    flown: tuple[Setup, Flown, Path],
+) -> None:
+    _, flight, path = flown
+    perceiver = flight.perceivers["vision"]
+    whole = perceiver.perception.flight
+    assert whole is not None
+    assert whole.part == 1
+    assert whole.map.occupied_count > 2 * perceiver.perception.map.occupied_count
+    teller = ChangeTeller("vision_flight", 0.0)
+    own = FoldedMap().folded(teller.changes(whole.map, perceiver.where.origin, 0.0)).voxels
+    again = rebuild(path, KINDS["vision"], other=OtherMap(whole_flight=True)).folded.voxels
+    for one, other in ((again.keys, own.keys), (again.probability, own.probability), (again.explained, own.explained)):
+        np.testing.assert_array_equal(one, other)
+    with open_recording(path) as recording:
+        told = [entry.message for entry in recording.entries({Topic.MAP_VISION_FLIGHT})]
+    recorded = FoldedMap().folded(delta for delta in told if isinstance(delta, MapDelta)).voxels
+    assert len(recorded.keys) > 0.9 * len(own.keys)
 
 
 def test_the_ground_is_the_one_that_was_known(flown: tuple[Setup, Flown, Path]) -> None:
