@@ -15,10 +15,10 @@ from server.schemas import (
     PerceptionSettingsBody,
     PlanState,
     PlanWithSeen,
-    SensorName,
     SetAvoidanceBody,
     Source,
 )
+from telemetry.obstacles import MapName
 
 router = APIRouter(prefix="/api/obstacles", dependencies=[SignedIn], tags=["obstacles"], responses=ERROR_RESPONSES)
 
@@ -78,11 +78,14 @@ async def plan_with_seen(body: PlanWithSeen, operator: InCharge, flying: Fly) ->
     return answer(await flying.obstacles.plan_with_seen(body))
 
 
-@router.get("/map/{sensor}.{kind}", response_class=Response)
+@router.get("/map/{name}.{kind}", response_class=Response)
 async def export_map(
-    sensor: SensorName, kind: MapFormat, flying: Fly, source: Annotated[Source, Query()] = "live"
+    name: MapName, kind: MapFormat, flying: Fly, source: Annotated[Source, Query()] = "live"
 ) -> Response:
-    """The map as it is now: points, OctoMap, highest obstacle per cell, or clusters; 409 while it is empty."""
-    data = await flying.obstacles.exported(source, sensor, kind)
-    headers = {"content-disposition": f'attachment; filename="{sensor}-map.{kind}"'}
+    """A map as it is now: points, OctoMap, highest obstacle per cell, or clusters; 409 while it is empty.
+
+    "vision_flight": of all that the camera has seen on its way.
+    """
+    data = await flying.obstacles.exported(source, name, kind)
+    headers = {"content-disposition": f'attachment; filename="{name.replace("_", "-")}-map.{kind}"'}
     return Response(data, media_type=MEDIA_TYPES[kind], headers=headers)

@@ -27,12 +27,11 @@ from server.schemas import (
     PerceptionSettingsBody,
     PlanState,
     PlanWithSeen,
-    SensorName,
     SetAvoidanceBody,
     Source,
 )
 from telemetry.messages import LinkStatus, PlanRecord
-from telemetry.obstacles import SENSORS, PerceptionSettings
+from telemetry.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
 from telemetry.perception.limits import check_memory, check_perception
 from telemetry.requests import Operator, SetAvoidance
 
@@ -129,7 +128,7 @@ class ObstacleDesk:
         wanted = changed(self._live.settings, body)
         check_perception(wanted)
         if body.memory_limit_bytes is not None:
-            check_memory(body.memory_limit_bytes, maps=len(SENSORS))
+            check_memory(body.memory_limit_bytes, maps=len(MAP_NAMES))
         self._set(wanted)
         await self._keep(changed(self._kept, body))
         return self._live.state
@@ -160,12 +159,12 @@ class ObstacleDesk:
             maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
 
-    async def exported(self, source: Source, sensor: SensorName, kind: MapFormat) -> bytes:
+    async def exported(self, source: Source, name: MapName, kind: MapFormat) -> bytes:
         """Raises NotReadyError while the map is empty."""
-        voxels = await asyncio.to_thread(self._watches[source].mirrors[sensor].voxels)
+        voxels = await asyncio.to_thread(self._watches[source].mirrors[name].voxels)
         if voxels.origin is None or not len(voxels.keys):
-            raise NotReadyError(f"The map of the {sensor} is empty.", advice="Nothing has been seen yet.")
-        return await self._lane.call(map_file, voxels, sensor, kind)
+            raise NotReadyError(f"The map of the {sensor_of(name)} is empty.", advice="Nothing has been seen yet.")
+        return await self._lane.call(map_file, voxels, name, kind)
 
     async def _keep(self, settings: PerceptionSettings) -> None:
         self._kept = settings

@@ -21,14 +21,14 @@ from server.obstacles.watch import Watch
 from server.scene.regions import Route
 from server.scene.sights import MapLook
 from server.schemas import MapDrawn, Source
-from telemetry.obstacles import SENSORS, MapOrigin, PerceptionStatus, Sensor
+from telemetry.obstacles import MAP_NAMES, MapName, MapOrigin, PerceptionStatus, Sensor
 from telemetry.tracks import TracksStatus
 
 log = logging.getLogger("hedgehop.obstacles")
 
 PERIOD_S = 0.1
-BOXES_MAX: Mapping[Sensor, int] = {"radar": 130_000, "vision": 60_000, "ranges": 10_000}
-"""200,000 in all."""
+BOXES_MAX: Mapping[MapName, int] = {"radar": 130_000, "vision": 60_000, "ranges": 10_000, "vision_flight": 60_000}
+"""200,000 in all, and those of the camera's whole flight where they are shown."""
 FINER_BELOW = 0.6
 """Of the limit: a map that was coarsened gets its detail back only when it fits easily."""
 RATE_BYTES_S, BURST_BYTES = 400_000.0, 12_000_000.0
@@ -42,7 +42,7 @@ TOLD_EVERY_S = 1.0
 class Stage(Protocol):
     """The part of ``server.scene.sights.Sights`` that is used here."""
 
-    def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None: ...
+    def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None: ...
 
     def draw_now(
         self,
@@ -53,9 +53,9 @@ class Stage(Protocol):
         tracks: TracksStatus | None,
     ) -> None: ...
 
-    def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int: ...
+    def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int: ...
 
-    def drop_chunks(self, sensor: Sensor) -> None: ...
+    def drop_chunks(self, name: MapName) -> None: ...
 
 
 class Routes(Protocol):
@@ -66,7 +66,7 @@ class Routes(Protocol):
 
 @dataclass(slots=True)
 class _Picture:
-    """One sensor's map as it is drawn."""
+    """One map as it is drawn."""
 
     mirror: MapMirror | None = None
     generation: int = -1
@@ -104,7 +104,7 @@ class MapDrawing:
         tracks: Mapping[Source, TracksWatch],
     ) -> None:
         self._stage, self._watches, self._routes, self._tracks = stage, watches, routes, tracks
-        self._pictures = {sensor: _Picture() for sensor in SENSORS}
+        self._pictures = {name: _Picture() for name in MAP_NAMES}
         self._allowance = Allowance(time.monotonic())
         self._told_s = 0.0
         self._source: Source = "live"
@@ -134,9 +134,9 @@ class MapDrawing:
             await asyncio.sleep(PERIOD_S)
             source = self._shown_source()
             try:
-                for sensor in SENSORS:
+                for name in MAP_NAMES:
                     watch = self._watches[source]
-                    await asyncio.to_thread(self.draw, stage, sensor, watch.mirrors[sensor], _place(watch))
+                    await asyncio.to_thread(self.draw, stage, name, watch.mirrors[name], _place(watch))
             except Exception as error:
                 log.warning("Drawing a map: %s", reported(error, log, "Drawing a map").what)
             self._tell(source)
@@ -144,19 +144,19 @@ class MapDrawing:
     def draw(
         self,
         stage: Stage,
-        sensor: Sensor,
+        name: MapName,
         mirror: MapMirror,
         vehicle_enu_m: tuple[float, float, float] | None = None,
     ) -> None:
         """One turn of one map; in a thread. What is near the vehicle comes first."""
-        picture = self._pictures[sensor]
-        look = stage.look(sensor, mirror.origin)
+        picture = self._pictures[name]
+        look = stage.look(name, mirror.origin)
         if picture.mirror is not mirror or picture.generation != mirror.generation:
-            stage.drop_chunks(sensor)
+            stage.drop_chunks(name)
             picture.mirror, picture.generation = mirror, mirror.generation
             picture.waiting, picture.drawn_s, picture.look, picture.sent_bytes = {}, {}, None, 0
         dirty = mirror.taken_dirty()
-        detail = fitting_detail(mirror.boxes(), BOXES_MAX[sensor], picture.detail)
+        detail = fitting_detail(mirror.boxes(), BOXES_MAX[name], picture.detail)
         if look is None:
             # Whatever is drawn later is drawn whole.
             picture.look = None
@@ -165,12 +165,12 @@ class MapDrawing:
             dirty |= set(mirror.chunk_keys)
         picture.detail, picture.look = detail, look
         picture.waiting |= dict.fromkeys(dirty)
-        self._draw_waiting(stage, sensor, mirror, picture, look, vehicle_enu_m)
+        self._draw_waiting(stage, name, mirror, picture, look, vehicle_enu_m)
 
     def _draw_waiting(
         self,
         stage: Stage,
-        sensor: Sensor,
+        name: MapName,
         mirror: MapMirror,
         picture: _Picture,
         look: MapLook,
@@ -184,7 +184,7 @@ class MapDrawing:
             picture.drawn_s[key] = now_s
             voxels = mirror.chunk(key)
             drawn = None if voxels is None else coarser(voxels, picture.detail)
-            sent = stage.draw_chunks(sensor, look, {key: drawn})
+            sent = stage.draw_chunks(name, look, {key: drawn})
             self._allowance.spend(sent)
             picture.sent_bytes += sent
 
@@ -199,7 +199,7 @@ class MapDrawing:
                 watch.on_drawn(self.drawn() if each == source else [])
 
     def drawn(self) -> list[MapDrawn]:
-        return [_described(sensor, self._pictures[sensor]) for sensor in SENSORS if self._pictures[sensor].look]
+        return [_described(name, self._pictures[name]) for name in MAP_NAMES if self._pictures[name].look]
 
 
 def fitting_detail(boxes: tuple[int, ...], most: int, present: int) -> int:
@@ -241,14 +241,14 @@ def _origin(watch: Watch) -> MapOrigin | None:
     return next((origin for origin in origins if origin is not None), None)
 
 
-def _described(sensor: Sensor, picture: _Picture) -> MapDrawn:
+def _described(name: MapName, picture: _Picture) -> MapDrawn:
     assert picture.mirror is not None
     boxes = picture.mirror.boxes()
     detail = picture.detail
     shown = picture.look is not None and picture.look.visible
     text = "" if detail == 1 else f"drawn coarser: 1 box for {detail} x {detail} x {detail} voxels"
     return MapDrawn(
-        sensor=sensor,
+        sensor=name,
         voxels=boxes[0],
         drawn=boxes[DETAILS.index(detail)] if shown else 0,
         detail=detail,

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from server.jobs import Progress
 from server.obstacles.mirror import Voxels
-from server.schemas import MapFormat, SensorName
-from telemetry.obstacles import MapDelta
+from server.schemas import MapFormat
+from telemetry.obstacles import MapDelta, MapName
 
 
-def map_file(voxels: Voxels, sensor: SensorName, kind: MapFormat, *, report: Progress) -> bytes:
+def map_file(voxels: Voxels, name: MapName, kind: MapFormat, *, report: Progress) -> bytes:
     """Raises ExportError for a map that the format cannot hold."""
     from telemetry.perception import deltas
     from telemetry.perception.export import exported
 
     report("Writing the map", None)
     assert voxels.origin is not None
-    last = MapDelta(sensor, 0.0, 0.0, 0, True, 0, 1, voxels.origin, voxels.resolution_m, b"", b"", b"")
+    last = MapDelta(name, 0.0, 0.0, 0, True, 0, 1, voxels.origin, voxels.resolution_m, b"", b"", b"")
     kept = deltas.Voxels(voxels.keys, voxels.probability, voxels.explained.astype("u1"))
     return exported(kind, deltas.FoldedMap(last, kept))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from telemetry.obstacles import MapDelta, MapOrigin, Sensor, unpack_keys
+from telemetry.obstacles import MapDelta, MapName, MapOrigin, unpack_keys
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
@@ -46,7 +46,7 @@ class Voxels:
     explained: NDArray[np.bool_]
     resolution_m: float
     origin: MapOrigin | None
-    sensor: Sensor
+    sensor: MapName
 
     @property
     def centres_enu_m(self) -> F64:
@@ -57,7 +57,7 @@ class Voxels:
 class MapMirror:
     """From any thread: one fold or look at a time."""
 
-    sensor: Sensor
+    sensor: MapName
     origin: MapOrigin | None = None
     resolution_m: float = 0.0
     generation: int = 0

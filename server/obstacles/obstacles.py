@@ -37,7 +37,7 @@ from telemetry.requests import Operator, WholeMap
 
 log = logging.getLogger("hedgehop.obstacles")
 
-_MAPS = (Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_RANGES)
+_MAPS = (Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, Topic.MAP_RANGES)
 _STATUSES = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
 _ASK_EVERY_S = 2.0
 
@@ -172,7 +172,8 @@ class Obstacles:
         origin = next((status.origin for status in statuses if status.origin is not None), None)
         if origin is None:
             return None
-        maps = tuple(mirror.voxels() for mirror in watch.mirrors.values() if mirror.origin is not None)
+        mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
+        maps = tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None)
         directory = self._library.terrain_dir(terrain.id)
         return Situation(
             standing,

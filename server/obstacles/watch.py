@@ -22,13 +22,16 @@ from server.schemas import (
     Source,
 )
 from telemetry.obstacles import (
+    MAP_NAMES,
     SENSORS,
     AvoidanceStatus,
     MapDelta,
+    MapName,
     ObstacleAlert,
     PerceptionSettings,
     PerceptionStatus,
     Sensor,
+    sensor_of,
 )
 from telemetry.vehicle import VehicleState
 
@@ -63,7 +66,7 @@ class Watch:
         self._lost: dict[Sensor, ObstacleAlert] = {}
         self._told: ObstaclesState | None = None
         self.statuses: dict[Sensor, PerceptionStatus] = {}
-        self.mirrors: dict[Sensor, MapMirror] = {sensor: MapMirror(sensor) for sensor in SENSORS}
+        self.mirrors: dict[MapName, MapMirror] = {name: MapMirror(name) for name in MAP_NAMES}
         self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
         """Set when parts of a map are missing here."""
         self.settings = PerceptionSettings()
@@ -95,7 +98,7 @@ class Watch:
         before = self.statuses.get(sensor)
         self.statuses[sensor] = status
         self._heard_mono_s[sensor] = now_s
-        if status.voxels_occupied and self.mirrors[sensor].origin is None:
+        if any(self.mirrors[name].origin is None for name in _filled(status)):
             self.needs_whole[sensor].set()
         changed = before is None or before.state != status.state
         if changed or now_s - self._told_mono_s[sensor] >= 0.8 / RATE_HZ:
@@ -139,7 +142,7 @@ class Watch:
         """In a thread: what is large takes milliseconds, and the next part waits for this one."""
         try:
             if not await asyncio.to_thread(self.mirrors[delta.sensor].fold, delta):
-                self.needs_whole[delta.sensor].set()
+                self.needs_whole[sensor_of(delta.sensor)].set()
         except Exception as error:
             # Whatever a node sends: the others' maps and all alerts go on.
             log.warning("A part of the %s map: %s", delta.sensor, reported(error, log, "Taking in a map").what)
@@ -215,6 +218,13 @@ class Watch:
     def _tell_own(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()
         self.on_alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))
+
+
+def _filled(status: PerceptionStatus) -> list[MapName]:
+    """Maps of a sensor that are not empty, by its own word."""
+    flight = status.flight_map
+    filled: list[MapName] = [status.sensor] if status.voxels_occupied else []
+    return filled + (["vision_flight"] if flight is not None and flight.voxels_occupied else [])
 
 
 def is_in_air(state: VehicleState | None) -> bool:

@@ -28,7 +28,9 @@ UNKNOWN = ((104, 92, 120), (130, 115, 148))
 """Two stripes"""
 RADAR = (240, 90, 205)
 VISION = (255, 225, 80)
-"""Of the sensors that see obstacles: magenta and yellow stay apart for every kind of colour blindness."""
+VISION_FLIGHT = (225, 190, 70)
+"""Of the sensors that see obstacles, the last of the camera on its whole way: magenta and yellow stay apart for every
+kind of colour blindness."""
 TRACK = (255, 255, 255)
 TRACK_DANGEROUS = INSIDE
 SITE = (250, 250, 250)

@@ -19,7 +19,7 @@ from server.scene.regions import Route, conflict_nodes, region_nodes, route_node
 from server.scene.tracks import track_nodes
 from server.scene.voxels import chunk_nodes, chunk_place, sent_bytes
 from server.schemas import Source
-from telemetry.obstacles import MapOrigin, PerceptionStatus, Sensor
+from telemetry.obstacles import MapName, MapOrigin, PerceptionStatus, Sensor
 from telemetry.tracks import TracksStatus
 
 
@@ -61,12 +61,14 @@ class Sights:
         """Another model, frame or choice of layers; what moves is drawn again at the next turn."""
         self._drawing = drawing
 
-    def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
+    def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None:
         """None while there is nothing to draw a map on."""
         if self._drawing is None or origin is None:
             return None
         view = self._drawing.state.view
-        visible = view.show_radar_map if sensor == "radar" else view.show_vision_map
+        visible = {"radar": view.show_radar_map, "vision_flight": view.show_vision_flight}.get(
+            name, view.show_vision_map
+        )
         return MapLook(self._drawing, origin, view.show_explained, visible)
 
     def draw_now(
@@ -98,26 +100,26 @@ class Sights:
         if changed:
             self._put(changed)
 
-    def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
+    def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
         """None: the chunk is empty. Returns how many bytes it comes to for one page. Heavy: for a thread."""
         placing = EnuPlacing.of(look.drawing.dsm, look.origin)
         if placing is None:
             return 0
         sent = 0
         for key, voxels in chunks.items():
-            name = chunk_name(sensor, key)
+            chunk = chunk_name(name, key)
             nodes: list[Node] = []
             if voxels is not None and look.visible:
                 place = chunk_place(look.drawing, placing, key)
-                nodes = chunk_nodes(name, sensor, key, voxels, place, with_ground=look.with_ground)
-            sent += sent_bytes(self._nodes.get(name, []), nodes)
-            self._draw(name, nodes)
+                nodes = chunk_nodes(chunk, name, key, voxels, place, with_ground=look.with_ground)
+            sent += sent_bytes(self._nodes.get(chunk, []), nodes)
+            self._draw(chunk, nodes)
         return sent
 
-    def drop_chunks(self, sensor: Sensor) -> None:
-        """All of the sensor's: another map takes its place. For the thread that draws."""
-        for name in [name for name in self._nodes if name.startswith(f"/map_{sensor}/")]:
-            self._draw(name, [])
+    def drop_chunks(self, name: MapName) -> None:
+        """All of the map: another one takes its place. For the thread that draws."""
+        for chunk in [chunk for chunk in self._nodes if chunk.startswith(f"/map_{name}/")]:
+            self._draw(chunk, [])
 
     def _draw(self, name: str, nodes: list[Node]) -> None:
         with self._server.atomic():
@@ -136,5 +138,5 @@ class Sights:
         return self._placing
 
 
-def chunk_name(sensor: Sensor, key: ChunkKey) -> str:
-    return f"/map_{sensor}/{key[0]}_{key[1]}_{key[2]}"
+def chunk_name(name: MapName, key: ChunkKey) -> str:
+    return f"/map_{name}/{key[0]}_{key[1]}_{key[2]}"

@@ -22,15 +22,17 @@ from server.scene.enu import EnuPlacing
 from server.scene.nodes import Node
 from server.scene.payload import F64, U8
 from server.scene.shapes import linear_light
-from telemetry.obstacles import Sensor
+from telemetry.obstacles import MapName
 
-HUES: Mapping[Sensor, tuple[int, int, int]] = {
+HUES: Mapping[MapName, tuple[int, int, int]] = {
     "radar": palette.RADAR,
     "vision": palette.VISION,
     "ranges": palette.VISION,
+    "vision_flight": palette.VISION_FLIGHT,
 }
-_SEEN_SHARE, _GROUND_SHARE = 0.94, 0.4
-"""Of a voxel's edge: gaps show the single voxels, and known ground hides neither the model nor what stands on it."""
+_SEEN_SHARE, _FLIGHT_SHARE, _GROUND_SHARE = 0.94, 0.8, 0.4
+"""Of a voxel's edge: gaps show the single voxels, what the camera sees now covers what it has seen, and known ground
+hides neither the model nor what stands on it."""
 _LEAST_CAPACITY, _GROWTH = 32, 1.3
 
 
@@ -51,19 +53,23 @@ def chunk_place(drawing: Drawing, placing: EnuPlacing, key: ChunkKey) -> ChunkPl
 
 
 def chunk_nodes(
-    name: str, sensor: Sensor, key: ChunkKey, voxels: Voxels, place: ChunkPlace, *, with_ground: bool
+    name: str, of: MapName, key: ChunkKey, voxels: Voxels, place: ChunkPlace, *, with_ground: bool
 ) -> list[Node]:
     """``voxels`` as coarse as they are to be drawn; their number decides which arrays are as long as before."""
     corner_m = np.array(key, dtype=np.float64) * CHUNK_M
     local_m = voxels.centres_enu_m - corner_m
     seen = ~voxels.explained
     probability = voxels.probability[seen] / 255.0
-    colors = palette.probability_rgb(HUES[sensor], probability)
-    nodes = _boxes(f"{name}/seen", local_m[seen], colors, _SEEN_SHARE * voxels.resolution_m, place)
+    colors = palette.probability_rgb(HUES[of], probability)
+    nodes = _boxes(f"{name}/seen", local_m[seen], colors, _seen_share(of) * voxels.resolution_m, place)
     if with_ground:
         grey = np.broadcast_to(np.array(palette.KNOWN_GROUND, dtype=np.uint8), (int((~seen).sum()), 3))
         nodes += _boxes(f"{name}/ground", local_m[~seen], grey, _GROUND_SHARE * voxels.resolution_m, place)
     return nodes
+
+
+def _seen_share(of: MapName) -> float:
+    return _FLIGHT_SHARE if of == "vision_flight" else _SEEN_SHARE
 
 
 def sent_bytes(before: list[Node], after: list[Node]) -> int:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.base import Strict
-from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+from telemetry.obstacles import AvoidanceStatus, MapName, ObstacleAlert, PerceptionSettings
 
 SensorName = Literal["radar", "vision", "ranges"]
 MapFormat = Literal["ply", "bt", "tif", "geojson"]
@@ -48,9 +48,9 @@ class ManoeuvreDoc(Strict):
 
 
 class MapDrawn(Strict):
-    """What of one sensor's map the 3D view draws."""
+    """What of one map the 3D view draws."""
 
-    sensor: SensorName
+    sensor: MapName
     voxels: int
     """Occupied, of the whole map."""
     drawn: int

@@ -21,8 +21,10 @@ class ViewDoc(Strict):
     show_radar_map: bool = True
     show_vision_map: bool = True
     """The camera's voxels, and those of range finders."""
-    show_explained: bool = True
-    """Voxels that are known ground, in grey."""
+    show_vision_flight: bool = False
+    """All that the camera has seen on its way."""
+    show_explained: bool = False
+    """Voxels that are known ground, in grey: they would crowd the view from behind the vehicle."""
     show_regions: bool = True
     show_tracks: bool = True
     show_traversability: bool = False

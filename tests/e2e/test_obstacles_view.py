@@ -145,13 +145,14 @@ def _is_reviewed(page: Page, tmp_path: Path) -> None:
 def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page) -> None:
     visit(page, demo)
     start_simulator(page)
-    for layer in ("radar_map", "vision_map", "explained", "regions"):
+    for layer in ("radar_map", "vision_map", "regions", "vision_flight", "explained"):
         toggle = page.get_by_test_id(f"layer-{layer}")
-        expect(toggle).to_have_attribute("aria-pressed", "true")
-        toggle.click()
-        expect(toggle).to_have_attribute("aria-pressed", "false")
-        toggle.click()
-        expect(toggle).to_have_attribute("aria-pressed", "true")
+        is_on = layer not in ("vision_flight", "explained")
+        for shown in (is_on, not is_on):
+            expect(toggle).to_have_attribute("aria-pressed", str(shown).lower())
+            toggle.click()
+        expect(toggle).to_have_attribute("aria-pressed", str(is_on).lower())
+    _both_maps_are_one_picture(page)
 
     page.get_by_test_id("section-obstacles").get_by_role("button").first.click()
     depth = page.get_by_test_id("perception-radar_depth_m")
@@ -163,6 +164,17 @@ def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page
     page.get_by_test_id("polar-farther").click()
     expect(polar).to_have_attribute("data-range", "40")
     _maps_begin_anew_when_held_for(page)
+
+
+def _both_maps_are_one_picture(page: Page) -> None:
+    both, alone = page.get_by_test_id("merged-maps"), page.get_by_test_id("layer-vision_map")
+    both.click()
+    expect(both).to_have_attribute("aria-pressed", "true")
+    for layer, shown in (("radar_map", "true"), ("vision_flight", "true"), ("vision_map", "false")):
+        expect(page.get_by_test_id(f"layer-{layer}")).to_have_attribute("aria-pressed", shown)
+    both.click()
+    expect(both).to_have_attribute("aria-pressed", "false")
+    expect(alone).to_have_attribute("aria-pressed", "true")
 
 
 def _maps_begin_anew_when_held_for(page: Page) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from server.obstacles.watch import DEAD_S, Watch
-from telemetry.obstacles import AvoidanceStatus
+from telemetry.obstacles import AvoidanceStatus, FlightMapStatus
 from tests.server.obstacle_messages import alert, delta, status
 
 
@@ -126,6 +126,18 @@ def test_a_map_that_was_there_before_is_asked_for() -> None:
     assert not watch.needs_whole["radar"].is_set()
     watch.on_status(status(voxels_occupied=12))
     assert watch.needs_whole["radar"].is_set()
+
+
+def test_the_cameras_map_of_the_flight_is_a_map_of_its_own() -> None:
+    watch, _, _ = watching()
+    asyncio.run(watch.on_map(delta([(0, 0, 0)], sensor="vision_flight")))
+    assert watch.mirrors["vision_flight"].voxel_count == 1
+    assert watch.mirrors["vision"].voxel_count == 0
+    watch.on_status(status("vision", flight_map=FlightMapStatus(1, 100)))
+    assert not watch.needs_whole["vision"].is_set()
+    watch.forget()
+    watch.on_status(status("vision", flight_map=FlightMapStatus(1, 100)))
+    assert watch.needs_whole["vision"].is_set()
 
 
 def test_of_another_recording_nothing_stays() -> None:

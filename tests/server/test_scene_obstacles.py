@@ -207,4 +207,7 @@ def test_on_the_stage_what_has_gone_is_taken_away(server: viser.ViserServer) -> 
     sights.draw_chunks("radar", hidden, {(0, 0, 0): mirror.chunk((0, 0, 0))})
     assert sights.draw_chunks("radar", look, {(0, 0, 0): mirror.chunk((0, 0, 0))}) > 0
     sights.drop_chunks("radar")
+    whole = sights.look("vision_flight", placing.origin)
+    assert whole is not None
+    assert (look.visible, look.with_ground, whole.visible) == (True, False, False)
     assert sights.draw_chunks("radar", look, {(0, 0, 0): mirror.chunk((0, 0, 0))}) > 0

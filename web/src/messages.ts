@@ -65,6 +65,14 @@ export interface Eye {
   largest_speed_m_s: number;
 }
 
+/** The camera's map of the whole flight. */
+export interface FlightMapStatus {
+  voxels_occupied: number;
+  map_bytes: number;
+  part: number;
+  why: string;
+}
+
 /** What Hedgehop itself is doing with the vehicle. */
 export interface FlightStatus {
   way: "none" | "auto" | "guided";
@@ -196,6 +204,7 @@ export interface PerceptionStatus {
   divergence_m: number | null;
   latency_s: number | null;
   basis: Basis | null;
+  flight_map: FlightMapStatus | null;
   placed: boolean;
 }
 
@@ -776,7 +785,9 @@ export interface ViewDoc {
   show_radar_map: boolean;
   /** The camera's voxels, and those of range finders. */
   show_vision_map: boolean;
-  /** Voxels that are known ground, in grey. */
+  /** All that the camera has seen on its way. */
+  show_vision_flight: boolean;
+  /** Voxels that are known ground, in grey: they would crowd the view from behind the vehicle. */
   show_explained: boolean;
   show_regions: boolean;
   show_tracks: boolean;
@@ -1091,9 +1102,9 @@ export interface ManoeuvreDoc {
   top_unseen: boolean;
 }
 
-/** What of one sensor's map the 3D view draws. */
+/** What of one map the 3D view draws. */
 export interface MapDrawn {
-  sensor: "radar" | "vision" | "ranges";
+  sensor: "radar" | "vision" | "ranges" | "vision_flight";
   /** Occupied, of the whole map. */
   voxels: number;
   drawn: number;

@@ -64,6 +64,7 @@ export function perception(fields: Partial<PerceptionStatus> = {}): PerceptionSt
     sensor: "radar",
     state: "running",
     placed: true,
+    flight_map: null,
     text: "",
     t_mono_s: 100,
     t_utc_s: 1000,

@@ -11,7 +11,7 @@ import { SENSOR_WORDS, WATCH_WORDS, sensorRow } from "./words";
 const DIVERGENCE_M = 2;
 
 function Notes({ sensor, entry, source }: { sensor: SensorName; entry: Sensed; source: Source }) {
-  const { text, divergence_m } = entry.status;
+  const { text, divergence_m, flight_map } = entry.status;
   const drawn = drawnOf(source, sensor);
   return (
     <>
@@ -20,6 +20,12 @@ function Notes({ sensor, entry, source }: { sensor: SensorName; entry: Sensed; s
         <p class={`sensor-says ${divergence_m > DIVERGENCE_M ? "near" : "muted"}`} data-testid="divergence">
           {divergence_m > DIVERGENCE_M && <Icon name="warning" size={16} />}
           {metres(divergence_m)} between its path and the GNSS path
+        </p>
+      )}
+      {flight_map && (
+        <p class="sensor-says muted" data-testid="flight-map" title={flight_map.why}>
+          {number(flight_map.voxels_occupied)} voxels on the whole flight
+          {flight_map.part > 1 && `, part ${flight_map.part}: its path broke off`}
         </p>
       )}
       {drawn && drawn.text && (

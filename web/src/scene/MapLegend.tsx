@@ -2,19 +2,26 @@ import { metres, number } from "../format";
 import type { ViewDoc } from "../messages";
 import { SensorMark } from "../obstacles/SensorMark";
 import { SENSOR_WORDS } from "../obstacles/words";
-import { drawnOf, hasSensors, obstacles, type SensorName } from "../store/obstacles";
+import { drawnOf, hasSensors, obstacles, type MapName, type SensorName } from "../store/obstacles";
 import { hasTracks } from "../store/moving";
 import { isReplaying } from "../store/review";
 import { view } from "../store/state";
 import { setView } from "../store/stream";
 
-type Layer = "show_radar_map" | "show_vision_map" | "show_explained" | "show_regions" | "show_tracks";
+type Layer =
+  | "show_radar_map"
+  | "show_vision_map"
+  | "show_vision_flight"
+  | "show_explained"
+  | "show_regions"
+  | "show_tracks";
 
 interface Key {
   layer: Layer;
   label: string;
   title: string;
   sensor?: SensorName;
+  map?: MapName;
 }
 
 const KEYS: readonly Key[] = [
@@ -23,12 +30,21 @@ const KEYS: readonly Key[] = [
     label: SENSOR_WORDS.radar,
     title: "What the radar has seen on the whole flight: the lighter, the surer",
     sensor: "radar",
+    map: "radar",
   },
   {
     layer: "show_vision_map",
     label: SENSOR_WORDS.vision,
     title: "What the camera and range finders see now: the lighter, the surer",
     sensor: "vision",
+    map: "vision",
+  },
+  {
+    layer: "show_vision_flight",
+    label: "Camera, flight",
+    title: "All that the camera has seen on its way; nothing is searched in it",
+    sensor: "vision",
+    map: "vision_flight",
   },
   { layer: "show_explained", label: "Known ground", title: "Seen, and known from the surface model" },
   {
@@ -62,7 +78,7 @@ function Sample({ entry }: { entry: Key }) {
     return (
       <>
         <SensorMark sensor={entry.sensor} />
-        <span class={`probability sensor-${entry.sensor}`} aria-hidden="true" />
+        <span class={`probability sensor-${entry.sensor} map-${entry.map}`} aria-hidden="true" />
       </>
     );
   }
@@ -71,20 +87,49 @@ function Sample({ entry }: { entry: Key }) {
 }
 
 /** Of large maps only so much is drawn that the browser keeps up: the key says how large its boxes are then. */
-function Coarser({ sensor }: { sensor: SensorName }) {
+function Coarser({ name }: { name: MapName }) {
   const source = isReplaying.value ? "replay" : "live";
-  const drawn = drawnOf(source, sensor);
+  const drawn = drawnOf(source, name);
   if (!drawn || drawn.detail <= 1) return null;
   const { radar_resolution_m, vision_resolution_m } = obstacles[source].value.settings;
-  const edge_m = (sensor === "radar" ? radar_resolution_m : vision_resolution_m) * drawn.detail;
+  const edge_m = (name === "radar" ? radar_resolution_m : vision_resolution_m) * drawn.detail;
   return (
     <span
       class="muted"
-      data-testid={`coarser-${sensor}`}
+      data-testid={`coarser-${name}`}
       title={`${number(drawn.drawn)} boxes drawn for ${number(drawn.voxels)} voxels`}
     >
       {metres(edge_m)} boxes
     </span>
+  );
+}
+
+/** What radar and camera have seen on the flight in one picture, and nothing over it (Miccinesi 2022, fig. 22). */
+const MERGED: Partial<ViewDoc> = {
+  show_radar_map: true,
+  show_vision_map: false,
+  show_vision_flight: true,
+  show_explained: false,
+  show_regions: false,
+};
+const APART: Partial<ViewDoc> = { show_vision_map: true, show_vision_flight: false, show_regions: true };
+
+const isShown = (fields: Partial<ViewDoc>) =>
+  Object.entries(fields).every(([name, value]) => view.value[name as keyof ViewDoc] === value);
+
+function MergedMaps() {
+  const isMerged = isShown(MERGED);
+  return (
+    <button
+      type="button"
+      title="Radar and camera in one picture: all that both have seen on the flight"
+      aria-pressed={isMerged}
+      data-testid="merged-maps"
+      onClick={() => setView(isMerged ? APART : MERGED)}
+    >
+      <span class="eye" aria-hidden="true" />
+      Both maps
+    </button>
   );
 }
 
@@ -113,9 +158,10 @@ export function MapLegend() {
           <span class="eye" aria-hidden="true" />
           <Sample entry={entry} />
           {entry.label}
-          {entry.sensor && <Coarser sensor={entry.sensor} />}
+          {entry.map && <Coarser name={entry.map} />}
         </button>
       ))}
+      {isAny(hasSensors) && <MergedMaps />}
       <span class="probability-scale" aria-hidden="true">
         likely → sure
       </span>

@@ -127,8 +127,10 @@ export const watching = (source: Source): PerceptionStatus[] =>
     return entry && watches ? [entry.status] : [];
   });
 
-export const drawnOf = (source: Source, sensor: SensorName): MapDrawn | null =>
-  obstacles[source].value.maps.find((entry) => entry.sensor === sensor) ?? null;
+export type MapName = MapDrawn["sensor"];
+
+export const drawnOf = (source: Source, name: MapName): MapDrawn | null =>
+  obstacles[source].value.maps.find((entry) => entry.sensor === name) ?? null;
 
 export function forgetSensing(source: Source): void {
   sensed[source].value = new Map();
