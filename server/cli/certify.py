@@ -26,7 +26,7 @@ from planning.request import check_hole_area
 from planning.summary import certificate_summary, dsm_summary
 from server.cli import options as o
 from server.cli.files import read_small
-from server.cli.mission_vehicle import demands_of, vehicle_of
+from server.cli.mission_vehicle import Given, judged_by
 from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
 from server.cli.terrain import ModelOptions, read_model
 from server.cli.verdict import leg_lines, verdict_lines
@@ -60,20 +60,9 @@ def certify(
     with refusing(as_json=as_json):
         check_hole_area(max_hole_m2)
         flight = read_flight(mission.name, read_small(mission))
-        vehicle = vehicle_of(
-            flight,
-            profile,
-            position_error_m=position_error_m,
-            rtl_height_m=rtl_height_m,
-            radius_m=vehicle_radius_m,
-            following_m=following_m,
-            dsm_rms_m=dsm_rms_m,
-            downwash_m=downwash_m,
-        )
-        request = demands_of(
-            flight, vehicle, way=flown_as, required_m=required_clearance_m, highest_m=max_height_above_ground_m
-        )
-        params = request.clearance()
+        given = Given(profile, position_error_m, vehicle_radius_m, following_m, dsm_rms_m, downwash_m, rtl_height_m)
+        request = judged_by(flight, given, flown_as, required_clearance_m, max_height_above_ground_m)
+        vehicle, params = request.profile, request.clearance()
         timer = StepTimer(progress)
         source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
         other = other_surface(flight, source)

@@ -24,7 +24,7 @@ from planning.other_surface import other_surface
 from server.cli import options as o
 from server.cli.files import check_directory, read_small
 from server.cli.flight_progress import FlightProgress
-from server.cli.mission_vehicle import demands_of, vehicle_of
+from server.cli.mission_vehicle import Given, judged_by
 from server.cli.nodes import OPERATOR, Station, own_nodes
 from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
 from server.cli.review import answer, say_below
@@ -91,17 +91,8 @@ def fly(
         flight = read_mission(mission.name, read_small(mission))
         parse_address(link)
         _check_record(record)
-        vehicle = vehicle_of(
-            flight,
-            profile,
-            position_error_m=position_error_m,
-            rtl_height_m=rtl_height_m,
-            radius_m=vehicle_radius_m,
-            following_m=following_m,
-            dsm_rms_m=dsm_rms_m,
-            downwash_m=downwash_m,
-        )
-        request = demands_of(flight, vehicle, way=mode, required_m=required_clearance_m, highest_m=None)
+        given = Given(profile, position_error_m, vehicle_radius_m, following_m, dsm_rms_m, downwash_m, rtl_height_m)
+        request = judged_by(flight, given, mode, required_clearance_m)
         model_options = ModelOptions(crs, z_scale, vertical_datum)
         model = read_model(dsm, StepTimer(progress), model_options)[0] if dsm else None
         other = None if model is None else other_surface(flight, model)
@@ -112,7 +103,7 @@ def fly(
         options = FlyOptions(
             address=link,
             operator=OPERATOR,
-            profile=vehicle,
+            profile=request.profile,
             clearance=request.clearance(),
             way=mode,
             dsm=model,
@@ -126,7 +117,7 @@ def fly(
         if doc.figures is not None:
             doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
         say_below(doc)
-        answer(doc, as_json=as_json)
+        answer(doc, as_json=as_json, other=other)
         kept = doc.figures is None or doc.figures.below_required is None
         raise typer.Exit(DONE if completed and kept else FAILED)
 

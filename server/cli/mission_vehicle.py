@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from planning.feasibility import commanded_speed_m_s
 from planning.margins.following_error import WAY_NAMES, Way
@@ -12,34 +12,37 @@ from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
 from server.cli.output import harmless, say
 
 
-def vehicle_of(flight: Mission, profile: str | None, **overrides: float | None) -> VehicleProfile:
-    """The named profile, else the mission's own, else the default one; options override it. Says which it is."""
-    own = None if flight.planned_for is None else flight.planned_for.profile
-    if profile is not None:
-        vehicle = load_profile(profile)
-        if own is not None and own != vehicle:
-            say(f"Note: --profile {harmless(profile)} is taken instead of the mission's own {harmless(own.name)}.")
-    elif own is not None:
-        vehicle = own
-        say(
-            f"Note: vehicle as in the mission's file: {harmless(own.name)}, position error {own.position_error_m:g} m,"
-            f" return height {own.rtl_height_m:g} m."
-        )
-    else:
-        vehicle = load_profile(DEFAULT_PROFILE)
-        say(f"Note: the mission's file names no vehicle: {vehicle.name} is taken. Give --profile for another.")
-    given = {key: value for key, value in overrides.items() if value is not None}
-    for key, value in given.items():
-        if own is not None and (planned := getattr(own, key)) != value:
-            words = "what follows from the mission's own" if planned is None else f"the mission's own {planned:g}"
-            say(f"Note: {key.removesuffix('_m').replace('_', ' ')} of {value:g} m is taken instead of {words}.")
-    return replace(vehicle, **given)
+@dataclass(frozen=True, slots=True)
+class Given:
+    """As on the command line; None: as the mission's own file says, or the profile."""
+
+    profile: str | None
+    position_error_m: float | None
+    vehicle_radius_m: float | None
+    following_m: float | None
+    dsm_rms_m: float | None
+    downwash_m: float | None
+    rtl_height_m: float | None
+
+    @property
+    def overrides(self) -> dict[str, float]:
+        """Fields of the vehicle that win over its profile's."""
+        values = {
+            "position_error_m": self.position_error_m,
+            "rtl_height_m": self.rtl_height_m,
+            "radius_m": self.vehicle_radius_m,
+            "following_m": self.following_m,
+            "dsm_rms_m": self.dsm_rms_m,
+            "downwash_m": self.downwash_m,
+        }
+        return {name: value for name, value in values.items() if value is not None}
 
 
-def demands_of(
-    flight: Mission, vehicle: VehicleProfile, *, way: Way | None, required_m: float | None, highest_m: float | None
+def judged_by(
+    flight: Mission, given: Given, way: Way | None, required_m: float | None, highest_m: float | None = None
 ) -> PlanRequest:
-    """What a mission that was planned before is judged by: what is given wins over what its file says."""
+    """Vehicle (its ``profile``) and demands of a mission that was planned before; ``way`` None: as it was planned."""
+    vehicle = _vehicle(flight, given.profile, given.overrides)
     own = flight.planned_for or PlannedFor(vehicle)
     if required_m is not None and own.required_clearance_m not in (None, required_m):
         say(f"Note: {required_m:g} m are required instead of the mission's own {own.required_clearance_m:g} m.")
@@ -55,6 +58,29 @@ def demands_of(
     )
     check_demands(request)
     return request
+
+
+def _vehicle(flight: Mission, profile: str | None, overrides: dict[str, float]) -> VehicleProfile:
+    """The named profile, else the mission's own, else the default one; options override it. Says which it is."""
+    own = None if flight.planned_for is None else flight.planned_for.profile
+    if profile is not None:
+        vehicle = load_profile(profile)
+        if own is not None and own != vehicle:
+            say(f"Note: --profile {harmless(profile)} is taken instead of the mission's own {harmless(own.name)}.")
+    elif own is not None:
+        vehicle = own
+        say(
+            f"Note: vehicle as in the mission's file: {harmless(own.name)}, position error {own.position_error_m:g} m,"
+            f" return height {own.rtl_height_m:g} m."
+        )
+    else:
+        vehicle = load_profile(DEFAULT_PROFILE)
+        say(f"Note: the mission's file names no vehicle: {vehicle.name} is taken. Give --profile for another.")
+    for key, value in overrides.items():
+        if own is not None and (planned := getattr(own, key)) != value:
+            words = "what follows from the mission's own" if planned is None else f"the mission's own {planned:g}"
+            say(f"Note: {key.removesuffix('_m').replace('_', ' ')} of {value:g} m is taken instead of {words}.")
+    return replace(vehicle, **overrides)
 
 
 def _as_fast_as_commanded(path: PathParams, flight: Mission) -> PathParams:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from planning.formats.detect import read_mission
+from planning.other_surface import other_surface
 from server.cli import options as o
 from server.cli.files import read_small
 from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
@@ -64,7 +65,7 @@ def review(
         for note in doc.notes:
             say(f"Note: {note}")
         say_below(doc)
-        answer(doc, as_json=as_json)
+        answer(doc, as_json=as_json, other=other_surface(flown, model) if flown and model else None)
         raise typer.Exit(DONE if doc.figures is not None and doc.figures.below_required is None else FAILED)
 
 
@@ -74,12 +75,13 @@ def say_below(doc: ReviewDoc) -> None:
         say(f"WARNING: {doc.figures.below_required}")
 
 
-def answer(doc: ReviewDoc, *, as_json: bool) -> None:
-    """One JSON object, or a few lines."""
+def answer(doc: ReviewDoc, *, as_json: bool, other: str | None = None) -> None:
+    """One JSON object, or a few lines. ``other``: that it is judged over another surface model than was planned on."""
+    said = {} if other is None else {"other_surface": other}
     if as_json:
-        print_json(summary(doc))
+        print_json(summary(doc) | said)
     else:
-        typer.echo("\n".join(figure_lines(doc)))
+        typer.echo("\n".join([*said.values(), *figure_lines(doc)]))
 
 
 def summary(doc: ReviewDoc) -> dict[str, Any]:

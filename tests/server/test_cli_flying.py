@@ -158,6 +158,23 @@ def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp
     assert wider.code == 1
 
 
+def test_a_flight_over_another_model_than_the_planned_one_says_so_first(
+    ground: Ground, flight: tuple[Run, Path], tmp_path: Path
+) -> None:
+    planned = replace(SHORT, surface_sha256="ab" * 32)
+    elsewhere = write_mission(tmp_path / "elsewhere.waypoints", planned)
+    arguments = ("fly", elsewhere, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk")
+    run = hedgehop(*arguments)
+    assert run.code == 0, run.err
+    first, second = run.out.splitlines()[:2]
+    assert "than the mission was planned on (abababab)" in first
+    assert second == "COMPLETED"
+    notes = [line for line in run.err.splitlines() if line.startswith("Note: ")]
+    assert notes[0] == f"Note: {first}"
+    again = hedgehop("review", flight[1], "--dsm", ground.dsm, "--mission", elsewhere, "--json")
+    assert again.json["other_surface"] == first
+
+
 def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:
     low = write_mission(tmp_path / "low.waypoints", mission([(50.0, 150.0, 3.0), (90.0, 150.0, 3.0)]))
     record = tmp_path / "refused.mcap"

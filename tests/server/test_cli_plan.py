@@ -13,6 +13,7 @@ import pytest
 from pymavlink import mavwp
 
 from planning.demo import demo_survey_polygon
+from planning.geotiff import read_dsm, write_dsm
 from tests.server.cli_runs import Run, hedgehop
 
 KEYS = {
@@ -149,6 +150,25 @@ def test_certify_takes_vehicle_and_demands_from_the_missions_own_file(
     wider = hedgehop("certify", hillside[0], tmp_path / "mission.plan", "--position-error-m", 0.5, "--json")
     assert wider.json["required_clearance_m"] == pytest.approx(run.json["required_clearance_m"] + 0.4)
     assert "position error of 0.5 m is taken instead of the mission's own 0.1" in wider.err
+
+
+def test_certify_over_another_model_says_so_first(
+    hillside: tuple[Path, Path], flight: tuple[Run, Path], tmp_path: Path
+) -> None:
+    higher = tmp_path / "higher.tif"
+    dsm = read_dsm(hillside[0])
+    write_dsm(higher, dsm.with_elevation(dsm.elevation_m + 0.5))
+    mission = flight[1] / "mission.plan"
+    words = "than the mission was planned on"
+    run = hedgehop("certify", higher, mission)
+    assert words in run.out.splitlines()[0]
+    assert "home's ground is 0.50 m higher here" in run.out.splitlines()[0]
+    summary = hedgehop("certify", higher, mission, "--json").json
+    assert next(iter(summary)) == "other_surface"
+    assert words in summary["other_surface"]
+    same = hedgehop("certify", hillside[0], mission, "--json")
+    assert same.json["other_surface"] is None
+    assert words not in same.err
 
 
 def test_return_height_too_low(hillside: tuple[Path, Path], tmp_path: Path) -> None:
