@@ -375,6 +375,12 @@ class Certificate:
     home: HomeStand | None = None
 
     @property
+    def kept_m(self) -> float:
+        """Smallest 3-D distance from the lowest ground that the vehicle may stand on at home, where that is known."""
+        low_m = math.inf if self.home is None else self.home.min_distance_m
+        return self.min_distance_m if math.isnan(low_m) else min(self.min_distance_m, low_m)
+
+    @property
     def following_m(self) -> float:
         """Radius of the tube around the line that is proved."""
         return 0.0 if self.budget is None else self.budget.value_m("following")

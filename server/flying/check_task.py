@@ -112,13 +112,13 @@ def check_start(
 
 
 def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
-    """Another way of flying is another term for following the line."""
+    """Another way of flying is another term for following the line; it is judged from where the vehicle may stand."""
     demands = demands_from_doc(PlanDoc.model_validate_json(record.plan_json))
     required_m = replace(demands, way="guided").clearance().required_clearance_m
-    if certificate.min_distance_m >= required_m:
+    if certificate.kept_m >= required_m:
         return ""
     return (
-        f"The line keeps {math.floor(certificate.min_distance_m * 100) / 100:.2f} m; handed over one at a time it needs"
+        f"The line keeps {math.floor(certificate.kept_m * 100) / 100:.2f} m; handed over one at a time it needs"
         f" {math.ceil(required_m * 100 - 1e-6) / 100:.2f} m, because the vehicle follows it less closely."
     )
 
