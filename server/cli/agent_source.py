@@ -15,10 +15,11 @@ from telemetry.agent.driver_lines import DriverLines, LineCounts
 from telemetry.agent.sources import at, recorded_readings
 from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings
 from telemetry.errors import SensorLinkError
+from telemetry.sensors.serial_port import open_port
 from telemetry.sensors.ti_mmwave.config import read_config
 from telemetry.sensors.ti_mmwave.differences import differences
 from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.ports import DATA_BAUD, config_port_beside, open_port
+from telemetry.sensors.ti_mmwave.ports import DATA_BAUD, config_port_beside
 from telemetry.sensors.ti_mmwave.session import TiPorts
 
 NO_PORT = "none"

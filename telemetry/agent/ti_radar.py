@@ -14,12 +14,12 @@ from mapping.errors import RadarDataError
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.wire import TARGETS_MAX
 from telemetry.errors import SensorError
+from telemetry.sensors.serial_port import open_port
 from telemetry.sensors.ti_mmwave.config import LEAST_SNR_DB
 from telemetry.sensors.ti_mmwave.differences import other_configuration
 from telemetry.sensors.ti_mmwave.frame import TiFrame
 from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiCounts, TiStream
-from telemetry.sensors.ti_mmwave.ports import open_port
 from telemetry.sensors.ti_mmwave.session import TiPorts, configure, empty, frames
 
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import termios
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import serial
 
 from telemetry.errors import SensorError
+from telemetry.sensors.serial_port import failing_as_sensor, open_port
 from telemetry.sensors.ti_mmwave.commands import Command
 from telemetry.sensors.ti_mmwave.frame import TiFrame
 from telemetry.sensors.ti_mmwave.packets import TiStream
-from telemetry.sensors.ti_mmwave.ports import CONFIG_BAUD, DATA_BAUD, open_port
+from telemetry.sensors.ti_mmwave.ports import CONFIG_BAUD, DATA_BAUD
 from telemetry.sensors.ti_mmwave.sender import ConfigSender
 
 GARBLED_S, GARBLED_BYTES = 3.0, 200
@@ -36,7 +36,7 @@ class TiPorts:
 
 def empty(port: serial.Serial) -> None:
     """What waits there is old. Raises SensorError."""
-    with _failing_as_sensor(str(port.port)):
+    with failing_as_sensor(str(port.port)):
         port.reset_input_buffer()
 
 
@@ -52,7 +52,7 @@ def configure(
 
     Raises SensorError: refused, silent, or the port.
     """
-    with contextlib.closing(open_port(device, baud)) as port, _failing_as_sensor(device):
+    with contextlib.closing(open_port(device, baud)) as port, failing_as_sensor(device):
         port.reset_input_buffer()
         sender = ConfigSender(commands)
         port.write(sender.start(now()))
@@ -75,7 +75,7 @@ def frames(
     device, byte_s = str(port.port), 10.0 / port.baudrate
     heard_s = frame_s = now()
     while True:
-        with _failing_as_sensor(device):
+        with failing_as_sensor(device):
             data = port.read(max(1, port.in_waiting))
         now_s = now()
         found = stream.feed(data)
@@ -91,13 +91,3 @@ def frames(
                 where=device,
                 advice="Check its power, that this is its data port, and that it was started.",
             )
-
-
-@contextlib.contextmanager
-def _failing_as_sensor(device: str) -> Iterator[None]:
-    try:
-        yield
-    except (serial.SerialException, OSError, termios.error) as error:
-        raise SensorError(
-            "The radar has gone: its port does not answer any more.", where=device, advice="Check its cable and power."
-        ) from error
