@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from mapping.errors import RadarDataError
 from telemetry.agent.client import NoticeReading, RadarReading
-from telemetry.agent.wire import TARGETS_MAX
+from telemetry.agent.live_radar import LiveRadar, LiveStatus, reading_of
 from telemetry.errors import SensorError
 from telemetry.sensors.serial_port import open_port
 from telemetry.sensors.ti_mmwave.config import LEAST_SNR_DB
@@ -22,7 +22,6 @@ from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiCounts, TiStream
 from telemetry.sensors.ti_mmwave.session import TiPorts, configure, empty, frames
 
-AGAIN_S = (0.5, 1.0, 2.0, 5.0)
 USUAL_PERIOD_S = 0.1
 LONGEST_PAUSE_S = 5.0
 """Between two frames of a capture: what is longer is a gap that nobody wants to wait for."""
@@ -31,15 +30,15 @@ _CHUNK_BYTES = 4096
 
 
 @dataclass(slots=True)
-class TiStatus:
-    """What an agent tells of its radar."""
+class TiStatus(LiveStatus):
+    """What an agent tells of its TI radar."""
 
     stream: TiCounts = field(default_factory=TiCounts)
     points: int = 0
-    interruptions: int = 0
-    """Times that the radar went away: a pulled cable, no power, silence."""
-    trouble: str = ""
-    """Why nothing comes at present; empty while frames come."""
+
+    @property
+    def frames(self) -> int:
+        return self.stream.frames
 
     def as_dict(self) -> dict[str, int | str]:
         s = self.stream
@@ -59,11 +58,10 @@ class TiStatus:
     def __str__(self) -> str:
         s = self.stream
         damaged = s.damaged_packets + s.implausible_lengths
-        text = (
-            f"radar: {s.frames} frames, {self.points} points, {s.lost_packets} packets lost, {damaged} damaged, "
-            f"{s.bad_bytes} bad bytes, {self.interruptions} interruptions"
+        return self.told(
+            f"{s.frames} frames, {self.points} points, {s.lost_packets} packets lost, {damaged} damaged, "
+            f"{s.bad_bytes} bad bytes"
         )
-        return f"{text}; {self.trouble}" if self.trouble else text
 
 
 class Comparison:
@@ -80,8 +78,8 @@ class Comparison:
         return other_configuration(frame, config)
 
 
-class TiRadar:
-    """``readings`` blocks, in a thread of its own; ``status`` may be read from any."""
+class TiRadar(LiveRadar):
+    """Configured anew whenever it was away."""
 
     def __init__(
         self,
@@ -92,30 +90,11 @@ class TiRadar:
         now: Callable[[], float] = time.monotonic,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
-        """``tell`` hears one line when the radar goes away or sends garbage, and one when it is back."""
-        self._config, self._ports, self._tell, self._now, self._wait = config, ports, tell, now, wait
+        self._config, self._ports = config, ports
         self._stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s)
-        self.status = TiStatus(self._stream.counts)
+        self.status = TiStatus(stream=self._stream.counts)
         self._comparison = Comparison(config)
-
-    def readings(self) -> Generator[RadarReading | NoticeReading, None, None]:
-        """For ever, with a notice for the pilot when the radar goes away and when it is back.
-
-        Raises SensorError only while not a single frame has come: then somebody can still put it right.
-        """
-        failures = 0
-        while True:
-            try:
-                for reading in self._session():
-                    failures = 0
-                    yield reading
-            except SensorError as error:
-                if not self._stream.counts.frames:
-                    raise
-                self.status.interruptions += failures == 0
-                yield from self._trouble(error)
-            self._wait(AGAIN_S[min(failures, len(AGAIN_S) - 1)])
-            failures += 1
+        super().__init__(self.status, tell=tell, now=now, wait=wait)
 
     def _session(self) -> Iterator[RadarReading | NoticeReading]:
         self._stream.reset()
@@ -136,12 +115,11 @@ class TiRadar:
                 yield from self._fine()
                 yield from self._compare(frame)
                 self.status.points += len(frame.xyz_m)
-                yield reading_of(frame, t_s, self._config.least_snr_db)
+                yield frame_reading(frame, t_s, self._config.least_snr_db)
 
     def _compare(self, frame: TiFrame) -> Iterator[NoticeReading]:
         if what := self._comparison.first_difference(frame):
-            self._tell(f"{what} {ADVICE}")
-            yield NoticeReading(self._now(), True, f"radar: {what}")
+            yield self._notice(f"{what} {ADVICE}", what)
 
     def _garbled(self) -> Iterator[NoticeReading]:
         error = SensorError(
@@ -153,27 +131,11 @@ class TiRadar:
             raise error
         yield from self._trouble(error)
 
-    def _trouble(self, error: SensorError) -> Iterator[NoticeReading]:
-        if str(error) != self.status.trouble:
-            self.status.trouble = str(error)
-            self._tell(str(error))
-            yield NoticeReading(self._now(), True, f"radar: {error.what}")
 
-    def _fine(self) -> Iterator[NoticeReading]:
-        if self.status.trouble:
-            self.status.trouble = ""
-            self._tell("The radar sends frames again.")
-            yield NoticeReading(self._now(), False, "radar: It sends frames again.")
-
-
-def reading_of(frame: TiFrame, t_s: float, least_snr_db: float) -> RadarReading:
-    """The strongest targets stay where there are too many; of unknown strength: just strong enough to be detected."""
+def frame_reading(frame: TiFrame, t_s: float, least_snr_db: float) -> RadarReading:
+    """Of unknown strength: just strong enough to be detected."""
     snr_db = np.where(np.isnan(frame.snr_db), np.float32(least_snr_db), frame.snr_db)
-    targets = np.column_stack((frame.xyz_m, frame.radial_speed_m_s, snr_db)).astype(np.float32)
-    if len(targets) > TARGETS_MAX:
-        strongest = np.argsort(-snr_db, kind="stable")[:TARGETS_MAX]
-        targets = targets[np.sort(strongest)]
-    return RadarReading(t_s, targets, frame.lost_before)
+    return reading_of(t_s, frame.xyz_m, frame.radial_speed_m_s, snr_db, frame.lost_before)
 
 
 def captured_readings(
@@ -200,7 +162,7 @@ def captured_readings(
                 advice="Give the radar's configuration with --ti-config.",
             )
         status.points += len(frame.xyz_m)
-        yield after_s, reading_of(frame, after_s, least_snr_db)
+        yield after_s, frame_reading(frame, after_s, least_snr_db)
     if not stream.counts.frames:
         raise RadarDataError(
             f"There is no frame in its {stream.counts.bytes:,} bytes.",

@@ -10,7 +10,7 @@ import pytest
 from mapping.errors import RadarDataError
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import at
-from telemetry.agent.ti_radar import LONGEST_PAUSE_S, TiStatus, captured_readings, reading_of
+from telemetry.agent.ti_radar import LONGEST_PAUSE_S, TiStatus, captured_readings, frame_reading
 from telemetry.sensors.ti_mmwave.commands import parse_commands
 from telemetry.sensors.ti_mmwave.config import config_of
 from telemetry.sensors.ti_mmwave.model import TiConfig
@@ -34,7 +34,7 @@ def captured(
 def test_a_thousand_targets_are_sent_and_no_more() -> None:
     points = [(0.0, 10.0 + 0.01 * k, 0.0, 0.0) for k in range(1500)]
     (found,) = TiStream().feed(sdk3(1, points, [10.0 + 0.1 * (k // 500) for k in range(1500)]))
-    reading = reading_of(found, 0.0, 15.0)
+    reading = frame_reading(found, 0.0, 15.0)
     assert reading.targets.shape == (1000, 5)
     assert reading.targets[0, 1] == pytest.approx(15.0)
     assert reading.targets[:, 4].min() > 10.05
@@ -42,7 +42,7 @@ def test_a_thousand_targets_are_sent_and_no_more() -> None:
 
 def test_targets_of_unknown_strength_count_as_just_detected() -> None:
     (found,) = TiStream().feed(sdk3(1, POINTS))
-    reading = reading_of(found, 0.0, 13.5)
+    reading = frame_reading(found, 0.0, 13.5)
     assert reading.targets[:, 4].tolist() == [13.5, 13.5]
 
 
