@@ -55,6 +55,9 @@ def agent(
     ti_capture: Annotated[
         Path | None, typer.Option("--ti-capture", metavar="FILE", help="Send what a TI radar's data port once sent.")
     ] = None,
+    position2go: Annotated[
+        str | None, typer.Option("--position2go", metavar="PORT", help="Port of an Infineon Position2Go.")
+    ] = None,
     token_file: Annotated[
         Path | None,
         typer.Option(
@@ -70,7 +73,7 @@ def agent(
     ] = 1000.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was sent as JSON at the end.")] = False,
 ) -> None:
-    """Send radar frames and point clouds to a ground station: from stdin, a TI radar or a recording."""
+    """Send radar frames and point clouds to a ground station: from stdin, a radar on a port, or a recording."""
     with refusing(as_json=as_json):
         sensor_url(address)
         _check(voxel_m, limit_kb_s)
@@ -81,7 +84,8 @@ def agent(
             voxel_m=voxel_m,
             limit_bytes_per_s=1000.0 * limit_kb_s,
         )
-        source = source_of(SourceOptions(recording, ti_config, ti_data, ti_config_port, ti_baud, ti_capture))
+        options = SourceOptions(recording, ti_config, ti_data, ti_config_port, ti_baud, ti_capture, position2go)
+        source = source_of(options)
         asyncio.run(_run(made, source))
         _answer(made, source, as_json=as_json)
 

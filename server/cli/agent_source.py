@@ -12,6 +12,9 @@ from server.cli.output import say
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading
 from telemetry.agent.driver_lines import DriverLines, LineCounts
+from telemetry.agent.live_radar import LiveStatus
+from telemetry.agent.position2go import BAUD as POSITION2GO_BAUD
+from telemetry.agent.position2go import Position2Go
 from telemetry.agent.sources import at, recorded_readings
 from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings
 from telemetry.errors import SensorLinkError
@@ -36,6 +39,8 @@ class SourceOptions:
     ti_baud: int | None = None
     """By default that of the radars' data ports."""
     ti_capture: Path | None = None
+    position2go: str | None = None
+    """Its port."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +48,8 @@ class Source:
     """``readings`` block; run them through in a thread of their own."""
 
     readings: Iterator[Reading]
-    radar: TiStatus | None = None
-    """Of a TI radar, live or from a file."""
+    radar: LiveStatus | None = None
+    """Of a radar that the agent itself reads, live or from a file."""
     lines: LineCounts | None = None
     """Of a driver on standard input."""
 
@@ -58,6 +63,10 @@ def source_of(options: SourceOptions) -> Source:
             file.open("rb").close()
     if options.recording is not None:
         return Source(_paced(recorded_readings(options.recording)))
+    if options.position2go is not None:
+        open_port(options.position2go, POSITION2GO_BAUD).close()
+        board = Position2Go(options.position2go, tell=say)
+        return Source(board.readings(), board.status)
     config = _config(options.ti_config)
     if options.ti_capture is not None:
         status = TiStatus()
@@ -70,7 +79,12 @@ def source_of(options: SourceOptions) -> Source:
 
 
 def _check(options: SourceOptions) -> None:
-    sources = {"--recording": options.recording, "--ti-data": options.ti_data, "--ti-capture": options.ti_capture}
+    sources = {
+        "--recording": options.recording,
+        "--ti-data": options.ti_data,
+        "--ti-capture": options.ti_capture,
+        "--position2go": options.position2go,
+    }
     given = [name for name, value in sources.items() if value is not None]
     if len(given) > 1:
         raise BadRequestError(f"{' and '.join(given)} are two sources.", advice="Give one of them.")
