@@ -24,7 +24,9 @@ LOOK_S = 2.5
 """Longer than a message can be on its way: what has not shown by then in the vehicle's state did not arrive."""
 TAKEOFF_LOOK_S = 6.0
 """Motors need seconds to spin up before anything shows."""
-LOOKS_S = {TAKEOFF: TAKEOFF_LOOK_S, MISSION_START: TAKEOFF_LOOK_S}
+START_LOOK_S = 1.5
+"""A mission that runs is not begun again by another order to, and the motors are off 10 s after arming."""
+LOOKS_S = {TAKEOFF: TAKEOFF_LOOK_S, MISSION_START: START_LOOK_S}
 LOOKS = 6
 LATE_S = 1.0
 """Between two heartbeats: one that came this much before the end of the wait still tells what became of a command."""

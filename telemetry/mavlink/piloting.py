@@ -14,9 +14,10 @@ from telemetry.flight.guided import GuidedScript
 from telemetry.flight.rest import Rest, rest_from, rest_of_flight
 from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.avoidance import Avoidance
-from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
-from telemetry.mavlink.going_on import ReadMission, check_again, check_same_mission, set_speeds
+from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
+from telemetry.mavlink.going_on import ReadMission, check_same_mission, set_speeds
 from telemetry.mavlink.joining import JoinMission
+from telemetry.mavlink.mission_start import start_mission
 from telemetry.mavlink.mode_change import change_mode
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.procedures import Accepted, Procedures, Spawn
@@ -311,8 +312,7 @@ class Pilot:
             if self.join is not None:
                 await self.join.take_off()
             else:
-                await self._begin_mission(request.digest)
-                await vehicle.wait_until(lambda state: state.armed, timeout_s=10, what="arm")
+                await start_mission(vehicle, request.digest, self._read_mission)
         except (TelemetryError, asyncio.CancelledError) as error:
             self._start_ended(str(error) or SUPERSEDED)
             raise
@@ -334,36 +334,6 @@ class Pilot:
         if state.landed is None:
             return state.alt_rel_home_m is not None and state.alt_rel_home_m >= LOW_M
         return state.landed in IN_THE_AIR
-
-    async def _begin_mission(self, digest: str) -> None:
-        """ArduPilot does not arm in AUTO; PX4 takes off as soon as it is armed in its mission mode."""
-        vehicle, orders = self.vehicle, self.vehicle.orders
-        first, at = sequence_of(1, vehicle.state.autopilot), vehicle.state.mission_item
-        if at is None or at > first:  # not known: it may be where an earlier flight broke off
-            await vehicle.obey(orders.mission_item(first))
-        if vehicle.firmware == "ardupilot":
-            await vehicle.obey(orders.mode("GUIDED"))
-            await self._arm_if_needed()
-            await self._check_or_disarm(digest)
-            await vehicle.obey(orders.mission_mode())
-            await vehicle.obey(orders.start_mission())
-        else:
-            await vehicle.obey(orders.mission_mode())
-            await check_again(vehicle.onboard, digest, self._read_mission)
-            await self._arm_if_needed()
-            await vehicle.obey(orders.start_mission())
-
-    async def _check_or_disarm(self, digest: str) -> None:
-        try:
-            await check_again(self.vehicle.onboard, digest, self._read_mission)
-        except TelemetryError:
-            with contextlib.suppress(TelemetryError):  # it switches its motors off by itself soon
-                await self.vehicle.obey(self.vehicle.orders.disarm())
-            raise
-
-    async def _arm_if_needed(self) -> None:
-        if not self.vehicle.state.armed:
-            await self.vehicle.obey(self.vehicle.orders.arm())
 
     async def _mission_mode(self, accepted: Accepted) -> None:
         await self.vehicle.obey(self.vehicle.orders.mission_mode())

@@ -114,4 +114,4 @@ def frame_of(data: bytes) -> Frame:
 def _unpacked(packed: bytes, count: int, bits: int) -> NDArray[np.uint32]:
     """(count,) numbers of so many bits each, the lowest bit first."""
     each = np.unpackbits(np.frombuffer(packed, np.uint8), bitorder="little")[: count * bits].reshape(count, bits)
-    return each @ (1 << np.arange(bits, dtype=np.uint32))
+    return (each @ (1 << np.arange(bits, dtype=np.uint32))).astype(np.uint32)
