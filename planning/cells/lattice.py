@@ -16,6 +16,7 @@ F64 = NDArray[np.float64]
 
 _STEPS = 12
 _SAME_PLACE_PX = 1e-10
+_ROUNDING_M = 1e-9
 
 
 class Lattice(NamedTuple):
@@ -57,6 +58,44 @@ def bend_at(lattice, row, column):
     x = a * nodes[i, j, 0] + b * nodes[i, j + 1, 0] + c * nodes[i + 1, j, 0] + d * nodes[i + 1, j + 1, 0]
     y = a * nodes[i, j, 1] + b * nodes[i, j + 1, 1] + c * nodes[i + 1, j, 1] + d * nodes[i + 1, j + 1, 1]
     return x, y
+
+
+@njit(cache=True, nogil=True)
+def bend_range(lattice, row0, column0, row1, column1):
+    """(x0, y0, x1, y1) that hold ``bend_at`` of all places of a block.
+
+    Between lines of nodes it is bilinear: its extremes lie where those lines and the block's sides cross.
+    """
+    if lattice.bend_m.shape[0] == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    px, first_row, first_column = lattice.node_px, lattice.first_row, lattice.first_column
+    x0 = y0 = np.inf
+    x1 = y1 = -np.inf
+    row = row0
+    while True:
+        column = column0
+        while True:
+            x, y = bend_at(lattice, row, column)
+            x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
+            if column == column1:
+                break
+            column = min(column1, ((column + first_column) // px + 1) * px - first_column)
+        if row == row1:
+            break
+        row = min(row1, ((row + first_row) // px + 1) * px - first_row)
+    return x0 - _ROUNDING_M, y0 - _ROUNDING_M, x1 + _ROUNDING_M, y1 + _ROUNDING_M
+
+
+@njit(cache=True, nogil=True)
+def block_around(lattice, bend, row0, column0, row1, column1):
+    """(x0, y0, x1, y1) that hold a block of cells, which are bent by no more than ``bend``, a ``bend_range``."""
+    lean0, lean1 = row0 * lattice.shear_m, row1 * lattice.shear_m
+    return (
+        column0 * lattice.width_m + min(lean0, lean1) + bend[0],
+        row0 * lattice.height_m + bend[1],
+        column1 * lattice.width_m + max(lean0, lean1) + bend[2],
+        row1 * lattice.height_m + bend[3],
+    )
 
 
 @njit(cache=True, nogil=True)

@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planning.cells.cells import Cells
-from planning.cells.lattice import quad_of
-from planning.certificate.quads import quad_distance_sq
+from planning.cells.lattice import is_rectangular, quad_of
+from planning.certificate.quads import away
 
 F64 = NDArray[np.float64]
 
@@ -36,7 +36,8 @@ def cells_around(cells: Cells, xy_m: tuple[float, float], radius_m: float) -> Ce
     rows, columns = cells.layout.reach(place - radius_m, place + radius_m)
     height_m = cells.elevation_m[rows, columns].astype(np.float64)
     near_m, far_m = np.empty(height_m.shape), np.empty(height_m.shape)
-    _distances(cells.layout.lattice, rows.start, columns.start, x, y, near_m, far_m)
+    measure = _of_rectangles if is_rectangular(cells.layout.lattice) else _of_quads
+    measure(cells.layout.lattice, rows.start, columns.start, x, y, near_m, far_m)
     return CellsAround(height_m, near_m, far_m, _holds(cells, place, radius_m))
 
 
@@ -48,12 +49,33 @@ def _holds(cells: Cells, xy_m: F64, radius_m: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _distances(lattice, row0, column0, x, y, near_m, far_m):
+def _of_rectangles(lattice, row0, column0, x, y, near_m, far_m):
+    rows, columns = near_m.shape
+    near_x, far_x = _along_side(column0, columns, lattice.width_m, x)
+    near_y, far_y = _along_side(row0, rows, lattice.height_m, y)
+    for i in range(rows):
+        for j in range(columns):
+            near_m[i, j], far_m[i, j] = np.sqrt(near_x[j] + near_y[i]), np.sqrt(far_x[j] + far_y[i])
+
+
+@njit(cache=True, nogil=True)
+def _along_side(first, count, side_m, x):
+    """Squared distances, along one axis, to the nearest and the farthest point of each cell."""
+    near, far = np.empty(count), np.empty(count)
+    for k in range(count):
+        before, after = (first + k) * side_m - x, x - (first + k + 1) * side_m
+        near[k], far[k] = max(0.0, max(before, after)) ** 2, max(before * before, after * after)
+    return near, far
+
+
+@njit(cache=True, nogil=True)
+def _of_quads(lattice, row0, column0, x, y, near_m, far_m):
     for i in range(near_m.shape[0]):
         for j in range(near_m.shape[1]):
             quad = quad_of(lattice, row0 + i, column0 + j)
-            sq, _ = quad_distance_sq(x, y, 0.0, 0.0, 0.0, 0.0, quad, np.inf)
+            off_x, off_y = away(quad, x, y)
+            near_m[i, j] = np.sqrt(off_x * off_x + off_y * off_y)
             far = 0.0
             for k in range(4):
                 far = max(far, (quad[2 * k] - x) ** 2 + (quad[2 * k + 1] - y) ** 2)
-            near_m[i, j], far_m[i, j] = np.sqrt(sq), np.sqrt(far)
+            far_m[i, j] = np.sqrt(far)

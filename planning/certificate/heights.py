@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planning.cells.lattice import is_rectangular, quad_of
+from planning.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 from planning.certificate.nearest import STACK
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
 from planning.certificate.quads import part_inside
@@ -56,6 +56,15 @@ def _touched(low_m, high_m, res):
 
 
 @njit(cache=True, nogil=True)
+def _over_cell(ground_m, z0, z1, lowest, highest):
+    """The range, widened by the heights above one cell that is entered at z0 and left at z1."""
+    ground = np.float64(ground_m)
+    if not np.isfinite(ground):
+        return -np.inf, highest
+    return min(lowest, min(z0, z1) - ground), max(highest, max(z0, z1) - ground)
+
+
+@njit(cache=True, nogil=True)
 def _range_in_row(elevation_m, wide, row, ax, az, dx, dz, t0, t1, lowest, highest):
     xa, xb = ax + t0 * dx, ax + t1 * dx
     first, last = _touched(min(xa, xb), max(xa, xb), wide)
@@ -65,13 +74,7 @@ def _range_in_row(elevation_m, wide, row, ax, az, dx, dz, t0, t1, lowest, highes
             continue
         if not (0 <= row < elevation_m.shape[0] and 0 <= col < elevation_m.shape[1]):
             return -np.inf, highest
-        ground = np.float64(elevation_m[row, col])
-        if not np.isfinite(ground):
-            lowest = -np.inf
-            continue
-        z0, z1 = az + u0 * dz, az + u1 * dz
-        lowest = min(lowest, min(z0, z1) - ground)
-        highest = max(highest, max(z0, z1) - ground)
+        lowest, highest = _over_cell(elevation_m[row, col], az + u0 * dz, az + u1 * dz, lowest, highest)
     return lowest, highest
 
 
@@ -92,19 +95,24 @@ def _ranges(elevation_m, wide, high, start_m, end_m, lowest_m, highest_m):
 
 
 @njit(cache=True, nogil=True)
+def _meets(box, ax, ay, dx, dy):
+    """Whether the line, in plan, meets the rectangle."""
+    t0, t1 = _inside(ax, dx, box[0], box[2], 0.0, 1.0)
+    t0, t1 = _inside(ay, dy, box[1], box[3], t0, t1)
+    return t0 <= t1
+
+
+@njit(cache=True, nogil=True)
 def _range_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, lowest, highest):
-    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
-        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
+    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    for r in range(row0, stop_row):
+        for c in range(col0, stop_column):
+            if not _meets(block_around(lattice, bend, r, c, r + 1, c + 1), ax, ay, dx, dy):
+                continue
             t0, t1 = part_inside(quad_of(lattice, r, c), ax, ay, dx, dy)
-            if t0 > t1:
-                continue
-            ground = np.float64(elevation_m[r, c])
-            if not np.isfinite(ground):
-                lowest = -np.inf
-                continue
-            z0, z1 = az + t0 * dz, az + t1 * dz
-            lowest = min(lowest, min(z0, z1) - ground)
-            highest = max(highest, max(z0, z1) - ground)
+            if t0 <= t1:
+                lowest, highest = _over_cell(elevation_m[r, c], az + t0 * dz, az + t1 * dz, lowest, highest)
     return lowest, highest
 
 
@@ -127,9 +135,7 @@ def _ranges_over_quads(elevation_m, layout, lattice, boxes_m, start_m, end_m, lo
             size -= 1
             level, i, j = node[size, 0], node[size, 1], node[size, 2]
             offset, rows, cols = layout[level, 0], layout[level, 1], layout[level, 2]
-            x0, y0, x1, y1 = block_box(lattice, boxes_m, offset, cols, level, i, j)
-            t0, t1 = part_inside((x0, y0, x1, y0, x1, y1, x0, y1), ax, ay, dx, dy)
-            if t0 > t1:
+            if not _meets(block_box(lattice, boxes_m, offset, cols, level, i, j), ax, ay, dx, dy):
                 continue
             if level == 0:
                 lowest, highest = _range_in_leaf(

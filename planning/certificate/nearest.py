@@ -17,9 +17,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from planning.cells.lattice import is_rectangular, quad_of
+from planning.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
-from planning.certificate.quads import quad_box, quad_distance_sq
+from planning.certificate.quads import quad_distance_sq
 
 F64 = NDArray[np.float64]
 
@@ -105,24 +105,21 @@ def column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
 @njit(cache=True, nogil=True)
 def _nearest_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, best_sq, best_t):
     lowest = min(az, az + dz)
-    boxes, wide, high = is_rectangular(lattice), lattice.width_m, lattice.height_m
-    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
-        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+    rectangular = is_rectangular(lattice)
+    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
+    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    for r in range(row0, stop_row):
+        for c in range(col0, stop_column):
             top = np.float64(elevation_m[r, c])
             if not np.isfinite(top):
                 top = np.inf
             above = lowest - top
             if above > 0.0 and above * above >= best_sq:
                 continue
-            if boxes:
-                x0, y0, x1, y1 = c * wide, r * high, (c + 1) * wide, (r + 1) * high
-                sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
-            else:
-                quad = quad_of(lattice, r, c)
-                x0, y0, x1, y1 = quad_box(quad)
-                sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
-                if sq < best_sq:
-                    sq, t = quad_distance_sq(ax, ay, az, dx, dy, dz, quad, top)
+            x0, y0, x1, y1 = block_around(lattice, bend, r, c, r + 1, c + 1)
+            sq, t = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
+            if sq < best_sq and not rectangular:
+                sq, t = quad_distance_sq(ax, ay, az, dx, dy, dz, quad_of(lattice, r, c), top)
             if sq < best_sq:
                 best_sq, best_t = sq, t
     return best_sq, best_t

@@ -9,7 +9,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from planning.cells.cells import Cells
-from planning.cells.lattice import Lattice, corner, is_rectangular, place_of, straight
+from planning.cells.lattice import Lattice, bend_range, block_around, is_rectangular, place_of, straight
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -59,25 +59,16 @@ def _pyramid(elevation_m: F32, lattice: Lattice) -> MaxPyramid:
     layout = np.array([level.shape for level in levels])
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     flat = np.concatenate([level.ravel() for level in levels])
-    boxes = np.empty((0, 4)) if is_rectangular(lattice) else _all_boxes(lattice, elevation_m.shape, len(levels))
-    return MaxPyramid(elevation_m, flat, np.column_stack([offsets, layout]).astype(np.int64), lattice, boxes)
+    flat_layout = np.column_stack([offsets, layout]).astype(np.int64)
+    boxes = np.empty((0 if is_rectangular(lattice) else flat.size, 4))
+    _block_boxes(lattice, *elevation_m.shape, flat_layout, boxes)
+    return MaxPyramid(elevation_m, flat, flat_layout, lattice, boxes)
 
 
 def _halved(level_m: NDArray[np.floating]) -> NDArray[np.floating]:
     rows, cols = level_m.shape
     padded = np.pad(level_m, ((0, rows % 2), (0, cols % 2)), mode="edge")
     return padded.reshape(padded.shape[0] // 2, 2, padded.shape[1] // 2, 2).max(axis=(1, 3))
-
-
-def _all_boxes(lattice: Lattice, shape: tuple[int, int], levels: int) -> F64:
-    """(B, 4) of all levels: the lowest from the cells' corners, the others from those below them."""
-    least = np.empty((*(-(-side // LEAF_PX) for side in shape), 4))
-    _block_boxes(lattice, shape[0], shape[1], least)
-    sides: list[NDArray[np.floating]] = [np.concatenate([-least[..., :2], least[..., 2:]], axis=2)]
-    while len(sides) < levels:
-        sides.append(np.stack([_halved(sides[-1][..., k]) for k in range(4)], axis=2))
-    flat = np.concatenate([side.reshape(-1, 4) for side in sides])
-    return np.concatenate([-flat[:, :2], flat[:, 2:]], axis=1, dtype=np.float64)
 
 
 @njit(cache=True, parallel=True, nogil=True)
@@ -97,17 +88,32 @@ def _block_maxima(elevation_m, out):
                 out[i, j] = largest
 
 
-@njit(cache=True, parallel=True, nogil=True)
-def _block_boxes(lattice, height, width, out):
-    for i in prange(out.shape[0]):
-        for j in range(out.shape[1]):
-            x0 = y0 = np.inf
-            x1 = y1 = -np.inf
-            for r in range(i * LEAF_PX, min(height, (i + 1) * LEAF_PX) + 1):
-                for c in range(j * LEAF_PX, min(width, (j + 1) * LEAF_PX) + 1):
-                    x, y = corner(lattice, r, c)
-                    x0, y0, x1, y1 = min(x0, x), min(y0, y), max(x1, x), max(y1, y)
-            out[i, j, 0], out[i, j, 1], out[i, j, 2], out[i, j, 3] = x0, y0, x1, y1
+@njit(cache=True, nogil=True)
+def _block_boxes(lattice, height, width, layout, out):
+    """All levels: the lowest from where its cells lie, the others from those below them."""
+    for level in range(layout.shape[0] if out.shape[0] else 0):
+        offset, rows, columns = layout[level, 0], layout[level, 1], layout[level, 2]
+        for i in range(rows):
+            for j in range(columns):
+                if level == 0:
+                    block = i * LEAF_PX, j * LEAF_PX, min(height, (i + 1) * LEAF_PX), min(width, (j + 1) * LEAF_PX)
+                    box = block_around(lattice, bend_range(lattice, *block), *block)
+                else:
+                    box = _around_children(out, layout[level - 1], i, j)
+                k = offset + i * columns + j
+                out[k, 0], out[k, 1], out[k, 2], out[k, 3] = box
+
+
+@njit(cache=True, nogil=True)
+def _around_children(boxes_m, below, i, j):
+    """The box around those of the blocks that block (i, j) has in the level below."""
+    x0 = y0 = np.inf
+    x1 = y1 = -np.inf
+    for ci in range(2 * i, min(below[1], 2 * i + 2)):
+        for cj in range(2 * j, min(below[2], 2 * j + 2)):
+            box = boxes_m[below[0] + ci * below[2] + cj]
+            x0, y0, x1, y1 = min(x0, box[0]), min(y0, box[1]), max(x1, box[2]), max(y1, box[3])
+    return x0, y0, x1, y1
 
 
 @njit(cache=True, nogil=True)

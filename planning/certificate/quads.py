@@ -16,18 +16,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def quad_box(quad):
-    """(x0, y0, x1, y1) around it."""
-    return (
-        min(min(quad[0], quad[2]), min(quad[4], quad[6])),
-        min(min(quad[1], quad[3]), min(quad[5], quad[7])),
-        max(max(quad[0], quad[2]), max(quad[4], quad[6])),
-        max(max(quad[1], quad[3]), max(quad[5], quad[7])),
-    )
-
-
-@njit(cache=True, nogil=True)
-def _away(quad, x, y):
+def away(quad, x, y):
     """(x, y) from the quadrilateral's nearest point; (0, 0) inside."""
     best, best_x, best_y, inside = np.inf, 0.0, 0.0, True
     for k in range(4):
@@ -48,7 +37,7 @@ def _away(quad, x, y):
 @njit(cache=True, nogil=True)
 def _half_slope(t, ax, ay, az, dx, dy, dz, quad, top):
     """Half the derivative of the squared distance by t."""
-    ox, oy = _away(quad, ax + t * dx, ay + t * dy)
+    ox, oy = away(quad, ax + t * dx, ay + t * dy)
     above = az + t * dz - top
     slope = dx * ox + dy * oy
     return slope + dz * above if above > 0.0 else slope
@@ -90,7 +79,7 @@ def quad_distance_sq(ax, ay, az, dx, dy, dz, quad, top):
         t = high
     else:  # the slope is a straight line between the two and passes zero
         t = low - at_low * (high - low) / (at_high - at_low)
-    ox, oy = _away(quad, ax + t * dx, ay + t * dy)
+    ox, oy = away(quad, ax + t * dx, ay + t * dy)
     above = max(0.0, az + t * dz - top)
     return ox * ox + oy * oy + above * above, t
 

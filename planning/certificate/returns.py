@@ -17,10 +17,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from planning.cells.lattice import is_rectangular, quad_of
+from planning.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 from planning.certificate.nearest import STACK, column_distance_sq
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
-from planning.certificate.quads import quad_box, quad_distance_sq
+from planning.certificate.quads import quad_distance_sq
 
 F64 = NDArray[np.float64]
 
@@ -125,22 +125,21 @@ def _asked_by_quad(ax, ay, bx, by, hx, hy, quad, top, clearance_m):
 
 @njit(cache=True, nogil=True)
 def _leaf_altitude(elevation_m, row0, col0, lattice, ax, ay, bx, by, hx, hy, clearance_m, needed):
-    boxes, wide, high = is_rectangular(lattice), lattice.width_m, lattice.height_m
-    for r in range(row0, min(elevation_m.shape[0], row0 + LEAF_PX)):
-        for c in range(col0, min(elevation_m.shape[1], col0 + LEAF_PX)):
+    rectangular = is_rectangular(lattice)
+    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
+    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    for r in range(row0, stop_row):
+        for c in range(col0, stop_column):
             top = np.float64(elevation_m[r, c])
             if not np.isfinite(top):
                 top = np.inf
             if top + clearance_m <= needed:
                 continue
-            if boxes:
-                x0, y0, x1, y1 = c * wide, r * high, (c + 1) * wide, (r + 1) * high
-                needed = max(needed, _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m))
-            else:
-                quad = quad_of(lattice, r, c)
-                x0, y0, x1, y1 = quad_box(quad)
-                if _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m) > needed:
-                    needed = max(needed, _asked_by_quad(ax, ay, bx, by, hx, hy, quad, top, clearance_m))
+            x0, y0, x1, y1 = block_around(lattice, bend, r, c, r + 1, c + 1)
+            asked = _asked(ax, ay, bx, by, hx, hy, x0, y0, x1, y1, top, clearance_m)
+            if asked > needed and not rectangular:
+                asked = _asked_by_quad(ax, ay, bx, by, hx, hy, quad_of(lattice, r, c), top, clearance_m)
+            needed = max(needed, asked)
     return needed
 
 
