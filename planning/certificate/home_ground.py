@@ -61,7 +61,7 @@ def home_ground(
         return _unknown(alt_m, reach_m, f"the surface model has unknown cells within {reach_m:.2f} m")
     if stands_dsm_m is None:
         lattice = dsm.cells.layout.lattice
-        sides = (float(lattice.height_m), float(lattice.width_m))
+        sides = (float(lattice.height_m), float(lattice.width_m), float(lattice.shear_m))
         steep = _steep(around.height_m, around.near_m, *sides, centre_m, reach_m, radius_m)
         words, on_top = _obstacle(around, alt_m, *steep)
     else:
@@ -96,15 +96,21 @@ def _obstacle(around: CellsAround, alt_m: float, high_m: float, low_m: float) ->
 
 
 @njit(cache=True, nogil=True)
-def free_step_m(rows, cols, high, wide):
-    """By how much cells so many rows and columns apart, each ``high`` by ``wide`` metres, may differ."""
-    return max(FREE_STEP_M, FREE_SLOPE * math.hypot(rows * high, cols * wide)) + _ROUNDING_M
+def free_step_m(rows, cols, high, wide, lean):
+    """By how much cells so many rows and columns apart may differ.
+
+    Each is ``high`` by ``wide`` metres, and every row is moved by ``lean`` against the one before.
+    """
+    return max(FREE_STEP_M, FREE_SLOPE * math.hypot(rows * high, cols * wide + rows * lean)) + _ROUNDING_M
 
 
 @njit(cache=True, nogil=True)
-def gap_m(rows, cols, high, wide):
-    """Distance between the nearest points of cells so many rows and columns apart."""
-    return math.hypot(high * max(0, abs(rows) - 1), wide * max(0, abs(cols) - 1))
+def gap_m(rows, cols, high, wide, lean):
+    """Distance between the nearest points of cells so many rows and columns apart; of leaning ones, at least."""
+    across = wide * max(0, abs(cols) - 1)
+    if lean != 0.0:
+        across = max(0.0, abs(cols * wide + rows * lean) - wide - abs(lean))
+    return math.hypot(high * max(0, abs(rows) - 1), across)
 
 
 @njit(cache=True, nogil=True)
@@ -122,7 +128,7 @@ def _tile_ranges(cells, near_m, reach_m, tile):
 
 
 @njit(cache=True, nogil=True)
-def _steep_between(cells, near_m, tall, wide, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low):
+def _steep_between(cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low):
     """Highest and lowest cell of the pairs too steep, the first in tile (i, j), the second in (p, q)."""
     for r in range(i * tile, min(cells.shape[0], (i + 1) * tile)):
         for c in range(j * tile, min(cells.shape[1], (j + 1) * tile)):
@@ -130,16 +136,16 @@ def _steep_between(cells, near_m, tall, wide, centre_m, reach_m, radius_m, tile,
                 continue
             for s in range(p * tile, min(cells.shape[0], (p + 1) * tile)):
                 for d in range(q * tile, min(cells.shape[1], (q + 1) * tile)):
-                    if near_m[s, d] > reach_m or gap_m(s - r, d - c, tall, wide) > radius_m:
+                    if near_m[s, d] > reach_m or gap_m(s - r, d - c, tall, wide, lean) > radius_m:
                         continue
                     a, b = np.float64(cells[r, c]), np.float64(cells[s, d])
-                    if abs(b - a) > free_step_m(s - r, d - c, tall, wide):
+                    if abs(b - a) > free_step_m(s - r, d - c, tall, wide, lean):
                         high, low = max(high, max(a, b)), min(low, min(a, b))
     return high, low
 
 
 @njit(cache=True, nogil=True)
-def _steep(cells, near_m, tall, wide, centre_m, reach_m, radius_m):
+def _steep(cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m):
     """Highest and lowest cell of all pairs that are too steep; (-inf, inf) when there is none.
 
     Squares of cells that differ by no more than is free anyway are passed over together.
@@ -147,7 +153,8 @@ def _steep(cells, near_m, tall, wide, centre_m, reach_m, radius_m):
     side = min(tall, wide)
     tile = max(1, int(radius_m / side / _TILES_PER_RADIUS))
     tile_high, tile_low = _tile_ranges(cells, near_m, reach_m, tile)
-    around = math.ceil(radius_m / (tile * side)) + 1
+    leaning_m = (radius_m / tall + 2.0) * abs(lean)
+    around = math.ceil((radius_m + leaning_m) / (tile * side)) + 1
     high, low = -np.inf, np.inf
     for i in range(tile_high.shape[0]):
         for j in range(tile_high.shape[1]):
@@ -156,6 +163,6 @@ def _steep(cells, near_m, tall, wide, centre_m, reach_m, radius_m):
                     most = max(tile_high[p, q] - tile_low[i, j], tile_high[i, j] - tile_low[p, q])
                     if most > FREE_STEP_M:
                         high, low = _steep_between(
-                            cells, near_m, tall, wide, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low
+                            cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low
                         )
     return high, low

@@ -149,7 +149,7 @@ def _checked(dsm: Dsm, grid: _Grid, place: I64, centre_m: float, radius_m: float
 
 @njit(cache=True, nogil=True)
 def _is_steep(high_m, low_m, r, c, s, d, cell_m):
-    return max(high_m[s, d] - low_m[r, c], high_m[r, c] - low_m[s, d]) > free_step_m(s - r, d - c, cell_m, cell_m)
+    return max(high_m[s, d] - low_m[r, c], high_m[r, c] - low_m[s, d]) > free_step_m(s - r, d - c, cell_m, cell_m, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -160,9 +160,9 @@ def _rough(high_m, low_m, cell_m, radius_m):
     rough = np.zeros((height, width), np.bool_)
     for rows in range(around + 1):
         for cols in range(-around, around + 1):
-            if (rows == 0 and cols < 0) or gap_m(rows, cols, cell_m, cell_m) > radius_m:
+            if (rows == 0 and cols < 0) or gap_m(rows, cols, cell_m, cell_m, 0.0) > radius_m:
                 continue
-            free_m = free_step_m(rows, cols, cell_m, cell_m)
+            free_m = free_step_m(rows, cols, cell_m, cell_m, 0.0)
             for r in range(height - rows):
                 for c in range(max(0, -cols), min(width, width - cols)):
                     s, d = r + rows, c + cols
@@ -178,7 +178,9 @@ def _is_blocked_by(high_m, low_m, r, c, cell_m, row, col, reach_m, radius_m):
     around = int(radius_m / cell_m) + 1
     for s in range(max(0, r - around), min(height, r + around + 1)):
         for d in range(max(0, c - around), min(width, c + around + 1)):
-            in_reach = _near_m(s - row, d - col, cell_m) <= reach_m and gap_m(s - r, d - c, cell_m, cell_m) <= radius_m
+            in_reach = (
+                _near_m(s - row, d - col, cell_m) <= reach_m and gap_m(s - r, d - c, cell_m, cell_m, 0.0) <= radius_m
+            )
             if in_reach and _is_steep(high_m, low_m, r, c, s, d, cell_m):
                 return True
     return False

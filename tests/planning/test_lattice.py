@@ -115,3 +115,15 @@ def test_rectangles_around_a_place_are_as_near_as_quadrilaterals(
     as_quads = replace(dsm, source=Cells(cells, unbent))
     stands = [home_ground(model, place, centre_m=reach_m - 0.02, radius_m=0.02) for model in (dsm, as_quads)]
     assert repr(stands[0]) == repr(stands[1])
+
+
+def test_a_vehicle_is_not_set_down_between_leaning_cells_that_differ_too_much() -> None:
+    """Four rows down and four columns back lie 0.3 m away, where every row is moved by a cell."""
+    cells = np.full((40, 40), 0.5, np.float32)
+    cells[18, 22], cells[22, 18] = 1.05, 0.0
+    lattice = straight(0.1, 0.1, 0.1)
+    leaning = Cells(cells, Layout(lattice, (WEST, NORTH), np.array([[1.0, 0.0], [0.0, -1.0]]), cells.shape))
+    dsm = replace(dsm_of(np.zeros((40, 80)), res=0.1), source=leaning)
+    place = leaning.layout.xy_of(20.5, 20.5)
+    assert home_ground(dsm, place, centre_m=0.35, radius_m=0.35).obstacle is not None
+    assert home_ground(dsm, place, centre_m=0.35, radius_m=0.25).obstacle is None
