@@ -105,14 +105,15 @@ def _judged(dsm: Dsm, ground: Dsm, line: FlownLine, params: ClearanceParams, tre
     near_m, near_from = _near_return(pyramid, dsm, low_line, params)
     nearest_low = _nearest_low(pyramid, line, low_points_m, stand, distance_m)
     stand = _with_distance(stand, nearest_low)
-    home_problem = home_reason(at_home, stand, nearest_low, params)
-    if home_problem is not None:
-        spare_m = float(distance_m.min()) - params.required_clearance_m
+    planned_m = float(distance_m.min())
+    home_problem = home_reason(at_home, stand, nearest_low, planned_m, params)
+    spare_m = planned_m - params.required_clearance_m
+    if home_problem is not None and (spare_m >= 0.0 or at_home.obstacle is not None):
         stand = replace(stand, better=better_home(ground, line.home_xy_m, params, spare_m=spare_m))
-        home_problem = home_reason(at_home, stand, nearest_low, params)
+        home_problem = home_reason(at_home, stand, nearest_low, planned_m, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
-    too_near = not float(distance_m.min()) >= params.required_clearance_m
+    too_near = not planned_m >= params.required_clearance_m
     worst_is_unknown = too_near and _is_unknown_near(pyramid, dsm, worst, distance_m)
     found = [
         *unjudged_reasons(line),
@@ -127,7 +128,7 @@ def _judged(dsm: Dsm, ground: Dsm, line: FlownLine, params: ClearanceParams, tre
     reasons: tuple[Reason, ...] = tuple(reason for reason in found if reason is not None)
     return Certificate(
         certified=not reasons,
-        min_distance_m=float(distance_m.min()),
+        min_distance_m=planned_m,
         min_vertical_m=float(lowest_m.min()),
         required_clearance_m=params.required_clearance_m,
         worst=worst,

@@ -9,10 +9,11 @@ import numpy as np
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_search import FARTHEST_M
 from planning.dsm import Dsm
-from planning.margins.words import is_by_hand
+from planning.margins.words import is_by_hand, rounded_down, rounded_up
 from planning.model import ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 
 RTK_ERROR_M = 0.1
+SAME_M = 0.005
 WINDS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 FILL_OR_AVOID = (
     "Keep the line farther inside the surface model and away from its holes, fill the holes,"
@@ -33,9 +34,7 @@ def line_reasons(
     if hit:
         deepest = min(hit, key=lambda leg: leg.min_vertical_m)
         text = f"The line enters the terrain: {-deepest.min_vertical_m:.2f} m deep on {_leg(deepest)}."
-        mend = (
-            f"Raise the line there by at least {_up(params.required_clearance_m - deepest.min_vertical_m, 0.1):.1f} m."
-        )
+        mend = f"Raise the line there by at least {rounded_up(params.required_clearance_m - deepest.min_vertical_m)} m."
         reasons.append(Reason("terrain_hit", text, mend))
     short = [leg for leg in legs if not leg.min_distance_m >= params.required_clearance_m]
     if short:
@@ -48,16 +47,16 @@ def _clearance_reason(
 ) -> Reason:
     nearest = min(short, key=lambda leg: leg.min_distance_m)
     required_m = params.required_clearance_m
-    missing_m = _up(required_m - nearest.min_distance_m, 0.01)
+    missing = rounded_up(required_m - nearest.min_distance_m)
     to_what = "an unknown cell or the model's edge" if worst_is_unknown else "the surface"
     text = (
-        f"The line comes within {_down(nearest.min_distance_m, 0.01):.2f} m of {to_what} on {_leg(nearest)}, at"
-        f" {worst.lat_deg:.7f}, {worst.lon_deg:.7f}: {missing_m:.2f} m less than the required {required_m:.2f} m"
+        f"The line comes within {rounded_down(nearest.min_distance_m)} m of {to_what} on {_leg(nearest)}, at"
+        f" {worst.lat_deg:.7f}, {worst.lon_deg:.7f}: {missing} m less than the required {rounded_up(required_m)} m"
         f" ({len(short)} {'leg' if len(short) == 1 else 'legs'} too near)."
     )
     if worst_is_unknown:
         return Reason("clearance", text, FILL_OR_AVOID)
-    mend = f"Raise H by at least {missing_m:.2f} m or take a larger R."
+    mend = f"Raise H by at least {missing} m or take a larger R."
     with_rtk_m = _required_with_rtk_m(params)
     if nearest.min_distance_m >= with_rtk_m:
         mend += (
@@ -86,7 +85,7 @@ def return_reason(needed_m: float, from_m: np.ndarray | None, dsm: Dsm, params: 
         return Reason("return_unknown", text, mend)
     height_m = math.ceil(needed_m)
     text = (
-        f"The straight way home from {place} needs {_up(needed_m, 0.01):.2f} m above home;"
+        f"The straight way home from {place} needs {rounded_up(needed_m)} m above home;"
         f" the return height is {params.rtl_height_m:.2f} m."
     )
     mend = (
@@ -104,40 +103,47 @@ def near_return_reason(
         return None
     lat_deg, lon_deg = dsm.lat_lon_from_xy(from_m[None, :2])[0]
     text = (
-        f"The way home from {lat_deg:.7f}, {lon_deg:.7f} needs {_up(needed_m, 0.01):.2f} m above home, but so close to"
+        f"The way home from {lat_deg:.7f}, {lon_deg:.7f} needs {rounded_up(needed_m)} m above home, but so close to"
         " home autopilots do not climb to the return height (ArduPilot RTL_CONE_SLOPE, PX4 RTL_CONE_ANG)."
     )
     mend = "Fly higher near home, or choose a home with nothing tall between it and the line."
     return Reason("return_near_home", text, mend)
 
 
-def home_reason(ground: HomeGround, stand: HomeStand, nearest: LegClearance, params: ClearanceParams) -> Reason | None:
+def home_reason(
+    ground: HomeGround, stand: HomeStand, nearest: LegClearance, planned_m: float, params: ClearanceParams
+) -> Reason | None:
     """Why no vehicle can start at home, or what the flight would come to if it stood as low as it may there.
 
-    ``nearest`` is the leg that comes nearest to the surface then.
+    ``nearest`` is the leg that comes nearest to the surface then, ``planned_m`` what the line keeps from where heights
+    are counted. A line that is too near by itself says so; of home it is said only how much nearer it makes it.
     """
     obstacle = ground.obstacle
     if obstacle is not None and not ground.on_top:
         return Reason("home_column", f"The column over home is not clear: {obstacle}.", _other_home(stand))
-    missing_m = _up(params.required_clearance_m - stand.min_distance_m, 0.01)
+    missing = rounded_up(params.required_clearance_m - stand.min_distance_m)
     if obstacle is not None:
         text = (
             f"Home lies on top of something: {obstacle}. All heights are counted from there; a vehicle that stands"
-            f" beside it flies the whole mission up to {_up(stand.drop_m, 0.01):.2f} m lower, and comes within"
-            f" {_down(stand.min_distance_m, 0.01):.2f} m of the surface."
+            f" beside it flies the whole mission up to {rounded_up(stand.drop_m)} m lower, and comes within"
+            f" {rounded_down(stand.min_distance_m)} m of the surface."
         )
         return Reason("home_on_top", text, _other_home(stand))
     if stand.drop_m == 0.0 or not stand.min_distance_m < params.required_clearance_m:
+        return None
+    line_does = planned_m >= params.required_clearance_m
+    if not line_does and stand.min_distance_m > planned_m - SAME_M:
         return None
     source = f"the surface model is so low within {stand.reach_m:.2f} m of it"
     if stand.told_by == "vehicle":
         source = "so low it may be by its own account"
     text = (
-        f"A vehicle at home may stand {_up(stand.drop_m, 0.01):.2f} m lower than heights are counted from: {source}."
-        f" It then comes within {_down(stand.min_distance_m, 0.01):.2f} m of the surface on {_leg(nearest)}:"
-        f" {missing_m:.2f} m less than the required {params.required_clearance_m:.2f} m."
+        f"A vehicle at home may stand {rounded_up(stand.drop_m)} m lower than heights are counted from: {source}."
+        f" It then comes within {rounded_down(stand.min_distance_m)} m of the surface on {_leg(nearest)}:"
+        f" {missing} m less than the required {rounded_up(params.required_clearance_m)} m."
     )
-    return Reason("home_drop", text, f"Raise H by at least {missing_m:.2f} m. {_other_home(stand)}")
+    mend = f"Raise H by at least {missing} m."
+    return Reason("home_drop", text, f"{mend} {_other_home(stand)}" if line_does else mend)
 
 
 def _other_home(stand: HomeStand) -> str:
@@ -173,9 +179,9 @@ def height_reason(highest_m: float, leg: int, item: int, params: ClearanceParams
     limit_m = params.max_height_above_ground_m
     if limit_m is None or highest_m + params.following_m <= limit_m:
         return None
-    above = f", and the vehicle may be {_up(params.following_m, 0.01):.2f} m above it" if params.following_m else ""
+    above = f", and the vehicle may be {rounded_up(params.following_m)} m above it" if params.following_m else ""
     text = (
-        f"The line flies {_up(highest_m, 0.01):.2f} m above ground on leg {leg + 1} (item {item + 1}){above};"
+        f"The line flies {rounded_up(highest_m)} m above ground on leg {leg + 1} (item {item + 1}){above};"
         f" the limit is {limit_m:.2f} m."
     )
     return Reason(
@@ -196,12 +202,3 @@ def _leg(leg: LegClearance) -> str:
 
 def _legs(legs: list[LegClearance]) -> str:
     return "One leg leads" if len(legs) == 1 else f"{len(legs)} legs lead"
-
-
-def _up(value: float, step: float) -> float:
-    """Rounded up to a multiple of ``step``, so that what the text asks for is enough."""
-    return math.ceil(value / step) * step
-
-
-def _down(value: float, step: float) -> float:
-    return math.floor(value / step) * step

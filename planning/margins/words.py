@@ -45,17 +45,18 @@ def tube_words(following_m: float, min_distance_m: float) -> str:
     """Every point within ``following_m`` of the line is at most that much nearer to any column."""
     if following_m <= 0:
         return "The proof is of the line alone: nothing is allowed for how the autopilot departs from it."
+    tube_m = rounded_up(following_m)
     if min_distance_m <= following_m:
-        return f"Within {_up(following_m)} m of the line, where the autopilot may fly, the surface model is touched."
+        return f"Within {tube_m} m of the line, where the autopilot may fly, the surface model is touched."
     return (
-        f"The proof is of a tube: everything within {_up(following_m)} m of the line, where the autopilot may fly,"
-        f" keeps at least {_down(min_distance_m - following_m)} m from the surface model."
+        f"The proof is of a tube: everything within {tube_m} m of the line, where the autopilot may fly,"
+        f" keeps at least {rounded_down(min_distance_m - following_m)} m from the surface model."
     )
 
 
 def sum_words(budget: ClearanceBudget) -> str:
     """All terms in one line, added up."""
-    return " + ".join(f"{term.name} {_up(term.value_m)} m" for term in budget.terms)
+    return " + ".join(f"{term.name} {rounded_up(term.value_m)} m" for term in budget.terms)
 
 
 def uncovered_words(budget: ClearanceBudget | None, required_m: float) -> str | None:
@@ -63,16 +64,18 @@ def uncovered_words(budget: ClearanceBudget | None, required_m: float) -> str | 
     parts = () if budget is None else budget.uncovered_by(required_m)
     if budget is None or not parts:
         return None
-    missing = ", ".join(f"{_up(part.missing_m)} m of {part.name}" for part in parts)
+    missing = ", ".join(f"{rounded_up(part.missing_m)} m of {part.name}" for part in parts)
     return (
-        f"The required clearance of {_up(required_m)} m was set by hand; all terms together come to"
-        f" {_up(budget.total_m)} m. It does not cover {missing}."
+        f"The required clearance of {rounded_up(required_m)} m was set by hand; all terms together come to"
+        f" {rounded_up(budget.total_m)} m. It does not cover {missing}."
     )
 
 
-def _up(value_m: float) -> str:
+def rounded_up(value_m: float) -> str:
+    """Centimetres, for what is demanded."""
     return f"{math.ceil(value_m * 100 - 1e-6) / 100:.2f}"
 
 
-def _down(value_m: float) -> str:
+def rounded_down(value_m: float) -> str:
+    """Centimetres, so that no clearance is flattered."""
     return f"{math.floor(value_m * 100 + 1e-6) / 100:.2f}"

@@ -19,6 +19,7 @@ from planning.dsm import Dsm
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.holes import fill_holes
+from planning.margins.words import rounded_down, rounded_up
 from planning.model import Certificate, ClearanceParams, Mission
 from planning.vehicle_profile import parse_profile
 from server.clock import utc_now
@@ -118,8 +119,8 @@ def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
     if certificate.kept_m >= required_m:
         return ""
     return (
-        f"The line keeps {math.floor(certificate.kept_m * 100) / 100:.2f} m; handed over one at a time it needs"
-        f" {math.ceil(required_m * 100 - 1e-6) / 100:.2f} m, because the vehicle follows it less closely."
+        f"The line keeps {rounded_down(certificate.kept_m)} m; handed over one at a time it needs"
+        f" {rounded_up(required_m)} m, because the vehicle follows it less closely."
     )
 
 

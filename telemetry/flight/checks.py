@@ -9,6 +9,7 @@ from typing import Literal
 from planning.dsm import is_amsl
 from planning.flown import AMSL_FRAMES
 from planning.formats.commands import has_position
+from planning.margins.words import rounded_down, rounded_up
 from planning.model import Certificate, ClearanceParams, Home, HomeStand, Mission, VehicleProfile
 from telemetry.flight.parameters import ReturnSettings
 from telemetry.messages import OnboardMission
@@ -58,8 +59,8 @@ def clearance_row(certificate: Certificate | None, problem: str, *, has_surface:
         more = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
         return Row("clearance", "bad", reasons[0].text + more, reasons[0].mend)
     text = (
-        f"At least {_down(certificate.min_distance_m)} m from the surface model,"
-        f" required {certificate.required_clearance_m:.2f} m."
+        f"At least {rounded_down(certificate.min_distance_m)} m from the surface model,"
+        f" required {rounded_up(certificate.required_clearance_m)} m."
     )
     return Row("clearance", "good", text)
 
@@ -92,7 +93,7 @@ def _lower_end(stand: HomeStand | None) -> str:
     if stand is None or not stand.drop_m >= WORTH_A_WORD_M:
         return ""
     by_whom = "by its own RTK height" if stand.told_by == "vehicle" else f"by the model within {stand.reach_m:.2f} m"
-    return f" It may stand {_up(stand.drop_m)} m lower than that {by_whom}; the clearance is judged from there."
+    return f" It may stand {rounded_up(stand.drop_m)} m lower than that {by_whom}; the clearance is judged from there."
 
 
 def amsl_row(mission: Mission | None, state: VehicleState, home: Home) -> Row | None:
@@ -160,11 +161,13 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
         return Row("rtl_height", "bad", reason.text, mend)
     if height_m is None:
         text = f"The vehicle does not tell its return height ({settings.parameter}); {planned}."
-        return Row("rtl_height", "accept", text, f"Make sure it is {_up(needed_m)} m or more.")
+        return Row("rtl_height", "accept", text, f"Make sure it is {rounded_up(needed_m)} m or more.")
     if not settings.steep_enough:
         text = "Close to home the vehicle climbs less on its return than the certificate takes for granted."
         return Row("rtl_height", "accept", text, "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45).")
-    need = f"the ways home need {_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
+    need = (
+        f"the ways home need {rounded_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
+    )
     return Row("rtl_height", "good", f"The vehicle returns at {height_m:.2f} m; {need}.")
 
 
@@ -196,11 +199,3 @@ def ready_row(state: VehicleState) -> Row:
     if state.ready_to_arm is None:
         return Row("ready", "good", "The vehicle does not say whether it is ready: arming will tell.")
     return Row("ready", "good", "The vehicle says that it is ready.")
-
-
-def _down(value_m: float) -> str:
-    return f"{math.floor(value_m * 100) / 100:.2f}"
-
-
-def _up(value_m: float) -> str:
-    return f"{math.ceil(value_m * 100 - 1e-6) / 100:.2f}"

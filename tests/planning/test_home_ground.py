@@ -144,6 +144,34 @@ def test_the_clearance_holds_for_the_whole_line_flown_that_much_lower() -> None:
     assert certify(dsm_of(cells, res=0.2), high_line(1.91), replace(RTK, vehicle_radius_m=0.6)).certified
 
 
+def test_a_line_too_near_by_itself_says_of_home_only_how_much_nearer_it_makes_it() -> None:
+    """Beside an unknown cell no other home helps: one was offered, 0.0 m away."""
+    cells = fine()
+    cells[103, 100] = -0.25
+    dipped = certify(dsm_of(cells, res=0.2), high_line(1.0), RTK)
+    assert codes(dipped)[:2] == ["clearance", "home_drop"]
+    mend = dipped.reasons[1].mend
+    assert mend == "Raise H by at least 0.40 m."
+    assert dipped.home is not None
+    assert dipped.home.better is None
+    cells[100, 118:] = np.nan
+    beside_unknown = certify(dsm_of(cells, res=0.2), high_line(9.0), RTK)
+    assert beside_unknown.home is not None
+    assert beside_unknown.home.drop_m > 0.0
+    assert "clearance" in codes(beside_unknown)
+    assert "home_drop" not in codes(beside_unknown)
+    assert beside_unknown.home.better is None
+
+
+def test_a_drop_that_takes_the_last_millimetre_is_refused() -> None:
+    cells = fine()
+    cells[103, 100] = -0.004
+    params = replace(RTK, vehicle_radius_m=0.6)
+    planned = certify(dsm_of(cells, res=0.2), high_line(RTK.required_clearance_m + 0.003), params)
+    assert planned.min_distance_m > params.required_clearance_m
+    assert codes(planned)[0] == "home_drop"
+
+
 def test_slopes_count_with_the_reach_of_the_position_error() -> None:
     slope = math.tan(math.radians(30.0))
     cells = np.broadcast_to(slope * 0.5 * np.arange(100)[None, :], (100, 100)).astype(np.float32)

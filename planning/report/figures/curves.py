@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.formats.safe_text import clean_name
+from planning.margins.words import rounded_up
 from planning.model import Certificate, FlownLine, Poi, SampledPath, Timing
 from planning.report.figures.chart import Chart, Mark, Series, render_chart
 from planning.report.words import metres
@@ -43,7 +44,7 @@ def clearance_trend(certificate: Certificate) -> str:
     short = np.where(d_m < need, d_m, np.nan)
     series = [
         Series(s_m, d_m, "distance to the surface model", GOOD, 1.8, fill="#e8f3ea"),
-        Series(_ends(s_m), np.array([need, need]), f"required {need:.2f} m", BAD, 1.4, dash="6 4"),
+        Series(_ends(s_m), np.array([need, need]), f"required {rounded_up(need)} m", BAD, 1.4, dash="6 4"),
     ]
     if np.isfinite(short).any():
         series.append(Series(s_m, short, "below required", TIGHT, 2.6))
