@@ -292,3 +292,22 @@ def test_a_position2go_file_needs_two_receivers(tmp_path: Path) -> None:
         open_adc(path, AWR1843, None)
     with pytest.raises(RadarDataError, match=r"no \.cfg"):
         open_adc(path, POSITION2GO, SMALL)
+
+
+def test_frames_are_read_in_any_order(tmp_path: Path) -> None:
+    made = [cube(number, POSITION2GO.shape) for number in range(3)]
+    rows = [oda_line(k * 63_694_000, one) for k, one in enumerate(made)]
+    (tmp_path / "radar.csv").write_text("\n".join(["time,re,im", rows[0], "", *rows[1:]]))
+    (tmp_path / "adc.bin").write_bytes(dca1000_bytes([cube(number) for number in range(3)]))
+    files = (
+        open_oda(tmp_path / "radar.csv", POSITION2GO),
+        open_adc(save(tmp_path / "a.npy", np.stack(made)), POSITION2GO, None),
+        open_adc(tmp_path / "adc.bin", AWR1843, I_FIRST),
+    )
+    for opened in files:
+        one_by_one, every = list(opened.frames()), opened.any_frame()
+        assert every.count == 3
+        for number in (2, 0, 1):
+            found = every.read(number)
+            assert found.t_s == one_by_one[number].t_s
+            assert np.array_equal(found.cube, one_by_one[number].cube)

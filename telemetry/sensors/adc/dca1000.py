@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
 from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, refuse_clipped, refuse_empty
+from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
 from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.waveform import fmcw_params
 
@@ -44,14 +43,15 @@ def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None, sampl
 
     code = told(_counts(path, frame_bytes, count), samples_as, path.name)
 
-    def frames() -> Iterator[AdcFrame]:
+    def read(number: int) -> AdcFrame:
         with path.open("rb") as file:
-            for number in range(count):
-                cube = _cube(file.read(frame_bytes), code, config, params.shape)
-                refuse_clipped(cube, f"{path.name}, frame {number}")
-                yield AdcFrame(number * config.frame_period_s, cube)
+            file.seek(number * frame_bytes)
+            cube = _cube(file.read(frame_bytes), code, config, params.shape)
+        refuse_clipped(cube, f"{path.name}, frame {number}")
+        return AdcFrame(number * config.frame_period_s, cube)
 
-    return AdcFile(path.name, params, config.frame_period_s, (code.note,) if code.note else (), frames)
+    every, notes = AnyFrame(count, read), (code.note,) if code.note else ()
+    return AdcFile(path.name, params, config.frame_period_s, notes, every.in_order, lambda: every)
 
 
 def _counts(path: Path, frame_bytes: int, frames: int) -> NDArray[np.int64]:

@@ -23,6 +23,18 @@ class AdcFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class AnyFrame:
+    """A file's frames for who looks at them in any order."""
+
+    count: int
+    read: Callable[[int], AdcFrame]
+    """Frame 0 to ``count`` - 1. Raises RadarDataError where the file is wrong."""
+
+    def in_order(self) -> Iterator[AdcFrame]:
+        return (self.read(number) for number in range(self.count))
+
+
+@dataclass(frozen=True, slots=True)
 class AdcFile:
     """Opened and checked; ``frames`` reads one after the other and raises RadarDataError where the file is wrong."""
 
@@ -33,6 +45,8 @@ class AdcFile:
     notes: tuple[str, ...]
     """What was assumed or put right, a sentence each."""
     frames: Callable[[], Iterator[AdcFrame]]
+    any_frame: Callable[[], AnyFrame]
+    """Finds out where each frame lies, which of a file of lines takes reading all of it. Raises RadarDataError."""
 
 
 CLIPPED = 0.01

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
 from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, dimensions, refuse_clipped, refuse_empty
+from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, AnyFrame, dimensions, refuse_clipped, refuse_empty
 
 USUAL_PERIOD_S = 0.1
 """Arrays do not tell it."""
@@ -53,14 +52,14 @@ def open_npy(
         notes += (code.note or "Its samples were stored unsigned: 65536 was taken off those above 32767.",)
     step_s = period_s or USUAL_PERIOD_S
 
-    def frames() -> Iterator[AdcFrame]:
-        for number in range(layout.shape[0]):
-            stored = _frame(path, layout, number)
-            cube = stored.astype(np.complex64) if code is None else _decoded(stored, code)
-            refuse_clipped(cube, f"{path.name}, frame {number}")
-            yield AdcFrame(number * step_s, cube)
+    def read(number: int) -> AdcFrame:
+        stored = _frame(path, layout, number)
+        cube = stored.astype(np.complex64) if code is None else _decoded(stored, code)
+        refuse_clipped(cube, f"{path.name}, frame {number}")
+        return AdcFrame(number * step_s, cube)
 
-    return AdcFile(path.name, fitting, step_s, notes, frames)
+    every = AnyFrame(layout.shape[0], read)
+    return AdcFile(path.name, fitting, step_s, notes, every.in_order, lambda: every)
 
 
 def _layout(path: Path) -> _Layout:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
-from telemetry.sensors.adc.model import AdcFile, AdcFrame, refuse_clipped, refuse_empty
+from telemetry.sensors.adc.model import AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
 
 RATE_HZ = 15.7
 _BLOCKS = 4
@@ -33,24 +34,65 @@ def open_oda(path: Path, params: FmcwParams) -> AdcFile:
         )
 
     def frames() -> Iterator[AdcFrame]:
-        first_ns = last_ns = None
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            for number, line in enumerate(file, start=1):
-                if not line.strip() or (number == 1 and _is_heading(line)):
-                    continue
-                where = f"{path.name}, line {number}"
-                values = _values(line, params, where)
-                t_ns = float(values[0])
-                first_ns = t_ns if first_ns is None else first_ns
-                _check_time(t_ns, first_ns, last_ns, where)
-                last_ns = t_ns
-                cube = _cube(values[1:], params)
-                refuse_clipped(cube, where)
-                yield AdcFrame((t_ns - first_ns) * 1e-9, cube)
-        if first_ns is None:
-            raise RadarDataError("There is no frame in it.", where=path.name, advice="Record it again.")
+        first_ns: float | None = None
+        for row in _rows(path, params):
+            first_ns = row.t_ns if first_ns is None else first_ns
+            yield _frame(row.line, row.number, first_ns, params, path.name)
 
-    return AdcFile(path.name, params, 1.0 / RATE_HZ, (), frames)
+    def any_frame() -> AnyFrame:
+        rows = [(row.offset, row.number, row.t_ns) for row in _rows(path, params)]
+
+        def read(number: int) -> AdcFrame:
+            offset, line_number, _ = rows[number]
+            with path.open("rb") as file:
+                file.seek(offset)
+                return _frame(file.readline(), line_number, rows[0][2], params, path.name)
+
+        return AnyFrame(len(rows), read)
+
+    return AdcFile(path.name, params, 1.0 / RATE_HZ, (), frames, any_frame)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    number: int
+    """Of the line, from 1."""
+    offset: int
+    """Of its first byte."""
+    t_ns: float
+    line: bytes
+
+
+def _rows(path: Path, params: FmcwParams) -> Iterator[_Row]:
+    """The lines that hold frames, their lengths and times checked. Raises RadarDataError."""
+    first_ns = last_ns = None
+    offset = 0
+    with path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            begins_at, offset = offset, offset + len(line)
+            text = _text(line)
+            if not text.strip() or (number == 1 and _is_heading(text)):
+                continue
+            where = f"{path.name}, line {number}"
+            t_ns = _number(_fields(text, params, where)[0], 1, where)
+            first_ns = t_ns if first_ns is None else first_ns
+            _check_time(t_ns, first_ns, last_ns, where)
+            last_ns = t_ns
+            yield _Row(number, begins_at, t_ns, line)
+    if first_ns is None:
+        raise RadarDataError("There is no frame in it.", where=path.name, advice="Record it again.")
+
+
+def _frame(line: bytes, number: int, first_ns: float, params: FmcwParams, name: str) -> AdcFrame:
+    where = f"{name}, line {number}"
+    values = _values(_text(line), params, where)
+    cube = _cube(values[1:], params)
+    refuse_clipped(cube, where)
+    return AdcFrame((float(values[0]) - first_ns) * 1e-9, cube)
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8-sig", errors="replace")
 
 
 def _check_time(t_ns: float, first_ns: float, last_ns: float | None, where: str) -> None:
@@ -74,8 +116,8 @@ def _is_heading(line: str) -> bool:
     return False
 
 
-def _values(line: str, params: FmcwParams, where: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """(1 + 4 x chirps x samples,)"""
+def _fields(line: str, params: FmcwParams, where: str) -> list[str]:
+    """As many as a frame has. Raises RadarDataError."""
     fields = line.strip().rstrip(",").split(",")
     expected = 1 + _BLOCKS * params.chirps * params.samples
     if len(fields) != expected:
@@ -85,21 +127,27 @@ def _values(line: str, params: FmcwParams, where: str) -> np.ndarray[tuple[int],
             where=where,
             advice="The row was cut off, or the file comes from another radar.",
         )
+    return fields
+
+
+def _values(line: str, params: FmcwParams, where: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """(1 + 4 x chirps x samples,)"""
+    fields = _fields(line, params, where)
     try:
         return np.array(fields, dtype=np.float64)
     except ValueError:
-        column, field = next((k, field) for k, field in enumerate(fields, start=1) if not _is_number(field))
+        for column, field in enumerate(fields, start=1):
+            _number(field, column, where)
+        raise
+
+
+def _number(field: str, column: int, where: str) -> float:
+    try:
+        return float(field)
+    except ValueError:
         raise RadarDataError(
             f'Value {column} is "{field.strip()[:20]}".', where=where, advice="Only numbers may stand in it."
         ) from None
-
-
-def _is_number(field: str) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
 
 
 def _cube(
