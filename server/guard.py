@@ -26,7 +26,9 @@ JSON_LIMIT_BYTES = 8 * 1024**2
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 CHUNK_TIMEOUT_S = 30.0
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-UPLOADS = frozenset({"/api/terrains", "/api/orthophotos", "/api/recordings/import", "/api/traversability/uwb"})
+UPLOADS = frozenset(
+    {"/api/terrains", "/api/orthophotos", "/api/recordings/import", "/api/traversability/uwb", "/api/radar/files"}
+)
 # Neither can be sent across origins without a preflight, which nothing here answers.
 BODY_TYPES = frozenset({"application/json", "application/octet-stream"})
 PAGE_POLICY = (
@@ -181,7 +183,7 @@ def _check_body(headers: Headers, limit: int) -> None:
 def too_large(limit: int) -> TooLargeError:
     return TooLargeError(
         f"The body is larger than {limit / 1024**2:,.0f} MiB.",
-        advice="Crop or downsample a raster, or raise the setting upload_limit_bytes.",
+        advice="Crop or downsample a raster, record fewer frames, or raise the setting upload_limit_bytes.",
     )
 
 

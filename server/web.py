@@ -24,6 +24,7 @@ from server.api import (
     link,
     obstacles,
     plan,
+    radar,
     recordings,
     sensors,
     session,
@@ -37,11 +38,13 @@ from server.errors import error_doc, status_of
 from server.guard import Guard
 from server.hub import Hub
 from server.library import Library
+from server.library.radar_files import RadarShelf
 from server.scene import proxy
 from server.scene.host import SceneHost
 from server.schemas import NoticeMessage
 from server.sensor_token import sensor_token
 from server.settings import Settings
+from server.studies.radar_desk import RadarDesk
 from server.together import Background
 
 if TYPE_CHECKING:
@@ -54,7 +57,21 @@ MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
 OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
 """Joins the bus and all that hangs on it."""
-ROUTERS = (session, plan, terrain, traversability, view, console, link, flight, obstacles, sensors, recordings, proxy)
+ROUTERS = (
+    session,
+    plan,
+    terrain,
+    traversability,
+    view,
+    console,
+    link,
+    flight,
+    obstacles,
+    sensors,
+    recordings,
+    radar,
+    proxy,
+)
 
 
 def create_app(
@@ -135,11 +152,14 @@ async def _open(
     stack.push_async_callback(workspace.close)
     flying = await open_flying(settings, library, hub, workspace)
     stack.push_async_callback(flying.close)
+    shelf = await asyncio.to_thread(RadarShelf, library.root, library.notices.append)
+    studied = RadarDesk(shelf, hub.publish)
+    stack.push_async_callback(studied.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
-    return Parts(settings, auth, hub, library, host, workspace, flying)
+    return Parts(settings, auth, hub, library, host, workspace, flying, studied)
 
 
 async def _tell(request: Request, error: Exception) -> Response:

@@ -152,6 +152,16 @@ class RadarChain:
         size = self.settings.azimuth_size
         return doa.azimuth_axis(self.rows, size), doa.azimuth_spectrum(still, self.rows, size)
 
+    def range_azimuth(self, spectra: Spectra) -> tuple[F64, F64]:
+        """(size,) sine to the right, ascending, (ranges, size) power of all speeds, each freed of its own Doppler."""
+        ranges, size = len(spectra.range_m), self.settings.azimuth_size
+        power = np.zeros((ranges, size))
+        for bins, speed_m_s in zip(spectra.bins, spectra.speed_m_s, strict=True):
+            cycles_per_s = np.full(ranges, 2.0 * speed_m_s / self.params.wavelength_m)
+            still = doa.without_doppler(bins.T, cycles_per_s, self.params)
+            power += doa.azimuth_spectrum(still, self.rows, size)
+        return doa.azimuth_axis(self.rows, size), power
+
     def _range_cells(self) -> tuple[int, int]:
         """First and last + 1 that can hold a target that is kept."""
         first = np.searchsorted(self.range_m, self.settings.nearest_m - self._slack_m())

@@ -21,6 +21,7 @@ from telemetry.requests import Operator
 
 if TYPE_CHECKING:
     from server.flying.flying import Flying
+    from server.studies.radar_desk import RadarDesk
     from server.workspace import Workspace
 
 
@@ -35,6 +36,7 @@ class Parts:
     scene_host: SceneHost
     workspace: Workspace
     flying: Flying
+    radar: RadarDesk
 
 
 def parts_of(connection: HTTPConnection) -> Parts:

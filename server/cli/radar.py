@@ -17,9 +17,8 @@ from server.cli import options as o
 from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
 
 if TYPE_CHECKING:
-    from mapping.radar import Detections, FmcwParams, RadarChain
-    from telemetry.sensors.adc.model import AdcFile, AdcFrame
-    from telemetry.sensors.ti_mmwave.model import TiConfig
+    from mapping.radar import Detections, Spectra
+    from telemetry.sensors.adc.reading import Reading
 
 SHOWN = 10
 """Detections of the first frame, in the answer for people."""
@@ -81,55 +80,37 @@ def process(
         if out is not None and out.suffix.lower() != ".mcap":
             what = f"{out.suffix or 'No ending'} is no format of recordings."
             raise RadarOptionsError(what, where=out.name, advice="Choose .mcap.")
-        chosen: Sensor = sensor or ("position2go" if file.suffix.lower() == ".csv" else "awr1843")
-        opened, chain, config = _opened(file, chosen, cfg, most, samples_as)
-        for note in (*opened.notes, *_differences(config)):
+        reading = _read(file, sensor, cfg, most, samples_as)
+        for note in reading.notes:
             say(f"Note: {note}")
         done = Processed(keeps=as_json)
-        _run(_detections(opened, chain, done, most, plots, plot_frame), opened, out, file, chosen)
+        _run(_detections(reading, done, most, plots, plot_frame), out, file, reading.sensor)
         end_progress()
-        _answer(file, done, parameters(chosen, opened), as_json=as_json)
+        _answer(file, done, _parameters(reading), as_json=as_json)
         raise typer.Exit(DONE)
 
 
 radar.command("process", epilog=examples.RADAR_PROCESS)(process)
 
 
-def _opened(
-    file: Path, sensor: Sensor, cfg: Path | None, most: int | None, samples_as: SamplesAs
-) -> tuple[AdcFile, RadarChain, TiConfig | None]:
+def _read(file: Path, sensor: Sensor | None, cfg: Path | None, most: int | None, samples_as: SamplesAs) -> Reading:
     """Loaded only now: the help must not wait for compilers."""
-    from mapping.radar import AWR1843, AWR1843_SETTINGS, POSITION2GO, POSITION2GO_SETTINGS, RadarChain
-    from telemetry.sensors.adc.opening import open_adc
-    from telemetry.sensors.ti_mmwave.config import read_config
+    from telemetry.sensors.adc.reading import HowRead, read_adc
 
-    if cfg is not None and sensor != "awr1843":
-        raise RadarOptionsError("A Position2Go has no .cfg.", where="--cfg", advice="Leave it out, or the sensor.")
-    config = read_config(cfg) if cfg is not None else None
-    usual, settings = (AWR1843, AWR1843_SETTINGS) if sensor == "awr1843" else (POSITION2GO, POSITION2GO_SETTINGS)
-    opened = open_adc(file, usual, config, most=most, samples_as=samples_as)
-    return opened, RadarChain(opened.params, settings), config
-
-
-def _differences(config: TiConfig | None) -> list[str]:
-    if config is None:
-        return []
-    from telemetry.sensors.ti_mmwave.differences import differences
-
-    return differences(config)
+    return read_adc(file, HowRead(sensor, samples_as, most), cfg)
 
 
 def _detections(
-    opened: AdcFile, chain: RadarChain, done: Processed, most: int | None, plots: Path | None, plot_frame: int
+    reading: Reading, done: Processed, most: int | None, plots: Path | None, plot_frame: int
 ) -> Iterator[tuple[float, Detections]]:
     """Frame by frame; counts what it did, and draws the chosen frame once all have been read: until then nothing is
     written that an error would leave behind."""
-    chosen: tuple[Any, Detections] | None = None
-    for number, frame in enumerate(islice(opened.frames(), most)):
+    chosen: tuple[Spectra, Detections] | None = None
+    for number, frame in enumerate(islice(reading.file.frames(), most)):
         if number == 0:
-            _processed(chain, frame, opened.name, number)  # compiles, which is not the frame's time
+            reading.processed(frame, number)  # compiles, which is not the frame's time
         began_s = time.perf_counter()
-        spectra, found = _processed(chain, frame, opened.name, number)
+        spectra, found = reading.processed(frame, number)
         done.seconds += time.perf_counter() - began_s
         done.take(frame.t_s, found)
         if plots is not None and number == plot_frame:
@@ -137,33 +118,19 @@ def _detections(
         progress(f"Frame {number}", None)
         yield frame.t_s, found
     if plots is not None:
-        _draw(plots, chain, chosen, plot_frame, opened.name, done.frames)
+        _draw(plots, reading, chosen, plot_frame, done.frames)
 
 
-def _draw(
-    plots: Path, chain: RadarChain, chosen: tuple[Any, Detections] | None, number: int, name: str, frames: int
-) -> None:
+def _draw(plots: Path, reading: Reading, chosen: tuple[Spectra, Detections] | None, number: int, frames: int) -> None:
     if chosen is None:
         what = f"Frame {number} is not in the file, which has {frames}."
         raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
     from server.cli.radar_plots import write_figures
 
-    write_figures(plots, chain, *chosen, f"{name}, frame {number}")
+    write_figures(plots, reading.chain, *chosen, f"{reading.file.name}, frame {number}")
 
 
-def _processed(chain: RadarChain, frame: AdcFrame, name: str, number: int) -> Any:
-    from mapping.errors import RadarDataError
-
-    try:
-        spectra = chain.spectra(frame.cube)
-        return spectra, chain.detect(spectra)
-    except RadarDataError as error:
-        raise RadarDataError(error.what, where=f"{name}, frame {number}", advice=error.advice) from error
-
-
-def _run(
-    frames: Iterator[tuple[float, Detections]], opened: AdcFile, out: Path | None, file: Path, sensor: Sensor
-) -> None:
+def _run(frames: Iterator[tuple[float, Detections]], out: Path | None, file: Path, sensor: Sensor) -> None:
     if out is None:
         for _ in frames:
             continue
@@ -173,25 +140,10 @@ def _run(
         write_targets(out, frames, t_utc_s=file.stat().st_mtime, source=sensor)
 
 
-def parameters(sensor: Sensor, opened: AdcFile) -> dict[str, Any]:
-    """What the frames were taken for."""
-    p: FmcwParams = opened.params
-    return {
-        "sensor": sensor,
-        "chirps": p.chirps,
-        "antennas": len(p.antennas),
-        "samples": p.samples,
-        "start_frequency_hz": p.start_frequency_hz,
-        "slope_hz_per_s": p.slope_hz_per_s,
-        "sample_rate_hz": p.sample_rate_hz,
-        "chirp_interval_s": p.chirp_interval_s,
-        "frame_period_s": opened.period_s,
-        "wavelength_m": p.wavelength_m,
-        "range_resolution_m": p.range_resolution_m,
-        "max_range_m": p.max_range_m,
-        "velocity_resolution_m_s": p.velocity_resolution_m_s,
-        "max_velocity_m_s": p.max_velocity_m_s,
-    }
+def _parameters(reading: Reading) -> dict[str, Any]:
+    from server.radar_facts import parameters
+
+    return parameters(reading.sensor, reading.file)
 
 
 def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool) -> None:
@@ -221,27 +173,9 @@ def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool)
 
 
 def _rows(frame: int, t_s: float, found: Detections) -> list[dict[str, Any]]:
-    """All that is known of each detection, the strongest first."""
-    import numpy as np
+    from server.radar_facts import detection_rows
 
-    azimuth_deg, elevation_deg, xyz_m = np.degrees(found.azimuth_rad), np.degrees(found.elevation_rad), found.xyz_m
-    return [
-        {
-            "frame": frame,
-            "t_s": round(t_s, 6),
-            "range_m": round(float(found.range_m[k]), 4),
-            "radial_speed_m_s": round(float(found.radial_speed_m_s[k]), 4),
-            "azimuth_deg": round(float(azimuth_deg[k]), 3),
-            "elevation_deg": round(float(elevation_deg[k]), 3),
-            "x_right_m": round(float(xyz_m[k, 0]), 4),
-            "y_forward_m": round(float(xyz_m[k, 1]), 4),
-            "z_up_m": round(float(xyz_m[k, 2]), 4),
-            "snr_db": round(float(found.snr_db[k]), 2),
-            "doppler_cell": int(found.cells[k, 0]),
-            "range_cell": int(found.cells[k, 1]),
-        }
-        for k in np.argsort(-found.snr_db, kind="stable")
-    ]
+    return [{"frame": frame, "t_s": round(t_s, 6), **row} for row in detection_rows(found)]
 
 
 def _table(found: Detections) -> list[str]:

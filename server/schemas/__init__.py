@@ -110,6 +110,7 @@ from server.schemas.stream import (
     ObstaclesMessage,
     PerceptionMessage,
     PlanMessage,
+    RadarFilesMessage,
     RecorderMessage,
     RecordingsMessage,
     ReplayMessage,
@@ -126,6 +127,15 @@ from server.schemas.stream import (
     TraversabilityMessage,
     VehicleMessage,
     ViewMessage,
+)
+from server.schemas.studies import (
+    RadarDetectionDoc,
+    RadarFileDoc,
+    RadarFrame,
+    RadarMap,
+    RadarOpened,
+    RadarParametersDoc,
+    RadarReading,
 )
 from server.schemas.traversability import (
     LandingSiteDoc,
@@ -207,6 +217,14 @@ __all__ = [
     "PreflightDoc",
     "ProfileDoc",
     "ProfileEntry",
+    "RadarDetectionDoc",
+    "RadarFileDoc",
+    "RadarFilesMessage",
+    "RadarFrame",
+    "RadarMap",
+    "RadarOpened",
+    "RadarParametersDoc",
+    "RadarReading",
     "ReasonDoc",
     "RecorderMessage",
     "RecordingDoc",

@@ -12,6 +12,7 @@ from server.schemas.library import JobDoc, LibraryState
 from server.schemas.obstacles import ObstaclesState, SensorName
 from server.schemas.results import ErrorDoc, PlanState
 from server.schemas.review import ReviewDoc
+from server.schemas.studies import RadarFileDoc
 from server.schemas.traversability import TraversabilityState
 from server.schemas.view import SelectionDoc, ViewDoc
 from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
@@ -222,6 +223,14 @@ class TraversabilityMessage(Strict):
     traversability: TraversabilityState
 
 
+class RadarFilesMessage(Strict):
+    """Files of raw radar samples that are kept, newest first."""
+
+    v: Literal[1] = 1
+    type: Literal["radar_files"] = "radar_files"
+    files: list[RadarFileDoc]
+
+
 class NoticeMessage(Strict):
     """Something the operator must read: a failed click, a warning."""
 
@@ -258,6 +267,7 @@ ServerMessage = Annotated[
     | ObstaclesMessage
     | TracksMessage
     | TraversabilityMessage
+    | RadarFilesMessage
     | NoticeMessage,
     Field(discriminator="type"),
 ]

@@ -1296,6 +1296,93 @@ export interface LandingSitesBody {
   radius_m?: number;
 }
 
+/** A file of raw samples that is kept. */
+export interface RadarFileDoc {
+  id: string;
+  name: string;
+  bytes: number;
+  added_utc: string;
+  /** Of the configuration that was given with it; empty: none. */
+  cfg_name: string;
+}
+
+/** What a file does not tell itself; as on the command line. */
+export interface RadarReading {
+  /** Null: a Position2Go's for .csv, else an AWR1843's. */
+  sensor?: "awr1843" | "position2go" | null;
+  samples?: "auto" | "twos-complement" | "offset-binary";
+  /** Only the first so many frames. */
+  most?: number | null;
+}
+
+/** What the frames are taken for. */
+export interface RadarParametersDoc {
+  sensor: "awr1843" | "position2go";
+  chirps: number;
+  antennas: number;
+  samples: number;
+  start_frequency_hz: number;
+  slope_hz_per_s: number;
+  sample_rate_hz: number;
+  chirp_interval_s: number;
+  frame_period_s: number;
+  wavelength_m: number;
+  range_resolution_m: number;
+  max_range_m: number;
+  velocity_resolution_m_s: number;
+  max_velocity_m_s: number;
+}
+
+/** A file that has been read through once. */
+export interface RadarOpened {
+  file: RadarFileDoc;
+  frames: number;
+  parameters: RadarParametersDoc;
+  /** What was assumed or put right, a sentence each. */
+  notes: string[];
+}
+
+export interface RadarDetectionDoc {
+  range_m: number;
+  /** Positive: moving away. */
+  radial_speed_m_s: number;
+  /** Positive: to the right. */
+  azimuth_deg: number;
+  elevation_deg: number;
+  x_right_m: number;
+  y_forward_m: number;
+  z_up_m: number;
+  snr_db: number;
+  doppler_cell: number;
+  range_cell: number;
+}
+
+/** Power by two axes, in steps of a 255th of what lies between floor and top. */
+export interface RadarMap {
+  rows: number;
+  columns: number;
+  /** Base64 of one byte per cell, row by row. */
+  cells: string;
+  floor_db: number;
+  top_db: number;
+  first_row: number;
+  row_step: number;
+  first_column: number;
+  /** Where the middle of the first cell lies, and the next one's. */
+  column_step: number;
+}
+
+/** One frame, processed. */
+export interface RadarFrame {
+  number: number;
+  t_s: number;
+  /** Rows: radial speed in m/s, ascending; columns: range in m. */
+  doppler: RadarMap;
+  /** Rows: range in m; columns: sine of the azimuth, to the right; null where one antenna tells none. */
+  azimuth: RadarMap | null;
+  detections: RadarDetectionDoc[];
+}
+
 export interface Snapshot {
   v: 1;
   type: "snapshot";
@@ -1488,6 +1575,13 @@ export interface TraversabilityMessage {
   traversability: TraversabilityState;
 }
 
+/** Files of raw radar samples that are kept, newest first. */
+export interface RadarFilesMessage {
+  v: 1;
+  type: "radar_files";
+  files: RadarFileDoc[];
+}
+
 /** Something the operator must read: a failed click, a warning. */
 export interface NoticeMessage {
   v: 1;
@@ -1561,6 +1655,7 @@ export type ServerMessage =
   | ObstaclesMessage
   | TracksMessage
   | TraversabilityMessage
+  | RadarFilesMessage
   | NoticeMessage;
 
 export type ClientMessage =

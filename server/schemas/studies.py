@@ -1,0 +1,106 @@
+"""Looked at in Review beside recordings: files of raw radar samples."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from server.schemas.base import Strict
+
+RadarSensor = Literal["awr1843", "position2go"]
+SamplesAs = Literal["auto", "twos-complement", "offset-binary"]
+PageName = Annotated[str, Field(max_length=64)]
+
+
+class RadarFileDoc(Strict):
+    """A file of raw samples that is kept."""
+
+    id: str
+    name: str
+    bytes: int
+    added_utc: str
+    cfg_name: str = ""
+    """Of the configuration that was given with it; empty: none."""
+
+
+class RadarReading(Strict):
+    """What a file does not tell itself; as on the command line."""
+
+    sensor: RadarSensor | None = None
+    """Null: a Position2Go's for .csv, else an AWR1843's."""
+    samples: SamplesAs = "auto"
+    most: Annotated[int, Field(ge=1)] | None = None
+    """Only the first so many frames."""
+
+
+class RadarParametersDoc(Strict):
+    """What the frames are taken for."""
+
+    sensor: RadarSensor
+    chirps: int
+    antennas: int
+    samples: int
+    start_frequency_hz: float
+    slope_hz_per_s: float
+    sample_rate_hz: float
+    chirp_interval_s: float
+    frame_period_s: float
+    wavelength_m: float
+    range_resolution_m: float
+    max_range_m: float
+    velocity_resolution_m_s: float
+    max_velocity_m_s: float
+
+
+class RadarOpened(Strict):
+    """A file that has been read through once."""
+
+    file: RadarFileDoc
+    frames: int
+    parameters: RadarParametersDoc
+    notes: list[str]
+    """What was assumed or put right, a sentence each."""
+
+
+class RadarDetectionDoc(Strict):
+    range_m: float
+    radial_speed_m_s: float
+    """Positive: moving away."""
+    azimuth_deg: float
+    """Positive: to the right."""
+    elevation_deg: float
+    x_right_m: float
+    y_forward_m: float
+    z_up_m: float
+    snr_db: float
+    doppler_cell: int
+    range_cell: int
+
+
+class RadarMap(Strict):
+    """Power by two axes, in steps of a 255th of what lies between floor and top."""
+
+    rows: int
+    columns: int
+    cells: str
+    """Base64 of one byte per cell, row by row."""
+    floor_db: float
+    top_db: float
+    first_row: float
+    row_step: float
+    first_column: float
+    column_step: float
+    """Where the middle of the first cell lies, and the next one's."""
+
+
+class RadarFrame(Strict):
+    """One frame, processed."""
+
+    number: int
+    t_s: float
+    doppler: RadarMap
+    """Rows: radial speed in m/s, ascending; columns: range in m."""
+    azimuth: RadarMap | None
+    """Rows: range in m; columns: sine of the azimuth, to the right; null where one antenna tells none."""
+    detections: list[RadarDetectionDoc]
