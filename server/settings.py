@@ -89,7 +89,7 @@ class Settings(BaseSettings):
     allowed_origins: Names = ()
     """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
     upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
-    """Largest surface model, orthophoto or recording that can be dropped in."""
+    """Largest surface model, orthophoto, recording or radar file that can be dropped in."""
     link: Names = ()
     """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
     first vehicle heard on one of them is the one that is flown."""

@@ -92,9 +92,16 @@ export function parseNumber(text: string): number | null {
 /** A number for an input: as many decimals as it has, at most 7. */
 export const editable = (value: number) => String(Number(value.toFixed(7)));
 
-/** A message about a surface model without the words of the command line: here a form asks for the same. */
+/** A message about a file without the words of the command line: here a form asks for the same. */
 export function forConsole(message: string): string {
   return message
+    .replace(/: --cfg FILE/g, ", on the left")
+    .replace(/--samples twos-complement or offset-binary/g, "two's complement or offset binary, on the left")
+    .replace(/--samples twos-complement takes/g, "“Two's complement” on the left takes")
+    .replace(/Leave --samples out/g, "Choose “Told by the samples” on the left")
+    .replace(/Use --sensor position2go/g, "Choose the Position2Go on the left")
+    .replace(/Leave out --cfg or the sensor/g, "Take its configuration away, or choose the AWR1843")
+    .replace(/: --frames (\d+)/g, " (“Only the first frames”: $1)")
     .replace(/ with --[a-z-]+/g, "")
     .replace(/use --z-scale( [\d.]*\d| with the metres of one unit)/g, "declare their unit")
     .replace(/--[a-z-]+ (?=EPSG:)/g, "")

@@ -28,6 +28,7 @@ import "./styles/polar.css";
 import "./styles/alerts.css";
 import "./styles/tracks.css";
 import "./styles/traversability.css";
+import "./styles/studies.css";
 import { App } from "./shell/App";
 import { startKeyboard } from "./shell/keyboard";
 import { startFollowing } from "./scene/following";

@@ -88,6 +88,14 @@ describe("messages of the planner", () => {
     ],
     ["If they are metres, use --z-scale 1.", "If they are metres, declare their unit."],
     ["Negate them (gdal_calc.py --calc=-A), or leave them.", "Negate them, or leave them."],
+    [
+      "Give the configuration that the radar ran with: --cfg FILE.",
+      "Give the configuration that the radar ran with, on the left.",
+    ],
+    [
+      "take the whole frames alone: --frames 12.",
+      "take the whole frames alone (“Only the first frames”: 12).",
+    ],
     ["Choose a place on known ground.", "Choose a place on known ground."],
   ])("%s", (message, shown) => expect(f.forConsole(message)).toBe(shown));
 });

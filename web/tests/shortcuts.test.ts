@@ -23,6 +23,15 @@ describe("keys", () => {
     expect(shortcutOf(key, false)?.id).toBe(id);
   });
 
+  it("arrows move the frame where radar files are looked at, the replay where flights are", () => {
+    const at = (study: "flights" | "radar", shift = false) =>
+      shortcutOf(press("ArrowRight", false, shift), false, { view: "review", study, afterG: false });
+    expect(at("radar")).toEqual({ id: "frame", by: 1 });
+    expect(at("radar", true)).toEqual({ id: "frame", by: 10 });
+    expect(at("flights")?.id).toBe("seek");
+    expect(shortcutOf(press(" "), false, { view: "review", study: "radar", afterG: false })).toBeNull();
+  });
+
   it("1 to 7 are the sections", () => {
     expect(shortcutOf(press("4"), false)).toEqual({ id: "section", section: 4 });
     expect(shortcutOf(press("8"), false)).toBeNull();

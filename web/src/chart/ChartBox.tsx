@@ -16,7 +16,8 @@ interface Props {
 
 const LEAST = { width: 80, height: 60 };
 
-function useSize(ref: { current: HTMLElement | null }): Size | null {
+/** How large an element is, as it changes. */
+export function useSize(ref: { current: HTMLElement | null }): Size | null {
   const [size, setSize] = useState<Size | null>(null);
   useEffect(() => {
     const element = ref.current;

@@ -53,23 +53,38 @@ export function goToSignIn(why: "ended" | "signed_out" = "ended"): void {
   location.assign(why === "ended" ? "/signin?ended=true" : "/signin");
 }
 
-/** One request to our server; returns the answer if it is a good one. */
-export async function request(method: string, path: string, body?: unknown): Promise<Response> {
-  const init: RequestInit = { method, credentials: "same-origin" };
+const CANCELLED: ErrorDoc = { ...NO_ANSWER, code: "cancelled", what: "Cancelled." };
+
+/** Whether somebody no longer wanted the answer: nothing to tell anyone. */
+export const isCancelled = (error: unknown) => error instanceof ApiError && error.doc.code === "cancelled";
+
+/** One request to our server; returns the answer if it is a good one. `signal` gives it up. */
+export async function request(
+  method: string,
+  path: string,
+  body?: unknown,
+  signal: AbortSignal | null = null,
+): Promise<Response> {
+  const init: RequestInit = { method, credentials: "same-origin", signal };
   if (method !== "GET") {
     init.headers = { "Content-Type": "application/json" };
     init.body = JSON.stringify(body ?? {});
   }
   const response = await fetch(path, init).catch(() => {
-    throw new ApiError(0, NO_ANSWER);
+    throw new ApiError(0, signal?.aborted ? CANCELLED : NO_ANSWER);
   });
   if (response.status === 401) goToSignIn();
   if (!response.ok) throw errorFromBody(response.status, await response.text());
   return response;
 }
 
-export async function requestJson<T>(method: string, path: string, body?: unknown): Promise<T> {
-  const response = await request(method, path, body);
+export async function requestJson<T>(
+  method: string,
+  path: string,
+  body?: unknown,
+  signal: AbortSignal | null = null,
+): Promise<T> {
+  const response = await request(method, path, body, signal);
   return (await response.json()) as T;
 }
 
@@ -79,19 +94,24 @@ export interface Upload {
 }
 
 /** Sends a file's raw bytes; XMLHttpRequest, because fetch tells no progress of what it sends. */
-export function upload(path: string, file: Blob, onProgress: (share: number) => void): Upload {
+export function upload(
+  path: string,
+  file: Blob,
+  onProgress: (share: number) => void,
+  method: "POST" | "PUT" = "POST",
+): Upload {
   const xhr = new XMLHttpRequest();
   const done = new Promise<string>((resolve, reject) => {
     xhr.upload.onprogress = (event) => event.lengthComputable && onProgress(event.loaded / event.total);
     xhr.onerror = () => reject(new ApiError(0, NO_ANSWER));
-    xhr.onabort = () => reject(new ApiError(0, { ...NO_ANSWER, code: "cancelled", what: "Cancelled." }));
+    xhr.onabort = () => reject(new ApiError(0, CANCELLED));
     xhr.onload = () => {
       if (xhr.status === 401) goToSignIn();
       if (xhr.status >= 200 && xhr.status < 300) resolve(xhr.responseText);
       else reject(errorFromBody(xhr.status, xhr.responseText));
     };
   });
-  xhr.open("POST", path);
+  xhr.open(method, path);
   xhr.setRequestHeader("Content-Type", "application/octet-stream");
   xhr.send(file);
   return { done, cancel: () => xhr.abort() };

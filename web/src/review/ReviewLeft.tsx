@@ -15,6 +15,8 @@ import { Icon } from "../ui/Icon";
 import { Done, Outcome } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { Check } from "../ui/fields";
+import { StudyLeft } from "./Studies";
+import { study } from "./study";
 import {
   PLAYING,
   RECORDINGS,
@@ -30,7 +32,10 @@ import {
 
 /** Recordings that were dropped or chosen: imported, and the last of them opened. */
 export function takeRecordings(files: readonly File[]): void {
-  if (files.length > 0) goTo("review");
+  if (files.length > 0) {
+    study.value = "flights";
+    goTo("review");
+  }
   files.forEach((file) => void sendRecording(file, imported));
 }
 
@@ -236,7 +241,7 @@ function Play() {
 }
 
 /** Which flight is looked at, against what, and Play as the one primary action. */
-export function ReviewLeft() {
+function FlightsLeft() {
   return (
     <>
       <div class="panel-scroll">
@@ -248,3 +253,6 @@ export function ReviewLeft() {
     </>
   );
 }
+
+/** Flights, or what else is looked at. */
+export const ReviewLeft = () => <StudyLeft flights={FlightsLeft} />;

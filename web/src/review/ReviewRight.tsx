@@ -10,6 +10,7 @@ import { Segmented } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { EventList } from "./EventList";
 import { Figures } from "./Figures";
+import { StudyRight } from "./Studies";
 
 type Part = "figures" | "instruments" | "events";
 
@@ -46,7 +47,7 @@ function Head({ open }: { open: ReviewDoc }) {
 }
 
 /** What is true about a recorded flight: all of it where there is room, one part at a time where there is not. */
-export function ReviewRight() {
+function FlightsRight() {
   const open = review.value;
   if (!open) {
     return (
@@ -95,3 +96,6 @@ export function ReviewRight() {
     </div>
   );
 }
+
+/** What is true about a flight, or about what else is looked at. */
+export const ReviewRight = () => <StudyRight flights={FlightsRight} />;

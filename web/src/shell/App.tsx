@@ -8,7 +8,7 @@ import { drawer, openDialog } from "./ui_state";
 import { activeView } from "./views";
 
 export function App() {
-  const { id, Left, Right, Below } = activeView.value;
+  const { id, Left, Right, Below, Over } = activeView.value;
   const open = drawer.value;
   return (
     <div class="app" data-drawer={open ?? "none"} data-view={id}>
@@ -20,6 +20,7 @@ export function App() {
       <main class="centre">
         <Scene />
         <Below />
+        {Over && <Over />}
       </main>
       <aside class="panel right" aria-label="What is true" data-testid="panel-right">
         <Right />

@@ -1,10 +1,19 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
+import { study } from "../review/study";
 import { droppedFiles } from "../store/dropped";
 import { isRadarLog, isRecording, takeFiles } from "../store/files";
+import { bringIn, isRadarSamples } from "../studies/radar";
 import { takeRadarLogs } from "../traversability/commands";
 import { dragging } from "./ui_state";
+import { activeView, goTo } from "./views";
+
+/** A .csv holds points, unless radar files are what is looked at. */
+function isSamples(file: File): boolean {
+  const looksAtThem = activeView.value.id === "review" && study.value === "radar";
+  return isRadarSamples(file) || (looksAtThem && /\.csv$/i.test(file.name));
+}
 
 export const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
 
@@ -33,7 +42,10 @@ export function FileDrop() {
     const files = await droppedFiles(event.dataTransfer);
     takeRecordings(files.filter(isRecording));
     takeRadarLogs(files.filter(isRadarLog));
-    takeFiles(files.filter((file) => !isRecording(file) && !isRadarLog(file)));
+    const samples = files.filter((file) => isSamples(file));
+    if (samples.length > 0) goTo("review");
+    void bringIn(samples);
+    takeFiles(files.filter((file) => !isRecording(file) && !isRadarLog(file) && !isSamples(file)));
   };
   return (
     <div
@@ -50,7 +62,7 @@ export function FileDrop() {
         <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
         <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
         <p>Recorded flight: .tlog, .mcap</p>
-        <p>UWB radar log: .npz</p>
+        <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
       </div>
     </div>
   );

@@ -4,6 +4,8 @@ import { acknowledgeFirst } from "../obstacles/commands";
 import { switchSound } from "../obstacles/sound";
 import { chase } from "../scene/following";
 import { seekBy, togglePlaying } from "../review/commands";
+import { study } from "../review/study";
+import { stepFrame } from "../studies/radar";
 import { takeFiles } from "../store/files";
 import { sound } from "../store/prefs";
 import { document_, selection } from "../store/state";
@@ -78,6 +80,8 @@ function act(hit: Hit): void {
       return togglePlaying();
     case "seek":
       return seekBy(hit.by_s ?? 0);
+    case "frame":
+      return stepFrame(hit.by ?? 0);
     case "help":
       openDialog.value = "help";
   }
@@ -105,7 +109,11 @@ export function onKey(event: KeyboardEvent): void {
   const at_ms = pressedAt_ms(event);
   const follows = afterG(pressedG_ms, at_ms);
   pressedG_ms = event.key.toLowerCase() === "g" && !key.mod && !inInput ? at_ms : -Infinity;
-  const hit = shortcutOf(key, inInput, { view: activeView.value.id as ViewId, afterG: follows });
+  const hit = shortcutOf(key, inInput, {
+    view: activeView.value.id as ViewId,
+    study: study.value,
+    afterG: follows,
+  });
   if (!hit || isControl(event)) return;
   event.preventDefault();
   act(hit);

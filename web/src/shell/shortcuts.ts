@@ -1,3 +1,5 @@
+import type { StudyId } from "../review/study";
+
 /** The keys of the console, in the order of the help sheet. `mod` is Ctrl, or Cmd on a Mac. */
 export const SHORTCUTS = [
   { id: "undo", keys: "Ctrl Z", text: "Undo" },
@@ -20,6 +22,7 @@ export const SHORTCUTS = [
   { id: "sound", keys: "M", text: "Sound of alerts on or off" },
   { id: "play", keys: "Space", text: "Review: play and pause" },
   { id: "seek", keys: "← or →", text: "Review: 10 s back, 10 s forward" },
+  { id: "frame", keys: "← or →", text: "Radar files: one frame back or on, with Shift ten" },
   { id: "help", keys: "?", text: "This sheet" },
 ] as const;
 
@@ -41,11 +44,14 @@ export interface Hit {
   view?: ViewId;
   /** For `seek`: by how much. */
   by_s?: number;
+  /** For `frame`: by how many. */
+  by?: number;
 }
 
-/** Where the key was pressed: the view, and whether G was pressed just before. */
+/** Where the key was pressed: the view, what Review looks at, and whether G was pressed just before. */
 export interface Where {
   view: ViewId;
+  study?: StudyId;
   afterG: boolean;
 }
 
@@ -75,9 +81,20 @@ export function shortcutOf(
 ): Hit | null {
   const view = VIEW_KEYS[pressed.key.toLowerCase()];
   if (where.afterG && view && !pressed.mod && !inInput) return { id: "view", view };
-  const hit = where.view === "review" && !pressed.mod && !inInput ? replayKey(pressed.key) : null;
+  const hit = where.view === "review" && !pressed.mod && !inInput ? reviewKey(pressed, where.study) : null;
   const found = hit ?? anywhere(pressed, inInput);
   return found && where.view !== "plan" && PLANNING.has(found.id) ? null : found;
+}
+
+function reviewKey(pressed: Key, study: StudyId = "flights"): Hit | null {
+  if (study === "flights") return replayKey(pressed.key);
+  return study === "radar" ? frameKey(pressed) : null;
+}
+
+function frameKey({ key, shift }: Key): Hit | null {
+  const by = shift ? 10 : 1;
+  if (key === "ArrowLeft") return { id: "frame", by: -by };
+  return key === "ArrowRight" ? { id: "frame", by } : null;
 }
 
 function replayKey(key: string): Hit | null {

@@ -8,7 +8,9 @@ import { PlanLeft } from "../plan/PlanLeft";
 import { PlanRight } from "../plan/PlanRight";
 import { ReviewLeft } from "../review/ReviewLeft";
 import { ReviewRight } from "../review/ReviewRight";
+import { StudyCentre } from "../review/Studies";
 import { TimePane } from "../review/TimePane";
+import { study, studyIn } from "../review/study";
 import { lastView } from "../store/prefs";
 import { selection } from "../store/state";
 import { setSelection } from "../store/stream";
@@ -21,6 +23,8 @@ export interface View {
   Left: ComponentType;
   Right: ComponentType;
   Below: ComponentType;
+  /** What may lie over the 3D view and what is below it. */
+  Over?: ComponentType;
   /** Of the left panel, by their number keys. */
   sections: readonly string[];
 }
@@ -49,12 +53,13 @@ export const views: readonly [View, ...View[]] = [
     Left: ReviewLeft,
     Right: ReviewRight,
     Below: TimePane,
+    Over: StudyCentre,
     sections: ["recordings", "judge", "maps"],
   },
 ];
 
 const byId = (id: string) => views.find((view) => view.id === id);
-const inAddress = () => byId(location.hash.slice(1));
+const inAddress = () => byId(location.hash.slice(1).split("/")[0] ?? "");
 
 /** The address tells the view, so that it can be linked and reloaded; without it, the last one of this browser. */
 export const activeView = signal<View>(inAddress() ?? byId(lastView.value) ?? views[0]);
@@ -71,11 +76,13 @@ export function goTo(id: View["id"]): void {
 
 effect(() => {
   const { id } = activeView.value;
+  const address = id === "review" && study.value !== "flights" ? `#review/${study.value}` : `#${id}`;
   lastView.value = id;
-  if (inAddress()?.id !== id) history.replaceState(null, "", `#${id}`);
+  if (location.hash !== address) history.replaceState(null, "", address);
 });
 
 window.addEventListener("hashchange", () => {
   const view = inAddress();
+  if (view?.id === "review") study.value = studyIn(location.hash) ?? "flights";
   if (view) goTo(view.id);
 });

@@ -1,6 +1,6 @@
 import { signal } from "@preact/signals";
 import type { Imported, JobDoc, RecordingDoc, UwbRule } from "../messages";
-import { ApiError, asErrorDoc, request, upload, type Upload } from "../net/api";
+import { asErrorDoc, isCancelled, request, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
 import { folderOf } from "./dropped";
 import { document_, jobs, notifyText, setError, terrain } from "./state";
@@ -38,12 +38,12 @@ const POINT_FILES = /\.(csv|geojson|json|kml|kmz|waypoints|plan|txt)$/i;
 const MOST_POINT_BYTES = 20e6;
 let nextId = 1;
 
-async function sendFile(path: string, file: File): Promise<string> {
+export async function sendFile(path: string, file: File, method: "POST" | "PUT" = "POST"): Promise<string> {
   const id = nextId++;
   const show = (share: number) => {
     sending.value = sending.value.map((entry) => (entry.id === id ? { ...entry, share } : entry));
   };
-  const running: Upload = upload(path, file, show);
+  const running: Upload = upload(path, file, show, method);
   sending.value = [...sending.value, { id, name: file.name, share: 0, cancel: running.cancel }];
   try {
     return await running.done;
@@ -53,8 +53,7 @@ async function sendFile(path: string, file: File): Promise<string> {
 }
 
 function report(place: string, error: unknown): void {
-  const cancelled = error instanceof ApiError && error.doc.code === "cancelled";
-  if (!cancelled) setError(place, asErrorDoc(error));
+  if (!isCancelled(error)) setError(place, asErrorDoc(error));
 }
 
 /** Sends a surface model; reading it becomes a job. */

@@ -4,6 +4,7 @@ import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
+import { radarFiles } from "./radar";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
@@ -68,6 +69,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "tracks":
       takeMoving(message, performance.now());
+      return;
+    case "radar_files":
+      radarFiles.value = message.files;
       return;
     case "traversability":
       traversability.value = message.traversability;
