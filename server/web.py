@@ -26,6 +26,7 @@ from server.api import (
     plan,
     radar,
     recordings,
+    scenarios,
     sensors,
     session,
     terrain,
@@ -39,12 +40,14 @@ from server.guard import Guard
 from server.hub import Hub
 from server.library import Library
 from server.library.radar_files import RadarShelf
+from server.library.scenario_runs import ScenarioShelf
 from server.scene import proxy
 from server.scene.host import SceneHost
 from server.schemas import NoticeMessage
 from server.sensor_token import sensor_token
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
+from server.studies.scenario_desk import ScenarioDesk
 from server.together import Background
 
 if TYPE_CHECKING:
@@ -70,6 +73,7 @@ ROUTERS = (
     sensors,
     recordings,
     radar,
+    scenarios,
     proxy,
 )
 
@@ -152,14 +156,23 @@ async def _open(
     stack.push_async_callback(workspace.close)
     flying = await open_flying(settings, library, hub, workspace)
     stack.push_async_callback(flying.close)
-    shelf = await asyncio.to_thread(RadarShelf, library.root, library.notices.append)
-    studied = RadarDesk(shelf, hub.publish)
-    stack.push_async_callback(studied.close)
+    radar_desk, scenario_desk = await asyncio.to_thread(_open_studies, library, hub, flying, background)
+    stack.push_async_callback(radar_desk.close)
+    stack.push_async_callback(scenario_desk.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
-    return Parts(settings, auth, hub, library, host, workspace, flying, studied)
+    return Parts(settings, auth, hub, library, host, workspace, flying, radar_desk, scenario_desk)
+
+
+def _open_studies(library: Library, hub: Hub, flying: Flying, background: Background) -> tuple[RadarDesk, ScenarioDesk]:
+    """What Review looks at beside recordings. No scenario runs beside a flight."""
+    damaged = library.notices.append
+    runs = ScenarioShelf(library.root, damaged)
+    desk = ScenarioDesk(runs, tell=hub.publish, armed=lambda: flying.armed, spawn=background.spawn)
+    flying.on_armed = desk.on_armed
+    return RadarDesk(RadarShelf(library.root, damaged), hub.publish), desk
 
 
 async def _tell(request: Request, error: Exception) -> Response:

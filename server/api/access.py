@@ -22,6 +22,7 @@ from telemetry.requests import Operator
 if TYPE_CHECKING:
     from server.flying.flying import Flying
     from server.studies.radar_desk import RadarDesk
+    from server.studies.scenario_desk import ScenarioDesk
     from server.workspace import Workspace
 
 
@@ -37,6 +38,7 @@ class Parts:
     workspace: Workspace
     flying: Flying
     radar: RadarDesk
+    scenarios: ScenarioDesk
 
 
 def parts_of(connection: HTTPConnection) -> Parts:

@@ -12,7 +12,7 @@ from server.cli import options as o
 from server.cli.files import check_directory
 from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
 from server.errors import StorageError
-from telemetry.scenarios.catalogue import NAMES, run_scenario
+from telemetry.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
 from telemetry.scenarios.result import ScenarioResult, tally, tally_json
 from telemetry.scenarios.wanted import Wanted
 from telemetry.sensing import RadarKind
@@ -47,7 +47,8 @@ def scenario(
         ),
     ] = None,
     plots: Annotated[
-        Path | None, typer.Option("--plots", metavar="DIR", help="Of foliage: draw the ROC of both rules (roc.png).")
+        Path | None,
+        typer.Option("--plots", metavar="DIR", help="Draw what of it is a curve, such as the ROC of foliage."),
     ] = None,
     as_json: o.AsJson = False,
 ) -> None:
@@ -58,16 +59,17 @@ def scenario(
     with refusing(as_json=as_json):
         _check(name, record, seeds)
         own = _own(name, radar, figures or [])
-        _check_plots(name, plots)
+        _check_plots(name, plots, seeds)
         results: list[ScenarioResult] = []
         for number in range(seed, seed + seeds):
             progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
-            results.append(run_scenario(name, Wanted(number, o.existing(world), radar, own, record)))
+            wanted = Wanted(number, o.existing(world), radar, own, record, charts=plots is not None)
+            results.append(run_scenario(name, wanted))
             end_progress()
             if not as_json:
                 typer.echo("\n".join(results[-1].lines()))
         if plots is not None:
-            _draw(plots, seed)
+            _draw(plots, results[0])
         if as_json:
             print_json(results[0].as_json() if seeds == 1 else tally_json(results))
         elif seeds > 1:
@@ -75,23 +77,25 @@ def scenario(
         raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
 
 
-def _draw(plots: Path, seed: int) -> None:
+def _draw(plots: Path, result: ScenarioResult) -> None:
     """Loaded only now: drawing is rarely asked for."""
-    from server.cli.foliage_plots import write_roc
-    from telemetry.scenarios.foliage_roc import rocs
+    from server.cli.chart_plots import write_charts
 
-    progress("Drawing the ROC", None)
-    path = write_roc(plots, rocs(seed), seed)
-    end_progress()
-    say(f"Drawn: {path}")
+    for path in write_charts(plots, result):
+        say(f"Drawn: {path}")
 
 
-def _check_plots(name: str, plots: Path | None) -> None:
+def _check_plots(name: str, plots: Path | None, seeds: int) -> None:
     if plots is None:
         return
-    if name != "foliage":
+    if not scenario_named(name).draws:
+        able = ", ".join(scenario.name for scenario in SCENARIOS if scenario.draws)
         raise ParameterError(
-            f"There is nothing to draw of {name}.", where="--plots", advice="Leave --plots away, or run foliage."
+            f"There is nothing to draw of {name}.", where="--plots", advice=f"Leave --plots away, or run one of {able}."
+        )
+    if seeds > 1:
+        raise ParameterError(
+            f"Figures show one seed, not {seeds}.", where="--plots", advice="Leave --seeds away, or --plots."
         )
     check_directory(plots)
 

@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from server.errors import reported
@@ -135,6 +135,8 @@ class Flying:
             sees=self._obstacles.simulated,
         )
         self._scenery = Scenery(workspace.stage, {"live": self.live, "replay": self.replay})
+        self.on_armed: Callable[[], None] = lambda: None
+        """What must make way for a flight hears that one begins."""
         self._followed = PlanFollowed(library, self.live, open_dsm=lambda: workspace.dsm)
         self._track_so_far = TrackSoFar(self.shelf.folder, self.live, self._lane)
 
@@ -238,6 +240,8 @@ class Flying:
             self._workspace.picture.again()
         if was_armed and not state.armed:
             self.desk.on_disarmed()
+        if state.armed and not was_armed:
+            self.on_armed()
 
     async def _on_link(self, status: LinkStatus) -> None:
         self._present.tell(LinkMessage(link=status))

@@ -12,7 +12,7 @@ from server.schemas.library import JobDoc, LibraryState
 from server.schemas.obstacles import ObstaclesState, SensorName
 from server.schemas.results import ErrorDoc, PlanState
 from server.schemas.review import ReviewDoc
-from server.schemas.studies import RadarFileDoc
+from server.schemas.studies import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability import TraversabilityState
 from server.schemas.view import SelectionDoc, ViewDoc
 from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
@@ -231,6 +231,14 @@ class RadarFilesMessage(Strict):
     files: list[RadarFileDoc]
 
 
+class ScenarioRunsMessage(Strict):
+    """The scenario that runs, and those that were run, newest first."""
+
+    v: Literal[1] = 1
+    type: Literal["scenario_runs"] = "scenario_runs"
+    runs: list[ScenarioRunDoc]
+
+
 class NoticeMessage(Strict):
     """Something the operator must read: a failed click, a warning."""
 
@@ -268,6 +276,7 @@ ServerMessage = Annotated[
     | TracksMessage
     | TraversabilityMessage
     | RadarFilesMessage
+    | ScenarioRunsMessage
     | NoticeMessage,
     Field(discriminator="type"),
 ]

@@ -1,4 +1,4 @@
-"""Looked at in Review beside recordings: files of raw radar samples."""
+"""Looked at in Review beside recordings: files of raw radar samples, and scenarios."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.base import Strict
+from server.schemas.results import ErrorDoc
 
 RadarSensor = Literal["awr1843", "position2go"]
 SamplesAs = Literal["auto", "twos-complement", "offset-binary"]
@@ -104,3 +105,90 @@ class RadarFrame(Strict):
     azimuth: RadarMap | None
     """Rows: range in m; columns: sine of the azimuth, to the right; null where one antenna tells none."""
     detections: list[RadarDetectionDoc]
+
+
+class ScenarioDoc(Strict):
+    """A field test of the papers in simulation."""
+
+    name: str
+    flown: str
+    held: str
+    paper: str
+    has_charts: bool
+    command_line_only: bool
+    """Too long for a browser."""
+
+
+class ScenarioRunDoc(Strict):
+    """A scenario that runs, or was run."""
+
+    id: str
+    name: str
+    seed: int
+    started_utc: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    step: str = ""
+    progress: float | None = None
+    passed: bool | None = None
+    """Whether every figure was reached; null until then."""
+    seconds: float | None = None
+    """That it took."""
+    error: ErrorDoc | None = None
+
+
+class ScenarioFigureDoc(Strict):
+    words: str
+    value: float | None
+    """Null: there was nothing to measure it on, or no end to it."""
+    unit: str
+    least: float | None
+    most: float | None
+    verdict: Literal["reached", "NOT REACHED", "not measured"] | None
+    """Null where nothing must be reached."""
+    paper: str
+    """What the paper prints of it."""
+
+
+class SeriesDoc(Strict):
+    name: str
+    """Empty: of the one before it."""
+    x: list[float]
+    y: list[float]
+    drawn: Literal["line", "points"]
+    printed: bool
+    """As the paper prints it."""
+
+
+class ChartDoc(Strict):
+    title: str
+    x_label: str
+    y_label: str
+    x_span: tuple[float, float]
+    y_span: tuple[float, float]
+    is_true: bool
+    """A drawing of places: as many metres in both directions."""
+    series: list[SeriesDoc]
+
+
+class ScenarioPartDoc(Strict):
+    """One flight of it, or what else is measured."""
+
+    title: str
+    duration_s: float
+    """0: nothing flew."""
+    contact: bool
+    min_true_distance_m: float | None
+    alerts: int
+    figures: list[ScenarioFigureDoc]
+    notes: list[str]
+    charts: list[ChartDoc]
+
+
+class ScenarioResultDoc(Strict):
+    run: ScenarioRunDoc
+    parts: list[ScenarioPartDoc]
+
+
+class RunScenario(Strict):
+    name: Annotated[str, Field(max_length=40)]
+    seed: Annotated[int, Field(ge=0, le=10_000)] = 0

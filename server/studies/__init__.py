@@ -1,1 +1,1 @@
-"""What Review looks at beside recordings: files of raw radar samples."""
+"""What Review looks at beside recordings: files of raw radar samples, and scenarios."""

@@ -48,6 +48,7 @@ SAME_M = 1.5
 """A track this near to a pole is that pole's."""
 LOOK_EVERY = 3
 """Slices between the avoidance's own looks, about as the link's clock has it."""
+DRAWN_EVERY = 10
 
 
 @dataclass(slots=True)
@@ -61,6 +62,8 @@ class Flown:
     climbed_m: float = 0.0
     errors: list[tuple[float, float, float]] = field(default_factory=list)
     """Of tracked poles in view: off the nose (rad), error of range (m), error of bearing (rad)."""
+    path_enu_m: list[tuple[float, float]] = field(default_factory=list)
+    """Five times a second, in the hall's east and north."""
 
 
 class Radar(Protocol):
@@ -164,6 +167,8 @@ class _Way:
             self._began_s = self._wire.now_s
         flown.duration_s = self._wire.now_s - self._began_s
         flown.nearest_gap_m = min(flown.nearest_gap_m, self._approach.gap_m(place + self._approach.start_enu_m))
+        if self._slices % DRAWN_EVERY == 0:
+            flown.path_enu_m.append((place + self._approach.start_enu_m).tolist())
         flown.climbed_m = max(flown.climbed_m, truth.position_enu_m[2] - UP_M)
         if flown.first_evasion_s is None and self._avoiding.is_engaged:
             flown.first_evasion_s = flown.duration_s

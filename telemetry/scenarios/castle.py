@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from telemetry.obstacles import Sensor
 from telemetry.scenarios import scenes
+from telemetry.scenarios.charts import Chart, series
 from telemetry.scenarios.flown import Flown
 from telemetry.scenarios.map_figures import radar_figures, vision_figures
 from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult
@@ -41,7 +44,11 @@ CASES = (
 
 
 def run(wanted: Wanted) -> ScenarioResult:
-    return ScenarioResult(NAME, wanted.seed, tuple(fly_case(case, wanted) for case in CASES))
+    parts = []
+    for case in CASES:
+        wanted.report(case.title, len(parts) / len(CASES))
+        parts.append(fly_case(case, wanted))
+    return ScenarioResult(NAME, wanted.seed, tuple(parts))
 
 
 def fly_case(case: Case, wanted: Wanted, *, ahead_m: float = scenes.CASTLE_AHEAD_M) -> FlightResult:
@@ -69,7 +76,16 @@ def fly_case(case: Case, wanted: Wanted, *, ahead_m: float = scenes.CASTLE_AHEAD
         vision=vision_figures(flown, setup),
         figures=_figures(case, flown, ahead_m),
         notes=_notes(flown),
+        charts=(_chart(case, flown, ahead_m),),
     )
+
+
+def _chart(case: Case, flown: Flown, ahead_m: float) -> Chart:
+    """As fig. 12 shows the flight: out, over the building, and back, from the side."""
+    path_m = np.array([truth.position_enu_m for truth in flown.track]).reshape(-1, 3)
+    height_m = float(path_m[:, 2].max(initial=1.0))
+    lines = (series("flown", path_m[:, 1], path_m[:, 2]), series("the building's face", [ahead_m] * 2, [0.0, height_m]))
+    return Chart(f"Height along the way, {case.title} (fig. 12)", "north, m", "above home, m", lines)
 
 
 def _figures(case: Case, flown: Flown, ahead_m: float) -> tuple[Figure, ...]:
@@ -77,7 +93,7 @@ def _figures(case: Case, flown: Flown, ahead_m: float) -> tuple[Figure, ...]:
     delays = [delay_s for sensor in case.able if (delay_s := flown.watches[sensor].delay_s) is not None]
     name = case.title
     figures = [
-        Figure(f"{name}: contacts", float(flown.contact), most=0.0),
+        Figure(f"{name}: contacts", float(flown.contact), most=0.0, paper="none (fig. 12)"),
         Figure(f"{name}: building detected", float(all(_saw(flown, s) for s in case.able)), least=1.0),
         Figure(f"{name}: building passed and landed", float(passed and flown.landed), least=1.0),
         Figure(f"{name}: alert behind the first voxel", max(delays, default=math.inf), most=LATEST_ALERT_S, unit=" s"),

@@ -11,6 +11,7 @@ from mapping.alerts import AlertParams
 from mapping.radar_targets import Gate, Variant, in_gate, polar, to_enu
 from telemetry.obstacles import PerceptionSettings
 from telemetry.scenarios import scenes
+from telemetry.scenarios.charts import Chart, series
 from telemetry.scenarios.figures import clusters_of, spread, within
 from telemetry.scenarios.flown import Flown, RadarLook
 from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
@@ -62,7 +63,7 @@ def run(wanted: Wanted) -> ScenarioResult:
         vertical_spread_m=spread(returns.mapped["heading_only"][level, 2]),
     )
     note = f"{len(errors_m)} returns of the reflector in {len(flown.radar)} frames, in {len(mine)} voxels"
-    return ScenarioResult(NAME, wanted.seed, (_result(flown, radar, figures, (note,)),))
+    return ScenarioResult(NAME, wanted.seed, (_result(flown, radar, figures, (note,), _charts(returns, places[0])),))
 
 
 def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> Returns:
@@ -94,6 +95,25 @@ def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
     return xyz[own & (np.abs(measured.range_m - true.range_m) <= RANGE_GATE_M)]
 
 
+def _charts(returns: Returns, reflector: F64) -> tuple[Chart, ...]:
+    """From above (fig. 14) by the variant that was chosen, and from the side (fig. 15) by all three."""
+    words = {
+        "heading_only": "heading only",
+        "full_attitude": "measured elevation",
+        "full_attitude_flat": "attitude, level",
+    }
+    chosen = returns.mapped["heading_only"]
+    stands = series("reflector", reflector[:1], reflector[1:2], drawn="points", printed=True)
+    level = _level(returns)
+    across = [series(words[name], *found[level][:, [0, 2]].T, drawn="points") for name, found in returns.mapped.items()]
+    side = series("reflector", reflector[:1], reflector[2:3], drawn="points", printed=True)
+    seen = series("returns", *chosen[:, :2].T, drawn="points")
+    return (
+        Chart("Returns from above, heading only", "east, m", "north, m", (seen, stands), is_true=True),
+        Chart("The three rotations from the side (fig. 15)", "east, m", "up, m", (*across, side)),
+    )
+
+
 def _place_figures(returns: Returns, errors_m: F64) -> tuple[Figure, ...]:
     far = (returns.range_m >= FAR_M[0]) & (returns.range_m <= FAR_M[1])
     near = returns.range_m <= NEAR_M
@@ -114,7 +134,9 @@ def _holding(voxels: F64, places: F64, map_to_world: F64) -> F64:
 def _cluster_figure(voxels: F64) -> Figure:
     """Voxels that one alert would hold together are one cluster."""
     count = len(np.unique(clusters_of(voxels, link_m=AlertParams().same_within_m)))
-    return Figure("clusters that the reflector makes", float(count), least=1.0, most=1.0)
+    return Figure(
+        "clusters that the reflector makes", float(count), least=1.0, most=1.0, paper="one, compact (fig. 15)"
+    )
 
 
 def _spread_figures(returns: Returns) -> tuple[Figure, ...]:
@@ -125,7 +147,7 @@ def _spread_figures(returns: Returns) -> tuple[Figure, ...]:
     # A map is no finer than its voxels: a spread below one is one.
     ratio = measured / max(chosen, PerceptionSettings().radar_resolution_m)
     return (
-        Figure("vertical spread, measured elevation over heading only", ratio, least=3.0),
+        Figure("vertical spread, measured elevation over heading only", ratio, least=3.0, paper="a smear (fig. 15)"),
         Figure("vertical spread, heading only", chosen, unit=" m"),
         Figure("vertical spread, measured elevation", measured, unit=" m"),
         Figure("vertical spread, full attitude but level", flat, unit=" m"),
@@ -141,7 +163,13 @@ def _share(hits: NDArray[np.bool_]) -> float:
     return float(hits.mean()) if len(hits) else 0.0
 
 
-def _result(flown: Flown, radar: MapFigures, figures: tuple[Figure, ...], notes: tuple[str, ...]) -> FlightResult:
+def _result(
+    flown: Flown,
+    radar: MapFigures,
+    figures: tuple[Figure, ...],
+    notes: tuple[str, ...],
+    charts: tuple[Chart, ...] = (),
+) -> FlightResult:
     return FlightResult(
         title="lateral flight",
         duration_s=flown.duration_s,
@@ -152,4 +180,5 @@ def _result(flown: Flown, radar: MapFigures, figures: tuple[Figure, ...], notes:
         vision=MapFigures(),
         figures=figures,
         notes=notes,
+        charts=charts,
     )

@@ -19,15 +19,15 @@ from planning.traversable import UwbScans
 from telemetry.scenarios.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
 from telemetry.scenarios.foliage_drive import lawn_drive
 from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, Rates, cleared_by, driven, rates, seconds_per_scan
-from telemetry.scenarios.foliage_roc import echoes_m2
+from telemetry.scenarios.foliage_roc import echoes_m2, roc_chart, rocs
 from telemetry.scenarios.foliage_rural import route
 from telemetry.scenarios.foliage_trials import BRANCHES_WIDE_M, CELL_M, TRIAL_1, TRIAL_2, Printed, trial_site
-from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult, measured
 from telemetry.scenarios.wanted import Wanted
 from telemetry.sensors.uwb_log import write_uwb_log
 from telemetry.simulator.sensors.uwb import UwbModel
 
-NAME = "foliage"
+NAME, ROC = "foliage", "ROC"
 SPARSE = (1, "c")
 STRONG_WITHIN, SMALL_WITHIN = 0.003, 0.015
 """Of Table II: the five things that reflect well, and the small ones. T_max is a maximum over chance: it moves both."""
@@ -50,9 +50,18 @@ def run(wanted: Wanted) -> ScenarioResult:
     if wanted.record is not None:
         record(sparse, wanted.record)
     results = [_calibration(thresholds)]
-    for trial, table in ((1, TRIAL_1), (2, TRIAL_2)):
-        results += [_trial(trial, letter, printed, wanted.seed) for letter, (_, printed) in table.items()]
+    trials = [(1, *row) for row in TRIAL_1.items()] + [(2, *row) for row in TRIAL_2.items()]
+    for number, (trial, letter, (_, printed)) in enumerate(trials):
+        wanted.report(f"Trial {trial} {letter}", number / (len(trials) + 2))
+        results.append(_trial(trial, letter, printed, wanted.seed))
+    if wanted.charts:
+        wanted.report("Drawing the ROC", len(trials) / (len(trials) + 2))
+        results.append(_roc(wanted.seed))
     return ScenarioResult(NAME, wanted.seed, (*results, _sweep(sparse), _rural(wanted.seed), _cost(sparse)))
+
+
+def _roc(seed: int) -> FlightResult:
+    return measured(ROC, (), charts=tuple(roc_chart(roc) for roc in rocs(seed)))
 
 
 def record(there: Drive, log: Path) -> None:
@@ -74,7 +83,7 @@ def _calibration(thresholds: Thresholds) -> FlightResult:
     table, layers = table_ii(thresholds), fig_6(thresholds)
     off = {name: abs(table[name] - printed) for name, printed in PRINTED.items()}
     four, five = layers[4], layers[5]
-    return _result(
+    return measured(
         "the simulated radar beside the real one",
         (
             Figure("Table II, largest deviation of large things", _worst(off, small=False), most=STRONG_WITHIN),
@@ -82,9 +91,12 @@ def _calibration(thresholds: Thresholds) -> FlightResult:
             Figure("Fig. 6, four layers over T_max", four.leaves - four.leaves_limit, least=0.0, unit=" counts"),
             Figure("Fig. 6, bricks behind four layers over T_d", four.bricks, least=1.0, unit=" counts"),
             Figure("Fig. 6, bricks behind five layers over T_d", five.bricks, most=0.5, unit=" counts"),
+            *(
+                Figure(f"Table II, P(z|occ) of {name}", round(table[name], 4), paper=f"{printed:.4f}")
+                for name, printed in PRINTED.items()
+            ),
         ),
-        [f"{name}: P(z|occ) {table[name]:.4f}, printed {printed:.4f}" for name, printed in PRINTED.items()]
-        + [_behind(row.layers) for row in layers if row.layers]
+        [_behind(row.layers) for row in layers if row.layers]
         + [f"{row.layers} layers: foliage {row.leaves:.1f}, bricks {row.bricks:.1f} counts over T_d" for row in layers],
     )
 
@@ -104,11 +116,20 @@ def _trial(trial: int, letter: str, printed: Printed, seed: int) -> FlightResult
     there = driven(trial_site(trial, letter), lawn_drive(), seed)
     found = rates(there, cleared_by(there)[0])
     held = (trial, letter) == SPARSE
-    figures: tuple[Figure, ...] = (Figure("FNR", found.obstacles.rate, most=0.10 if held else None),)
-    if found.foliage.cells:
-        figures = (Figure("TNR of all foliage", found.foliage.rate, least=0.90 if held else None), *figures)
     theirs = rates(there, cleared_by(there, PAPERS_RULE)[0])
-    return _result(there.site.name, figures, [*_rows(printed, theirs, found), *_apart(found)])
+    fnr = _percent(printed.fnr)
+    figures: tuple[Figure, ...] = (
+        Figure("FNR", found.obstacles.rate, most=0.10 if held else None, paper=fnr),
+        Figure("FNR, the paper's rule here", theirs.obstacles.rate, paper=fnr),
+    )
+    if found.foliage.cells:
+        tnr = _percent(printed.tnr)
+        figures = (
+            Figure("TNR of all foliage", found.foliage.rate, least=0.90 if held else None, paper=tnr),
+            Figure("TNR of all foliage, the paper's rule here", theirs.foliage.rate, paper=tnr),
+            *figures,
+        )
+    return measured(there.site.name, figures, [*_rows(printed, theirs, found), *_apart(found)])
 
 
 def _rows(printed: Printed, theirs: Rates, ours: Rates) -> list[str]:
@@ -148,7 +169,7 @@ def _sweep(there: Drive) -> FlightResult:
                 f"P_O {most_occupied:.1f}, P_C2 {free_before:.1f}: TNR {_percent(found.foliage.rate)}, "
                 f"FNR {_percent(found.obstacles.rate)}"
             )
-    return _result("fig. 9, trial 1 c, our rule", (), notes)
+    return measured("fig. 9, trial 1 c, our rule", (), notes)
 
 
 def _rural(seed: int) -> FlightResult:
@@ -158,22 +179,17 @@ def _rural(seed: int) -> FlightResult:
         Figure("route from A to B after clearing", float(way.after), least=1.0),
         Figure("share of the seen brick piles that still blocks", way.piles_kept, least=0.9),
     )
-    return _result("trial 3, rural", figures, [f"{int(way.result.cleared.sum())} cells cleared along the way"])
+    return measured("trial 3, rural", figures, [f"{int(way.result.cleared.sum())} cells cleared along the way"])
 
 
 def _cost(there: Drive) -> FlightResult:
     """Real time at 10 Hz, which the paper's was not."""
     share = seconds_per_scan(there) / HZ_BUDGET_S
     cells = there.map.index.size
-    return _result(
+    return measured(
         "processor time", (Figure(f"of a scan, {cells:,} cells, at 10 Hz", 100 * share, most=50.0, unit=" %"),), []
     )
 
 
 def _percent(share: float | None) -> str:
     return "none" if share is None or math.isnan(share) else f"{100 * share:.1f} %"
-
-
-def _result(title: str, figures: tuple[Figure, ...], notes: list[str]) -> FlightResult:
-    nothing = MapFigures()
-    return FlightResult(title, 0.0, False, math.inf, (), nothing, nothing, figures=figures, notes=tuple(notes))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.uwb import UwbParams
+from telemetry.scenarios.charts import Chart, series
 from telemetry.scenarios.foliage_drive import lawn_drive
 from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, placed_cells
 from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
@@ -56,6 +57,28 @@ def rocs(seed: int) -> tuple[Roc, ...]:
         curves = tuple(curve(there, name, params) for name, params in RULES.items())
         found.append(Roc(there.site.name, (printed.tnr or 0.0, printed.fnr), curves))
     return tuple(found)
+
+
+def roc_chart(roc: Roc) -> Chart:
+    """In percent, as fig. 9 has it."""
+    drawn = [
+        one
+        for found in roc.curves
+        for one in (
+            series(found.rule, 100 * found.fnr, 100 * found.tnr),
+            series(f"{found.rule}, limit in use", [100 * found.usual[1]], [100 * found.usual[0]], drawn="points"),
+        )
+    ]
+    tnr, fnr = (100 * share for share in roc.paper)
+    printed = series("the paper's, whose FNR is of all obstacles", [fnr], [tnr], drawn="points", printed=True)
+    return Chart(
+        f"ROC, {roc.trial}",
+        "FNR of the things on the lawn, %",
+        "TNR of the foliage, %",
+        (*drawn, printed),
+        x_span=(-2.0, 102.0),
+        y_span=(-2.0, 102.0),
+    )
 
 
 def curve(there: Drive, rule: str, params: UwbParams) -> Curve:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mapping.radar import Detections, RadarChain
 from mapping.radar.fft import Window
 from planning.errors import ParameterError
+from telemetry.scenarios.charts import Chart, Series, series
 from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult, measured
 from telemetry.scenarios.wanted import Wanted
 from telemetry.simulator.sensors.iq import noise
@@ -46,16 +47,20 @@ class Sensor:
     """The reflector stands within so much of the boresight."""
     azimuth_most_deg: float | None
     printed: str
+    range_paper: str
+    azimuth_paper: str
 
 
 SENSORS = (
-    Sensor("AWR1843", AWR1843_IQ, math.radians(45.0), 1.0, ""),
+    Sensor("AWR1843", AWR1843_IQ, math.radians(45.0), 1.0, "", "cells of 0.5 m", ""),
     Sensor(
         "Position2Go",
         POSITION2GO_IQ,
         math.radians(20.0),
         None,
         "printed for the Position2Go: 0.15 m, 2 degrees inside 20 degrees; two antennas cannot do better at 15 dB",
+        "0.15 m",
+        "2 deg inside 20 deg",
     ),
 )
 
@@ -68,17 +73,48 @@ def run(wanted: Wanted) -> ScenarioResult:
             where=NAME,
             advice="Leave --world and --record out.",
         )
-    return ScenarioResult(NAME, wanted.seed, tuple(measure(sensor, wanted.seed) for sensor in SENSORS))
+    parts = []
+    for sensor in SENSORS:
+        wanted.report(sensor.title, len(parts) / len(SENSORS))
+        parts.append(measure(sensor, wanted.seed))
+    return ScenarioResult(NAME, wanted.seed, tuple(parts))
 
 
 def measure(sensor: Sensor, seed: int, *, places: int = PLACES, phases: int = PHASES) -> FlightResult:
     errors = errors_of(sensor.model, sensor.side_rad, np.random.default_rng([seed, 21]), places)
     figures = _error_figures(sensor, errors)
+    shares: list[tuple[Window, float, float]] = []
     for number, (window, cells, least) in enumerate(PAIRS):
         share = resolved(sensor.model, window, cells, np.random.default_rng([seed, 22, number]), phases)
         words = f"{sensor.title}: two alike {cells:g} range cells apart, {window} window, resolved in"
+        shares.append((window, cells, 100 * share))
         figures.append(Figure(words, 100 * share, least=None if least is None else 100 * least, unit=" % of phases"))
-    return measured(sensor.title, tuple(figures), (sensor.printed,) if sensor.printed else ())
+    notes = (sensor.printed,) if sensor.printed else ()
+    return measured(sensor.title, tuple(figures), notes, (_errors_chart(sensor, errors), _pairs_chart(sensor, shares)))
+
+
+def _errors_chart(sensor: Sensor, errors: Errors) -> Chart:
+    """What share of the places lies within each error."""
+
+    def curve(name: str, found: F64) -> Series:
+        return series(name, np.sort(np.abs(found)), 100.0 * np.arange(1, len(found) + 1) / max(1, len(found)))
+
+    curves = (curve("range, m", errors.range_m), curve("speed, m/s", errors.speed_m_s))
+    title = f"{sensor.title}: errors at {SNR_DB:g} dB"
+    return Chart(title, "error", "places within, %", (*curves, curve("azimuth, deg", errors.azimuth_deg)))
+
+
+def _pairs_chart(sensor: Sensor, shares: list[tuple[Window, float, float]]) -> Chart:
+    windows = list(dict.fromkeys(window for window, _, _ in shares))
+    lines = [
+        series(
+            f"{window} window", *zip(*[(cells, share) for name, cells, share in shares if name == window], strict=True)
+        )
+        for window in windows
+    ]
+    return Chart(
+        f"{sensor.title}: two alike told apart", "apart, range cells", "of phases, %", tuple(lines), y_span=(0.0, 104.0)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,9 +193,15 @@ def _error_figures(sensor: Sensor, errors: Errors) -> list[Figure]:
     title = f"{sensor.title}, {SNR_DB:g} dB"
     return [
         Figure(f"{title}: reflector found at", 100 * errors.found, least=99.0, unit=" % of places"),
-        Figure(f"{title}: range error (RMS)", _rms(errors.range_m), most=0.1, unit=" m"),
+        Figure(f"{title}: range error (RMS)", _rms(errors.range_m), most=0.1, unit=" m", paper=sensor.range_paper),
         Figure(f"{title}: radial speed error (RMS)", _rms(errors.speed_m_s), most=0.1, unit=" m/s"),
-        Figure(f"{title}: azimuth error (RMS)", _rms(errors.azimuth_deg), most=sensor.azimuth_most_deg, unit=" deg"),
+        Figure(
+            f"{title}: azimuth error (RMS)",
+            _rms(errors.azimuth_deg),
+            most=sensor.azimuth_most_deg,
+            unit=" deg",
+            paper=sensor.azimuth_paper,
+        ),
         Figure(f"{title}: range error, 95 % within", _p95(errors.range_m), unit=" m"),
         Figure(f"{title}: radial speed error, 95 % within", _p95(errors.speed_m_s), unit=" m/s"),
         Figure(f"{title}: azimuth error, 95 % within", _p95(errors.azimuth_deg), unit=" deg"),

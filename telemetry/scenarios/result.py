@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from telemetry.obstacles import Sensor
+from telemetry.scenarios.charts import Chart
 
 WITHIN_M = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 
@@ -22,9 +23,11 @@ class Figure:
     least: float | None = None
     most: float | None = None
     unit: str = ""
+    paper: str = ""
+    """What the paper prints of it; empty: nothing that could stand beside it."""
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Literal["reached", "NOT REACHED", "not measured"]:
         if math.isnan(self.value):
             return "not measured"
         return "reached" if self.reached else "NOT REACHED"
@@ -38,7 +41,8 @@ class Figure:
         limit = f"at least {_short(self.least)}" if self.least is not None else ""
         limit = f"at most {_short(self.most)}" if self.most is not None else limit
         verdict = f"  ({limit}{self.unit}: {self.verdict})" if limit else ""
-        return f"{self.words}: {_short(self.value)}{self.unit}{verdict}"
+        printed = f"  (paper: {self.paper})" if self.paper else ""
+        return f"{self.words}: {_short(self.value)}{self.unit}{verdict}{printed}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +83,19 @@ class FlightResult:
     """Unknown objects in the way that were alarmed too late or not at all."""
     figures: tuple[Figure, ...] = ()
     notes: tuple[str, ...] = ()
+    charts: tuple[Chart, ...] = ()
 
     @property
     def first_alert_s(self) -> float | None:
         return min((alert.t_s for alert in self.alerts), default=None)
 
 
-def measured(title: str, figures: tuple[Figure, ...], notes: tuple[str, ...] = ()) -> FlightResult:
+def measured(
+    title: str, figures: tuple[Figure, ...], notes: tuple[str, ...] = (), charts: tuple[Chart, ...] = ()
+) -> FlightResult:
     """Of a part in which nothing flies."""
-    return FlightResult(title, 0.0, False, math.inf, (), MapFigures(), MapFigures(), figures=figures, notes=notes)
+    nothing = MapFigures()
+    return FlightResult(title, 0.0, False, math.inf, (), nothing, nothing, figures=figures, notes=notes, charts=charts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +149,7 @@ def _flight_json(flight: FlightResult) -> dict[str, Any]:
                 "most": figure.most,
                 "unit": figure.unit.strip(),
                 "reached": figure.reached,
+                "paper": figure.paper,
             }
             for figure in flight.figures
         ],

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from telemetry.sensing import RadarKind
+
+Report = Callable[[str, float | None], None]
+
+
+def _to_nobody(step: str, share: float | None) -> None:
+    """Where nobody waits for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,3 +28,7 @@ class Wanted:
     """Other perception settings than the scenario's, of those that it takes: "tracker" and "velocities"."""
     record: Path | None = None
     """Where the flight is kept; of several flights each beside it, under its own name."""
+    charts: bool = False
+    """Whether curves are wanted that cost extra time."""
+    report: Report = field(default=_to_nobody, compare=False)
+    """How far it is: what is being done, and what share of the whole, if that is known."""

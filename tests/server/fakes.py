@@ -195,6 +195,7 @@ class FakeFlying:
         self.obstacles = _Asked(self.asked)
         self.published: list[tuple[str, Any]] = []
         self.agents = Agents(self)
+        self.armed = False
         self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
 
     def publish(self, topic: str, message: Any) -> None:

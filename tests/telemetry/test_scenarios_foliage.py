@@ -13,13 +13,15 @@ from mapping.uwb import Cleared, UwbParams
 from planning.errors import ParameterError
 from planning.geotiff import read_dsm
 from planning.traversable import cleared_ground, traversable_ground
-from server.cli.foliage_plots import write_roc
+from server.cli.chart_plots import write_charts
 from telemetry.scenarios import foliage
+from telemetry.scenarios.charts import MOST_POINTS
 from telemetry.scenarios.foliage_drive import KEEP_M, SCAN_S, SPEED_M_S, drive, lawn_drive, things_on_lawn
 from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, rates, seconds_per_scan
-from telemetry.scenarios.foliage_roc import Roc, curve, echoes_m2
+from telemetry.scenarios.foliage_roc import Roc, curve, echoes_m2, roc_chart
 from telemetry.scenarios.foliage_rural import connected, route
 from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
+from telemetry.scenarios.result import ScenarioResult, measured
 from telemetry.scenarios.wanted import Wanted
 from telemetry.sensors.uwb_log import read_uwb_log
 from telemetry.simulator.sensors.uwb import UwbModel
@@ -164,9 +166,17 @@ def test_thick_branches_echo_more_than_what_they_hide() -> None:
     assert four["2 bricks"] < UwbModel().least_m2, "at 10 m it answers nothing at all"
 
 
-def test_the_roc_is_drawn(sparse: Drive, tmp_path: Path) -> None:
+def test_the_roc_is_drawn_beside_the_papers_point(sparse: Drive, tmp_path: Path) -> None:
     ours = curve(sparse, "our rule", UwbParams())
-    path = write_roc(tmp_path / "plots", [Roc("1 c", (0.9, 0.1), (ours, ours)), Roc("2 f", (0.6, 0.1), (ours,))], 3)
+    charts = tuple(roc_chart(roc) for roc in (Roc("1 c", (0.9, 0.1), (ours, ours)), Roc("2 f", (0.6, 0.1), (ours,))))
+    printed = [one for one in charts[1].series if one.printed]
+    assert [(one.x, one.y) for one in printed] == [((10.0,), (60.0,))]
+    line = next(one for one in charts[1].series if one.drawn == "line")
+    assert (line.x[0], line.y[0], line.x[-1], line.y[-1]) == (0.0, 0.0, 100.0, 100.0)
+    assert len(line.x) <= MOST_POINTS + 1
+    result = ScenarioResult("foliage", 3, (measured("ROC", (), charts=charts),))
+    (path,) = write_charts(tmp_path / "plots", result)
+    assert path.name == "roc.png"
     with Image.open(path) as image:
         assert image.size[0] > 1000
         assert len(set(image.convert("L").get_flattened_data())) > 20

@@ -1383,6 +1383,90 @@ export interface RadarFrame {
   detections: RadarDetectionDoc[];
 }
 
+/** A field test of the papers in simulation. */
+export interface ScenarioDoc {
+  name: string;
+  flown: string;
+  held: string;
+  paper: string;
+  has_charts: boolean;
+  /** Too long for a browser. */
+  command_line_only: boolean;
+}
+
+/** A scenario that runs, or was run. */
+export interface ScenarioRunDoc {
+  id: string;
+  name: string;
+  seed: number;
+  started_utc: string;
+  state: "running" | "done" | "failed" | "cancelled";
+  step: string;
+  progress: number | null;
+  /** Whether every figure was reached; null until then. */
+  passed: boolean | null;
+  /** That it took. */
+  seconds: number | null;
+  error: ErrorDoc | null;
+}
+
+export interface ScenarioFigureDoc {
+  words: string;
+  /** Null: there was nothing to measure it on, or no end to it. */
+  value: number | null;
+  unit: string;
+  least: number | null;
+  most: number | null;
+  /** Null where nothing must be reached. */
+  verdict: "reached" | "NOT REACHED" | "not measured" | null;
+  /** What the paper prints of it. */
+  paper: string;
+}
+
+export interface SeriesDoc {
+  /** Empty: of the one before it. */
+  name: string;
+  x: number[];
+  y: number[];
+  drawn: "line" | "points";
+  /** As the paper prints it. */
+  printed: boolean;
+}
+
+export interface ChartDoc {
+  title: string;
+  x_label: string;
+  y_label: string;
+  x_span: [number, number];
+  y_span: [number, number];
+  /** A drawing of places: as many metres in both directions. */
+  is_true: boolean;
+  series: SeriesDoc[];
+}
+
+/** One flight of it, or what else is measured. */
+export interface ScenarioPartDoc {
+  title: string;
+  /** 0: nothing flew. */
+  duration_s: number;
+  contact: boolean;
+  min_true_distance_m: number | null;
+  alerts: number;
+  figures: ScenarioFigureDoc[];
+  notes: string[];
+  charts: ChartDoc[];
+}
+
+export interface ScenarioResultDoc {
+  run: ScenarioRunDoc;
+  parts: ScenarioPartDoc[];
+}
+
+export interface RunScenario {
+  name: string;
+  seed?: number;
+}
+
 export interface Snapshot {
   v: 1;
   type: "snapshot";
@@ -1582,6 +1666,13 @@ export interface RadarFilesMessage {
   files: RadarFileDoc[];
 }
 
+/** The scenario that runs, and those that were run, newest first. */
+export interface ScenarioRunsMessage {
+  v: 1;
+  type: "scenario_runs";
+  runs: ScenarioRunDoc[];
+}
+
 /** Something the operator must read: a failed click, a warning. */
 export interface NoticeMessage {
   v: 1;
@@ -1656,6 +1747,7 @@ export type ServerMessage =
   | TracksMessage
   | TraversabilityMessage
   | RadarFilesMessage
+  | ScenarioRunsMessage
   | NoticeMessage;
 
 export type ClientMessage =

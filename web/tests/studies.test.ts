@@ -4,6 +4,7 @@ import { studyIn } from "../src/review/study";
 import { ticks } from "../src/studies/axes";
 import { LEVELS } from "../src/studies/colours";
 import { fan, powerAt, spanOfColumns, spanOfRows, upright } from "../src/studies/maps";
+import { limitText, measuredText } from "../src/studies/figures";
 import { Newest } from "../src/studies/newest";
 
 const base64 = (cells: number[]) => btoa(String.fromCharCode(...cells));
@@ -97,9 +98,31 @@ describe("of questions asked in quick succession", () => {
   });
 });
 
+describe("a scenario's figures", () => {
+  const figure = { words: "", value: null, unit: "m", verdict: null, paper: "", least: null, most: null };
+
+  it.each([
+    [0.03456, "0.0346"],
+    [12.345, "12.3"],
+    [1234.5, "1235"],
+    [1, "1"],
+    [0.8, "0.800"],
+    [0.00001, "0.0000"],
+    [null, "–"],
+  ])("%d is %s", (value, text) => expect(measuredText(value)).toBe(text));
+
+  it("say what they are held to", () => {
+    expect(limitText({ ...figure, least: 0.9 })).toBe("≥ 0.900 m");
+    expect(limitText({ ...figure, most: 3 })).toBe("≤ 3 m");
+    expect(limitText({ ...figure, least: 1, most: 1, unit: "" })).toBe("1");
+    expect(limitText(figure)).toBe("");
+  });
+});
+
 describe("the address", () => {
   it.each([
     ["#review/radar", "radar"],
+    ["#review/scenarios", "scenarios"],
     ["#review", null],
     ["#review/nothing", null],
   ])("%s tells what Review looks at", (hash, study) => {

@@ -2,6 +2,9 @@ import type { ComponentType } from "preact";
 import { RadarCentre } from "../studies/RadarCentre";
 import { RadarLeft } from "../studies/RadarLeft";
 import { RadarRight } from "../studies/RadarRight";
+import { ScenarioCentre } from "../studies/ScenarioCentre";
+import { ScenarioLeft } from "../studies/ScenarioLeft";
+import { ScenarioRight } from "../studies/ScenarioRight";
 import { Segmented } from "../ui/Button";
 import { STUDIES, study, type StudyId } from "./study";
 
@@ -15,6 +18,7 @@ interface Study {
 /** What Review looks at beside flights. */
 const OTHERS: Readonly<Record<Exclude<StudyId, "flights">, Study>> = {
   radar: { Left: RadarLeft, Centre: RadarCentre, Right: RadarRight },
+  scenarios: { Left: ScenarioLeft, Centre: ScenarioCentre, Right: ScenarioRight },
 };
 
 const shown = (): Study | null => (study.value === "flights" ? null : OTHERS[study.value]);

@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 export const STUDIES = [
   { value: "flights", label: "Flights" },
   { value: "radar", label: "Radar files" },
+  { value: "scenarios", label: "Scenarios" },
 ] as const;
 
 export type StudyId = (typeof STUDIES)[number]["value"];

@@ -7,6 +7,7 @@ import { confirm, forgetUnconfirmed } from "./reconnect";
 import { radarFiles } from "./radar";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
+import { runs } from "./scenarios";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
 import { traversability } from "./traversability";
@@ -72,6 +73,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "radar_files":
       radarFiles.value = message.files;
+      return;
+    case "scenario_runs":
+      runs.value = message.runs;
       return;
     case "traversability":
       traversability.value = message.traversability;

@@ -168,6 +168,7 @@ function Reading() {
         min={1}
         max={1e6}
         step={1}
+        whole
         testid="radar-most"
         onChange={(next) => readAs({ most: next })}
       />

@@ -1,0 +1,52 @@
+"""The curves of a scenario as figures: what the console draws, from the same numbers."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from telemetry.scenarios.charts import Chart, ends
+from telemetry.scenarios.result import ScenarioResult
+
+_COLOURS = ("#1f6f8b", "#e4572e", "#2e6b34", "#7d3fd1", "#8a6d1d")
+_PRINTED = "#333333"
+
+
+def write_charts(folder: Path, result: ScenarioResult) -> list[Path]:
+    """One figure for each part of the scenario that has curves. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = [part for part in result.flights if part.charts]
+    return [_write(folder, part.title, part.charts, f"{result.name}, seed {result.seed}") for part in drawn]
+
+
+def _write(folder: Path, title: str, charts: tuple[Chart, ...], whole: str) -> Path:
+    figure = Figure(figsize=(4.8 * len(charts), 4.8), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, chart in zip(figure.subplots(1, len(charts), squeeze=False)[0], charts, strict=True):
+        _draw(axes, chart)
+    figure.suptitle(f"{whole}: {title}", fontsize=10, color="#555555")
+    path = folder / f"{re.sub('[^a-z0-9]+', '-', title.lower()).strip('-')}.png"
+    figure.savefig(path, metadata={"Software": None})
+    return path
+
+
+def _draw(axes: Axes, chart: Chart) -> None:
+    named = -1
+    for one in chart.series:
+        named += bool(one.name)
+        colour = _PRINTED if one.printed else _COLOURS[max(named, 0) % len(_COLOURS)]
+        style = (
+            {"linestyle": "", "marker": "x" if one.printed else "o", "markersize": 5} if one.drawn == "points" else {}
+        )
+        axes.plot(one.x, one.y, color=colour, linewidth=1.2, label=one.name or None, **style)
+    x_span, y_span = ends(chart)
+    axes.set(xlim=x_span, ylim=y_span, xlabel=chart.x_label, ylabel=chart.y_label)
+    axes.set_title(chart.title, fontsize=9)
+    if chart.is_true:
+        axes.set_aspect("equal", adjustable="box")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=7)

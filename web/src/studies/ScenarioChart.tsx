@@ -1,0 +1,99 @@
+import type { ChartDoc, SeriesDoc } from "../messages";
+import { PlotFrame, type Area } from "./PlotFrame";
+
+const COLOURS = [
+  "var(--flown)",
+  "var(--accent)",
+  "var(--radar-line)",
+  "var(--vision-line)",
+  "var(--replayed)",
+] as const;
+
+/** A series without a name goes on with the one before it. */
+function coloured(series: readonly SeriesDoc[]): { one: SeriesDoc; colour: string }[] {
+  let named = -1;
+  return series.map((one) => {
+    if (one.name !== "") named += 1;
+    return {
+      one,
+      colour: one.printed ? "var(--text)" : (COLOURS[Math.max(0, named) % COLOURS.length] ?? COLOURS[0]),
+    };
+  });
+}
+
+const cross = (x: number, y: number) => `M${x - 6} ${y - 6}l12 12m0-12l-12 12`;
+
+function Drawn({ one, colour, area }: { one: SeriesDoc; colour: string; area: Area }) {
+  const at = one.x.map((x, index) => [area.x(x), area.y(one.y[index] ?? 0)] as const);
+  if (one.printed) {
+    const d = at.map(([x, y]) => cross(x, y)).join("");
+    return <path class="printed" d={d} stroke={colour} data-testid="printed-mark" />;
+  }
+  if (one.drawn === "points") {
+    return (
+      <g fill={colour} data-testid="chart-points">
+        {at.map(([x, y], index) => (
+          <circle key={index} cx={x} cy={y} r={at.length > 60 ? 2 : 5} />
+        ))}
+      </g>
+    );
+  }
+  const d = at.map(([x, y], index) => `${index ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
+  return <path class="curve" d={d} stroke={colour} data-testid="chart-line" />;
+}
+
+function Keys({ series }: { series: readonly SeriesDoc[] }) {
+  return (
+    <p class="series-keys">
+      {coloured(series)
+        .filter(({ one }) => one.name !== "")
+        .map(({ one, colour }) => (
+          <span key={one.name}>
+            <svg width="18" height="12" aria-hidden="true">
+              {one.printed ? (
+                <path class="printed" d={cross(9, 6)} stroke={colour} />
+              ) : one.drawn === "points" ? (
+                <circle cx="9" cy="6" r="4" fill={colour} />
+              ) : (
+                <path class="curve" d="M0 6h18" stroke={colour} />
+              )}
+            </svg>
+            {one.name}
+          </span>
+        ))}
+    </p>
+  );
+}
+
+/** A scenario's curve with the paper's figures in it. */
+export function ScenarioChart({ chart }: { chart: ChartDoc }) {
+  return (
+    <figure class="scenario-chart" data-testid="scenario-chart">
+      <figcaption>{chart.title}</figcaption>
+      <PlotFrame
+        testid="chart-frame"
+        label={chart.title}
+        xLabel={chart.x_label}
+        yLabel={chart.y_label}
+        xSpan={chart.x_span}
+        ySpan={chart.y_span}
+        isTrue={chart.is_true}
+        over={(area) => (
+          <svg
+            class="chart-series"
+            x={area.left}
+            y={area.top}
+            width={area.width}
+            height={area.height}
+            viewBox={`${area.left} ${area.top} ${area.width} ${area.height}`}
+          >
+            {coloured(chart.series).map(({ one, colour }, index) => (
+              <Drawn key={index} one={one} colour={colour} area={area} />
+            ))}
+          </svg>
+        )}
+      />
+      <Keys series={chart.series} />
+    </figure>
+  );
+}

@@ -1,0 +1,56 @@
+import { effect, signal } from "@preact/signals";
+import type { ScenarioDoc, ScenarioResultDoc, ScenarioRunDoc } from "../messages";
+import { asErrorDoc, requestJson } from "../net/api";
+import { order, pending } from "../store/outcomes";
+import { chosenName, runs, scenarios, shownResult } from "../store/scenarios";
+import { setError } from "../store/state";
+
+/** Where errors of this study appear. */
+export const SCENARIOS = "scenarios";
+export const RUNS = "scenario_runs";
+
+const path = (id: string) => `/api/scenarios/runs/${encodeURIComponent(id)}`;
+
+/** The run that this page has started: its result is opened once it is there. */
+const awaited = signal<string | null>(null);
+
+/** What there is, asked once. */
+export async function learn(): Promise<void> {
+  if (scenarios.value !== null || pending.value.has(SCENARIOS)) return;
+  try {
+    scenarios.value = await requestJson<ScenarioDoc[]>("GET", "/api/scenarios");
+    chosenName.value ??= scenarios.value[0]?.name ?? null;
+  } catch (error) {
+    setError(SCENARIOS, asErrorDoc(error));
+  }
+}
+
+export async function run(name: string, seed: number): Promise<void> {
+  const answer = await order({ place: RUNS, path: "/api/scenarios/runs", body: { name, seed } });
+  if (answer) awaited.value = ((await answer.json()) as ScenarioRunDoc).id;
+}
+
+export const cancel = (id: string) => order({ place: RUNS, path: `${path(id)}/cancel` });
+
+export async function remove(id: string): Promise<void> {
+  const gone = await order({ place: RUNS, path: path(id), method: "DELETE" });
+  if (gone && shownResult.value?.run.id === id) shownResult.value = null;
+}
+
+export async function openResult(id: string): Promise<void> {
+  setError(RUNS, null);
+  try {
+    shownResult.value = await requestJson<ScenarioResultDoc>("GET", path(id));
+    chosenName.value = shownResult.value.run.name;
+  } catch (error) {
+    setError(RUNS, asErrorDoc(error));
+  }
+}
+
+effect(() => {
+  const mine = runs.value.find((one) => one.id === awaited.value);
+  if (!mine || mine.state === "running") return;
+  awaited.value = null;
+  if (mine.state === "done") void openResult(mine.id);
+  else if (mine.error) setError(RUNS, mine.error);
+});
