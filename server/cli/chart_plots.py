@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from telemetry.scenarios.charts import Chart, ends
+from telemetry.scenarios.charts import Chart, Series, ends
 from telemetry.scenarios.result import ScenarioResult
 
 _COLOURS = ("#1f6f8b", "#e4572e", "#2e6b34", "#7d3fd1", "#8a6d1d")
 _PRINTED = "#333333"
+MANY = 60
+"""More points than these are drawn small."""
 
 
 def write_charts(folder: Path, result: ScenarioResult) -> list[Path]:
@@ -39,10 +42,7 @@ def _draw(axes: Axes, chart: Chart) -> None:
     for one in chart.series:
         named += bool(one.name)
         colour = _PRINTED if one.printed else _COLOURS[max(named, 0) % len(_COLOURS)]
-        style = (
-            {"linestyle": "", "marker": "x" if one.printed else "o", "markersize": 5} if one.drawn == "points" else {}
-        )
-        axes.plot(one.x, one.y, color=colour, linewidth=1.2, label=one.name or None, **style)
+        axes.plot(one.x, one.y, color=colour, linewidth=1.2, label=one.name or None, **_style(one))
     x_span, y_span = ends(chart)
     axes.set(xlim=x_span, ylim=y_span, xlabel=chart.x_label, ylabel=chart.y_label)
     axes.set_title(chart.title, fontsize=9)
@@ -50,3 +50,11 @@ def _draw(axes: Axes, chart: Chart) -> None:
         axes.set_aspect("equal", adjustable="box")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=7)
+
+
+def _style(one: Series) -> dict[str, Any]:
+    if one.printed:
+        return {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2, "zorder": 5}
+    if one.drawn == "points":
+        return {"linestyle": "", "marker": "o", "markersize": 2 if len(one.x) > MANY else 5}
+    return {}

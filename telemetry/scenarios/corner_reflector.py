@@ -29,6 +29,8 @@ RANGE_GATE_M, WEAKEST = 1.5, 0.01
 and the hill at that range are weaker than that."""
 FAR_M, NEAR_M = (60.0, 76.0), 40.0
 LEVEL_WITHIN_M = 0.4
+DRAWN_M = 12.0
+"""Around the reflector, from above."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,18 +100,26 @@ def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
 def _charts(returns: Returns, reflector: F64) -> tuple[Chart, ...]:
     """From above (fig. 14) by the variant that was chosen, and from the side (fig. 15) by all three."""
     words = {
-        "heading_only": "heading only",
         "full_attitude": "measured elevation",
         "full_attitude_flat": "attitude, level",
+        "heading_only": "heading only (chosen)",
     }
-    chosen = returns.mapped["heading_only"]
-    stands = series("reflector", reflector[:1], reflector[1:2], drawn="points", printed=True)
+    east_m, north_m, up_m = reflector.tolist()
     level = _level(returns)
-    across = [series(words[name], *found[level][:, [0, 2]].T, drawn="points") for name, found in returns.mapped.items()]
-    side = series("reflector", reflector[:1], reflector[2:3], drawn="points", printed=True)
-    seen = series("returns", *chosen[:, :2].T, drawn="points")
+    seen = series("returns", *returns.mapped["heading_only"][:, :2].T, drawn="points")
+    above = series("reflector", [east_m], [north_m], drawn="points", printed=True)
+    across = [series(name, *returns.mapped[of][level][:, [0, 2]].T, drawn="points") for of, name in words.items()]
+    side = series("reflector", [east_m], [up_m], drawn="points", printed=True)
     return (
-        Chart("Returns from above, heading only", "east, m", "north, m", (seen, stands), is_true=True),
+        Chart(
+            "Returns from above, heading only (fig. 14)",
+            "east, m",
+            "north, m",
+            (seen, above),
+            x_span=(east_m - DRAWN_M, east_m + DRAWN_M),
+            y_span=(north_m - DRAWN_M, north_m + DRAWN_M),
+            is_true=True,
+        ),
         Chart("The three rotations from the side (fig. 15)", "east, m", "up, m", (*across, side)),
     )
 

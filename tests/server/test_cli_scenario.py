@@ -7,10 +7,12 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.scenarios.catalogue import NAMES
-from telemetry.scenarios.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.scenarios.charts import Chart, series
+from telemetry.scenarios.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult, measured
 from telemetry.scenarios.wanted import Wanted
 from tests.server.cli_runs import hedgehop
 
@@ -79,12 +81,32 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
         ("wood", "--record", there): "There is such a file already",
         ("wood", "--record", tmp_path / "new.mcap", "--seeds", 2): "A recording holds one seed",
         ("wood", "--seeds", 0): "--seeds",
+        ("wood", "--plots", tmp_path): "There is nothing to draw of wood",
+        ("foliage", "--plots", tmp_path, "--seeds", 2): "Figures show one seed, not 2",
     }
     for arguments, words in wrong.items():
         run = hedgehop("scenario", *arguments)
         assert run.code == 2, arguments
         assert words in run.err
     assert flights == []
+
+
+def test_curves_are_asked_for_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[Wanted] = []
+    line = series("measured", [0.0, 1.0], [0.0, 2.0])
+    chart = Chart("errors", "m", "%", (line, series("paper", [0.5], [1.0], drawn="points", printed=True)))
+
+    def run(name: str, wanted: Wanted) -> ScenarioResult:
+        asked.append(wanted)
+        return ScenarioResult(name, wanted.seed, (measured("Errors, AWR1843", (), charts=(chart, chart)),))
+
+    monkeypatch.setattr(import_module("server.cli.scenario"), "run_scenario", run)
+    assert hedgehop("scenario", "iq-reflector", "--plots", tmp_path / "new").code == 0
+    assert hedgehop("scenario", "iq-reflector").code == 0
+    assert [wanted.charts for wanted in asked] == [True, False]
+    with Image.open(tmp_path / "new" / "errors-awr1843.png") as image:
+        assert image.size[0] > 1000
+        assert len(set(image.convert("L").get_flattened_data())) > 20
 
 
 def test_a_broken_world_is_refused_with_its_place(tmp_path: Path) -> None:
