@@ -99,7 +99,7 @@ def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
 
 def _charts(returns: Returns, reflector: F64) -> tuple[Chart, ...]:
     """From above (fig. 14) by the variant that was chosen, and from the side (fig. 15) by all three."""
-    words = {
+    words: dict[Variant, str] = {
         "full_attitude": "measured elevation",
         "full_attitude_flat": "attitude, level",
         "heading_only": "heading only (chosen)",

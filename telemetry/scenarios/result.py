@@ -91,11 +91,13 @@ class FlightResult:
 
 
 def measured(
-    title: str, figures: tuple[Figure, ...], notes: tuple[str, ...] = (), charts: tuple[Chart, ...] = ()
+    title: str, figures: tuple[Figure, ...], notes: Sequence[str] = (), charts: tuple[Chart, ...] = ()
 ) -> FlightResult:
     """Of a part in which nothing flies."""
     nothing = MapFigures()
-    return FlightResult(title, 0.0, False, math.inf, (), nothing, nothing, figures=figures, notes=notes, charts=charts)
+    return FlightResult(
+        title, 0.0, False, math.inf, (), nothing, nothing, figures=figures, notes=tuple(notes), charts=charts
+    )
 
 
 @dataclass(frozen=True, slots=True)

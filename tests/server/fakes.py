@@ -196,6 +196,7 @@ class FakeFlying:
         self.published: list[tuple[str, Any]] = []
         self.agents = Agents(self)
         self.armed = False
+        self.on_armed: Callable[[], None] = lambda: None
         self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
 
     def publish(self, topic: str, message: Any) -> None:

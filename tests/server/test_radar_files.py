@@ -39,12 +39,12 @@ def sent(server: Running, name: str, data: bytes) -> RadarFileDoc:
     return RadarFileDoc.model_validate_json(answer.text)
 
 
-def opened(server: Running, file: RadarFileDoc, **how: object) -> RadarOpened:
+def opened(server: Running, file: RadarFileDoc, **how: str | int) -> RadarOpened:
     answer = ok(server.http.get(f"{FILES}/{file.id}/open", params={**PAGE, **how}))
     return RadarOpened.model_validate_json(answer.text)
 
 
-def frame(server: Running, file: RadarFileDoc, number: int, **how: object) -> RadarFrame:
+def frame(server: Running, file: RadarFileDoc, number: int, **how: str | int) -> RadarFrame:
     answer = ok(server.http.get(f"{FILES}/{file.id}/frames/{number}", params={**PAGE, **how}))
     return RadarFrame.model_validate_json(answer.text)
 
