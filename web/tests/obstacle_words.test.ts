@@ -106,6 +106,8 @@ describe("avoidance", () => {
     expect(plain(climbing.word)).toBe("Climbing +4.0 m");
     expect([climbing.level, climbing.note]).toEqual(["near", "Over a crane."]);
     expect(avoidanceWords(status({ state: "ceiling" })).level).toBe("bad");
+    expect(avoidanceWords(status({ state: "offset", height_offset_m: 8.1 })).word).toMatch(/^Higher \+8\.1/);
+    expect(avoidanceWords(status({ state: "offset" })).word).toBe("New line");
   });
 
   it("warns of a speed that the region does not suffice for", () => {

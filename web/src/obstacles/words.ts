@@ -115,14 +115,19 @@ const AVOIDANCE: Record<AvoidanceStatus["state"], AvoidanceWords> = {
   ceiling: { word: "At its ceiling", level: "bad", note: "It may not climb any further, and holds. Decide." },
 };
 
+/** No longer above the plan: the rest was planned and certified again. */
+const NEW_LINE: AvoidanceWords = { word: "New line", level: "neutral", note: "The rest is flown in GUIDED." };
+const LOW_M = 0.05;
+
 const WATCHES: Record<AvoidanceStatus["by"], string> = {
   climb: AVOIDANCE.watching.note,
   sidestep: "Steps aside by itself past what it follows; climbs where it cannot.",
 };
 
 export function avoidanceWords(status: AvoidanceStatus): AvoidanceWords {
-  const words = AVOIDANCE[status.state];
-  const higher = status.height_offset_m >= 0.05 ? ` +${metres(status.height_offset_m)}` : "";
+  const isHigher = status.height_offset_m >= LOW_M;
+  const words = status.state === "offset" && !isHigher ? NEW_LINE : AVOIDANCE[status.state];
+  const higher = isHigher ? ` +${metres(status.height_offset_m)}` : "";
   const note = status.state === "watching" ? WATCHES[status.by] : words.note;
   return { ...words, word: words.word + higher, note: status.text || note };
 }
