@@ -130,6 +130,15 @@ class Autopilot(Pilot):
             self.face(goal_neu, at_least_m=0.3)
         return "accepted"
 
+    def follow(self, goal_neu: Vec3, v_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
+        """Only in GUIDED and in the air."""
+        if not isinstance(self.mode, Guided) or not self.flying:
+            return "failed"
+        self.mode.follow(self, goal_neu, v_neu)
+        if heading_rad is not None:
+            self.turn_to(heading_rad)
+        return "accepted"
+
     def fly_at(self, v_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
         """Only in GUIDED and in the air."""
         if not isinstance(self.mode, Guided) or not self.flying:

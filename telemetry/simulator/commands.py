@@ -91,17 +91,20 @@ class Commands:
         return self._pilot.set_mode(name)
 
     def position_target(self, message: Any) -> None:
-        """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED: a place is flown to; without one, a velocity is flown."""
+        """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED: a place is flown to, a velocity flown, or both followed."""
         heading_rad = None if message.type_mask & NO_YAW else _heading(message.yaw)
+        velocity = None if message.type_mask & NO_VELOCITY else self._velocity(message)
         if message.type_mask & NO_POSITION:
-            if not message.type_mask & NO_VELOCITY and (velocity := self._velocity(message)):
+            if velocity:
                 self._pilot.fly_at(velocity, heading_rad=heading_rad)
             return
         if message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
             goal = self._place(message.lat_int / 1e7, message.lon_int / 1e7, message.alt, message.coordinate_frame)
         else:
             goal = self._local(message)
-        if goal:
+        if goal and velocity:
+            self._pilot.follow(goal, velocity, heading_rad=heading_rad)
+        elif goal and message.type_mask & NO_VELOCITY:
             self._pilot.go_to(goal, heading_rad=heading_rad)
 
     def _velocity(self, message: Any) -> Vec3 | None:

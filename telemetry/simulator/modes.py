@@ -97,34 +97,44 @@ class Guided:
         self._path: Path | None = None
         self._velocity_neu: Vec3 | None = None
         self._told_s = 0.0
-        self._is_sent = False
-        """From place to place: neither taking off, nor stopping, nor at a velocity."""
+        self._sent: Literal["", "places", "velocities", "both"] = ""
+        """What it is led by; nothing while it takes off or stops."""
         self.goal: Vec3 | None = None
         return None
 
     def take_off(self, pilot: Pilot, up_m: float) -> None:
         """``up_m``: height in the frame."""
         self.stage = "takeoff"
-        self._path, self._velocity_neu, self._is_sent = None, None, False
+        self._path, self._velocity_neu, self._sent = None, None, ""
         self.goal = self._place = (pilot.p_neu[0], pilot.p_neu[1], up_m)
 
     def go_to(self, pilot: Pilot, goal_neu: Vec3) -> None:
-        """The first place after a take-off or a stop is gone to at the vehicle's own speeds, over ground and up,
-        whatever was set before: recorded."""
-        if not self._is_sent:
-            pilot.forget_speeds()
-            self._is_sent = True
-        self._shaped = shaped_from(pilot)
+        self._begin(pilot, "places")
         self._velocity_neu, self._path = None, self._leg(pilot, goal_neu)
         self.goal = self._place = goal_neu
         self.stage = "flight"
 
     def fly_at(self, pilot: Pilot, v_neu: Vec3) -> None:
         """At this velocity, until it has not been told again for too long."""
-        self._shaped = shaped_from(pilot)
-        self._velocity_neu, self._told_s, self._is_sent = v_neu, pilot.now_s, False
+        self._begin(pilot, "velocities")
+        self._velocity_neu, self._told_s = v_neu, pilot.now_s
         self.goal = self._place = self._path = None
         self.stage = "flight"
+
+    def follow(self, pilot: Pilot, goal_neu: Vec3, v_neu: Vec3) -> None:
+        """After this place, which moves on at this velocity until it has not been told again for too long."""
+        self._begin(pilot, "both")
+        self._velocity_neu, self._told_s, self._path = v_neu, pilot.now_s, None
+        self.goal = self._place = goal_neu
+        self.stage = "flight"
+
+    def _begin(self, pilot: Pilot, by: Literal["places", "velocities", "both"]) -> None:
+        """What was set before the first of a kind is forgotten, and the vehicle's own speeds count, over ground and up:
+        recorded for places."""
+        if self._sent != by:
+            pilot.forget_speeds()
+            self._sent = by
+        self._shaped = shaped_from(pilot)
 
     def _leg(self, pilot: Pilot, goal_neu: Vec3) -> Path | None:
         if not int(pilot.parameters["GUID_OPTIONS"]) & STRAIGHT_LEGS:
@@ -139,8 +149,7 @@ class Guided:
             return pilot.target
         if self._velocity_neu is not None:
             told = pilot.now_s - self._told_s <= pilot.parameters["GUID_TIMEOUT"]
-            self._shaped.moving(self._velocity_neu if told else REST, pilot.axes(), dt_s)
-            return self._shaped.motion
+            return self._moved(pilot, self._velocity_neu if told else REST, dt_s)
         if self._path is not None:
             return self._path.update(pilot, dt_s)
         if self._place is None:
@@ -151,6 +160,17 @@ class Guided:
         if self.stage == "takeoff" and abs(self._place[2] - motion[0][2]) < TAKEN_OFF_M:
             self.stage = "flight"
         return motion
+
+    def _moved(self, pilot: Pilot, v_neu: Vec3, dt_s: float) -> Motion:
+        """At a velocity, or after a place that has it."""
+        axes = pilot.axes(pilot.speed_m_s)
+        if self._place is None:
+            self._shaped.moving(v_neu, axes, dt_s)
+            return self._shaped.motion
+        self._shaped.following(self._place, v_neu, axes, dt_s)
+        n, e, u = self._place
+        self.goal = self._place = (n + v_neu[0] * dt_s, e + v_neu[1] * dt_s, u + v_neu[2] * dt_s)
+        return self._shaped.motion
 
 
 class Land:

@@ -59,6 +59,12 @@ class Shaped:
         up_m_s = self._vertical_speed(goal_neu[2] - self.p_neu[2], axes)
         self._step(self._flat_velocity(goal_neu, axes), up_m_s, axes, dt_s)
 
+    def following(self, goal_neu: Vec3, v_neu: Vec3, axes: Axes, dt_s: float) -> None:
+        """One step after a place that moves at this velocity."""
+        north, east = self._flat_velocity(goal_neu, axes)
+        up_m_s = self._vertical_speed(goal_neu[2] - self.p_neu[2], axes)
+        self._step((north + v_neu[0], east + v_neu[1]), up_m_s + v_neu[2], axes, dt_s)
+
     def moving(self, v_neu: Vec3, axes: Axes, dt_s: float) -> None:
         """One step at this velocity, or as fast as the limits allow."""
         north, east = _limited(v_neu[0], v_neu[1], axes.speed_m_s)
