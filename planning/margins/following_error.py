@@ -3,7 +3,9 @@
 Distances in space between the flown track and the line from the first waypoint to the last, by the vehicle's own
 estimate; the worst of each row counts, not its 95th percentile, for a certificate holds everywhere. All flights were
 made with default parameters and the autopilots' own built-in physics. Beyond the speed that was flown the worst grows
-with the square of the speed, as the way round a corner at the same acceleration does; below it, it stays.
+with the square of the speed, as the way round a corner at the same acceleration does; below it, it stays. In GUIDED
+the recorded ArduCopter was sent places; led along its legs it departs less in simulation, which no recording supports
+yet.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The navigation script of Melita 2020, section 7, sans-IO: targets are handed over one at a time.
 
 Take-off, then each target when the one before was reached and its loiter time has passed, then the way home. It never
-skips a target, waits while the link is down, and ends as soon as somebody else chooses another flight mode.
+skips a target, waits while the link is down, and ends as soon as somebody else chooses another flight mode. A vehicle
+that does not fly straight from place to place is led along the leg (``feed``).
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ from typing import Literal
 from planning.model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
 from telemetry.flight.errand import Errand, Then
-from telemetry.flight.handover import Handover, is_fresh
+from telemetry.flight.feed import Feed
+from telemetry.flight.handover import Handover, away_m, is_fresh
+from telemetry.flight.leading import Leading
 from telemetry.flight.mode_watch import ModeWatch
 from telemetry.flight.orders import Orders, Place
 from telemetry.flight.punctuality import Punctuality
 from telemetry.flight.standstill import Standstill
+from telemetry.flight.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.ends import GROUND_STATION, Ends
 from telemetry.messages import FlightStatus, GuidedTarget
@@ -49,9 +53,13 @@ class GuidedScript:
         target: tuple[int, int],
         own: tuple[int, int] = GROUND_STATION,
         note: str = "",
+        feed: Feed | None = None,
     ) -> None:
-        """``note``: said of the flight while there is nothing else to say."""
+        """``note``: said of the flight while there is nothing else to say. ``feed``: for ArduPilot only."""
         self._note = note
+        self._leading = None if feed is None else Leading(feed)
+        self._came_from: Place | None = None
+        """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._ends, self._orders = request, Ends(target, own), Orders(firmware, target)
         self._watch, self._punctuality = ModeWatch(), Punctuality()
         self.phase: Phase = "idle"
@@ -148,7 +156,9 @@ class GuidedScript:
         if self.phase == "arming":
             return self._interrupt("Paused before the take-off.")
         if self.phase == "flying":
-            self.phase, self.hint = "paused", ""
+            self.phase, self.hint, self._came_from = "paused", "", None
+            if self._leading is not None:
+                self._leading.stop()
             return self._go_to(self._here(), now_s, holds=True)
         if self.phase == "taking_off":
             self.phase, self.hint = "paused", "It climbs to the height of the take-off first."
@@ -192,23 +202,30 @@ class GuidedScript:
 
     def _fly(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None
-        if self._reached_s is None and self._handover.has_arrived(state, now_s):
-            self._reached_s, self.hint = now_s, ""
+        if self._reached_s is None and self._has_arrived(state, now_s):
+            self._reached_s, self.hint, self._came_from = now_s, "", self._handover.place
             self._punctuality.reached(self.target, now_s)
         if self._reached_s is None:
             self._punctuality.on_the_way(self.target, now_s)
             place = self._handover.place
             self._stands = self._standstill.words(state, place, f"item {self.target.item}", now_s)
-            return self._again_if_needed(state, now_s)
+            return self._lead(state, now_s) if self._leading else self._again_if_needed(state, now_s)
         self._stands = ""
         if now_s - self._reached_s < self.target.loiter_s or not is_fresh(state, now_s):
-            return []
+            return self._lead(state, now_s)
         self._index += 1
         progress = Progress("flying", self._index, len(self._request.targets))
         if self._index == len(self._request.targets):
             self.phase, self._handover = "returning", None
             return [progress, *self._go_home(now_s)]
         return [progress, *self._hand_over(now_s)]
+
+    def _has_arrived(self, state: VehicleState, now_s: float) -> bool:
+        assert self._handover is not None
+        if self._leading is None:
+            return self._handover.has_arrived(state, now_s)
+        near_m = self._request.waypoint_radius_m + self._leading.early_m
+        return self._leading.is_over and is_fresh(state, now_s) and away_m(state, self._handover.place) <= near_m
 
     def _hold(self, state: VehicleState, now_s: float) -> list[Action]:
         if self._handover is not None:
@@ -250,11 +267,32 @@ class GuidedScript:
             lon_deg=target.lon_deg,
             alt_rel_home_m=target.alt_rel_home_m,
             home_alt_amsl_m=self._home_alt_amsl_m,
-            heading_rad=target.heading_rad,
+            heading_rad=self._heading_rad(target),
         )
         # ArduPilot forgets the speed with the first place after a take-off or a hold: the place comes first.
-        actions = self._go_to(place, now_s)
+        actions = self._go_to(place, now_s) if self._leading is None else self._begin_leg(place, now_s)
         return actions if target.speed_m_s == self._speed_m_s else [*actions, *self._set_speed(target.speed_m_s, now_s)]
+
+    def _heading_rad(self, target: GuidedTarget) -> float | None:
+        """As it is asked for, else along the leg: what looks ahead looks where the vehicle goes."""
+        if target.heading_rad is not None or self._orders.firmware != "ardupilot":
+            return target.heading_rad
+        start = self._came_from or self._here()
+        return bearing_rad((start.lat_deg, start.lon_deg), (target.lat_deg, target.lon_deg))
+
+    def _begin_leg(self, place: Place, now_s: float) -> list[Action]:
+        assert self._leading is not None
+        self._handover = Handover(place, radius_m=self._request.waypoint_radius_m)
+        self._leading.go(self._came_from or self._here(), self.left, now_s)
+        return self._lead(self._state, now_s)
+
+    def _lead(self, state: VehicleState, now_s: float) -> list[Action]:
+        """Nothing while the vehicle's position is old: it stops by itself."""
+        if self._leading is None or self._handover is None or not is_fresh(state, now_s):
+            return []
+        at = replace(self._here(), heading_rad=state.heading_rad)
+        found = self._leading.set_point(at, now_s, heading_rad=self._handover.place.heading_rad)
+        return [] if found is None else [Send(self._orders.follow(found.place, found.v_neu_m_s))]
 
     def _set_speed(self, speed_m_s: float, now_s: float) -> list[Action]:
         self._speed_m_s = speed_m_s

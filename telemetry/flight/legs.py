@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from telemetry.flight.handover import METRES_PER_DEG, is_fresh
+from telemetry.flight.handover import is_fresh
 from telemetry.flight.helm import Helm, here_of
 from telemetry.flight.orders import Place
+from telemetry.flight.targets import bearing_rad
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.vehicle import VehicleState
@@ -16,8 +17,6 @@ RADIUS_M = 0.7
 """Corners are cut by less than this."""
 TURNED_RAD, TURN_S = math.radians(20.0), 8.0
 """The nose points where it will fly; and how long that is waited for."""
-LEVEL_LEG_M = 1.0
-"""A shorter leg over ground has no direction that the nose should turn to."""
 
 
 class Legs:
@@ -86,19 +85,10 @@ def _is_aside(state: VehicleState, heading_rad: float | None) -> bool:
 def _place(target: GuidedTarget, state: VehicleState) -> Place:
     """The nose turns to where the vehicle goes, if nothing else is asked for: the sensors look that way."""
     heading_rad = target.heading_rad
-    if heading_rad is None:
-        heading_rad = _bearing_rad(target, state)
+    if heading_rad is None and state.lat_deg is not None and state.lon_deg is not None:
+        ahead_rad = bearing_rad((state.lat_deg, state.lon_deg), (target.lat_deg, target.lon_deg))
+        heading_rad = state.heading_rad if ahead_rad is None else ahead_rad
     home_alt_m = math.nan
     if state.alt_amsl_m is not None and state.alt_rel_home_m is not None:
         home_alt_m = state.alt_amsl_m - state.alt_rel_home_m
     return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, home_alt_m, heading_rad)
-
-
-def _bearing_rad(target: GuidedTarget, state: VehicleState) -> float | None:
-    if state.lat_deg is None or state.lon_deg is None:
-        return None
-    north_m = (target.lat_deg - state.lat_deg) * METRES_PER_DEG
-    east_m = (target.lon_deg - state.lon_deg) * METRES_PER_DEG * math.cos(math.radians(target.lat_deg))
-    if math.hypot(north_m, east_m) < LEVEL_LEG_M:
-        return state.heading_rad
-    return math.atan2(east_m, north_m) % math.tau

@@ -15,7 +15,8 @@ from telemetry.mavlink.modes import mode_numbers
 CUSTOM_MODE = 1.0
 IGNORE_ALL_BUT_PLACE = 0b1101_1111_1000
 """POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored."""
-YAW_IS_GIVEN = IGNORE_ALL_BUT_PLACE & ~mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+VELOCITY_IS_GIVEN = 0b1101_1100_0000
+YAW_IS_GIVEN = ~mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 GROUND_SPEED, CLIMB_SPEED, ANY_THROTTLE = 1.0, 2.0, -1.0
 
 
@@ -69,24 +70,28 @@ class Orders:
         return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE)
 
     def go_to(self, place: Place) -> Message:
-        lat_e7, lon_e7 = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
-        yaw_rad = place.heading_rad
         if self.firmware == "px4":
-            return self._reposition(lat_e7, lon_e7, place.home_alt_amsl_m + place.alt_rel_home_m, yaw_rad)
-        mask = IGNORE_ALL_BUT_PLACE if yaw_rad is None else YAW_IS_GIVEN
-        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+            return self._reposition(place)
+        return self._position_target(place, IGNORE_ALL_BUT_PLACE, (0.0, 0.0, 0.0))
+
+    def follow(self, place: Place, v_neu_m_s: tuple[float, float, float]) -> Message:
+        """ArduPilot's: the place moves on at this velocity until the next one is sent."""
+        return self._position_target(place, VELOCITY_IS_GIVEN, v_neu_m_s)
+
+    def _position_target(self, place: Place, mask: int, v_neu_m_s: tuple[float, float, float]) -> Message:
+        yaw_rad, frame = place.heading_rad, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         return mavlink.MAVLink_set_position_target_global_int_message(
             time_boot_ms=0,
             target_system=self.target[0],
             target_component=self.target[1],
             coordinate_frame=frame,
-            type_mask=mask,
-            lat_int=lat_e7,
-            lon_int=lon_e7,
+            type_mask=mask if yaw_rad is None else mask & YAW_IS_GIVEN,
+            lat_int=round(place.lat_deg * 1e7),
+            lon_int=round(place.lon_deg * 1e7),
             alt=place.alt_rel_home_m,
-            vx=0.0,
-            vy=0.0,
-            vz=0.0,
+            vx=v_neu_m_s[0],
+            vy=v_neu_m_s[1],
+            vz=-v_neu_m_s[2],
             afx=0.0,
             afy=0.0,
             afz=0.0,
@@ -97,9 +102,11 @@ class Orders:
     def end_mode(self, end: Literal["rtl", "land"]) -> str:
         return end.upper()
 
-    def _reposition(self, lat_e7: int, lon_e7: int, alt_amsl_m: float, yaw_rad: float | None) -> Message:
+    def _reposition(self, place: Place) -> Message:
         default_speed, change_mode = -1.0, 1.0
-        yaw = math.nan if yaw_rad is None else yaw_rad
+        yaw = math.nan if place.heading_rad is None else place.heading_rad
+        lat_e7, lon_e7 = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
+        alt_amsl_m = place.home_alt_amsl_m + place.alt_rel_home_m
         command, frame = mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_FRAME_GLOBAL
         return mavlink.MAVLink_command_int_message(
             *self.target, frame, command, 0, 0, default_speed, change_mode, 0.0, yaw, lat_e7, lon_e7, alt_amsl_m

@@ -26,6 +26,8 @@ FRAME_AMSL, FRAME_HOME = 0, 3
 PRESENT_HEIGHT_M = 0.01
 """ArduPilot takes a height that it stores as 0 cm for the present one."""
 METRES_PER_DEG = 111_195.0
+LEVEL_LEG_M = 1.0
+"""A shorter leg over ground has no direction that the nose should turn to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,13 @@ def _nearest(lat_lon_deg: F64, target: GuidedTarget) -> int:
     away_m = np.hypot(north_m, east_m)
     near = np.flatnonzero(away_m <= away_m.min() + 0.05)
     return int(near[0])
+
+
+def bearing_rad(start_deg: tuple[float, float], end_deg: tuple[float, float]) -> float | None:
+    """From one latitude and longitude to another; None where they are too near each other to have a direction."""
+    north_m = (end_deg[0] - start_deg[0]) * METRES_PER_DEG
+    east_m = (end_deg[1] - start_deg[1]) * METRES_PER_DEG * math.cos(math.radians(end_deg[0]))
+    return None if math.hypot(north_m, east_m) < LEVEL_LEG_M else math.atan2(east_m, north_m) % math.tau
 
 
 class _Reader:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -16,6 +15,7 @@ from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.avoidance import Avoidance
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.mavlink.going_on import ReadMission, check_same_mission, set_speeds
+from telemetry.mavlink.guided_way import guided_way
 from telemetry.mavlink.joining import JoinMission
 from telemetry.mavlink.mission_start import start_mission
 from telemetry.mavlink.mode_change import change_mode
@@ -25,8 +25,6 @@ from telemetry.requests import FlyManoeuvre, StartAuto, StartGuided
 from telemetry.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
-GUIDED_OPTIONS, STRAIGHT_LEGS = "GUID_OPTIONS", 64
-"""ArduCopter then flies to the places of GUIDED as it does to waypoints."""
 IN_THE_AIR = ("taking_off", "in_air", "landing")
 LOW_M = 1.0
 SUPERSEDED = "Another command was given."
@@ -34,15 +32,6 @@ FOREIGN_MISSION = (
     "The mission on board is not the one that was started any more: another ground station has written to it."
     " The vehicle holds. Return home or land."
 )
-
-
-def curves_note(options: float | None) -> str:
-    """Of a vehicle whose GUID_OPTIONS are these, or not known."""
-    wanted = STRAIGHT_LEGS | int(options or 0)
-    return (
-        "In GUIDED this vehicle shapes height and place apart: recorded, up to 1.7 m below the straight leg."
-        f" Set {GUIDED_OPTIONS} {wanted} on the vehicle, and it flies straight legs; or fly in AUTO."
-    )
 
 
 class Pilot:
@@ -172,8 +161,10 @@ class Pilot:
         if not request.targets:
             raise NotAllowedError("The script has no targets.", advice="Plan a mission first.")
         self.join = None
-        note = await self._guided_note()
-        script = GuidedScript(request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=note)
+        way = await guided_way(vehicle.firmware, self._read_parameter)
+        script = GuidedScript(
+            request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=way.note, feed=way.feed
+        )
         self.script, self._script_since_s = script, time.time()
 
         async def fly(accepted: Accepted) -> None:
@@ -184,15 +175,6 @@ class Pilot:
                 script.stop(SUPERSEDED)
 
         await self._procedures.take_over(fly)
-
-    async def _guided_note(self) -> str:
-        """What its settings mean for the line that ArduPilot flies from place to place."""
-        if self.vehicle.firmware != "ardupilot":
-            return ""
-        options = None
-        with contextlib.suppress(TelemetryError):  # what is not known is told as the worse of the two
-            options = await self._read_parameter(GUIDED_OPTIONS)
-        return "" if options is not None and int(options) & STRAIGHT_LEGS else curves_note(options)
 
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
         """Raises NotAllowedError when nothing is flown that could be gone on with."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from planning.formats.wpl import read_wpl
 from planning.model import F64
+from telemetry.flight.feed import Feed
 from telemetry.flight.guided import GuidedScript
 from telemetry.flight.targets import guided_plan
 from telemetry.mavlink.actions import Action, Send
@@ -21,14 +23,26 @@ from telemetry.simulator.vehicle import SimulatedVehicle
 from telemetry.vehicle import VehicleState
 from tests.telemetry.simulator_bench import SLICE_S, Bench
 
-STREAMS_HZ = {33: 20, 245: 4, 87: 2}
-"""GLOBAL_POSITION_INT, EXTENDED_SYS_STATE and POSITION_TARGET_GLOBAL_INT, as the link asks for them."""
+STREAMS_HZ = {33: 20, 30: 20, 245: 4, 87: 2}
+"""GLOBAL_POSITION_INT, ATTITUDE, EXTENDED_SYS_STATE and POSITION_TARGET_GLOBAL_INT, as the link asks for them."""
 
 
 class ScriptedFlight:
-    """``track``: (N, 4) time, north, east, up while targets were flown; ``line``: (K, 3) of the targets."""
+    """``track``: (N, 5) time, north, east, up and heading while targets were flown; ``line``: (K, 3) of the targets.
 
-    def __init__(self, mission: Path, **parameters: float) -> None:
+    ``silent_s``: from when to when the link is down, counted from the first target.
+    """
+
+    def __init__(
+        self,
+        mission: Path,
+        *,
+        feed: Feed | None = None,
+        silent_s: tuple[float, float] = (math.inf, math.inf),
+        **parameters: float,
+    ) -> None:
+        self._silent_s, self._flies_s = silent_s, math.inf
+        self.sent: list[Any] = []
         plan = guided_plan(replace(read_wpl(mission.read_bytes()), firmware="ardupilot"))
         home = read_wpl(mission.read_bytes()).home
         self.frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
@@ -49,7 +63,7 @@ class ScriptedFlight:
         while self._state is None or self._state.alt_amsl_m is None:
             self._advance()
         asked = StartGuided(Operator("Ann", 1), plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
-        self.script = GuidedScript(asked, self._state, firmware="ardupilot", target=(1, 1))
+        self.script = GuidedScript(asked, self._state, firmware="ardupilot", target=(1, 1), feed=feed)
         self.track = self._fly()
 
     def _fly(self) -> F64:
@@ -59,9 +73,16 @@ class ScriptedFlight:
             self._advance()
             self._perform(self.script.on_tick(self.bench.now_s))
             if self.script.phase == "flying":
-                track.append((self.bench.now_s, *self.bench.vehicle.truth.p_neu))
+                self._flies_s = min(self._flies_s, self.bench.now_s)
+                truth = self.bench.vehicle.truth
+                track.append((self.bench.now_s, *truth.p_neu, truth.heading_rad))
         assert self.script.phase == "returning", self.script.status()
         return np.array(track)
+
+    @property
+    def is_silent(self) -> bool:
+        since_s = self.bench.now_s - self._flies_s
+        return self._silent_s[0] <= since_s < self._silent_s[1]
 
     def _advance(self) -> None:
         self.bench.advance(SLICE_S)
@@ -69,6 +90,8 @@ class ScriptedFlight:
 
     def _listen(self) -> None:
         heard, self._heard = self.bench.heard[self._heard :], len(self.bench.heard)
+        if self.is_silent:
+            return
         for one in heard:
             self._hear(one.message)
 
@@ -83,7 +106,8 @@ class ScriptedFlight:
 
     def _perform(self, actions: list[Action]) -> None:
         for action in actions:
-            if isinstance(action, Send):
+            if isinstance(action, Send) and not self.is_silent:
+                self.sent.append(action.message)
                 self.bench.send(action.message)  # what it answers is heard with the rest
 
 
