@@ -8,7 +8,7 @@ with less than these, slowly round corners, and with the velocity that it will h
 of velocity is taken up with the time constant acceleration / jerk.
 
 It moves on for GUID_TIMEOUT when nothing more is heard. The feed is never faster than that a link that falls silent
-would carry the vehicle off the line by ``Feed.off_line_m``.
+would carry the vehicle off the line by about ``Feed.off_line_m``, well within the following error of the certificate.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Feed:
     vertical_turn_m_s: float = 0.25
     """Change of velocity at a corner."""
     off_line_m: float = 1.0
-    """Beyond a corner, when the link is silent: less than the following error that the certificate counts with."""
+    """Beyond a corner, when the link is silent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +84,29 @@ def bounds_of(start: Place, targets: Sequence[GuidedTarget], feed: Feed) -> list
     for k in reversed(range(len(targets))):
         unit, length_m = legs[k]
         limits = _limits(unit, targets[k].speed_m_s, feed)
-        out_m_s, room_m = 0.0, feed.off_line_m
+        out_m_s = 0.0
         if found and targets[k].loiter_s == 0.0:
             onward = found[-1]
-            change = tuple(b - a for a, b in zip(unit, onward.unit, strict=True))
-            out_m_s = min(_corner_m_s(change, feed), limits[0], onward.speed_m_s, _entry_m_s(onward))
-            room_m = feed.off_line_m / max(math.hypot(*change), 1e-9)
-        found.append(Bounds(unit, length_m, *limits, out_m_s, room_m))
+            out_m_s = min(
+                _corner_m_s(_change(unit, onward.unit), feed), limits[0], onward.speed_m_s, _entry_m_s(onward)
+            )
+        found.append(Bounds(unit, length_m, *limits, out_m_s, _room_m(unit, legs[k + 1 :], feed)))
     return found[::-1]
+
+
+def _room_m(unit: Vec3, onward: Sequence[tuple[Vec3, float]], feed: Feed) -> float:
+    """Straight on, beside a place that goes round the corners at the same speed and stands at the end."""
+    room_m, left_m = 0.0, feed.off_line_m
+    for other, length_m in onward:
+        apart = math.hypot(*_change(unit, other))
+        if apart * length_m >= left_m:
+            return room_m + left_m / apart
+        room_m, left_m = room_m + length_m, left_m - apart * length_m
+    return room_m + left_m
+
+
+def _change(a: Vec3, b: Vec3) -> Vec3:
+    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
 
 
 def _leg(a: Vec3, b: Vec3) -> tuple[Vec3, float]:
@@ -113,7 +128,7 @@ def _limits(unit: Vec3, speed_m_s: float, feed: Feed) -> tuple[float, float]:
     )
 
 
-def _corner_m_s(change: tuple[float, ...], feed: Feed) -> float:
+def _corner_m_s(change: Vec3, feed: Feed) -> float:
     flat, up = math.hypot(change[0], change[1]), abs(change[2])
     return min(feed.turn_m_s / max(flat, 1e-9), feed.vertical_turn_m_s / max(up, 1e-9))
 

@@ -62,7 +62,7 @@ def test_a_link_that_falls_silent_leaves_the_vehicle_near_the_line(points: list[
     rows = led(points)
     carried = rows[:, :3] + rows[:, 3:] * FEED.silent_s
     assert np.hypot(*off_line(rows[:, :3], line)).max() < 0.01
-    assert np.hypot(*off_line(carried, line)).max() < FEED.off_line_m + 0.05
+    assert np.hypot(*off_line(carried, line)).max() < FEED.off_line_m + 0.3
 
 
 def test_it_is_as_fast_as_asked_and_climbs_no_faster_than_the_vehicle_can() -> None:
