@@ -28,6 +28,8 @@ SHORTEST_M = 0.05
 PATIENT_M, PATIENT_S = 1.0, 0.5
 """So far behind the fed place, and so long at its speed, the vehicle may be before the place waits for it."""
 CATCH_UP_M = 2.0
+STOPS_S = 0.5
+"""So long at its speed it goes on beyond a place that has stopped, and comes back."""
 CREEPING_M_S = 0.1
 """At which it comes to a leg's end, where it stands."""
 
@@ -193,7 +195,7 @@ class FedLeg:
         return min(bounds.speed_m_s, max(brakes, CREEPING_M_S), self._silence_m_s(left_m))
 
     def _silence_m_s(self, left_m: float) -> float:
-        return (left_m + self._bounds.room_m) / self._feed.silent_s
+        return (left_m + self._bounds.room_m) / (self._feed.silent_s + STOPS_S)
 
     def _patience(self, at: Place) -> float:
         """Share of the speed, for a vehicle that is there."""

@@ -76,7 +76,7 @@ def test_it_keeps_within_a_third_of_a_metre_of_the_line_led_or_by_itself(
         assert within(off(flight)) < 0.25
         assert off(flight).max() < 0.5
     seconds = [flight.track[-1, 0] - flight.track[0, 0] for flight in (led, straight)]
-    assert seconds[0] < 1.35 * seconds[1]
+    assert seconds[0] < 1.5 * seconds[1]
 
 
 @pytest.mark.parametrize("changed", [{"SIM_WIND_SPD": 5.0}, {"WPNAV_ACCEL": 150.0}], ids=["wind", "slow to turn"])
@@ -89,7 +89,7 @@ def test_led_it_keeps_to_the_line_in_wind_and_with_other_settings(
 def test_a_link_that_falls_silent_does_not_carry_it_off_the_line(fly: Callable[..., ScriptedFlight]) -> None:
     for from_s in (20.0, 27.0, 33.0, 46.0):
         flight = fly("coro2.h1", feed=Feed(), silent_s=(from_s, from_s + 8.0))
-        assert off(flight).max() < Feed().off_line_m + 0.3
+        assert off(flight).max() < Feed().off_line_m + 0.5
 
 
 @pytest.mark.parametrize(
