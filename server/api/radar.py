@@ -40,6 +40,7 @@ class Asked(RadarReading):
 
 @router.get("/files", response_model=RadarFiles)
 async def files(request: Request) -> Response:
+    """The stream tells what changes."""
     return answer(RadarFiles(parts_of(request).radar.message().files))
 
 

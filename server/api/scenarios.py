@@ -20,9 +20,19 @@ class Scenarios(RootModel[list[ScenarioDoc]]):
     """What there is, and what each holds against which paper."""
 
 
+class Runs(RootModel[list[ScenarioRunDoc]]):
+    """What runs, and what was run, newest first."""
+
+
 @router.get("", response_model=Scenarios)
 async def scenarios() -> Response:
     return answer(Scenarios(scenario_docs()))
+
+
+@router.get("/runs", response_model=Runs)
+async def runs(request: Request) -> Response:
+    """The stream tells what changes."""
+    return answer(Runs(parts_of(request).scenarios.message().runs))
 
 
 @router.post("/runs", response_model=ScenarioRunDoc, status_code=202)

@@ -32,12 +32,7 @@ async def stream(websocket: WebSocket) -> None:
             session_key=key,
             session_remaining_s=parts.auth.remaining_s(session_id),
             snapshot=parts.workspace.snapshot,
-            present=lambda: [
-                *parts.workspace.present(),
-                *parts.flying.present_for(key),
-                parts.radar.message(),
-                parts.scenarios.message(),
-            ],
+            present=lambda: [*parts.workspace.present(), *parts.flying.present_for(key)],
             on_message=parts.workspace.on_show.on_client_message,
         )
     except BusyError:

@@ -68,15 +68,9 @@ def test_results_are_read_at_every_width(station: Station, page: Page, size: tup
     )
     kept = ScenarioResultDoc(run=run, parts=[part_doc(PART)]).model_dump_json()
     page.route(re.compile("/api/scenarios/runs/r1$"), lambda route: route.fulfill(body=kept))
-    page.route_web_socket(
-        re.compile(r"/ws$"),
-        lambda ws: ws.connect_to_server().on_message(
-            lambda text: ws.send(
-                f'{{"v":1,"type":"scenario_runs","runs":[{run.model_dump_json()}]}}'
-                if '"scenario_runs"' in str(text)
-                else text
-            )
-        ),
+    page.route(
+        re.compile("/api/scenarios/runs$"),
+        lambda route: route.fulfill(body=f"[{run.model_dump_json()}]"),
     )
     scenarios(page, station)
     page.set_viewport_size({"width": size[0], "height": size[1]})

@@ -96,6 +96,7 @@ def test_a_run_is_kept_with_its_figures_beside_the_papers(server: Running) -> No
     assert (len(chart.series[0].x), chart.series[0].x[-1]) == (751, 2999.0)
     assert (chart.series[1].printed, chart.series[1].y) == (True, [2.0])
     assert chart.x_span[0] < 0.0 < 2999.0 < chart.x_span[1]
+    assert [one["id"] for one in ok(server.http.get(f"{PATH}/runs")).json()] == [run.id]
     ok(server.http.delete(f"{PATH}/runs/{run.id}"))
     assert server.http.get(f"{PATH}/runs/{run.id}").status_code == 404
 
@@ -160,11 +161,12 @@ def test_strangers_run_and_read_nothing(server: Running) -> None:
         for method, path in (
             ("GET", PATH),
             ("POST", f"{PATH}/runs"),
+            ("GET", f"{PATH}/runs"),
             ("GET", f"{PATH}/runs/a"),
             ("DELETE", f"{PATH}/runs/a"),
             ("POST", f"{PATH}/runs/a/cancel"),
         ):
-            body = {"name": "wood"} if path.endswith("runs") else None
+            body = {"name": "wood"} if method == "POST" else None
             assert other.request(method, path, json=body).status_code == 401, path
 
 

@@ -1,13 +1,14 @@
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { bytes, count, day } from "../format";
 import type { RadarFileDoc, RadarReading } from "../messages";
 import { chooseFiles } from "../shell/keyboard";
 import { pending } from "../store/outcomes";
 import { chosen, chosenId, opened, radarFiles, reading } from "../store/radar";
+import { pageId } from "../store/state";
 import { Button } from "../ui/Button";
 import { AutoField, SelectField } from "../ui/fields";
 import { Section } from "../ui/Section";
-import { ENDINGS, FILES, READING, bringIn, choose, readAs, remove, setCfg } from "./radar";
+import { ENDINGS, FILES, READING, bringIn, choose, learnFiles, readAs, remove, setCfg } from "./radar";
 
 function Delete({ file }: { file: RadarFileDoc }) {
   const [asks, setAsks] = useState(false);
@@ -64,6 +65,7 @@ function Row({ file }: { file: RadarFileDoc }) {
 
 function Files() {
   const all = radarFiles.value;
+  useEffect(() => void learnFiles(), [pageId.value]);
   return (
     <Section
       id={FILES}

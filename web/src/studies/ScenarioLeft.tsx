@@ -3,6 +3,7 @@ import { day, duration, percent } from "../format";
 import type { ScenarioRunDoc } from "../messages";
 import { pending } from "../store/outcomes";
 import { chosenName, chosenScenario, running, runs, scenarios, shownResult } from "../store/scenarios";
+import { pageId } from "../store/state";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -11,7 +12,7 @@ import { Section } from "../ui/Section";
 import { RUNS, SCENARIOS, cancel, learn, openResult, remove, run } from "./scenarios";
 
 function Choice() {
-  useEffect(() => void learn(), []);
+  useEffect(() => void learn(), [pageId.value]);
   return (
     <Section id={SCENARIOS} title="Scenarios" icon="flag" summary={chosenName.value ?? "…"} startsOpen>
       <ul class="pick-list scenarios" aria-label="Scenarios">

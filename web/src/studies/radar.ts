@@ -54,6 +54,15 @@ async function answered<T>({ address, place, signal }: Question, take: (answer: 
   }
 }
 
+/** Which files there are, asked with every new connection; the stream tells what changes. */
+export async function learnFiles(): Promise<void> {
+  try {
+    radarFiles.value = await requestJson<RadarFileDoc[]>("GET", "/api/radar/files");
+  } catch (error) {
+    setError(FILES, asErrorDoc(error));
+  }
+}
+
 /** Opens the chosen file as it is to be read, and shows a frame of it. */
 function open(): void {
   const id = chosenId.value;

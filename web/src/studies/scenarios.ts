@@ -1,7 +1,7 @@
 import { effect, signal } from "@preact/signals";
 import type { ScenarioDoc, ScenarioResultDoc, ScenarioRunDoc } from "../messages";
 import { asErrorDoc, requestJson } from "../net/api";
-import { order, pending } from "../store/outcomes";
+import { order } from "../store/outcomes";
 import { chosenName, runs, scenarios, shownResult } from "../store/scenarios";
 import { setError } from "../store/state";
 
@@ -14,11 +14,11 @@ const path = (id: string) => `/api/scenarios/runs/${encodeURIComponent(id)}`;
 /** The run that this page has started: its result is opened once it is there. */
 const awaited = signal<string | null>(null);
 
-/** What there is, asked once. */
+/** What there is and what was run, asked with every new connection; the stream tells what changes. */
 export async function learn(): Promise<void> {
-  if (scenarios.value !== null || pending.value.has(SCENARIOS)) return;
   try {
     scenarios.value = await requestJson<ScenarioDoc[]>("GET", "/api/scenarios");
+    runs.value = await requestJson<ScenarioRunDoc[]>("GET", "/api/scenarios/runs");
     chosenName.value ??= scenarios.value[0]?.name ?? null;
   } catch (error) {
     setError(SCENARIOS, asErrorDoc(error));
