@@ -33,6 +33,8 @@ ANSWERS = (
     schemas.RadarFrame,
     schemas.ScenarioDoc,
     schemas.ScenarioResultDoc,
+    schemas.SectionDoc,
+    schemas.RadarTargetsDoc,
 )
 """Of requests, beside the stream."""
 TARGET = Path(__file__).resolve().parent.parent / "web" / "src" / "messages.ts"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
+from telemetry.looks import CloudLook, RadarLook
 from telemetry.obstacles import (
     AvoidanceStatus,
     GroundNotice,
@@ -43,6 +44,8 @@ class Topic(StrEnum):
     MAP_VISION = "map/vision"
     MAP_VISION_FLIGHT = "map/vision_flight"
     MAP_RANGES = "map/ranges"
+    RADAR_LOOK = "look/radar"  # RadarLook, latest wins
+    CLOUD_LOOK = "look/cloud"  # CloudLook, latest wins
     PERCEPTION_RADAR = "perception/radar"  # PerceptionStatus, latest wins
     PERCEPTION_VISION = "perception/vision"
     PERCEPTION_RANGES = "perception/ranges"
@@ -312,6 +315,8 @@ Published = (
     | SlamPose
     | RangeFrame
     | MapDelta
+    | RadarLook
+    | CloudLook
     | PerceptionStatus
     | ObstacleAlert
     | GroundNotice
@@ -342,6 +347,8 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.MAP_VISION: MapDelta,
     Topic.MAP_VISION_FLIGHT: MapDelta,
     Topic.MAP_RANGES: MapDelta,
+    Topic.RADAR_LOOK: RadarLook,
+    Topic.CLOUD_LOOK: CloudLook,
     Topic.PERCEPTION_RADAR: PerceptionStatus,
     Topic.PERCEPTION_VISION: PerceptionStatus,
     Topic.PERCEPTION_RANGES: PerceptionStatus,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,17 @@ FASTEST_M_S = 200.0
 SNR_LIMITS_DB = (-30.0, 120.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """Of one frame, as they were measured."""
+
+    t_mono_s: float
+    xyz_m: F64
+    """(N, 3) body frame, all whose numbers are finite"""
+    kept: Bools
+    """(N,) through the gate"""
+
+
 class RadarPerception(Perception):
     """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, or has only passed
     by, is "explained"."""
@@ -35,6 +47,7 @@ class RadarPerception(Perception):
         super().__init__(settings, alert_prefix=alert_prefix)
         self._evidence = RadarEvidence(self.evidence)
         self._passing = Passing()
+        self.newest: Targets | None = None
         self._look_through_the_gate()
 
     def set_settings(self, settings: Settings) -> None:
@@ -61,7 +74,7 @@ class RadarPerception(Perception):
         columns = self._columns(scan)
         if columns is None:
             return self._drop(scan, "columns of different length", now_mono_s)
-        xyz, speed, snr, ghost = self._kept(*columns)
+        xyz, speed, snr, ghost = self._kept(scan.t_mono_s, *columns)
         self._insert(scan.t_mono_s, pose, xyz, speed, snr, ghost)
         return self._look(scan.t_mono_s, now_mono_s, pose, len(xyz))
 
@@ -72,12 +85,13 @@ class RadarPerception(Perception):
             return None
         return xyz, speed, snr
 
-    def _kept(self, xyz: F64, speed: F64, snr: F64) -> tuple[F64, F64, F64, Bools]:
+    def _kept(self, t_mono_s: float, xyz: F64, speed: F64, snr: F64) -> tuple[F64, F64, F64, Bools]:
         """Believable numbers inside the gate, and which of them are side lobes' ghosts; the rest is counted."""
         finite = np.isfinite(xyz).all(axis=1) & np.isfinite(speed) & np.isfinite(snr)
         self._count("points: not finite", len(xyz) - int(finite.sum()))
         xyz, speed, snr = xyz[finite][:MOST_TARGETS], speed[finite][:MOST_TARGETS], snr[finite][:MOST_TARGETS]
         range_m = np.linalg.norm(xyz, axis=1)
+        all_xyz = xyz
         good = (range_m >= self.gate.nearest_m) & (range_m <= self.gate.farthest_m)
         good &= (np.abs(speed) <= FASTEST_M_S) & (snr >= SNR_LIMITS_DB[0]) & (snr <= SNR_LIMITS_DB[1])
         self._count("points: absurd range, speed or strength", len(good) - int(good.sum()))
@@ -85,6 +99,9 @@ class RadarPerception(Perception):
         targets = polar(xyz)
         inside = in_gate(targets, self.gate)
         self._count("points: outside the gate", len(inside) - int(inside.sum()))
+        kept = np.zeros(len(all_xyz), np.bool_)
+        kept[good] = inside
+        self.newest = Targets(t_mono_s, all_xyz, kept)
         return xyz[inside], speed[inside], snr[inside], side_lobes(targets, snr)[inside]
 
     def _insert(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -41,6 +41,17 @@ MOST_BREAKS = 20
 """Of the camera's path, ahead of its clouds."""
 
 
+@dataclass(frozen=True, slots=True)
+class SeenCloud:
+    """The believable points of one cloud, in the map's frame."""
+
+    t_mono_s: float
+    points_m: F64
+    """(N, 3)"""
+    eye_m: F64
+    """(3,) from where they were seen"""
+
+
 class VisionPerception(Perception):
     """The camera's map. Its path is laid over the vehicle's own positions once; from then on SLAM alone positions it.
 
@@ -58,6 +69,7 @@ class VisionPerception(Perception):
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         super().__init__(settings, alert_prefix=alert_prefix)
         self.flight = FlightMap(settings)
+        self.newest: SeenCloud | None = None
         self._path = PathWatch()
         self._breaks: deque[Break] = deque(maxlen=MOST_BREAKS)
         self._camera = PoseTrack()
@@ -117,6 +129,7 @@ class VisionPerception(Perception):
         self.map.clear()
         self._insert(points, pose, singly=cloud.voxel_m > 0 or self.settings.cloud_voxel_m > 0)
         self._points = len(points)
+        self.newest = SeenCloud(cloud.t_mono_s, points, pose.position_enu_m)
         return self._with_divergence(self._look(cloud.t_mono_s, now_mono_s, pose, len(points)))
 
     def _pose(self, t_mono_s: float) -> Pose | str:

@@ -15,6 +15,8 @@ from server.schemas import (
     PerceptionSettingsBody,
     PlanState,
     PlanWithSeen,
+    RadarTargetsDoc,
+    SectionDoc,
     SetAvoidanceBody,
     Source,
 )
@@ -76,6 +78,24 @@ async def plan_with_seen(body: PlanWithSeen, operator: InCharge, flying: Fly) ->
     """Takes what was seen into the open plan's surface model, or out of it again; an edit that can be undone."""
     del operator
     return answer(await flying.obstacles.plan_with_seen(body))
+
+
+@router.get("/section", response_model=SectionDoc)
+async def section(
+    flying: Fly,
+    source: Annotated[Source, Query()] = "live",
+    across: Annotated[bool, Query()] = False,
+    thickness_m: Annotated[float, Query(ge=0.1, le=50)] = 4.0,
+    reach_m: Annotated[float, Query(ge=5, le=200)] = 40.0,
+) -> Response:
+    """A vertical slice through the maps where the vehicle is, or was at the replay's time."""
+    return answer(await flying.obstacles.section(source, across, thickness_m, reach_m))
+
+
+@router.get("/targets", response_model=RadarTargetsDoc)
+async def targets(flying: Fly, source: Annotated[Source, Query()] = "live") -> Response:
+    """All targets of the radar's newest frame, kept by its gate or not."""
+    return answer(await flying.obstacles.targets(source))
 
 
 @router.get("/map/{name}.{kind}", response_class=Response)

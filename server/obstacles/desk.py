@@ -19,6 +19,7 @@ from server.obstacles.keeping import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.mirror import Voxels
 from server.obstacles.rest_of_plan import Underway, rest_of_plan
+from server.obstacles.section import Looking
 from server.obstacles.watch import Watch
 from server.schemas import (
     AcknowledgeBody,
@@ -27,6 +28,8 @@ from server.schemas import (
     PerceptionSettingsBody,
     PlanState,
     PlanWithSeen,
+    RadarTargetsDoc,
+    SectionDoc,
     SetAvoidanceBody,
     Source,
 )
@@ -67,10 +70,12 @@ class ObstacleDesk:
         underway: Callable[[], Underway | None],
         publish_settings: Callable[[PerceptionSettings], None],
         server_operator: Callable[[], Operator],
+        looking: Looking,
     ) -> None:
         self._root, self._watches, self._manoeuvres = root, watches, manoeuvres
         self._link, self._plans, self._lane = link, plans, lane
         self._underway = underway
+        self._looking = looking
         self._publish_settings, self._server_operator = publish_settings, server_operator
         self._live = watches["live"]
         self._avoid_when_adopted = False
@@ -158,6 +163,15 @@ class ObstacleDesk:
         return await self._plans.plan_with_seen(
             maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
+
+    async def section(self, source: Source, across: bool, thickness_m: float, reach_m: float) -> SectionDoc:
+        """Through the maps as they are now."""
+        return await asyncio.to_thread(
+            self._looking.section, source, across=across, thickness_m=thickness_m, reach_m=reach_m
+        )
+
+    async def targets(self, source: Source) -> RadarTargetsDoc:
+        return self._looking.targets(source)
 
     async def exported(self, source: Source, name: MapName, kind: MapFormat) -> bytes:
         """Raises NotReadyError while the map is empty."""

@@ -21,6 +21,7 @@ from server.obstacles.watch import Watch
 from server.scene.regions import Route
 from server.scene.sights import MapLook
 from server.schemas import MapDrawn, Source
+from telemetry.looks import CloudLook
 from telemetry.obstacles import MAP_NAMES, MapName, MapOrigin, PerceptionStatus, Sensor
 from telemetry.tracks import TracksStatus
 
@@ -52,6 +53,8 @@ class Stage(Protocol):
         routes: list[Route],
         tracks: TracksStatus | None,
     ) -> None: ...
+
+    def draw_cloud(self, source: Source, look: CloudLook | None) -> None: ...
 
     def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int: ...
 
@@ -128,6 +131,7 @@ class MapDrawing:
             tracks = self._tracks[source].status
             origin = _origin(watch) or (None if tracks is None else tracks.origin)
             stage.draw_now(source, origin, watch.statuses, routes, tracks)
+            stage.draw_cloud(source, watch.fresh_cloud())
 
     async def _draw_maps(self, stage: Stage) -> None:
         while True:

@@ -25,6 +25,7 @@ from server.obstacles.ground import KnownGround
 from server.obstacles.manoeuvre_task import Situation, prepare
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.rest_of_plan import Underway
+from server.obstacles.section import Looking
 from server.obstacles.sensor_nodes import SensorNodes
 from server.obstacles.tracks import TracksWatch
 from server.obstacles.watch import Watch, is_in_air
@@ -94,6 +95,7 @@ class Obstacles:
             underway=self._flown,
             publish_settings=lambda settings: bus.publish(Topic.PERCEPTION_SETTINGS, settings),
             server_operator=server_operator,
+            looking=Looking(self.watches, workspace.sights),
         )
 
     def hear(self, relay: Relay) -> None:
@@ -105,6 +107,8 @@ class Obstacles:
             relay.on(topic, live.on_status)
             relay.on(topic, replay.on_status, replayed=True)
         for watch, replayed in ((live, False), (replay, True)):
+            relay.on(Topic.RADAR_LOOK, watch.on_radar_look, replayed=replayed)
+            relay.on(Topic.CLOUD_LOOK, watch.on_cloud_look, replayed=replayed)
             relay.on(Topic.ALERT, watch.on_alert, replayed=replayed, each=True)
             relay.on(Topic.AVOIDANCE, watch.on_avoidance if replayed else self._on_avoidance, replayed=replayed)
         for source, tracks in self.tracks.items():

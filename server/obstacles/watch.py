@@ -21,6 +21,7 @@ from server.schemas import (
     ServerMessage,
     Source,
 )
+from telemetry.looks import CloudLook, RadarLook
 from telemetry.obstacles import (
     MAP_NAMES,
     SENSORS,
@@ -67,6 +68,8 @@ class Watch:
         self._told: ObstaclesState | None = None
         self.statuses: dict[Sensor, PerceptionStatus] = {}
         self.mirrors: dict[MapName, MapMirror] = {name: MapMirror(name) for name in MAP_NAMES}
+        self.radar_look: RadarLook | None = None
+        self._cloud_look: CloudLook | None = None
         self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
         """Set when parts of a map are missing here."""
         self.settings = PerceptionSettings()
@@ -147,6 +150,17 @@ class Watch:
             # Whatever a node sends: the others' maps and all alerts go on.
             log.warning("A part of the %s map: %s", delta.sensor, reported(error, log, "Taking in a map").what)
 
+    def on_radar_look(self, look: RadarLook) -> None:
+        self.radar_look = look
+
+    def on_cloud_look(self, look: CloudLook) -> None:
+        self._cloud_look = look
+
+    def fresh_cloud(self) -> CloudLook | None:
+        """What the camera sees now; a camera that has stopped sees nothing."""
+        look = self._cloud_look
+        return look if look is not None and abs(self._now_mono_s() - look.t_mono_s) < DEAD_S else None
+
     def on_drawn(self, maps: Sequence[MapDrawn]) -> None:
         self._maps_drawn = tuple(maps)
         self.refresh()
@@ -193,6 +207,7 @@ class Watch:
         self._lost.clear()
         for mirror in self.mirrors.values():
             mirror.clear()
+        self.radar_look = self._cloud_look = None
         self.avoidance = AvoidanceStatus()
         self.forget_alerts()
 

@@ -8,17 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import viser
 
 from planning.dsm import Dsm
 from server.obstacles.mirror import ChunkKey, Voxels
+from server.scene.clouds import cloud_nodes
 from server.scene.drawing import Drawing
 from server.scene.enu import EnuPlacing
 from server.scene.nodes import Canvas, Node
+from server.scene.payload import F64
 from server.scene.regions import Route, conflict_nodes, region_nodes, route_nodes
 from server.scene.tracks import track_nodes
 from server.scene.voxels import chunk_nodes, chunk_place, sent_bytes
 from server.schemas import Source
+from telemetry.looks import CloudLook
 from telemetry.obstacles import MapName, MapOrigin, PerceptionStatus, Sensor
 from telemetry.tracks import TracksStatus
 
@@ -52,6 +56,7 @@ class Sights:
         self._placing: EnuPlacing | None = None
         self._shown: set[str] = set()
         self._now: tuple[object, ...] = ()
+        self._cloud: tuple[object, ...] = ("", None, None)
 
     @property
     def dsm(self) -> Dsm | None:
@@ -99,6 +104,28 @@ class Sights:
         changed = {layer: drawn.get(layer, []) for layer in self._shown | gone}
         if changed:
             self._put(changed)
+
+    def draw_cloud(self, source: Source, look: CloudLook | None) -> None:
+        """The camera's newest points; nothing travels while the layer is off."""
+        drawing = self._drawing
+        wanted = look if drawing is not None and drawing.state.view.show_cloud else None
+        key = (source, wanted, drawing if wanted is not None else None)
+        if key[0] == self._cloud[0] and all(a is b for a, b in zip(key[1:], self._cloud[1:], strict=True)):
+            return
+        self._cloud = key
+        placing = None if wanted is None else self._place(wanted.origin)
+        nodes: list[Node] = []
+        if drawing is not None and placing is not None:
+            nodes = cloud_nodes(drawing, placing, wanted, prefix=f"/now_{source}")
+        self._put({"cloud": nodes})
+
+    def ground_up_m(self, origin: MapOrigin, enu_m: F64) -> F64:
+        """(N, 3) places -> (N,) up of the surface model there, above home; NaN where it is unknown."""
+        dsm = self.dsm
+        placing = None if dsm is None else EnuPlacing.of(dsm, origin)
+        if dsm is None or placing is None:
+            return np.full(len(enu_m), np.nan)
+        return dsm.elevation_at(placing.model_from_enu(enu_m)[:, :2]) - placing.home_alt_dsm_m
 
     def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
         """None: the chunk is empty. Returns how many bytes it comes to for one page. Heavy: for a thread."""

@@ -79,6 +79,54 @@ class ObstaclesState(Strict):
     """After a climb: why the rest is not flown at its proper height."""
 
 
+class SectionMap(Strict):
+    """One map's cells in a vertical slice, each once."""
+
+    name: MapName
+    resolution_m: float
+    s_m: list[float]
+    """Of their middles, along the slice from the vehicle."""
+    up_m: list[float]
+    """Above home."""
+    known_ground: list[bool]
+    left_out: int
+    """Cells that are too many to be told."""
+
+
+class SectionDoc(Strict):
+    """A vertical slice through the maps, where the vehicle is."""
+
+    text: str = ""
+    """Why there is none."""
+    across: bool
+    """Of the vehicle's heading, s to the right; else along it, s ahead."""
+    thickness_m: float
+    reach_m: float
+    vehicle_up_m: float | None = None
+    heading_deg: float | None = None
+    ground_s_m: list[float] = Field(default_factory=list)
+    ground_up_m: list[float | None] = Field(default_factory=list)
+    """Of the surface model, above home; null where it is unknown."""
+    maps: list[SectionMap] = Field(default_factory=list)
+
+
+class RadarTargetsDoc(Strict):
+    """All targets of the radar's newest frame, in its own frame, and the gate that they met."""
+
+    t_mono_s: float | None = None
+    """Null: there was no frame yet."""
+    right_m: list[float] = Field(default_factory=list)
+    ahead_m: list[float] = Field(default_factory=list)
+    up_m: list[float] = Field(default_factory=list)
+    kept: list[bool] = Field(default_factory=list)
+    azimuth_deg: float = 0.0
+    """Of the gate, to both sides."""
+    low_deg: float = 0.0
+    high_deg: float = 0.0
+    nearest_m: float = 0.0
+    farthest_m: float = 0.0
+
+
 # Bodies of requests
 
 

@@ -23,6 +23,8 @@ class ViewDoc(Strict):
     """The camera's voxels, and those of range finders."""
     show_vision_flight: bool = False
     """All that the camera has seen on its way."""
+    show_cloud: bool = False
+    """The camera's newest points, some of them."""
     show_explained: bool = False
     """Voxels that are known ground, in grey: they would crowd the view from behind the vehicle."""
     show_regions: bool = True

@@ -47,6 +47,8 @@ class SensorKind:
     """What is seen out to there must fit into the map's memory at once; None: a frame is a handful of voxels."""
     backlog: int
     """Frames that wait at most; those before them are skipped."""
+    looks: Topic | None = None
+    """What the newest frame showed."""
     flight_maps: Topic | None = None
     """Where the map is local: of that of the whole flight."""
 
@@ -123,6 +125,7 @@ RADAR = SensorKind(
     lambda s: _settings(s, s.radar_depth_m, s.radar_resolution_m),
     reach_m=None,
     backlog=20,  # Its map keeps everything, and a frame takes a millisecond: catching up is better than leaving out.
+    looks=Topic.RADAR_LOOK,
 )
 VISION = SensorKind(
     "vision",
@@ -134,6 +137,7 @@ VISION = SensorKind(
     lambda s: replace(_settings(s, s.vision_depth_m, s.vision_resolution_m), cloud_voxel_m=s.cloud_voxel_m),
     reach_m=40.0,
     backlog=1,  # Its map is made of the newest frame alone.
+    looks=Topic.CLOUD_LOOK,
     flight_maps=Topic.MAP_VISION_FLIGHT,
 )
 RANGES = SensorKind(

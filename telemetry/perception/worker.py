@@ -15,6 +15,7 @@ from telemetry.perception.changes import ChangeTeller
 from telemetry.perception.inbox import Inbox
 from telemetry.perception.kinds import SensorKind
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
 
 _log = logging.getLogger(__name__)
@@ -67,6 +68,7 @@ class Worker:
         self._changes = ChangeTeller(kind.sensor, utc_minus_mono_s)
         self._flight_changes = ChangeTeller("vision_flight", utc_minus_mono_s)
         self._told_s = self._delta_s = self._flight_delta_s = self._looked_s = clock()
+        self._showing = Showing(utc_minus_mono_s)
         self._frame_t_s = 0.0
         self._asked = GroundWanted(None, None)
         self._handlers: dict[str, Callable[[Any], None]] = {
@@ -108,6 +110,7 @@ class Worker:
             self._tell(self.perceiver.tick(self._clock, feed=True))
         self._tell_changes()
         self._tell_flight_changes(now_s)
+        self._show(now_s)
         if now_s >= self._looked_s + LOOK_S:
             self._looked_s = now_s
             self._look_ahead(self._flight())
@@ -157,6 +160,13 @@ class Worker:
         self._flight_delta_s = now_s
         if deltas := self._flight_changes.changes(flight.map, self._origin, self._frame_t_s or now_s):
             self._tell_flight_map(deltas)
+
+    def _show(self, now_s: float) -> None:
+        """What the newest frame showed, if there was one since."""
+        if self._kind.looks is None:
+            return
+        if (look := self._showing.due(self.perceiver.perception, self._origin, now_s)) is not None:
+            self._give(self._kind.looks, look)
 
     @property
     def _origin(self) -> MapOrigin | None:

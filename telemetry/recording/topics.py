@@ -10,7 +10,7 @@ MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, To
 FRAMES = frozenset({Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.RANGE_FRAME})
 """What sensors sent: from these maps are built again; a replay does not show them."""
 
-BULKY = MAPS | {Topic.CLOUD_FRAME}
+BULKY = MAPS | {Topic.CLOUD_FRAME, Topic.CLOUD_LOOK}
 """Of what little may wait for the disk: the rest of a flight must not suffer from it."""
 
 NOT_REPLAYED = FRAMES | {Topic.RAW, Topic.SERVER, Topic.TRUTH}

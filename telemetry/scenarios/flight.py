@@ -193,6 +193,9 @@ class _Flight:
                 self._tell(perceiver.kind.maps, delta, t_utc_s)
             for delta in self._perceiving[sensor].flight_changes(status.t_mono_s):
                 self._tell(Topic.MAP_VISION_FLIGHT, delta, t_utc_s)
+            look = self._perceiving[sensor].look(status.t_mono_s)
+            if look is not None and perceiver.kind.looks is not None:
+                self._tell(perceiver.kind.looks, look, t_utc_s)
         self._keep(sensor, frame, outcome)
 
     def _keep(self, sensor: Sensor, frame: RadarFrame | CloudFrame | None, outcome: Outcome) -> None:

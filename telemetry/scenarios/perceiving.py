@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 
+from telemetry.looks import CloudLook, RadarLook
 from telemetry.messages import FlightStatus, PlanRecord, Published
 from telemetry.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
 from telemetry.perception.changes import ChangeTeller
 from telemetry.perception.ground import ground_around
 from telemetry.perception.kinds import KINDS
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
 from telemetry.perception.worker import FLIGHT_DELTA_S
 from telemetry.scenarios.setup import PERCEPTION_S, Setup
@@ -30,6 +32,7 @@ class Perceiving:
         self.perceiver.on_ground(ground)
         self._laid: GroundWanted | None = None
         self._changes = ChangeTeller(sensor, T0_UTC_S - T0_MONO_S)
+        self._showing = Showing(T0_UTC_S - T0_MONO_S)
         self._flight_changes = ChangeTeller("vision_flight", T0_UTC_S - T0_MONO_S)
         self._waiting: deque[RadarFrame | CloudFrame] = deque()
         self._worked_s = self._flight_told_s = 0.0
@@ -71,6 +74,10 @@ class Perceiving:
             return []
         self._flight_told_s = now_s
         return self._flight_changes.changes(flight.map, self.perceiver.where.origin, now_s)
+
+    def look(self, now_s: float) -> RadarLook | CloudLook | None:
+        """What the newest frame showed, likewise."""
+        return self._showing.due(self.perceiver.perception, self.perceiver.where.origin, now_s)
 
     def _lay_ground(self) -> None:
         wanted = self.perceiver.ground_wanted

@@ -153,6 +153,7 @@ def test_maps_are_shown_and_hidden_and_the_regions_set(demo: Station, page: Page
             toggle.click()
         expect(toggle).to_have_attribute("aria-pressed", str(is_on).lower())
     _both_maps_are_one_picture(page)
+    _slices_and_targets_are_looked_at(page)
 
     page.get_by_test_id("section-obstacles").get_by_role("button").first.click()
     depth = page.get_by_test_id("perception-radar_depth_m")
@@ -175,6 +176,21 @@ def _both_maps_are_one_picture(page: Page) -> None:
     both.click()
     expect(both).to_have_attribute("aria-pressed", "false")
     expect(alone).to_have_attribute("aria-pressed", "true")
+
+
+def _slices_and_targets_are_looked_at(page: Page) -> None:
+    """The radar looks out on the ground, too: its frames come, kept or not."""
+    page.get_by_test_id("looking-section").click()
+    expect(page.get_by_test_id("section-says-live")).to_contain_text("heights above home")
+    page.get_by_test_id("section-across").click()
+    expect(page.get_by_test_id("section-says-live")).to_contain_text("left")
+    height = page.get_by_test_id("section-live").evaluate("canvas => canvas.clientHeight")
+    page.get_by_test_id("looking-targets").click()
+    expect(page.get_by_test_id("section-live")).to_have_count(0)
+    expect(page.get_by_test_id("targets-says-live")).to_contain_text(re.compile(r"\d+ of \d+ kept; gate ±45°"))
+    assert page.get_by_test_id("targets-live").evaluate("canvas => canvas.clientHeight") == height
+    page.get_by_test_id("looking-targets").click()
+    expect(page.get_by_test_id("targets-live")).to_have_count(0)
 
 
 def _maps_begin_anew_when_held_for(page: Page) -> None:

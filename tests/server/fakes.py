@@ -32,6 +32,8 @@ from server.schemas import (
     PlanMessage,
     PlanState,
     PoiDoc,
+    RadarTargetsDoc,
+    SectionDoc,
     SelectionDoc,
     ServerMessage,
     SetSelection,
@@ -232,6 +234,8 @@ _ANSWERS: dict[str, Any] = {
     "change_settings": _OBSTACLES,
     "plan_with_seen": plan_state(),
     "exported": b"a map",
+    "section": SectionDoc(across=True, thickness_m=2.0, reach_m=30.0, text="No sensor tells where the vehicle is."),
+    "targets": RadarTargetsDoc(),
 }
 
 

@@ -48,6 +48,9 @@ class CountingStage:
     def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
         return self._sights.look(sensor, origin)
 
+    def draw_cloud(self, source: Any, look: Any) -> None:
+        raise AssertionError("maps only")
+
     def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
         raise AssertionError("maps only")
 

@@ -105,11 +105,27 @@ def test_the_maps_the_gate_and_the_climb_can_be_set(served: Running, pilot: http
     assert served.flying.asked == [("change_settings", PerceptionSettingsBody(**body))]
 
 
+def test_slices_and_targets_are_for_everybody_who_is_signed_in(served: Running) -> None:
+    served.flying.asked.clear()
+    asked = {"source": "replay", "across": True, "thickness_m": 2, "reach_m": 30}
+    answer = served.http.get("/api/obstacles/section", params=asked)
+    assert answer.json()["text"] == "No sensor tells where the vehicle is."
+    assert served.http.get("/api/obstacles/targets").json()["t_mono_s"] is None
+    assert served.flying.asked == [("section", "replay", True, 2.0, 30.0), ("targets", "live")]
+    for wrong in ({"thickness_m": 0}, {"reach_m": 1e9}, {"thickness_m": "nan"}, {"source": "dream"}):
+        assert served.http.get("/api/obstacles/section", params=wrong).status_code == 422
+    with served.stranger() as other:
+        assert other.get("/api/obstacles/section").status_code == 401
+        assert other.get("/api/obstacles/targets").status_code == 401
+
+
 def test_a_map_is_a_file_by_its_sensor_and_kind(served: Running) -> None:
     answer = served.http.get("/api/obstacles/map/radar.geojson", params={"source": "replay"})
     assert answer.headers["content-type"] == "application/geo+json"
     assert 'filename="radar-map.geojson"' in answer.headers["content-disposition"]
     assert served.flying.asked[-1] == ("exported", "replay", "radar", "geojson")
+    whole = served.http.get("/api/obstacles/map/vision_flight.ply")
+    assert 'filename="vision-flight-map.ply"' in whole.headers["content-disposition"]
     for path in ("sonar.ply", "radar.exe", "radar"):
         assert served.http.get(f"/api/obstacles/map/{path}").status_code in (404, 422)
     with served.stranger() as other:

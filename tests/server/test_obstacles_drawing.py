@@ -31,6 +31,9 @@ class FakeStage:
     def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
         return None if origin is None else MapLook(self._drawing, origin, **self.view)
 
+    def draw_cloud(self, source: Any, look: Any) -> None:
+        raise AssertionError("maps only")
+
     def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
         raise AssertionError("maps only")
 

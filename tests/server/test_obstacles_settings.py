@@ -37,6 +37,7 @@ class Desk:
             underway=nobody,
             publish_settings=self.published.append,
             server_operator=nobody,
+            looking=nobody,
         )
 
     def change(self, **fields: Any) -> ObstaclesState:

@@ -75,8 +75,10 @@ def test_the_cameras_map_of_the_whole_flight_is_built_again_and_was_recorded(
         np.testing.assert_array_equal(one, other)
     with open_recording(path) as recording:
         told = [entry.message for entry in recording.entries({Topic.MAP_VISION_FLIGHT})]
+        shown = [entry.t_utc_s for entry in recording.entries({Topic.RADAR_LOOK, Topic.CLOUD_LOOK})]
     recorded = FoldedMap().folded(delta for delta in told if isinstance(delta, MapDelta)).voxels
     assert len(recorded.keys) > 0.9 * len(own.keys)
+    assert 20 < len(shown) <= 4 * (shown[-1] - shown[0] + 1), "each sensor's newest frame, twice a second"
 
 
 def test_the_ground_is_the_one_that_was_known(flown: tuple[Setup, Flown, Path]) -> None:

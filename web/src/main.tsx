@@ -25,6 +25,7 @@ import "./styles/review.css";
 import "./styles/obstacles.css";
 import "./styles/evasion.css";
 import "./styles/polar.css";
+import "./styles/looking.css";
 import "./styles/alerts.css";
 import "./styles/tracks.css";
 import "./styles/traversability.css";

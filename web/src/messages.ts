@@ -787,6 +787,8 @@ export interface ViewDoc {
   show_vision_map: boolean;
   /** All that the camera has seen on its way. */
   show_vision_flight: boolean;
+  /** The camera's newest points, some of them. */
+  show_cloud: boolean;
   /** Voxels that are known ground, in grey: they would crowd the view from behind the vehicle. */
   show_explained: boolean;
   show_regions: boolean;
@@ -1130,6 +1132,51 @@ export interface ObstaclesState {
   busy: string;
   /** After a climb: why the rest is not flown at its proper height. */
   stays_higher: string;
+}
+
+/** One map's cells in a vertical slice, each once. */
+export interface SectionMap {
+  name: "radar" | "vision" | "ranges" | "vision_flight";
+  resolution_m: number;
+  /** Of their middles, along the slice from the vehicle. */
+  s_m: number[];
+  /** Above home. */
+  up_m: number[];
+  known_ground: boolean[];
+  /** Cells that are too many to be told. */
+  left_out: number;
+}
+
+/** A vertical slice through the maps, where the vehicle is. */
+export interface SectionDoc {
+  /** Why there is none. */
+  text: string;
+  /** Of the vehicle's heading, s to the right; else along it, s ahead. */
+  across: boolean;
+  thickness_m: number;
+  reach_m: number;
+  vehicle_up_m: number | null;
+  heading_deg: number | null;
+  ground_s_m: number[];
+  /** Of the surface model, above home; null where it is unknown. */
+  ground_up_m: (number | null)[];
+  maps: SectionMap[];
+}
+
+/** All targets of the radar's newest frame, in its own frame, and the gate that they met. */
+export interface RadarTargetsDoc {
+  /** Null: there was no frame yet. */
+  t_mono_s: number | null;
+  right_m: number[];
+  ahead_m: number[];
+  up_m: number[];
+  kept: boolean[];
+  /** Of the gate, to both sides. */
+  azimuth_deg: number;
+  low_deg: number;
+  high_deg: number;
+  nearest_m: number;
+  farthest_m: number;
 }
 
 export interface SetAvoidanceBody {

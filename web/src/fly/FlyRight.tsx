@@ -1,5 +1,6 @@
 import { Avoidance } from "../obstacles/Avoidance";
 import { AheadLine, MissionAhead } from "../obstacles/MissionAhead";
+import { Looking } from "../obstacles/Looking";
 import { Sensors } from "../obstacles/Sensors";
 import { hasRoom } from "../tracks/Displays";
 import { ROWS, TrackList } from "../tracks/TrackList";
@@ -41,6 +42,7 @@ export function FlyRight() {
         {(isEmpty || !hasRoom("live")) && <TrackList source="live" rows={ROWS.narrow} />}
         <MissionAhead source="live" />
         <Sensors source="live" />
+        <Looking source="live" />
         {(!isEmpty || texts.value.length > 0) && <VehicleMessages />}
       </div>
       <Evasion />

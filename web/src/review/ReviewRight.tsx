@@ -3,6 +3,7 @@ import { day, duration } from "../format";
 import type { ReviewDoc } from "../messages";
 import { Instruments } from "../fly/Instruments";
 import { MissionAhead } from "../obstacles/MissionAhead";
+import { Looking } from "../obstacles/Looking";
 import { Sensors } from "../obstacles/Sensors";
 import { ROWS, TrackList } from "../tracks/TrackList";
 import { review } from "../store/review";
@@ -84,6 +85,7 @@ function FlightsRight() {
           <TrackList source="replay" rows={ROWS.narrow} />
           <MissionAhead source="replay" />
           <Sensors source="replay" />
+          <Looking source="replay" />
         </div>
         <div class="part part-figures">
           <Figures review={open} />

@@ -12,6 +12,7 @@ type Layer =
   | "show_radar_map"
   | "show_vision_map"
   | "show_vision_flight"
+  | "show_cloud"
   | "show_explained"
   | "show_regions"
   | "show_tracks";
@@ -46,6 +47,11 @@ const KEYS: readonly Key[] = [
     sensor: "vision",
     map: "vision_flight",
   },
+  {
+    layer: "show_cloud",
+    label: "Points",
+    title: "The camera's newest points, 4,000 at most, twice a second",
+  },
   { layer: "show_explained", label: "Known ground", title: "Seen, and known from the surface model" },
   {
     layer: "show_regions",
@@ -60,6 +66,7 @@ const KEYS: readonly Key[] = [
 ];
 
 const SWATCHES: Partial<Record<Layer, string>> = {
+  show_cloud: "points",
   show_explained: "explained",
   show_regions: "region",
 };

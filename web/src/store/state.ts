@@ -33,6 +33,7 @@ export const view = signal<ViewDoc>({
   show_radar_map: true,
   show_vision_map: true,
   show_vision_flight: false,
+  show_cloud: false,
   show_explained: false,
   show_regions: true,
   show_tracks: true,
