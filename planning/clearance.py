@@ -40,7 +40,7 @@ from planning.certificate.reasons import (
 from planning.certificate.returns import return_altitude
 from planning.certificate.threads import threads_for
 from planning.certificate.unjudged import unjudged_reasons
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError, ParameterError
 from planning.model import (
     Certificate,
@@ -69,7 +69,7 @@ def certify(
     line: FlownLine,
     params: ClearanceParams,
     *,
-    ground: Dsm | None = None,
+    ground: SurfaceModel | None = None,
     trend_step_m: float = 1.0,
     assumptions: dict[str, object] | None = None,
 ) -> Certificate:
@@ -77,6 +77,7 @@ def certify(
 
     ``ground`` is the model before its small holes were filled, if it had any: home and landing are judged on it,
     for a filled hole has the height of its rim's highest cell, maybe a wall's, and heights would be counted from it.
+    It may be the whole of a model of which ``dsm`` is a part: a better home is looked for farther around.
     ``assumptions`` are added to those written down here. Distances are exact to the rounding of float64.
     Raises ParameterError on a clearance, radius or step that is no positive number and MissionError on
     a line with a point that is not finite.
@@ -87,7 +88,9 @@ def certify(
     return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))
 
 
-def _judged(dsm: Dsm, ground: Dsm, line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Certificate:
+def _judged(
+    dsm: Dsm, ground: SurfaceModel, line: FlownLine, params: ClearanceParams, trend_step_m: float
+) -> Certificate:
     pyramid = cells_pyramid(dsm.cells)
     points_m = dsm.cells.layout.in_frame(line.points_m)
     start_m, end_m = points_m[:-1], points_m[1:]
@@ -250,7 +253,7 @@ def _with_distance(stand: HomeStand, nearest: LegClearance) -> HomeStand:
     return replace(stand, min_distance_m=nearest.min_distance_m) if math.isfinite(stand.drop_m) else stand
 
 
-def _landing_obstacle(ground: Dsm, line: FlownLine, params: ClearanceParams) -> str | None:
+def _landing_obstacle(ground: SurfaceModel, line: FlownLine, params: ClearanceParams) -> str | None:
     if line.landing_xy_m is None or line.landing_xy_m == line.home_xy_m:
         return None
     return ground_at(ground, line.landing_xy_m, params).obstacle

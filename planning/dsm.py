@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -19,8 +21,81 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
+class SurfaceModel(ABC):
+    """Where a surface model lies, and how to look at a part of it: in memory (``Dsm``) or still in its file."""
+
+    __slots__ = ()
+
+    transform: Affine
+    crs: CRS
+    vertical_datum: str | None
+    sha256: str
+
+    @property
+    @abstractmethod
+    def height_px(self) -> int: ...
+
+    @property
+    @abstractmethod
+    def width_px(self) -> int: ...
+
+    @abstractmethod
+    def window(self, row0: int, col0: int, height_px: int, width_px: int) -> Dsm:
+        """The part of the model that starts at (row0, col0), clipped to it; ParameterError where none is left."""
+
+    @abstractmethod
+    def whole(self) -> Dsm:
+        """All of it."""
+
+    @abstractmethod
+    def elevation_at(self, xy_m: F64) -> F64:
+        """Elevation of the (source) cell that holds each projected point (N, 2); NaN outside or unknown."""
+
+    def around(self, xy_m: F64, margin_m: float) -> Dsm:
+        """The part within ``margin_m`` of the bounding box of projected (N, 2) points; the nearest cell at least."""
+        return self.window(*self.box_around(xy_m, margin_m))
+
+    def box_around(self, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:
+        """First row, first column, rows and columns of that part."""
+        rows, columns = self.fractional_cell(np.array([xy_m.min(axis=0) - margin_m, xy_m.max(axis=0) + margin_m]))
+        (row0, row1), (column0, column1) = _inside(rows, self.height_px), _inside(columns, self.width_px)
+        return row0, column0, row1 - row0, column1 - column0
+
+    @property
+    def resolution_m(self) -> float:
+        return float(self.transform.a)
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """(west, south, east, north) of the outer cell edges, projected metres."""
+        west, north = self.transform.c, self.transform.f
+        return (
+            west,
+            north - self.height_px * self.resolution_m,
+            west + self.width_px * self.resolution_m,
+            north,
+        )
+
+    def fractional_cell(self, xy_m: F64) -> tuple[F64, F64]:
+        """Projected (N, 2) metres -> (rows, columns) float; k + 0.5 is the centre of cell k."""
+        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        return (self.transform.f - xy[:, 1]) / self.resolution_m, (xy[:, 0] - self.transform.c) / self.resolution_m
+
+    def lat_lon_from_xy(self, xy_m: F64) -> F64:
+        """Projected (N, 2) metres -> WGS84 (N, 2) latitude, longitude in degrees."""
+        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        lon, lat = _transformer(self.crs.to_wkt(), inverse=True).transform(xy[:, 0], xy[:, 1])
+        return np.column_stack([lat, lon])
+
+    def xy_from_lat_lon(self, lat_lon_deg: F64) -> F64:
+        """WGS84 (N, 2) latitude, longitude in degrees -> projected (N, 2) metres; inf where undefined."""
+        ll = np.asarray(lat_lon_deg, dtype=np.float64).reshape(-1, 2)
+        x, y = _transformer(self.crs.to_wkt(), inverse=False).transform(ll[:, 1], ll[:, 0])
+        return np.column_stack([x, y])
+
+
 @dataclass(frozen=True, slots=True)
-class Dsm:
+class Dsm(SurfaceModel):
     """A digital surface model (DSM).
 
     Heights are in the model's own vertical datum (``alt_dsm_m`` throughout the code); only
@@ -59,26 +134,6 @@ class Dsm:
         return self.elevation_m.shape[1]
 
     @property
-    def resolution_m(self) -> float:
-        return float(self.transform.a)
-
-    @property
-    def bounds_m(self) -> tuple[float, float, float, float]:
-        """(west, south, east, north) of the outer cell edges, projected metres."""
-        west, north = self.transform.c, self.transform.f
-        return (
-            west,
-            north - self.height_px * self.resolution_m,
-            west + self.width_px * self.resolution_m,
-            north,
-        )
-
-    def fractional_cell(self, xy_m: F64) -> tuple[F64, F64]:
-        """Projected (N, 2) metres -> (rows, columns) float; k + 0.5 is the centre of cell k."""
-        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
-        return (self.transform.f - xy[:, 1]) / self.resolution_m, (xy[:, 0] - self.transform.c) / self.resolution_m
-
-    @property
     def cells(self) -> Cells:
         """The cells that the heights were measured in, as they lie on the ground: what clearance is proved against."""
         if self.source is not None:
@@ -86,7 +141,6 @@ class Dsm:
         return square_cells(self.elevation_m, self.resolution_m, (self.transform.c, self.transform.f))
 
     def elevation_at(self, xy_m: F64) -> F64:
-        """Elevation of the (source) cell that holds each projected point (N, 2); NaN outside or unknown."""
         if self.source is not None:
             return self.source.elevation_at(xy_m)
         row_f, col_f = self.fractional_cell(xy_m)
@@ -110,8 +164,11 @@ class Dsm:
         source = self.source.with_elevation(elevation_m)
         return replace(self, source=source, elevation_m=squares(source, self.transform, self.elevation_m.shape))
 
+    def whole(self) -> Dsm:
+        return self
+
     def window(self, row0: int, col0: int, height_px: int, width_px: int) -> Dsm:
-        """The part of the model that starts at (row0, col0); clipped to the model, no copy of the grid."""
+        """No copy of the grid."""
         r0, c0 = max(0, row0), max(0, col0)
         r1, c1 = min(self.height_px, row0 + height_px), min(self.width_px, col0 + width_px)
         if r0 >= r1 or c0 >= c1:
@@ -122,17 +179,11 @@ class Dsm:
             source = source.around(np.array(low), np.array(high))
         return replace(self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=transform, source=source)
 
-    def lat_lon_from_xy(self, xy_m: F64) -> F64:
-        """Projected (N, 2) metres -> WGS84 (N, 2) latitude, longitude in degrees."""
-        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
-        lon, lat = _transformer(self.crs.to_wkt(), inverse=True).transform(xy[:, 0], xy[:, 1])
-        return np.column_stack([lat, lon])
 
-    def xy_from_lat_lon(self, lat_lon_deg: F64) -> F64:
-        """WGS84 (N, 2) latitude, longitude in degrees -> projected (N, 2) metres; inf where undefined."""
-        ll = np.asarray(lat_lon_deg, dtype=np.float64).reshape(-1, 2)
-        x, y = _transformer(self.crs.to_wkt(), inverse=False).transform(ll[:, 1], ll[:, 0])
-        return np.column_stack([x, y])
+def _inside(places: F64, count: int) -> tuple[int, int]:
+    """First and past-the-last of ``count`` cells that an interval touches; the nearest one when it touches none."""
+    first, last = (min(max(math.floor(place), 0), count - 1) for place in (places.min(), places.max()))
+    return first, last + 1
 
 
 @lru_cache(maxsize=32)

@@ -10,7 +10,7 @@ import numpy as np
 
 from planning.camera import gsd_cm
 from planning.clearance import certificate_json
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
 from planning.plan import Plan, plan_trade
 from planning.report import ReportInput, TradeRow, render_report
@@ -28,7 +28,9 @@ FILES = (
 )
 
 
-def export_file(name: str, plan: Plan, source: Dsm, *, title: str, created_utc: str, seconds: dict[str, float]) -> str:
+def export_file(
+    name: str, plan: Plan, source: SurfaceModel, *, title: str, created_utc: str, seconds: dict[str, float]
+) -> str:
     """One of ``FILES`` as text; ``source`` is the surface model as read."""
     writers: dict[str, Callable[[], str]] = {
         "trajectory.csv": lambda: trajectory_csv.write_trajectory(plan.path, plan.timing, plan.mission.home, plan.dsm),

@@ -6,7 +6,6 @@ Decoding happens in a confined child process (``planning.rasters``); what comes 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from secrets import token_hex
@@ -22,25 +21,23 @@ from planning.errors import ParameterError, RasterError
 from planning.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
 from planning.rasters import georef, sandbox
 from planning.rasters.assemble import ReadReport, assemble
+from planning.rasters.dsm_file import DsmFile
 from planning.rasters.header import RasterHeader, check_georeference, check_size
-from planning.rasters.heights import HeightStats
 from planning.rasters.limits import RasterLimits
-from planning.rasters.magic import driver_of
-from planning.rasters.surface_plan import SurfacePlan, plan_surface
+from planning.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
 from planning.spikes import find_spikes
 from planning.spikes import remove_spikes as without_spikes
 
 __all__ = [
+    "DsmFile",
     "RasterLimits",
     "ReadReport",
+    "open_dsm",
     "read_dsm",
     "read_dsm_reported",
     "read_orthophoto",
     "write_dsm",
 ]
-
-Progress = Callable[[str, float], None]
-"""Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
 
 
 def read_dsm(
@@ -54,7 +51,7 @@ def read_dsm(
     progress: Progress | None = None,
 ) -> Dsm:
     """A surface model in metres from a GeoTIFF or ESRI ASCII grid; see ``read_dsm_reported``."""
-    dsm, _ = _read(path, crs, z_scale, vertical_datum, limits or RasterLimits(), progress)
+    dsm, _ = _read(path, _declared(crs, z_scale, vertical_datum, limits), progress)
     return without_spikes(dsm, find_spikes(dsm)) if remove_spikes else dsm
 
 
@@ -77,11 +74,24 @@ def read_dsm_reported(
     for whatever must be exact (``Dsm.cells``). ``progress`` may raise to cancel.
     Raises a RasterError that says what to do.
     """
-    dsm, report = _read(path, crs, z_scale, vertical_datum, limits or RasterLimits(), progress)
+    dsm, report = _read(path, _declared(crs, z_scale, vertical_datum, limits), progress)
     spikes = find_spikes(dsm, progress=(lambda share: progress("spikes", share)) if progress else None)
     if remove_spikes:
         dsm = without_spikes(dsm, spikes)
     return dsm, replace(report, spikes=spikes, spikes_removed=remove_spikes and bool(spikes))
+
+
+def open_dsm(
+    path: str | os.PathLike[str],
+    *,
+    crs: str | None = None,
+    z_scale: float | None = None,
+    vertical_datum: str | None = None,
+    limits: RasterLimits | None = None,
+    progress: Progress | None = None,
+) -> DsmFile:
+    """The surface model of ``read_dsm``, of a large file only the parts that are asked for; isolated spikes stay."""
+    return DsmFile(Path(path), _declared(crs, z_scale, vertical_datum, limits), progress)
 
 
 def read_orthophoto(
@@ -110,7 +120,7 @@ def read_orthophoto(
         return plans[0].order()
 
     with sandbox.private_directory() as directory:
-        job = _job("read_picture", source, directory)
+        job = raster_job("read_picture", source, directory)
         sandbox.run_job(job, directory=directory, limits=limits, where=source.name, on_header=order, progress=progress)
         rgba = np.fromfile(job["target"], dtype=np.uint8).reshape(*plans[0].out_shape, 4)
     return drape(rgba, plans[0])
@@ -140,42 +150,19 @@ def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
             written.unlink(missing_ok=True)
 
 
-def _read(
-    path: str | os.PathLike[str],
-    crs: str | None,
-    z_scale: float | None,
-    vertical_datum: str | None,
-    limits: RasterLimits,
-    progress: Progress | None,
-) -> tuple[Dsm, ReadReport]:
+def _declared(
+    crs: str | None, z_scale: float | None, vertical_datum: str | None, limits: RasterLimits | None
+) -> Declared:
     if z_scale is not None and not (np.isfinite(z_scale) and z_scale > 0):
         raise ParameterError(f"The height scale must be greater than 0, got {z_scale}.", where="z_scale")
+    return Declared(crs, z_scale, vertical_datum, limits or RasterLimits())
+
+
+def _read(path: str | os.PathLike[str], declared: Declared, progress: Progress | None) -> tuple[Dsm, ReadReport]:
     source = Path(path)
-    plans: list[SurfacePlan] = []
-
-    def order(fields: dict[str, Any]) -> dict[str, Any]:
-        header = RasterHeader.from_json(fields)
-        declared = {"crs": crs, "z_scale": z_scale, "vertical_datum": vertical_datum}
-        plans.append(plan_surface(header, **declared, limits=limits, where=source.name))
-        return {}
-
-    with sandbox.private_directory() as directory:
-        job = _job("read_grid", source, directory)
-        answer = sandbox.run_job(
-            job, directory=directory, limits=limits, where=source.name, on_header=order, progress=progress
-        )
-        shape = (plans[0].header.height_px, plans[0].header.width_px)
-        stored = np.memmap(job["target"], dtype=np.float32, mode="r+", shape=shape)
-    # The file's name is gone with the directory; its pages live on while they are mapped.
-    stats = HeightStats.from_json(answer["stats"])
-    return assemble(np.asarray(stored), plans[0], stats, sha256=answer["sha256"], where=source.name, progress=progress)
-
-
-def _job(name: str, source: Path, directory: Path) -> dict[str, Any]:
-    driver = driver_of(source)
-    link = directory / token_hex(8)
-    link.symlink_to(source.resolve())
-    return {"job": name, "driver": driver, "source": str(link), "target": str(directory / token_hex(8))}
+    read = read_surface(source, declared, all_of, first_look=True, progress=progress)
+    assert read.stored is not None
+    return assemble(read.stored, read.plan, read.stats, sha256=read.sha256, where=source.name, progress=progress)
 
 
 def _compound(crs: CRS, vertical_datum: str | None) -> CRS:

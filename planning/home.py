@@ -9,7 +9,7 @@ from pyproj import Geod
 
 from planning.certificate.home_stand import better_home, ground_at
 from planning.certificate.reasons import direction
-from planning.dsm import Dsm, is_amsl
+from planning.dsm import Dsm, SurfaceModel, is_amsl
 from planning.errors import DatumError, MissionError, PoiError
 from planning.mission_items import FRAME_AMSL, FRAME_RELATIVE, Heights
 from planning.model import BetterHome, ClearanceParams, Home, MissionParams, SampledPath
@@ -19,7 +19,7 @@ HOME_DECIMALS = 9
 """As files carry degrees: home's height is taken where they say it is."""
 
 
-def home_from_dsm(dsm: Dsm, lat_lon_deg: tuple[float, float]) -> Home:
+def home_from_dsm(dsm: SurfaceModel, lat_lon_deg: tuple[float, float]) -> Home:
     """Home on the surface model's ground. Raises ``PoiError`` off the model or on unknown terrain."""
     lat_deg, lon_deg = lat_lon_deg
     alt_m = math.nan
@@ -35,7 +35,7 @@ def home_from_dsm(dsm: Dsm, lat_lon_deg: tuple[float, float]) -> Home:
 
 
 def default_home(
-    ground: Dsm, first_lat_lon_deg: tuple[float, float], params: ClearanceParams, *, most_drop_m: float
+    ground: SurfaceModel, first_lat_lon_deg: tuple[float, float], params: ClearanceParams, *, most_drop_m: float
 ) -> tuple[Home, str]:
     """Home at the first point of interest, or at the nearest place where a vehicle can start; and why not at it.
 
@@ -54,7 +54,7 @@ def default_home(
     return home_there(ground, better), why
 
 
-def home_there(ground: Dsm, better: BetterHome) -> Home:
+def home_there(ground: SurfaceModel, better: BetterHome) -> Home:
     """Home at a place that was found to do."""
     return home_from_dsm(ground, (round(better.lat_deg, HOME_DECIMALS), round(better.lon_deg, HOME_DECIMALS)))
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from affine import Affine
 
-from planning.dsm import F64, Dsm
+from planning.dsm import F64, Dsm, SurfaceModel
+from planning.holes import HoleReport, fill_holes
 from planning.model import Certificate, FlownLine
 from planning.request import PlanRequest
 
@@ -15,55 +19,155 @@ LARGE_PX = 4_000_000
 MARGIN_M = 10.0
 """Around the points, beside what the ball and the Gaussian reach."""
 GROWTH = 3.0
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A part of a surface model, or all of it, before and after its small holes were filled."""
+
+    dsm: Dsm
+    """As it came: a filled hole has its rim's height, and every altitude would be counted from it."""
+    filled: Dsm
+    holes: HoleReport
+    max_hole_m2: float
+
+
+class Grounds:
+    """Parts of one model; the last is kept."""
+
+    def __init__(self, model: SurfaceModel, max_hole_m2: float) -> None:
+        self.model = model
+        self._max_hole_m2 = max_hole_m2
+        self._last: Ground | None = None
+
+    def around(self, xy_m: F64, margin_m: float) -> Ground:
+        """Of what lies within ``margin_m`` of the bounding box of projected (N, 2) points."""
+        box = _needed_box(self.model, xy_m, margin_m)
+        last = self._last
+        if last is None or not _is_box(last.dsm, self.model, box):
+            dsm = _part(self.model, box)
+            filled, holes = fill_holes(dsm, max_area_m2=self._max_hole_m2)
+            last = self._last = Ground(dsm, filled, holes, self._max_hole_m2)
+        return last
+
+    def judged(
+        self, xy_m: F64, margin_m: float, judge: Callable[[Ground], T], is_enough: Callable[[Ground, T], bool]
+    ) -> T:
+        """What ``judge`` makes of a part that grows until it is enough, or the whole model."""
+        while True:
+            ground = self.around(xy_m, margin_m)
+            found = judge(ground)
+            if _is_whole(ground.dsm, self.model) or is_enough(ground, found):
+                return found
+            margin_m *= GROWTH
+
+
+def felt_m(request: PlanRequest) -> float:
+    """How far beside a place the safe surface over it feels the model, the blocks of the fast form included."""
+    surface = request.surface
+    sigma_m = surface.radius_m / 10 if surface.smooth_sigma_m is None else surface.smooth_sigma_m
+    return 1.5 * surface.radius_m + 5.0 * sigma_m + surface.height_m
 
 
 def least_margin_m(request: PlanRequest) -> float:
     """Beyond the points' bounding box: what the safe surface feels, and where the certificate should find ground."""
-    surface = request.surface
-    sigma_m = surface.radius_m / 10 if surface.smooth_sigma_m is None else surface.smooth_sigma_m
-    felt_m = 1.5 * surface.radius_m + 5.0 * sigma_m + surface.height_m  # with the blocks of the fast form
-    return felt_m + request.clearance().required_clearance_m + MARGIN_M
+    return felt_m(request) + request.clearance().required_clearance_m + MARGIN_M
 
 
-def needed_part(dsm: Dsm, xy_m: F64, margin_m: float) -> Dsm:
-    """The model within ``margin_m`` of the bounding box of projected (N, 2) points; whole where that saves little."""
-    if dsm.elevation_m.size < LARGE_PX or not np.isfinite(xy_m).all():
-        return dsm
-    rows, columns = dsm.fractional_cell(np.array([xy_m.min(axis=0) - margin_m, xy_m.max(axis=0) + margin_m]))
-    row0, column0 = max(0, int(rows.min())), max(0, int(columns.min()))
-    row1, column1 = min(dsm.height_px, int(rows.max()) + 1), min(dsm.width_px, int(columns.max()) + 1)
-    if row0 >= row1 or column0 >= column1 or (row1 - row0) * (column1 - column0) > dsm.elevation_m.size / 2:
-        return dsm
-    part = dsm.window(row0, column0, row1 - row0, column1 - column0)
-    return replace(part, elevation_m=np.ascontiguousarray(part.elevation_m))
+def needed_part(model: SurfaceModel, xy_m: F64, margin_m: float) -> Dsm:
+    """The model within ``margin_m`` of the bounding box of projected (N, 2) points; whole where that saves little.
+
+    Points outside the model need nothing of it.
+    """
+    return _part(model, _needed_box(model, xy_m, margin_m))
 
 
-def was_enough(part: Dsm, whole: Dsm, line: FlownLine, certificate: Certificate) -> bool:
+def was_enough(
+    ground: Ground, model: SurfaceModel, line: FlownLine, certificate: Certificate, *, felt_m: float = 0.0
+) -> bool:
     """Whether the certificate over the part is the one over the whole model.
 
     All ground beyond the part counts as infinitely high. Nothing that was found is as far as that, so nothing
-    that was found is there, and nothing beyond it could be nearer.
+    that was found is there, and nothing beyond it could be nearer. A small hole that the part cuts is not filled in
+    it: all that is found, and all that the path felt, is nearer than such holes, too.
     """
-    if part is whole:
+    if _is_whole(ground.dsm, model):
         return True
-    to_cut_m = _to_cut_m(part, whole, np.vstack([line.points_m[:, :2], [line.home_xy_m]]))
+    to_cut_m = _to_cut_m(ground.dsm, model, np.vstack([line.points_m[:, :2], [line.home_xy_m]]))
     found_m = max(
         float(certificate.trend_distance_m.max()),
         *(leg.min_distance_m for leg in certificate.legs),
         certificate.required_clearance_m,
+        felt_m,
     )
-    return found_m < to_cut_m
+    return found_m < to_cut_m - _cut_holes_m(ground, model)
 
 
-def _to_cut_m(part: Dsm, whole: Dsm, xy_m: F64) -> float:
-    """Smallest distance of any point between projected (N, 2) points to where the part was cut off."""
-    (west, south, east, north), outer = part.bounds_m, whole.bounds_m
+def _needed_box(model: SurfaceModel, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:
+    """First row, first column, rows and columns."""
+    whole = (0, 0, model.height_px, model.width_px)
+    if model.height_px * model.width_px < LARGE_PX:
+        return whole
+    west, south, east, north = model.bounds_m
+    inside = xy_m[((xy_m >= (west, south)) & (xy_m <= (east, north))).all(axis=1)]
+    if not len(inside):
+        return 0, 0, 1, 1
+    box = model.box_around(inside, margin_m)
+    return whole if box[2] * box[3] > model.height_px * model.width_px / 2 else box
+
+
+def _part(model: SurfaceModel, box: tuple[int, int, int, int]) -> Dsm:
+    if box == (0, 0, model.height_px, model.width_px):
+        return model.whole()
+    part = model.window(*box)
+    return replace(part, elevation_m=np.ascontiguousarray(part.elevation_m))
+
+
+def _is_box(part: Dsm, model: SurfaceModel, box: tuple[int, int, int, int]) -> bool:
+    row, column = (round(float(place[0])) for place in model.fractional_cell(np.array([part.transform @ (0, 0)])))
+    return (row, column, part.height_px, part.width_px) == box
+
+
+def _is_whole(part: Dsm, model: SurfaceModel) -> bool:
+    return (part.height_px, part.width_px) == (model.height_px, model.width_px)
+
+
+def _cuts(part: Dsm, model: SurfaceModel) -> tuple[bool, bool, bool, bool]:
+    """Whether the part was cut off at its west, south, east and north."""
     half_m = 0.5 * part.resolution_m
+    west, south, east, north = (
+        abs(inner - outer) > half_m for inner, outer in zip(part.bounds_m, model.bounds_m, strict=True)
+    )
+    return west, south, east, north
+
+
+def _to_cut_m(part: Dsm, model: SurfaceModel, xy_m: F64) -> float:
+    """Smallest distance of any point between projected (N, 2) points to where the part was cut off."""
+    west, south, east, north = part.bounds_m
     low, high = xy_m.min(axis=0), xy_m.max(axis=0)
-    cuts = [
-        (abs(west - outer[0]) > half_m, low[0] - west),
-        (abs(south - outer[1]) > half_m, low[1] - south),
-        (abs(east - outer[2]) > half_m, east - high[0]),
-        (abs(north - outer[3]) > half_m, north - high[1]),
-    ]
-    return float(min((away_m for is_cut, away_m in cuts if is_cut), default=np.inf))
+    away_m = (low[0] - west, low[1] - south, east - high[0], north - high[1])
+    cuts = zip(_cuts(part, model), away_m, strict=True)
+    return float(min((m for is_cut, m in cuts if is_cut), default=np.inf))
+
+
+def _cut_holes_m(ground: Ground, model: SurfaceModel) -> float:
+    """How far holes reach into the part that it cuts and that may be small enough to be filled in the whole model."""
+    cells = ground.filled.cells
+    heights, (west, south, east, north) = cells.elevation_m, _cuts(ground.dsm, model)
+    if ground.dsm.source is not None:  # its ring of unknown cells is the part's own; any side may be a cut
+        heights, (west, south, east, north) = heights[1:-1, 1:-1], (True,) * 4
+    # Holes that end at a cut are filled when what lies beyond is known: then they are small so far.
+    beyond = np.pad(heights, ((int(north), int(south)), (int(west), int(east))), constant_values=0.0)
+    side_m = float(np.sqrt(cells.area_m2))
+    stand_in = Dsm(beyond, Affine.scale(side_m, -side_m), ground.dsm.crs, None, "")
+    closed, found = fill_holes(stand_in, max_area_m2=ground.max_hole_m2)
+    if not found.count:
+        return 0.0
+    inner = closed.elevation_m[int(north) : int(north) + heights.shape[0], int(west) : int(west) + heights.shape[1]]
+    row, column = np.nonzero(np.isnan(heights) & ~np.isnan(inner))
+    height_px, width_px = heights.shape
+    sides = ((north, row + 1), (south, height_px - row), (west, column + 1), (east, width_px - column))
+    deep_px = np.min([away for is_cut, away in sides if is_cut], axis=0)
+    lattice = cells.layout.lattice
+    return float(deep_px.max()) * max(lattice.width_m, lattice.height_m)

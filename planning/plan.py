@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.certificate.home_search import FARTHEST_M
 from planning.certificate.home_stand import DROP_M
+from planning.certify_part import hole_assumptions
 from planning.clearance import certify
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError
 from planning.feasibility import Feasibility, feasibility_of, photos_row
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
-from planning.holes import HoleReport, fill_holes
+from planning.holes import HoleReport
 from planning.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.margins.words import uncovered_words
 from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
@@ -37,7 +37,7 @@ from planning.model import (
     Timing,
     VehicleProfile,
 )
-from planning.part import GROWTH, least_margin_m, needed_part, was_enough
+from planning.part import Ground, Grounds, felt_m, least_margin_m, was_enough
 from planning.path import MIN_SEGMENT_M, sampled_path
 from planning.poi import check_pois
 from planning.request import PlanRequest, check_request, check_size, effective_profile
@@ -59,8 +59,10 @@ class Plan:
     """A finished plan: what was asked, what was made of it, and the proof."""
 
     request: PlanRequest
+    ground: Dsm
+    """The surface model, or the part of a large one that the plan needs."""
     dsm: Dsm
-    """The surface model, or the part of a large one that the plan needs, with its small holes filled."""
+    """The same with its small holes filled."""
     surfaces: Surfaces
     path: SampledPath
     timing: Timing
@@ -80,7 +82,7 @@ class Plan:
 
 
 def plan_mission(
-    dsm: Dsm,
+    model: SurfaceModel,
     request: PlanRequest,
     *,
     report: Progress = lambda step, share: None,
@@ -94,38 +96,18 @@ def plan_mission(
     too close to the ground is returned with a certificate that says so.
     """
     check_request(request)
-    check_size(request, dsm)
-    if request.survey is not None:  # its photos see ground far from its lines
-        return _planned_over(dsm, request, report, assumptions or {})
-    points_xy_m = _points(dsm, request)
-    margin_m = least_margin_m(request)
-    while True:
-        part = needed_part(dsm, points_xy_m, margin_m)
-        plan = _planned_over(part, request, report, assumptions or {})
-        home_settled = margin_m >= FARTHEST_M or (plan.certificate.certified and _is_home_as_asked(plan))
-        if part is dsm or (home_settled and was_enough(part, dsm, plan.line, plan.certificate)):
-            return plan
-        margin_m *= GROWTH
-
-
-def _is_home_as_asked(plan: Plan) -> bool:
-    """Whether no place for home was looked for, which may lie beyond the part."""
-    first = plan.request.home_lat_lon_deg or (plan.request.pois[0].lat_deg, plan.request.pois[0].lon_deg)
-    home = plan.mission.home
-    return (home.lat_deg, home.lon_deg) == tuple(round(degrees, HOME_DECIMALS) for degrees in first)
-
-
-def _planned_over(dsm: Dsm, request: PlanRequest, report: Progress, assumptions: Mapping[str, object]) -> Plan:
+    check_size(request, model)
     report(SURFACE_STEP, 0.0)
-    filled, holes = fill_holes(dsm, max_area_m2=request.surface.fill_hole_area_m2)
-    check_pois(request.pois, filled)
-    job = _Job(request, dsm, filled, holes, report, assumptions)
-    home, why = _home(dsm, request)
-    plan = _planned(job, home, why)
+    grounds = Grounds(model, request.surface.fill_hole_area_m2)
+    first = grounds.around(_points(model, request), least_margin_m(request))
+    check_pois(request.pois, first.filled, bounds_m=model.bounds_m)
+    job = _Job(request, grounds, report, assumptions or {})
+    home, why = _home(model, request)
+    plan = _planned_from(job, home, why)
     better = _better_default(plan)
     if better is None:
         return plan
-    return _planned(job, home_there(dsm, better), why or "a vehicle may stand too low for the line's clearance")
+    return _planned_from(job, home_there(model, better), why or "a vehicle may stand too low for the line's clearance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,17 +115,31 @@ class _Job:
     """What stays the same wherever home is put."""
 
     request: PlanRequest
-    dsm: Dsm
-    """As it came: a filled hole has its rim's height, and every altitude would be counted from it."""
-    filled: Dsm
-    holes: HoleReport
+    grounds: Grounds
     report: Progress
     assumptions: Mapping[str, object]
 
+    @property
+    def model(self) -> SurfaceModel:
+        return self.grounds.model
 
-def _planned(job: _Job, home: Home, why_moved: str) -> Plan:
+
+def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
     """``why_moved``: what is wrong with home at the first point; empty when it is there or was given."""
-    request, filled, holes = job.request, job.filled, job.holes
+    model, request = job.model, job.request
+    points_xy_m = np.vstack([_points(model, request), model.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))])
+    feels_m = felt_m(request)
+
+    def is_enough(ground: Ground, plan: Plan) -> bool:
+        return was_enough(ground, model, plan.line, plan.certificate, felt_m=feels_m)
+
+    return job.grounds.judged(
+        points_xy_m, least_margin_m(request), lambda ground: _planned(job, ground, home, why_moved), is_enough
+    )
+
+
+def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
+    request, filled, holes = job.request, ground.filled, ground.holes
     first = request.pois[0]
     home_notes = [moved_note((first.lat_deg, first.lon_deg), home, why_moved)] if why_moved else []
     vertices_xy_m, vertex_poi = _vertices(filled, request, home)
@@ -153,18 +149,19 @@ def _planned(job: _Job, home: Home, why_moved: str) -> Plan:
     path = sampled_path(filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path)
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
-    built = _mission(job, profile, path, home)
+    built = _mission(job, filled, profile, path, home)
     built = replace(
-        built, mission=replace(built.mission, planned_for=request.planned_for, surface_sha256=job.dsm.sha256)
+        built, mission=replace(built.mission, planned_for=request.planned_for, surface_sha256=job.model.sha256)
     )
     job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}
-    certificate = certify(filled, line, request.clearance(), ground=job.dsm, assumptions=assumed)
+    certificate = certify(filled, line, request.clearance(), ground=job.model, assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
     coverage = _coverage(filled, request, line)
     return Plan(
         request=request,
+        ground=ground.dsm,
         dsm=filled,
         surfaces=surfaces,
         path=path,
@@ -234,14 +231,15 @@ def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, t
     return np.vstack([home_xy, xy_m]), (None, *poi_index)
 
 
-def _points(dsm: Dsm, request: PlanRequest) -> np.ndarray:
-    """(N, 2) projected places that were asked for, home among them where it was given."""
+def _points(model: SurfaceModel, request: PlanRequest) -> np.ndarray:
+    """(N, 2) projected places that were asked for, home among them where it was given, and a survey's area."""
     places = [(poi.lat_deg, poi.lon_deg) for poi in request.pois]
     home = [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else []
-    return dsm.xy_from_lat_lon(np.array([*places, *home]))
+    area = [] if request.survey is None else request.survey.polygon_lat_lon_deg
+    return model.xy_from_lat_lon(np.array([*places, *home, *area]))
 
 
-def _home(dsm: Dsm, request: PlanRequest) -> tuple[Home, str]:
+def _home(model: SurfaceModel, request: PlanRequest) -> tuple[Home, str]:
     """Home, and why it is not at the first point, where it was chosen.
 
     Rounded as files carry it, before its height is taken: at a cell's edge the rounding may change the cell.
@@ -249,8 +247,8 @@ def _home(dsm: Dsm, request: PlanRequest) -> tuple[Home, str]:
     lat_deg, lon_deg = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
     place = (round(lat_deg, HOME_DECIMALS), round(lon_deg, HOME_DECIMALS))
     if request.home_lat_lon_deg is not None:
-        return home_from_dsm(dsm, place), ""
-    return default_home(dsm, place, request.clearance(), most_drop_m=_expected_spare_m(request))
+        return home_from_dsm(model, place), ""
+    return default_home(model, place, request.clearance(), most_drop_m=_expected_spare_m(request))
 
 
 def _expected_spare_m(request: PlanRequest) -> float:
@@ -263,9 +261,9 @@ def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.nd
     return np.array([0.0 if i is None else request.pois[i].loiter_s for i in vertex_poi])
 
 
-def _mission(job: _Job, profile: VehicleProfile, path: SampledPath, home: Home) -> BuiltMission:
+def _mission(job: _Job, dsm: Dsm, profile: VehicleProfile, path: SampledPath, home: Home) -> BuiltMission:
     """Items of the mission; a landing at home first learns how high the way back must be."""
-    request, dsm = job.request, job.filled
+    request = job.request
 
     def build(params: MissionParams, needed_m: float | None = None) -> BuiltMission:
         return build_mission(path, home, params, profile, dsm, request.pois, rtl_height_needed_m=needed_m)
@@ -273,13 +271,8 @@ def _mission(job: _Job, profile: VehicleProfile, path: SampledPath, home: Home) 
     if request.mission.end == "rtl" or request.mission.land_transit_height_m is not None:
         return build(request.mission)
     scout = build(replace(request.mission, end="rtl")).mission
-    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance(), ground=job.dsm).rtl_height_needed_m
+    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance(), ground=job.model).rtl_height_needed_m
     return build(request.mission, needed_m if math.isfinite(needed_m) else profile.rtl_height_m)
-
-
-def hole_assumptions(holes: HoleReport, max_hole_m2: float) -> dict[str, object]:
-    """What a certificate writes down about unknown cells that were given a height."""
-    return {"holes_filled": holes.count, "holes_filled_area_m2": holes.area_m2, "max_hole_m2": max_hole_m2}
 
 
 def _assumptions(request: PlanRequest, surfaces: Surfaces, holes: HoleReport) -> dict[str, object]:

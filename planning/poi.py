@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.errors import PoiError
 from planning.model import F64, Poi
 from planning.visiting_order import shortest_order
@@ -15,20 +15,31 @@ from planning.visiting_order import shortest_order
 __all__ = ["check_pois", "shortest_order"]
 
 MIN_APART_M = 0.1
+Bounds = tuple[float, float, float, float]
+"""West, south, east, north; projected metres."""
 
 
-def check_pois(pois: Sequence[Poi], dsm: Dsm, surface: Dsm | None = None, *, at_least: int = 2) -> F64:
+def check_pois(
+    pois: Sequence[Poi],
+    dsm: SurfaceModel,
+    surface: Dsm | None = None,
+    *,
+    at_least: int = 2,
+    bounds_m: Bounds | None = None,
+) -> F64:
     """Projected metres (N, 2) of the points, or ``PoiError`` listing every problem at once.
 
-    With ``surface`` a point must also lie where the safe surface is known.
+    With ``surface`` a point must also lie where the safe surface is known. ``bounds_m`` are those of the whole model
+    where ``dsm`` is a part of it.
     """
+    bounds = bounds_m or dsm.bounds_m
     problems = [] if len(pois) >= at_least else [_too_few(len(pois), at_least)]
     degrees = np.array([(poi.lat_deg, poi.lon_deg) for poi in pois], dtype=np.float64).reshape(-1, 2)
     sound = np.array([_range_problem(poi) is None for poi in pois], dtype=bool)
     xy_m = np.full((len(pois), 2), np.nan)
     xy_m[sound] = dsm.xy_from_lat_lon(degrees[sound])
     for i, poi in enumerate(pois):
-        if problem := _range_problem(poi) or _place_problem(poi, xy_m[i], dsm, surface):
+        if problem := _range_problem(poi) or _place_problem(poi, xy_m[i], dsm, surface, bounds):
             problems.append(f"{_label(i, poi)}: {problem}")
     problems += _too_close(pois, xy_m)
     if problems:
@@ -55,10 +66,10 @@ def _range_problem(poi: Poi) -> str | None:
     return None
 
 
-def _place_problem(poi: Poi, xy_m: F64, dsm: Dsm, surface: Dsm | None) -> str | None:
-    if not _inside(dsm, xy_m):
+def _place_problem(poi: Poi, xy_m: F64, dsm: SurfaceModel, surface: Dsm | None, bounds: Bounds) -> str | None:
+    if not _inside(bounds, xy_m):
         place = f"{poi.lat_deg:.7f}, {poi.lon_deg:.7f} lies outside the surface model"
-        if _lands_when_swapped(poi, dsm):
+        if _lands_when_swapped(poi, dsm, bounds):
             return f"{place}, but swapped it lies on it: give the latitude first."
         return f"{place}: move it onto the model or take the model of this place."
     if not math.isfinite(dsm.elevation_at(xy_m)[0]):
@@ -68,15 +79,15 @@ def _place_problem(poi: Poi, xy_m: F64, dsm: Dsm, surface: Dsm | None) -> str | 
     return None
 
 
-def _inside(dsm: Dsm, xy_m: F64) -> bool:
-    west, south, east, north = dsm.bounds_m
+def _inside(bounds: Bounds, xy_m: F64) -> bool:
+    west, south, east, north = bounds
     return bool(west <= xy_m[0] <= east and south <= xy_m[1] <= north)
 
 
-def _lands_when_swapped(poi: Poi, dsm: Dsm) -> bool:
+def _lands_when_swapped(poi: Poi, dsm: SurfaceModel, bounds: Bounds) -> bool:
     if not (abs(poi.lon_deg) <= 90 and abs(poi.lat_deg) <= 180):
         return False
-    return _inside(dsm, dsm.xy_from_lat_lon(np.array([[poi.lon_deg, poi.lat_deg]]))[0])
+    return _inside(bounds, dsm.xy_from_lat_lon(np.array([[poi.lon_deg, poi.lat_deg]]))[0])
 
 
 def _too_close(pois: Sequence[Poi], xy_m: F64) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.errors import FormatError
 from planning.formats import geojson
 from planning.formats.commands import FLOWN_TO, NAV_LOITER_TIME, NAV_WAYPOINT, has_position
@@ -48,7 +48,7 @@ def read_pois(name: str, data: bytes) -> PoiFile:
     return found
 
 
-def warn_swapped(pois: Sequence[Poi | MissionItem], dsm: Dsm) -> tuple[str, ...]:
+def warn_swapped(pois: Sequence[Poi | MissionItem], dsm: SurfaceModel) -> tuple[str, ...]:
     """A warning when the places miss the surface model but would lie on it with latitude and longitude exchanged."""
     if not looks_swapped(pois, dsm):
         return ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.errors import ParameterError
 from planning.margins.following_error import Way
 from planning.margins.vehicle_terms import budget_of
@@ -163,7 +163,7 @@ def check_demands(request: PlanRequest) -> None:
         )
 
 
-def check_size(request: PlanRequest, dsm: Dsm) -> None:
+def check_size(request: PlanRequest, dsm: SurfaceModel) -> None:
     """Raises ParameterError for a ball larger than the surface model: then units or models were mistaken."""
     sides_m = (dsm.height_px * dsm.resolution_m, dsm.width_px * dsm.resolution_m)
     for name, value, side_m, which in (

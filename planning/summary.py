@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planning.clearance import certificate_json
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.feasibility import feasibility_json
 from planning.model import Certificate, finite_or_none
 from planning.plan import Plan
@@ -36,8 +36,8 @@ def certificate_summary(certificate: Certificate) -> dict[str, Any]:
     return {key: whole[key] for key in _CERTIFICATE_KEYS}
 
 
-def dsm_summary(source: Dsm, *, holes_filled: int) -> dict[str, Any]:
-    """Identity and size of the surface model as it was read (before holes were filled)."""
+def dsm_summary(source: SurfaceModel, part: Dsm, *, holes_filled: int) -> dict[str, Any]:
+    """Identity and size of the surface model, and what was unknown in the part looked at (before holes were filled)."""
     return {
         "sha256": source.sha256,
         "crs": crs_name(source),
@@ -45,12 +45,13 @@ def dsm_summary(source: Dsm, *, holes_filled: int) -> dict[str, Any]:
         "width": source.width_px,
         "height": source.height_px,
         "resolution_m": source.resolution_m,
-        "unknown_share": unknown_share(source),
+        "part": {"width": part.width_px, "height": part.height_px},
+        "unknown_share": unknown_share(part),
         "holes_filled": holes_filled,
     }
 
 
-def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
+def plan_summary(plan: Plan, source: SurfaceModel) -> dict[str, Any]:
     """Every figure of a plan that an operator or a script asks for; ``source`` is the model as read."""
     request = plan.request
     return {
@@ -68,7 +69,7 @@ def plan_summary(plan: Plan, source: Dsm) -> dict[str, Any]:
         "items": len(plan.mission.items),
         "max_items": request.mission.max_items,
         "excess_height_m": plan.built.excess_height_m,
-        "dsm": dsm_summary(source, holes_filled=plan.surfaces.holes_filled),
+        "dsm": dsm_summary(source, plan.ground, holes_filled=plan.surfaces.holes_filled),
         "survey": None if plan.coverage is None else survey_summary(plan.coverage),
         "warnings": list(plan.warnings),
     }
@@ -91,7 +92,7 @@ def _home(plan: Plan) -> dict[str, Any] | None:
     return place | stand
 
 
-def crs_name(dsm: Dsm) -> str:
+def crs_name(dsm: SurfaceModel) -> str:
     """ "EPSG:2193" where the system has such a code, its name otherwise."""
     authority = dsm.crs.to_authority()
     return ":".join(authority) if authority else dsm.crs.name

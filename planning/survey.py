@@ -11,7 +11,7 @@ import numpy as np
 
 from planning.camera import footprint_m, height_from_gsd_m
 from planning.camera import gsd_cm as gsd_at_height_cm
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.errors import ParameterError, PoiError
 from planning.model import F64, Camera, Poi
 from planning.polygon import area_m2, crossing_edges, extents
@@ -45,7 +45,7 @@ class SurveyPlan:
 
 def survey_lines(
     polygon_lat_lon: F64 | Sequence[tuple[float, float]],
-    dsm: Dsm,
+    dsm: SurfaceModel,
     *,
     camera: Camera | None,
     side_overlap: float,
@@ -113,7 +113,7 @@ def _finite_angle(angle_deg: float) -> float:
     return angle_deg % 180.0
 
 
-def _corners(polygon_lat_lon: F64 | Sequence[tuple[float, float]], dsm: Dsm) -> F64:
+def _corners(polygon_lat_lon: F64 | Sequence[tuple[float, float]], dsm: SurfaceModel) -> F64:
     degrees = np.asarray(polygon_lat_lon, dtype=np.float64).reshape(-1, 2)
     if len(degrees) > 1 and np.array_equal(degrees[0], degrees[-1]):
         degrees = degrees[:-1]
@@ -178,7 +178,7 @@ def _flyable(left_m: float, right_m: float) -> tuple[float, float]:
     return left_m - spare_m, right_m + spare_m
 
 
-def _refuse_unknown(ends: F64, dsm: Dsm) -> None:
+def _refuse_unknown(ends: F64, dsm: SurfaceModel) -> None:
     """The legs between lines count too: they are flown as well."""
     for i, (a, b) in enumerate(pairwise(ends)):
         length_m = float(np.hypot(*(b - a)))
@@ -195,7 +195,7 @@ def _refuse_unknown(ends: F64, dsm: Dsm) -> None:
             )
 
 
-def _pois(ends: F64, dsm: Dsm) -> tuple[Poi, ...]:
+def _pois(ends: F64, dsm: SurfaceModel) -> tuple[Poi, ...]:
     degrees = dsm.lat_lon_from_xy(ends)
     names = (f"line {i // 2 + 1} {'end' if i % 2 else 'start'}" for i in range(len(ends)))
     return tuple(Poi(float(lat), float(lon), name) for (lat, lon), name in zip(degrees, names, strict=True))

@@ -75,7 +75,9 @@ class Layout:
         places = self.places(np.column_stack([outline_x, outline_y]))
         first = np.floor(places.min(axis=0) - _TOUCH_PX).astype(int)
         stop = np.floor(places.max(axis=0) + _TOUCH_PX).astype(int) + 1
-        rows, columns = (slice(*np.clip((a, b), 0, n)) for a, b, n in zip(first, stop, self.shape, strict=True))
+        rows, columns = (
+            slice(*np.clip((a, b), 0, n).tolist()) for a, b, n in zip(first, stop, self.shape, strict=True)
+        )
         return rows, columns
 
 
@@ -111,8 +113,13 @@ class Cells:
     def around(self, low_xy_m: F64, high_xy_m: F64) -> Cells:
         """The cells that touch a projected rectangle, within a ring of unknown ones."""
         rows, columns = self.layout.reach(low_xy_m, high_xy_m)
-        inner = ringed(self.elevation_m[rows, columns])
-        return Cells(inner, self.layout.part(rows.start - 1, columns.start - 1, inner.shape))
+        return cut_out(self.layout, rows.start, columns.start, self.elevation_m[rows, columns])
+
+
+def cut_out(layout: Layout, row0: int, column0: int, elevation_m: F32) -> Cells:
+    """The cells of a layout from (row0, column0) on that have these heights, within a ring of unknown ones."""
+    inner = ringed(elevation_m)
+    return Cells(inner, layout.part(row0 - 1, column0 - 1, inner.shape))
 
 
 def square_cells(elevation_m: F32, resolution_m: float, north_west_xy_m: tuple[float, float]) -> Cells:

@@ -41,29 +41,56 @@ def squares(
     cells: Cells, transform: Affine, shape: tuple[int, int], *, progress: Callable[[float], None] | None = None
 ) -> F32:
     """The highest cell that each square touches; NaN where it touches an unknown one or reaches outside."""
+    whole = slice(0, shape[0]), slice(0, shape[1])
+    return squares_of_part(cells.layout, cells.elevation_m, (0, 0), transform, shape, whole, progress=progress)
+
+
+def squares_of_part(
+    layout: Layout,
+    elevation_m: F32,
+    first: tuple[int, int],
+    transform: Affine,
+    shape: tuple[int, int],
+    part: tuple[slice, slice],
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> F32:
+    """The same numbers as of all squares, for a ``part`` (rows, columns) of them.
+
+    ``elevation_m`` are those cells of ``layout`` that the part's squares touch, from cell ``first`` (row, column) on;
+    what lies outside of them counts as unknown.
+    """
     rows, columns = shape
     bounds = (transform.c, transform.f + rows * transform.e, transform.c + columns * transform.a, transform.f)
-    widest, highest = _reach(cells.layout, bounds)
-    margin = _margin(cells.layout) - 1e-6
+    widest, highest = _reach(layout, bounds)
+    margin = _margin(layout) - 1e-6
     half = (0.5 * transform.a * widest + margin, 0.5 * transform.a * highest + margin)
-    out = np.empty(shape, dtype=np.float32)
-    for tile, column_f, row_f in source_places(_inverse(cells.layout), transform, shape):
-        _highest_touched(cells.elevation_m, column_f, row_f, *half, out[tile])
+    out = np.empty((part[0].stop - part[0].start, part[1].stop - part[1].start), dtype=np.float32)
+    for tile, column_f, row_f in source_places(_inverse(layout), transform, shape, part):
+        here, there = zip(*(_shared(*pair) for pair in zip(tile, part, strict=True)), strict=True)
+        _highest_touched(elevation_m, first, column_f[here], row_f[here], *half, out[there])
         if progress:
-            progress((tile[0].stop or 0) / rows)
+            progress(there[0].stop / len(out))
     return out
 
 
+def _shared(tile: slice, part: slice) -> tuple[slice, slice]:
+    """What both hold, counted from the start of each."""
+    start, stop = max(tile.start, part.start), min(tile.stop, part.stop)
+    return slice(start - tile.start, stop - tile.start), slice(start - part.start, stop - part.start)
+
+
 def source_places(
-    to_source: Inverse, transform: Affine, shape: tuple[int, int]
+    to_source: Inverse, transform: Affine, shape: tuple[int, int], part: tuple[slice, slice] | None = None
 ) -> Iterator[tuple[tuple[slice, slice], F64, F64]]:
     """Tile by tile, the fractional source (columns, rows) of a target grid's cell centres.
 
-    Exact at nodes every 32 cells and bilinear in between: a map projection bends by less than a
-    millimetre over such a span.
+    With a ``part`` (rows, columns) only the tiles that hold some of it. Exact at nodes every 32 cells and bilinear
+    in between: a map projection bends by less than a millimetre over such a span.
     """
-    for row in range(0, shape[0], _TILE_PX):
-        for column in range(0, shape[1], _TILE_PX):
+    rows_in, columns_in = part or (slice(0, shape[0]), slice(0, shape[1]))
+    for row in range(rows_in.start // _TILE_PX * _TILE_PX, rows_in.stop, _TILE_PX):
+        for column in range(columns_in.start // _TILE_PX * _TILE_PX, columns_in.stop, _TILE_PX):
             rows, columns = min(_TILE_PX, shape[0] - row), min(_TILE_PX, shape[1] - column)
             node_rows, weight_rows = _nodes(rows)
             node_columns, weight_columns = _nodes(columns)
@@ -115,15 +142,21 @@ def _reach(layout: Layout, bounds: tuple[float, float, float, float]) -> tuple[f
 
 @njit(cache=True, nogil=True, parallel=True)
 def _highest_touched(
-    source: F32, column_f: F64, row_f: F64, half_columns: float, half_rows: float, target: F32
+    source: F32,
+    first: tuple[int, int],
+    column_f: F64,
+    row_f: F64,
+    half_columns: float,
+    half_rows: float,
+    target: F32,
 ) -> None:
     height, width = source.shape
     for i in prange(target.shape[0]):
         for j in range(target.shape[1]):
-            first_row = int(np.floor(row_f[i, j] - half_rows))
-            last_row = int(np.floor(row_f[i, j] + half_rows))
-            first_column = int(np.floor(column_f[i, j] - half_columns))
-            last_column = int(np.floor(column_f[i, j] + half_columns))
+            first_row = int(np.floor(row_f[i, j] - half_rows)) - first[0]
+            last_row = int(np.floor(row_f[i, j] + half_rows)) - first[0]
+            first_column = int(np.floor(column_f[i, j] - half_columns)) - first[1]
+            last_column = int(np.floor(column_f[i, j] + half_columns)) - first[1]
             value = np.float32(np.nan)
             if first_row >= 0 and last_row < height and first_column >= 0 and last_column < width:
                 value = source[first_row, first_column]

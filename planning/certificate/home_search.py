@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planning.certificate.home_ground import HomeGround, free_step_m, gap_m, home_ground
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -40,8 +40,17 @@ class Standing:
     """By how much a vehicle there may stand lower than the place's own cell."""
 
 
+_MORE_CELLS = 2
+"""Around what is looked at, so that the model's own edge, not a part's, is met."""
+
+
+def ground_around(model: SurfaceModel, xy_m: tuple[float, float], reach_m: float) -> Dsm:
+    """The part of a model, which may still be in its file, that holds all within ``reach_m`` of a projected place."""
+    return model.around(np.array([xy_m]), reach_m + _MORE_CELLS * model.resolution_m)
+
+
 def nearest_standing(
-    dsm: Dsm, xy_m: tuple[float, float], *, centre_m: float, radius_m: float, most_drop_m: float
+    model: SurfaceModel, xy_m: tuple[float, float], *, centre_m: float, radius_m: float, most_drop_m: float
 ) -> tuple[Standing | None, Standing | None]:
     """(the nearest place that drops by ``most_drop_m`` at most, the most level one that was found); None without one.
 
@@ -50,6 +59,7 @@ def nearest_standing(
     """
     level: Standing | None = None
     for search_m, block_m in SEARCHES_M:
+        dsm = ground_around(model, xy_m, search_m + 2.0 * (centre_m + SPARE_M + radius_m) + block_m)
         near, found = _search(dsm, xy_m, search_m, block_m, centre_m + SPARE_M, radius_m, most_drop_m)
         if near is not None:
             return near, near

@@ -8,31 +8,34 @@ from dataclasses import replace
 import numpy as np
 
 from planning.certificate.home_ground import HomeGround, home_ground
-from planning.certificate.home_search import Standing, nearest_standing
-from planning.dsm import Dsm
+from planning.certificate.home_search import Standing, ground_around, nearest_standing
+from planning.dsm import SurfaceModel
 from planning.model import SET_DOWN_M, BetterHome, ClearanceParams, FlownLine, HomeStand
 
 DROP_M = 0.3
 """What a better place may drop where the line has no clearance to spare."""
 
 
-def ground_at(ground: Dsm, xy_m: tuple[float, float], params: ClearanceParams) -> HomeGround:
+def ground_at(ground: SurfaceModel, xy_m: tuple[float, float], params: ClearanceParams) -> HomeGround:
     """The ground around a place of take-off or landing; ``ground`` is the model before holes were filled."""
     return _ground(ground, xy_m, params, None)
 
 
-def ground_at_home(ground: Dsm, home_xy_m: tuple[float, float], params: ClearanceParams) -> HomeGround:
+def ground_at_home(ground: SurfaceModel, home_xy_m: tuple[float, float], params: ClearanceParams) -> HomeGround:
     """As `ground_at`, but a height that the vehicle tells itself settles what it stands on."""
     known = params.home_known_dsm_m
     return _ground(ground, home_xy_m, params, None if known is None else known[0])
 
 
-def _ground(ground: Dsm, xy_m: tuple[float, float], params: ClearanceParams, stands_dsm_m: float | None) -> HomeGround:
+def _ground(
+    ground: SurfaceModel, xy_m: tuple[float, float], params: ClearanceParams, stands_dsm_m: float | None
+) -> HomeGround:
+    centre_m, radius_m = params.position_error_m + params.set_down_m, params.vehicle_radius_m
     return home_ground(
-        ground,
+        ground_around(ground, xy_m, centre_m + radius_m),
         xy_m,
-        centre_m=params.position_error_m + params.set_down_m,
-        radius_m=params.vehicle_radius_m,
+        centre_m=centre_m,
+        radius_m=radius_m,
         stands_dsm_m=stands_dsm_m,
     )
 
@@ -66,7 +69,7 @@ def lowered(line: FlownLine, stand: HomeStand) -> FlownLine:
 
 
 def better_home(
-    ground: Dsm, home_xy_m: tuple[float, float], params: ClearanceParams, *, spare_m: float
+    ground: SurfaceModel, home_xy_m: tuple[float, float], params: ClearanceParams, *, spare_m: float
 ) -> BetterHome | None:
     """The nearest place to stand for a line that has ``spare_m`` more clearance than it needs.
 
@@ -84,7 +87,7 @@ def better_home(
     return None if found is None else _placed(ground, home_xy_m, found, does=near is not None)
 
 
-def _placed(ground: Dsm, home_xy_m: tuple[float, float], found: Standing, *, does: bool) -> BetterHome:
+def _placed(ground: SurfaceModel, home_xy_m: tuple[float, float], found: Standing, *, does: bool) -> BetterHome:
     (lat_deg, lon_deg), (home_lat_deg, home_lon_deg) = ground.lat_lon_from_xy(np.array([found.xy_m, home_xy_m]))
     east = (lon_deg - home_lon_deg) * math.cos(math.radians(home_lat_deg))
     return BetterHome(

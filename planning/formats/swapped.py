@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.formats.commands import has_position
 from planning.model import Home, MissionItem
 
@@ -23,7 +23,7 @@ class _Place(Protocol):
     def lon_deg(self) -> float: ...
 
 
-def looks_swapped(places: Iterable[_Place], dsm: Dsm) -> bool:
+def looks_swapped(places: Iterable[_Place], dsm: SurfaceModel) -> bool:
     """Whether no place lies on the surface model as given, but most would with latitude and longitude exchanged."""
     lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in places], dtype=np.float64).reshape(-1, 2)
     lat_lon = lat_lon[lat_lon.any(axis=1)]  # 0, 0 in a mission item is no place
@@ -32,7 +32,7 @@ def looks_swapped(places: Iterable[_Place], dsm: Dsm) -> bool:
     return bool(_on_model(lat_lon[:, ::-1], dsm).mean() > 0.5)
 
 
-def _on_model(lat_lon_deg: np.ndarray, dsm: Dsm) -> np.ndarray:
+def _on_model(lat_lon_deg: np.ndarray, dsm: SurfaceModel) -> np.ndarray:
     west, south, east, north = dsm.bounds_m
     x, y = dsm.xy_from_lat_lon(np.clip(lat_lon_deg, [-90, -180], [90, 180])).T
     return (x >= west) & (x <= east) & (y >= south) & (y <= north) & (np.abs(lat_lon_deg[:, 0]) <= 90)

@@ -74,11 +74,16 @@ def _model(stored: F32, plan: SurfacePlan, sha256: str, progress: Callable[[str,
 
 
 def _north_up(stored: F32, t: Affine) -> tuple[F32, Affine]:
-    rows, columns = stored.shape
+    flipped = stored[:: -1 if t.e > 0 else 1, :: -1 if t.a < 0 else 1]
+    return np.ascontiguousarray(flipped), north_up_grid(t, stored.shape)[0]
+
+
+def north_up_grid(t: Affine, shape: tuple[int, ...]) -> tuple[Affine, tuple[int, int]]:
+    """Transform and (rows, columns) of the squares that stand for a raster's pixels one by one."""
+    rows, columns = shape
     size = (abs(t.a) + abs(t.e)) / 2 if not np.isclose(abs(t.a), abs(t.e), rtol=1e-9, atol=0) else abs(t.a)
     west, north = min(t.c, t.c + columns * t.a), max(t.f, t.f + rows * t.e)
-    flipped = stored[:: -1 if t.e > 0 else 1, :: -1 if t.a < 0 else 1]
-    return np.ascontiguousarray(flipped), Affine(size, 0.0, west, 0.0, -size, north)
+    return Affine(size, 0.0, west, 0.0, -size, north), (rows, columns)
 
 
 def _masked(stats: HeightStats, sentinels: tuple[float, ...]) -> tuple[str, ...]:

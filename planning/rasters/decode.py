@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -25,23 +26,34 @@ Ask = Callable[[Json], Json]
 
 DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
 _PART_PX = 4_000_000
+_SAMPLE_BLOCKS = 49
+_GOLDEN = 0.6180339887498949
+"""Its multiples, their whole parts cut off, lie evenly between 0 and 1."""
 _DIGEST_BYTES = 2**22
 # A file's own georeference is judged by the parent, in its own words.
 warnings.simplefilter("ignore", NotGeoreferencedWarning)
 
 
 def read_grid(job: Json, send: Send, ask: Ask) -> None:
-    """Band 1 as raw float32 rows in ``job["target"]``, NaN where the file says unknown."""
+    """Band 1 as raw float32 rows in ``job["target"]``, NaN where the file says unknown.
+
+    What is asked for: "pixels", [first row, first column, rows, columns], or null for none; the file's "digest"; the
+    statistics of a "sample" of it.
+    """
     with rasterio.open(job["source"], driver=job["driver"]) as source:
-        ask(header_of(source).as_json())
-        digest = _digest(Path(job["source"]))
-        stats = HeightStats()
-        with Path(job["target"]).open("wb") as target:
-            for window in _windows(source):
-                rows = stats.add(_known_heights(source, window))
-                _place(target, rows, window, source.width)
-                send("progress", stage="decode", share=(window.row_off + window.height) / source.height)
-    send("done", sha256=digest, stats=stats.as_json())
+        order = ask(header_of(source).as_json())
+        digest = _digest(Path(job["source"])) if order["digest"] else ""
+        sample, stats = HeightStats(), HeightStats()
+        for window in _sample(source) if order["sample"] else ():
+            sample.add(_known_heights(source, window))
+        if order["pixels"] is not None:
+            row0, column0, rows, columns = order["pixels"]
+            with Path(job["target"]).open("wb") as target:
+                for window in _windows(source, row0, column0, rows, columns):
+                    heights = stats.add(_known_heights(source, window))
+                    _place(target, heights, window.row_off - row0, window.col_off - column0, columns)
+                    send("progress", stage="decode", share=(window.row_off - row0 + window.height) / rows)
+    send("done", sha256=digest, stats=stats.as_json(), sample=sample.as_json())
 
 
 def read_picture(job: Json, send: Send, ask: Ask) -> None:
@@ -117,25 +129,45 @@ def header_of(source: Any) -> RasterHeader:
     )
 
 
-def _windows(source: Any) -> list[Window]:
-    """Parts of about ``_PART_PX`` that cut no block: whole rows, or less of them where blocks are tall."""
+def _windows(source: Any, row0: int, column0: int, rows: int, columns: int) -> list[Window]:
+    """Parts of about ``_PART_PX`` that cut no block inside: whole rows, or less of them where blocks are tall."""
     block_height, block_width = source.block_shapes[0]
-    rows = max(1, _PART_PX // (source.width * block_height)) * block_height
-    columns = source.width
-    if rows * columns > _PART_PX:
-        columns = max(1, _PART_PX // (rows * block_width)) * block_width
+    high = max(1, _PART_PX // (columns * block_height)) * block_height
+    wide = source.width
+    if high * columns > _PART_PX:
+        wide = max(1, _PART_PX // (high * block_width)) * block_width
+    tops, lefts = _cuts(row0, rows, high, block_height), _cuts(column0, columns, wide, block_width)
     return [
-        Window(column, row, min(columns, source.width - column), min(rows, source.height - row))  # pyright: ignore[reportCallIssue]
-        for row in range(0, source.height, rows)
-        for column in range(0, source.width, columns)
+        Window(left, top, right - left, bottom - top)  # pyright: ignore[reportCallIssue]
+        for top, bottom in pairwise(tops)
+        for left, right in pairwise(lefts)
     ]
 
 
-def _place(target: BinaryIO, part: NDArray[np.float32], window: Window, width: int) -> None:
+def _cuts(first: int, count: int, step: int, block: int) -> list[int]:
+    """Where to cut ``count`` from ``first`` on: both ends, and between blocks every ``step``."""
+    inner = range(first // block * block + step, first + count, step)
+    return [first, *inner, first + count]
+
+
+def _sample(source: Any) -> list[Window]:
+    """Blocks spread evenly over the raster."""
+    height, width = source.block_shapes[0]
+    down, across = -(-source.height // height), -(-source.width // width)
+    count = min(_SAMPLE_BLOCKS, max(1, _PART_PX // (height * width)))
+    numbers = sorted({int(k * _GOLDEN % 1.0 * down * across) for k in range(count)})
+    corners = [(number // across * height, number % across * width) for number in numbers]
+    return [
+        Window(left, top, min(width, source.width - left), min(height, source.height - top))  # pyright: ignore[reportCallIssue]
+        for top, left in corners
+    ]
+
+
+def _place(target: BinaryIO, part: NDArray[np.float32], row: int, column: int, width: int) -> None:
     """Write a part where it belongs in a file of rows of ``width`` float32."""
     lines = part.reshape(1, -1) if part.shape[1] == width else part
     for line, heights in enumerate(lines):
-        target.seek(4 * ((window.row_off + line) * width + window.col_off))
+        target.seek(4 * ((row + line) * width + column))
         target.write(np.ascontiguousarray(heights).data)
 
 

@@ -7,20 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
+from planning.certify_part import certify_part
 from planning.clearance import certificate_json
-from planning.clearance import certify as certify_line
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError
 from planning.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
 from planning.flight_time.predict import predict_duration
-from planning.flown import flown_line
 from planning.formats.commands import has_position
 from planning.formats.detect import read_flight
-from planning.holes import HoleReport, fill_holes
 from planning.margins.words import uncovered_words
 from planning.model import Certificate, Mission, VehicleProfile
 from planning.other_surface import other_surface
-from planning.plan import CERTIFICATE_STEP, hole_assumptions
+from planning.part import Ground
+from planning.plan import CERTIFICATE_STEP
 from planning.poi_files import warn_swapped
 from planning.request import check_hole_area
 from planning.summary import certificate_summary, dsm_summary
@@ -28,7 +27,7 @@ from server.cli import options as o
 from server.cli.files import read_small
 from server.cli.mission_vehicle import Given, judged_by
 from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
-from server.cli.terrain import ModelOptions, read_model
+from server.cli.terrain import ModelOptions, open_model
 from server.cli.verdict import leg_lines, verdict_lines
 from server.stopwatch import StepTimer
 
@@ -64,7 +63,8 @@ def certify(
         request = judged_by(flight, given, flown_as, required_clearance_m, max_height_above_ground_m)
         vehicle, params = request.profile, request.clearance()
         timer = StepTimer(progress)
-        source, made = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
+        opened = open_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
+        source = opened.model
         other = other_surface(flight, source)
         if other is not None:
             say(f"Note: {other}")
@@ -77,11 +77,16 @@ def certify(
         for warning in warnings:
             say(f"Note: {warning}")
         timer(CERTIFICATE_STEP, None)
-        filled, holes = fill_holes(source, max_area_m2=max_hole_m2)
-        made |= {**hole_assumptions(holes, max_hole_m2), "vehicle_profile": vehicle.name}
-        certificate = certify_line(filled, flown_line(flight, filled), params, ground=source, assumptions=made)
-        feasibility = _feasibility(flight, vehicle, filled, is_named=profile is not None)
-        summary = _summary(certificate, flight, vehicle, source, holes)
+        ground, certificate = certify_part(
+            source,
+            flight,
+            params,
+            max_hole_m2=max_hole_m2,
+            assumptions={**opened.made, "vehicle_profile": vehicle.name},
+        )
+        opened.say_spikes(ground.dsm)
+        feasibility = _feasibility(flight, vehicle, ground.filled, is_named=profile is not None)
+        summary = _summary(certificate, flight, vehicle, source, ground)
         summary |= {**feasibility_json(feasibility), "seconds": timer.seconds()}
         end_progress()
         summary = {"other_surface": other, **summary, "warnings": warnings}
@@ -101,13 +106,13 @@ def _feasibility(flight: Mission, vehicle: VehicleProfile, dsm: Dsm, *, is_named
 
 
 def _summary(
-    certificate: Certificate, flight: Mission, vehicle: VehicleProfile, source: Dsm, holes: HoleReport
+    certificate: Certificate, flight: Mission, vehicle: VehicleProfile, source: SurfaceModel, ground: Ground
 ) -> dict[str, Any]:
     return {
         **certificate_summary(certificate),
         "rtl_height_m": vehicle.rtl_height_m,
         "items": len(flight.items),
-        "dsm": dsm_summary(source, holes_filled=holes.count),
+        "dsm": dsm_summary(source, ground.dsm, holes_filled=ground.holes.count),
     }
 
 

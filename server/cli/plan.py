@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 import typer
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.errors import ParameterError, PoiError
 from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, PathParams, Poi, SurfaceParams
@@ -125,7 +125,7 @@ def plan(
             )
         waiting = with_loiter(points.pois, loiter_s)
 
-        def request_for(model: Dsm) -> PlanRequest:
+        def request_for(model: SurfaceModel) -> PlanRequest:
             for warning in (*points.warnings, *warn_swapped(points.pois, model)):
                 say(f"Note: {warning}")
             return replace(request, pois=in_shortest_order(waiting, model) if shortest_order else waiting)
@@ -148,7 +148,7 @@ def with_loiter(pois: Sequence[Poi], loiter_s: float | None) -> tuple[Poi, ...]:
     return tuple(poi if poi.loiter_s > 0 else replace(poi, loiter_s=loiter_s) for poi in pois)
 
 
-def in_shortest_order(pois: Sequence[Poi], model: Dsm) -> tuple[Poi, ...]:
+def in_shortest_order(pois: Sequence[Poi], model: SurfaceModel) -> tuple[Poi, ...]:
     """The points in the order of the shortest way that starts at the first."""
     xy_m = np.asarray(check_pois(pois, model))
     return tuple(pois[index] for index in shortest_order(xy_m))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.exports import FILES, export_file
 from planning.model import VehicleProfile
 from planning.plan import Plan, plan_mission
@@ -18,7 +18,7 @@ from planning.summary import plan_summary
 from planning.vehicle_profile import load_profile
 from server.cli.files import check_directory, write_files
 from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, say
-from server.cli.terrain import ModelOptions, read_model
+from server.cli.terrain import ModelOptions, open_model
 from server.cli.verdict import verdict_lines
 from server.clock import utc_now
 from server.stopwatch import StepTimer
@@ -32,7 +32,7 @@ def profile_with(name: str, **overrides: float | int | None) -> VehicleProfile:
 def run(
     dsm_file: Path,
     out: Path,
-    request_for: Callable[[Dsm], PlanRequest],
+    request_for: Callable[[SurfaceModel], PlanRequest],
     *,
     title: str,
     as_json: bool,
@@ -41,9 +41,11 @@ def run(
     """Plans, writes every file, says what came of it, and ends with 0 (certified and feasible) or 1."""
     check_directory(out)
     timer = StepTimer(progress)
-    source, made = read_model(dsm_file, timer, model)
-    plan = plan_mission(source, request_for(source), report=timer, assumptions=made)
+    opened = open_model(dsm_file, timer, model)
+    source = opened.model
+    plan = plan_mission(source, request_for(source), report=timer, assumptions=opened.made)
     seconds = timer.seconds()
+    opened.say_spikes(plan.ground)
     progress("Writing the files", None)
     created_utc = utc_now()
     files = {
@@ -55,7 +57,7 @@ def run(
     raise typer.Exit(DONE if plan.certificate.certified and plan.feasibility.feasible else FAILED)
 
 
-def _answer(plan: Plan, source: Dsm, out: Path, seconds: dict[str, float], *, as_json: bool) -> None:
+def _answer(plan: Plan, source: SurfaceModel, out: Path, seconds: dict[str, float], *, as_json: bool) -> None:
     summary = {**plan_summary(plan, source), "seconds": seconds}
     for warning in plan.warnings:
         say(f"Note: {warning}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from planning.dsm import Dsm
+from planning.dsm import SurfaceModel
 from planning.errors import ParameterError, PoiError
 from planning.formats.safe_text import clean_name
 from planning.model import MissionParams, SurfaceParams
@@ -132,7 +132,7 @@ def survey(
         check_request(request)
         corners = _corners(polygon)
 
-        def request_for(model: Dsm) -> PlanRequest:
+        def request_for(model: SurfaceModel) -> PlanRequest:
             lines = survey_lines(
                 corners,
                 model,

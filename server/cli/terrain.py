@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.errors import RasterFormatError
-from planning.geotiff import ReadReport, read_dsm_reported
+from planning.geotiff import open_dsm, read_dsm_reported
+from planning.spikes import Spike, find_spikes
 from server.cli.output import end_progress, say
 from server.stopwatch import READ_STEP, StepTimer
 
@@ -22,10 +24,45 @@ class ModelOptions:
     remove_spikes: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class OpenedModel:
+    """A surface model that stays in its file where that is large."""
+
+    model: SurfaceModel
+    made: dict[str, object]
+    """What was done to its heights, for the certificate's assumptions."""
+    spikes_told: bool
+
+    def say_spikes(self, part: Dsm) -> None:
+        """Those of the part that was looked at, once it is known."""
+        if not self.spikes_told:
+            _say_spikes(find_spikes(part), removed=False)
+
+
+def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedModel:
+    """Says what is remarkable about it. Where spikes are to be removed, all of it is read: they are told by size."""
+    if options.remove_spikes:
+        dsm, made = read_model(path, timer, options)
+        return OpenedModel(dsm, made, spikes_told=True)
+    _check_file(path)
+    timer(READ_STEP, 0.0)
+    model = open_dsm(
+        path,
+        crs=options.crs,
+        z_scale=options.z_scale,
+        vertical_datum=options.vertical_datum,
+        progress=lambda stage, share: timer(READ_STEP, share),
+    )
+    end_progress()
+    _say_warnings(model.warnings)
+    if model.report is not None:
+        _say_spikes(find_spikes(model.whole()), removed=False)
+    return OpenedModel(model, {}, spikes_told=model.report is not None)
+
+
 def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
-    """The surface model, and what was done to its heights, for the certificate's assumptions."""
-    if path.is_dir():
-        raise RasterFormatError("This is a directory.", where=str(path), advice="Give the file of the model itself.")
+    """All of a surface model, and what was done to its heights, for the certificate's assumptions."""
+    _check_file(path)
     timer(READ_STEP, 0.0)
     dsm, report = read_dsm_reported(
         path,
@@ -36,15 +73,24 @@ def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm
         progress=lambda stage, share: timer(READ_STEP, share),
     )
     end_progress()
-    _say_remarks(report)
+    _say_warnings(report.warnings)
+    _say_spikes(report.spikes, removed=report.spikes_removed)
     return dsm, {"spikes_removed": len(report.spikes)} if report.spikes_removed else {}
 
 
-def _say_remarks(report: ReadReport) -> None:
-    for warning in report.warnings:
+def _check_file(path: Path) -> None:
+    if path.is_dir():
+        raise RasterFormatError("This is a directory.", where=str(path), advice="Give the file of the model itself.")
+
+
+def _say_warnings(warnings: Sequence[str]) -> None:
+    for warning in warnings:
         say(f"Note: {warning}")
-    fate = "removed" if report.spikes_removed else "kept as terrain, unless you --remove-spikes"
-    for spike in report.spikes:
+
+
+def _say_spikes(spikes: Sequence[Spike], *, removed: bool) -> None:
+    fate = "removed" if removed else "kept as terrain, unless you --remove-spikes"
+    for spike in spikes:
         say(
             f"Note: isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
             f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: {fate}."

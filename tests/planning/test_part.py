@@ -8,7 +8,7 @@ from affine import Affine
 from pyproj import CRS
 
 from planning import part, plan
-from planning.dsm import Dsm
+from planning.dsm import Dsm, SurfaceModel
 from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
@@ -64,14 +64,32 @@ def test_the_plan_over_a_part_is_the_plan_over_the_whole(monkeypatch: pytest.Mon
 
 def test_the_part_grows_until_nothing_that_was_found_is_as_far_as_its_border(monkeypatch: pytest.MonkeyPatch) -> None:
     margins_m: list[float] = []
-    cut_at = part.needed_part
+    box_of = part._needed_box
 
-    def noted(dsm: Dsm, xy_m: part.F64, margin_m: float) -> Dsm:
+    def noted(model: SurfaceModel, xy_m: part.F64, margin_m: float) -> tuple[int, int, int, int]:
         margins_m.append(margin_m)
-        return cut_at(dsm, xy_m, margin_m)
+        return box_of(model, xy_m, margin_m)
 
-    monkeypatch.setattr(plan, "needed_part", noted)
+    monkeypatch.setattr(part, "_needed_box", noted)
     monkeypatch.setattr(plan, "least_margin_m", lambda asked: 12.0)
     whole, cut = both(monkeypatch, request(height_m=14.0))
-    assert margins_m[1:3] == [12.0, 36.0]
+    assert margins_m[-2:] == [12.0, 36.0]
     assert_same_flight(cut, whole)
+
+
+def test_a_small_hole_that_the_part_cuts_is_no_border_to_rely_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the whole model it is filled; in the part it stays unknown, which counts as infinitely high."""
+    monkeypatch.setattr(part, "LARGE_PX", 1000)
+    heights = np.full((200, 300), 100.0, dtype=np.float32)
+    heights[100, 60:72] = np.nan  # 3 m2, 6 m long
+    model = Dsm(heights, Affine(0.5, 0, 5e5, 0, -0.5, 4.17e6), CRS.from_epsg(32633), None, "")
+    west, _, _, north = model.bounds_m
+    here = np.array([[west + 50.0, north - 50.0]])
+
+    def deep_m(margin_m: float) -> float:
+        ground = part.Grounds(model, 4.0).around(here, margin_m)
+        return part._cut_holes_m(ground, model)
+
+    assert deep_m(17.0) == pytest.approx(3.0)  # its west end lies 17 m west of the middle: 3 m of it are cut off
+    assert deep_m(25.0) == 0.0
+    assert deep_m(10.0) == 0.0

@@ -46,7 +46,7 @@ def test_infinite_figures_become_null(plan: Plan) -> None:
 def test_model_as_read(dsm: Dsm) -> None:
     holed_m = dsm.elevation_m.copy()
     holed_m[:25] = np.nan
-    summary = dsm_summary(dsm.with_elevation(holed_m), holes_filled=3)
+    summary = dsm_summary(dsm, dsm.with_elevation(holed_m).window(0, 0, 50, 100), holes_filled=3)
     assert summary == {
         "sha256": dsm.sha256,
         "crs": "EPSG:32633",
@@ -54,7 +54,8 @@ def test_model_as_read(dsm: Dsm) -> None:
         "width": 100,
         "height": 100,
         "resolution_m": 0.5,
-        "unknown_share": 0.25,
+        "part": {"width": 100, "height": 50},
+        "unknown_share": 0.5,
         "holes_filled": 3,
     }
 

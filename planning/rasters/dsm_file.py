@@ -1,0 +1,124 @@
+"""A surface model that stays in its file: only the parts that are asked for are decoded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from planning.dsm import F64, Dsm, SurfaceModel
+from planning.errors import ParameterError, RasterError
+from planning.part import LARGE_PX
+from planning.rasters.assemble import ReadReport, assemble
+from planning.rasters.header import RasterHeader
+from planning.rasters.heights import doubts, mask_and_scale
+from planning.rasters.part_of import model_grid, needed_pixels, part_of
+from planning.rasters.reading import Declared, Pixels, Progress, Read, all_of, file_identity, read_surface
+
+AHEAD_PX = 256
+"""Decoded around what is asked for: the next question is mostly about a little more."""
+
+
+class DsmFile(SurfaceModel):
+    """A surface model in its file; a small one is read at once, of a large one a part at a time, the last is kept.
+
+    Its parts are the very ones of the model as a whole (``Dsm.window``). Never taken from overviews: their cells may
+    be averages, which lie below an obstacle.
+    """
+
+    def __init__(self, source: Path, declared: Declared, progress: Progress | None = None) -> None:
+        self._source, self._declared, self._progress = source, declared, progress
+        self._identity = file_identity(source)
+        self._kept: tuple[Pixels, np.ndarray] | None = None
+        self._whole: Dsm | None = None
+        self._first = read_surface(source, declared, _all_if_small, first_look=True, progress=progress)
+        plan = self._first.plan
+        self.transform, self._shape = model_grid(plan)
+        self.crs, self.vertical_datum, self.sha256 = plan.crs, plan.reference.vertical_datum, self._first.sha256
+        self.report: ReadReport | None = None
+        """Of the whole; None while only parts were read."""
+        if self._first.stored is not None:
+            self._assemble(self._first)
+        elif self._first.sample.known == 0:
+            self.whole()
+
+    @property
+    def height_px(self) -> int:
+        return self._shape[0]
+
+    @property
+    def width_px(self) -> int:
+        return self._shape[1]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was assumed or looks wrong, in plain words; of a large file judged by a sample of it."""
+        if self.report is not None:
+            return self.report.warnings
+        plan, sample = self._first.plan, self._first.sample
+        return (*plan.notes, *doubts(sample, dtype=plan.header.dtypes[0], scaled=plan.scaled))
+
+    def whole(self) -> Dsm:
+        if self._whole is None:
+            self._assemble(self._look(all_of(self._first.plan.header)))
+        assert self._whole is not None
+        return self._whole
+
+    def window(self, row0: int, col0: int, height_px: int, width_px: int) -> Dsm:
+        rows = slice(max(0, row0), min(self.height_px, row0 + height_px))
+        columns = slice(max(0, col0), min(self.width_px, col0 + width_px))
+        if rows.start >= rows.stop or columns.start >= columns.stop:
+            raise ParameterError("The window lies outside the surface model.")
+        pixels = needed_pixels(self._first.plan, (rows, columns))
+        if self._whole is None and not (self._kept is not None and self._kept[0].holds(pixels)):
+            self._read_around(pixels)
+        if self._whole is not None:
+            return self._whole.window(row0, col0, height_px, width_px)
+        assert self._kept is not None
+        kept, stored = self._kept
+        return part_of(self._first.plan, stored, kept, (rows, columns), sha256=self.sha256)
+
+    def elevation_at(self, xy_m: F64) -> F64:
+        xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        west, south, east, north = self.bounds_m
+        inside = ((xy >= (west, south)) & (xy <= (east, north))).all(axis=1)
+        out = np.full(len(xy), np.nan)
+        if inside.any():
+            out[inside] = self.around(xy[inside], self.resolution_m).elevation_at(xy[inside])
+        return out
+
+    def _read_around(self, pixels: Pixels) -> None:
+        """Reads all where the part does not tell what its numbers mean."""
+        header, plan = self._first.plan.header, self._first.plan
+        row0, column0 = max(0, pixels.row0 - AHEAD_PX), max(0, pixels.column0 - AHEAD_PX)
+        rows = min(header.height_px, pixels.row0 + pixels.rows + AHEAD_PX) - row0
+        columns = min(header.width_px, pixels.column0 + pixels.columns + AHEAD_PX) - column0
+        wanted = Pixels(row0, column0, rows, columns)
+        read = self._look(wanted)
+        if read.stats.sentinels:
+            self.whole()
+            return
+        assert read.stored is not None
+        mask_and_scale(read.stored, sentinels=(), scale=plan.height_scale, offset=plan.height_offset)
+        self._kept = wanted, read.stored
+
+    def _look(self, wanted: Pixels) -> Read:
+        read = read_surface(
+            self._source, self._declared, lambda header: wanted, first_look=False, progress=self._progress
+        )
+        if file_identity(self._source) != self._identity:
+            raise RasterError(
+                "The file was changed while it was being read.", where=self._source.name, advice="Start again."
+            )
+        return read
+
+    def _assemble(self, read: Read) -> None:
+        assert read.stored is not None
+        self._whole, self.report = assemble(
+            read.stored, read.plan, read.stats, sha256=self.sha256, where=self._source.name, progress=self._progress
+        )
+        self._kept = None
+
+
+def _all_if_small(header: RasterHeader) -> Pixels | None:
+    return all_of(header) if header.height_px * header.width_px < LARGE_PX else None

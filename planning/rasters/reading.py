@@ -1,0 +1,136 @@
+"""Asks a child process for a raster's header, a sample of it, or some of its numbers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from secrets import token_hex
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.errors import RasterError
+from planning.rasters import sandbox
+from planning.rasters.header import RasterHeader
+from planning.rasters.heights import HeightStats
+from planning.rasters.limits import RasterLimits
+from planning.rasters.magic import driver_of
+from planning.rasters.surface_plan import SurfacePlan, plan_surface
+
+F32 = NDArray[np.float32]
+Progress = Callable[[str, float], None]
+"""Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pixels:
+    """A block of a raster's pixels."""
+
+    row0: int
+    column0: int
+    rows: int
+    columns: int
+
+    def holds(self, other: Pixels) -> bool:
+        """Whether all of the other block is in it."""
+        return (
+            self.row0 <= other.row0
+            and self.column0 <= other.column0
+            and other.row0 + other.rows <= self.row0 + self.rows
+            and other.column0 + other.columns <= self.column0 + self.columns
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What is known of a surface model's file beside what it says itself, and what it may ask for."""
+
+    crs: str | None
+    z_scale: float | None
+    vertical_datum: str | None
+    limits: RasterLimits
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """What came of one look into a file."""
+
+    plan: SurfacePlan
+    sha256: str
+    """Empty when it was not asked for."""
+    stored: F32 | None
+    """(rows, columns) of the pixels that were asked for, NaN where the file says unknown."""
+    stats: HeightStats
+    """Of these pixels."""
+    sample: HeightStats
+    """Of blocks all over the file, where asked for."""
+
+
+def read_surface(
+    source: Path,
+    declared: Declared,
+    wanted: Callable[[RasterHeader], Pixels | None],
+    *,
+    first_look: bool,
+    progress: Progress | None = None,
+) -> Read:
+    """The pixels that ``wanted`` asks for when it knows the header; the digest too at the ``first_look``.
+
+    A first look that asks for no pixels takes a sample. Raises the RasterError that refuses the file.
+    """
+    plans: list[SurfacePlan] = []
+    asked: list[Pixels | None] = []
+
+    def order(fields: dict[str, Any]) -> dict[str, Any]:
+        header = RasterHeader.from_json(fields)
+        plans.append(
+            plan_surface(
+                header,
+                crs=declared.crs,
+                z_scale=declared.z_scale,
+                vertical_datum=declared.vertical_datum,
+                limits=declared.limits,
+                where=source.name,
+            )
+        )
+        asked.append(wanted(header))
+        box = asked[0]
+        pixels = None if box is None else [box.row0, box.column0, box.rows, box.columns]
+        return {"pixels": pixels, "digest": first_look, "sample": first_look and pixels is None}
+
+    with sandbox.private_directory() as directory:
+        job = raster_job("read_grid", source, directory)
+        answer = sandbox.run_job(
+            job, directory=directory, limits=declared.limits, where=source.name, on_header=order, progress=progress
+        )
+        stored, box = None, asked[0]
+        if box is not None:
+            # The file's name is gone with the directory; its pages live on while they are mapped.
+            stored = np.asarray(np.memmap(job["target"], dtype=np.float32, mode="r+", shape=(box.rows, box.columns)))
+    stats, sample = (HeightStats.from_json(answer[name]) for name in ("stats", "sample"))
+    return Read(plans[0], answer["sha256"], stored, stats, sample)
+
+
+def all_of(header: RasterHeader) -> Pixels:
+    """Every pixel."""
+    return Pixels(0, 0, header.height_px, header.width_px)
+
+
+def raster_job(name: str, source: Path, directory: Path) -> dict[str, Any]:
+    """What the child process is told: the file by a name of our own, and where its answer goes."""
+    driver = driver_of(source)
+    link = directory / token_hex(8)
+    link.symlink_to(source.resolve())
+    return {"job": name, "driver": driver, "source": str(link), "target": str(directory / token_hex(8))}
+
+
+def file_identity(source: Path) -> tuple[int, int, int]:
+    """Changes when the file is written or replaced."""
+    try:
+        found = os.stat(source)
+    except OSError as error:
+        raise RasterError(f"It cannot be read: {error.strerror}.", where=source.name) from error
+    return found.st_ino, found.st_size, found.st_mtime_ns
