@@ -30,6 +30,7 @@ class SurfaceModel(ABC):
     crs: CRS
     vertical_datum: str | None
     sha256: str
+    name: str
 
     @property
     @abstractmethod
@@ -114,6 +115,8 @@ class Dsm(SurfaceModel):
     """Hex digest of the file the model was read from."""
     source: Cells | None = None
     """The file's own cells where they are no squares of the grid; the grid is then nowhere lower than they are."""
+    name: str = ""
+    """Of its file; empty when nobody gave it one."""
 
     def __post_init__(self) -> None:
         t = self.transform

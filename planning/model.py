@@ -220,6 +220,8 @@ class Mission:
     """None: the file does not say."""
     surface_sha256: str = ""
     """Of the surface model's file that it was planned over; empty: the file does not say."""
+    surface_name: str = ""
+    """Of that file, as far as the mission's says; a name proves nothing, two may share one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from planning.feasibility import Feasibility, feasibility_of, photos_row
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
+from planning.formats.safe_text import clean_name
 from planning.holes import HoleReport
 from planning.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.margins.words import uncovered_words
@@ -150,9 +151,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
     profile = effective_profile(request.profile, request.path)
     built = _mission(job, filled, profile, path, home)
-    built = replace(
-        built, mission=replace(built.mission, planned_for=request.planned_for, surface_sha256=job.model.sha256)
-    )
+    built = replace(built, mission=_signed(built.mission, job))
     job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}
@@ -173,6 +172,14 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
         coverage=coverage,
         feasibility=_feasibility(built.mission, profile, predicted, coverage),
         warnings=(*home_notes, *built.warnings, *_warnings(request)),
+    )
+
+
+def _signed(mission: Mission, job: _Job) -> Mission:
+    """With what it was planned for, and over which surface model."""
+    model = job.model
+    return replace(
+        mission, planned_for=job.request.planned_for, surface_sha256=model.sha256, surface_name=clean_name(model.name)
     )
 
 

@@ -31,6 +31,8 @@ class PoiFile:
     pois: tuple[Poi, ...]
     polygon: Polygon | None = None
     warnings: tuple[str, ...] = ()
+    mission: Mission | None = None
+    """That the points are of; it may say over which surface model it was planned."""
 
 
 def read_pois(name: str, data: bytes) -> PoiFile:
@@ -112,9 +114,9 @@ def _from_placemark(mark: Placemark, where: str) -> PoiFile:
 
 def _from_mission(mission: Mission) -> PoiFile:
     if mission.pois:
-        return PoiFile(mission.pois, None, mission.warnings)
+        return PoiFile(mission.pois, None, mission.warnings, mission)
     places = [item for item in mission.items if item.command in FLOWN_TO and has_position(item)]
-    return PoiFile(tuple(_poi_from_item(item) for item in places), None, mission.warnings)
+    return PoiFile(tuple(_poi_from_item(item) for item in places), None, mission.warnings, mission)
 
 
 def _poi_from_item(item: MissionItem) -> Poi:

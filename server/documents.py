@@ -11,6 +11,7 @@ from planning.request import PlanRequest, survey_request
 from planning.survey import SurveyPlan, survey_lines
 from planning.vehicle_profile import path_params
 from server.edits import new_poi_id
+from server.planned_on import planned_on
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
 
 
@@ -83,7 +84,7 @@ def with_points(document: PlanDoc, points: PoiFile) -> PlanDoc:
         PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
         for p in points.pois
     ]
-    return document.model_copy(update={"pois": pois, "source": "pois"})
+    return document.model_copy(update={"pois": pois, "source": "pois", "planned_on": planned_on(points.mission)})
 
 
 def missing(document: PlanDoc) -> str:

@@ -15,6 +15,7 @@ from typing import Literal
 from server.errors import InUseError, StaleRevisionError, reported
 from server.history import History
 from server.library import Library
+from server.planned_on import on_another_model
 from server.schemas import ErrorDoc, NoticeMessage, PlanDoc, PlanEdit
 
 log = logging.getLogger("hedgehop.plan")
@@ -99,6 +100,7 @@ class PlanDesk:
         if document == self.document:
             return
         self._check_references(document)
+        document = on_another_model(self.document, document, self._library.terrains())
         self.history.edit(label, document, coalesce=coalesce, now_mono_s=time.monotonic())
         await self._follow()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from planning.dsm import Dsm
 from planning.following.below import below_required
 from planning.following.figures import Judged, judge
 from planning.model import Mission
+from planning.other_surface import other_surface
 from server.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
 from server.review_flight import Flight, placed_flight
 from server.schemas.flight import RecordingDoc
@@ -43,6 +45,7 @@ def review(
     """
     flight = placed_flight(log, dsm=dsm, mission=mission, truth=truth)
     judged = _judged(flight)
+    other = _other_surface(flight, dsm, log if mission is None else None)
     figures = judged.figures if judged else None
     return ReviewDoc(
         recording=recording,
@@ -56,8 +59,19 @@ def review(
         events=events(log),
         plan_name=log.plan.name if log.plan and mission is None else "",
         terrain_name=terrain_name,
-        notes=_notes(flight, judged, dsm, log),
+        other_surface=other or "",
+        notes=[*([other] if other else []), *_notes(flight, judged, dsm, log)],
     )
+
+
+def _other_surface(flight: Flight | None, dsm: Dsm | None, log: FlightLog | None) -> str | None:
+    """``log`` where its own mission is judged: older ones name the surface model beside it only."""
+    mission = None if flight is None else flight.mission
+    if mission is None or dsm is None:
+        return None
+    if not mission.surface_sha256 and log is not None and log.plan is not None:
+        mission = replace(mission, surface_sha256=log.plan.terrain_sha256, surface_name=log.plan.terrain_name)
+    return other_surface(mission, dsm)
 
 
 def _judged(flight: Flight | None) -> Judged | None:
@@ -72,8 +86,6 @@ def _notes(flight: Flight | None, judged: Judged | None, dsm: Dsm | None, log: F
     notes = list(flight.notes)
     if dsm is None:
         notes.append("There is no surface model: distances to the ground are not known.")
-    elif log.plan and log.plan.terrain_sha256 and log.plan.terrain_sha256 != dsm.sha256:
-        notes.append(f"The flight was planned over another surface model ({log.plan.terrain_name}).")
     if judged is None:
         return notes
     if judged.figures is None:

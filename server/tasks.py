@@ -28,6 +28,7 @@ from server.jobs import Progress
 from server.library.orthophotos import load_orthophoto
 from server.library.seen import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import load_terrain
+from server.planned_on import other_model
 from server.scene.payload import PlanScene, TerrainScene
 from server.scene.plan_payload import plan_scene
 from server.scene.terrain_payload import Shading, build_terrain_scene
@@ -94,7 +95,8 @@ def compute_plan(directory: Path, document: PlanDoc, *, report: Progress) -> tup
     """The answer to an edit, without the trade table."""
     plan, source, seconds = last_plan.of(directory, document, report)
     seen = 0 if document.seen_id is None else _terrain_with_seen(directory, document.seen_id)[1]
-    return result_doc(plan, source, seconds, seen), plan_scene(plan)
+    answer = result_doc(plan, source, seconds, seen)
+    return answer.model_copy(update={"other_surface": other_model(document, source)}), plan_scene(plan)
 
 
 def compute_trade(directory: Path, document: PlanDoc, *, report: Progress) -> list[TradeRow]:

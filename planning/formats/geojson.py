@@ -47,7 +47,7 @@ def write_geojson(path: SampledPath, mission: Mission, dsm: Dsm, *, summary: Jso
             _path(path, mission.home, dsm, summary or {}),
             *(_waypoint(item, k) for k, item in enumerate(mission.items) if has_position(item)),
             *(_poi(poi, k) for k, poi in enumerate(mission.pois)),
-            _home(mission.home, mission.surface_sha256),
+            _home(mission),
         ],
     }
     return json.dumps(document, allow_nan=False, ensure_ascii=False) + "\n"
@@ -85,12 +85,14 @@ def _poi(poi: Poi, index: int) -> Json:
     return _feature("Point", _lon_lat(poi.lat_deg, poi.lon_deg), properties)
 
 
-def _home(home: Home, surface_sha256: str) -> Json:
+def _home(mission: Mission) -> Json:
+    home = mission.home
     properties = {
         "role": "home",
         "home_alt_dsm_m": finite_or_none(home.alt_dsm_m),
         "vertical_datum": home.vertical_datum,
-        "surface_model": surface_sha256 or None,
+        "surface_model": mission.surface_sha256 or None,
+        "surface_name": clean_name(mission.surface_name) or None,
         "note": home_altitude_note(home),
         "version": __version__,
     }

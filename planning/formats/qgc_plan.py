@@ -79,6 +79,7 @@ def _provenance(mission: Mission) -> dict[str, object]:
         "cruise_speed_m_s": mission.cruise_speed_m_s,
         "pois": [_poi(poi) for poi in mission.pois],
         "surface_model": mission.surface_sha256 or None,
+        "surface_name": clean_name(mission.surface_name) or None,
         "planned_for": None if mission.planned_for is None else planned_for_json(mission.planned_for),
     }
 

@@ -38,8 +38,18 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
     raw = ours.get("planned_for")
     planned = None if raw is None else read_planned_for(raw, _at(file, "$.hedgehop.planned_for"), warnings)
     firmware, speed = _firmware(mission), _speed(mission, ours)
-    surface = surface_digest(ours.get("surface_model"))
-    return Mission(home, tuple(items), firmware, _pois(ours, file), speed, said_once(warnings), planned, surface)
+    surface, called = surface_digest(ours.get("surface_model")), ours.get("surface_name")
+    return Mission(
+        home,
+        tuple(items),
+        firmware,
+        _pois(ours, file),
+        speed,
+        said_once(warnings),
+        planned,
+        surface,
+        clean_name(called) if isinstance(called, str) else "",
+    )
 
 
 def _at(file: str, path: str) -> str:

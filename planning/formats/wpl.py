@@ -52,6 +52,7 @@ def _notes(mission: Mission) -> list[str]:
         *([f"# cruise_speed_m_s: {speed:g}"] if speed is not None else []),
         *([f"# planned_for: {planned_for_line(planned)}"] if (planned := mission.planned_for) is not None else []),
         *([f"# surface_model: {mission.surface_sha256}"] if mission.surface_sha256 else []),
+        *([f"# surface_name: {clean_name(mission.surface_name)}"] if mission.surface_name else []),
         f"# note: row 0 is home, {home_altitude_note(home)}",
     ]
 
@@ -94,6 +95,7 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
         tuple(warnings),
         planned,
         surface_digest(notes.get("surface_model")),
+        clean_name(notes.get("surface_name", "")),
     )
 
 

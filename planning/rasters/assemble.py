@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
@@ -58,7 +58,7 @@ def assemble(
             "Every cell is unknown.", where=where, advice="Check the export: it should hold the surface's heights."
         )
     mask_and_scale(stored, sentinels=sentinels, scale=plan.height_scale, offset=plan.height_offset)
-    dsm = _model(stored, plan, sha256, progress)
+    dsm = replace(_model(stored, plan, sha256, progress), name=where)
     found = doubts(stats, dtype=plan.header.dtypes[0], scaled=plan.scaled) if stats.known else ()
     return dsm, _report(dsm, plan, (*plan.notes, *_masked(stats, sentinels), *found))
 

@@ -29,6 +29,7 @@ class DsmFile(SurfaceModel):
     def __init__(self, source: Path, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
         self._identity = file_identity(source)
+        self.name = source.name
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
         self._first = read_surface(source, declared, _all_if_small, first_look=True, progress=progress)
@@ -76,7 +77,7 @@ class DsmFile(SurfaceModel):
             return self._whole.window(row0, col0, height_px, width_px)
         assert self._kept is not None
         kept, stored = self._kept
-        return part_of(self._first.plan, stored, kept, (rows, columns), sha256=self.sha256)
+        return part_of(self._first.plan, stored, kept, (rows, columns), sha256=self.sha256, name=self.name)
 
     def elevation_at(self, xy_m: F64) -> F64:
         xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)

@@ -39,7 +39,7 @@ def needed_pixels(plan: SurfacePlan, part: Part) -> Pixels:
     return Pixels(row0, column0, row1 - row0, column1 - column0)
 
 
-def part_of(plan: SurfacePlan, stored: F32, pixels: Pixels, part: Part, *, sha256: str) -> Dsm:
+def part_of(plan: SurfacePlan, stored: F32, pixels: Pixels, part: Part, *, sha256: str, name: str) -> Dsm:
     """The very part that ``Dsm.window`` gives of the whole model; ``stored`` are the raster's ``pixels``, in metres."""
     grid, shape = model_grid(plan)
     transform = grid @ Affine.translation(part[1].start, part[0].start)
@@ -57,7 +57,7 @@ def part_of(plan: SurfacePlan, stored: F32, pixels: Pixels, part: Part, *, sha25
         patch = _patch(plan, plan.placing, stored, pixels, rows, columns)
         first = (rows.start, columns.start)
         elevation_m = squares_of_part(plan.placing.layout, patch, first, grid, shape, part)
-    return Dsm(elevation_m, transform, plan.crs, plan.reference.vertical_datum, sha256, source)
+    return Dsm(elevation_m, transform, plan.crs, plan.reference.vertical_datum, sha256, source, name)
 
 
 def _stored(plan: SurfacePlan, part: Part) -> Part:

@@ -90,6 +90,7 @@ def summary(doc: ReviewDoc) -> dict[str, Any]:
     first = {key: figures.get(key) for key in FIRST_KEYS} | {"completed": figures.get("completed", False)}
     return {
         **first,
+        "other_surface": doc.other_surface or None,
         **{key: value for key, value in figures.items() if key not in first},
         "first_waypoint_t_s": doc.first_waypoint_t_s,
         "last_waypoint_t_s": doc.last_waypoint_t_s,
@@ -102,12 +103,15 @@ def summary(doc: ReviewDoc) -> dict[str, Any]:
 def figure_lines(doc: ReviewDoc) -> list[str]:
     """What the figures say to people."""
     figures = doc.figures
+    other = [doc.other_surface] if doc.other_surface else []
     if figures is None:
         return [
+            *other,
             f"{harmless(doc.recording.name)}: no figures",
             f"  recorded {doc.duration_s:.0f} s from {doc.start_utc}",
         ]
     lines = [
+        *other,
         _ending(figures),
         f"  from the first waypoint to the last: {_number(figures.duration_s, 1)} s,"
         f" predicted {_number(figures.predicted_s, 1)} s, lag {_number(figures.lag_s, 1)} s",

@@ -79,6 +79,7 @@ def load_terrain(directory: Path) -> Dsm:
         vertical_datum=manifest.doc.vertical_datum,
         sha256=manifest.doc.sha256,
         source=read_cells(directory, manifest.source) if manifest.source else None,
+        name=manifest.doc.name,
     )
 
 

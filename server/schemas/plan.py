@@ -97,9 +97,22 @@ class ClearanceDoc(Strict):
     """How it will be flown: the autopilot departs from the line by that much."""
 
 
+class PlannedOnDoc(Strict):
+    """The surface model that points were planned on elsewhere, or before the plan was given another one."""
+
+    name: Name = ""
+    sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+    home_lat_deg: Latitude | None = None
+    home_lon_deg: Longitude | None = None
+    home_alt_dsm_m: float | None = None
+    """Null: not known."""
+
+
 class PlanDoc(Strict):
     name: Name = "Untitled plan"
     terrain_id: str | None = None
+    planned_on: PlannedOnDoc | None = None
+    """Null: no other than that of ``terrain_id``, as far as anybody knows."""
     orthophoto_id: str | None = None
     seen_id: str | None = None
     """What was seen and raises the surface model as columns; None: the model is as it was read."""

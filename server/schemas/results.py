@@ -147,6 +147,8 @@ class HomeDoc(Strict):
 
 
 class ResultDoc(Strict):
+    other_surface: str = ""
+    """That the points were planned on another surface model, and how far home moves; empty: they were not."""
     certified: bool
     feasible: bool | None = None
     """Whether the vehicle can fly it; null: not all is known."""

@@ -87,5 +87,7 @@ class ReviewDoc(Strict):
     events: list[ReviewEvent]
     plan_name: str
     terrain_name: str
+    other_surface: str
+    """That this is another surface model than the mission was planned on, and how far home moves; empty: it is not."""
     notes: list[str]
     """What had to be assumed or could not be told."""

@@ -35,6 +35,7 @@ def packed(dsm: Dsm) -> bytes:
         crs_wkt=np.array(dsm.crs.to_wkt()),
         vertical_datum=np.array(dsm.vertical_datum or ""),
         sha256=np.array(dsm.sha256),
+        name=np.array(dsm.name),
     )
     return out.getvalue()
 
@@ -62,4 +63,5 @@ def _unpacked(data: bytes) -> Dsm:
             crs=CRS.from_wkt(str(fields["crs_wkt"])),
             vertical_datum=str(fields["vertical_datum"]) or None,
             sha256=str(fields["sha256"]),
+            name=str(fields["name"]) if "name" in fields else "",
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,7 +46,11 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     random = np.random.default_rng(8)
     heights = random.uniform(0.0, 30.0, (ROWS, COLUMNS)).astype(np.float32)
     heights[random.random(heights.shape) < 0.02] = -9999.0
-    layouts = ({"tiled": True, "blockxsize": 32, "blockysize": 16, "compress": "deflate"}, {"compress": "lzw"}, {})
+    layouts: tuple[dict[str, Any], ...] = (
+        {"tiled": True, "blockxsize": 32, "blockysize": 16, "compress": "deflate"},
+        {"compress": "lzw"},
+        {},
+    )
     return {
         name: write_raster(
             folder / f"{name}.tif", heights, crs=crs, transform=transform, nodata=-9999.0, **layouts[number % 3]
@@ -63,7 +68,8 @@ def everything_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
 def assert_same_part(one: Dsm, other: Dsm) -> None:
     assert one.transform == other.transform
     assert one.elevation_m.tobytes() == np.ascontiguousarray(other.elevation_m).tobytes()
-    assert (one.crs, one.vertical_datum, one.sha256) == (other.crs, other.vertical_datum, other.sha256)
+    assert (one.crs, one.vertical_datum) == (other.crs, other.vertical_datum)
+    assert (one.sha256, one.name) == (other.sha256, other.name)
     assert (one.source is None) == (other.source is None)
     if one.source is not None and other.source is not None:
         assert one.source.elevation_m.tobytes() == other.source.elevation_m.tobytes()
@@ -101,11 +107,11 @@ def test_any_part_is_the_one_of_the_whole_model(
     part = slice(row0, row1 + 1), slice(column0, column1 + 1)
     pixels = needed_pixels(read.plan, part)
     cut = read.stored[pixels.row0 : pixels.row0 + pixels.rows, pixels.column0 : pixels.column0 + pixels.columns]
-    made = part_of(read.plan, cut.copy(), pixels, part, sha256=read.sha256)
+    made = part_of(read.plan, cut.copy(), pixels, part, sha256=read.sha256, name=whole.name)
     assert_same_part(made, whole.window(row0, column0, row1 + 1 - row0, column1 + 1 - column0))
 
 
-@pytest.mark.parametrize("kind", list(KINDS))
+@pytest.mark.parametrize("kind", ["south up", "degrees", "turned and mirrored"])
 def test_parts_come_from_the_file_as_from_the_whole_model(files: dict[str, Path], kind: str) -> None:
     whole, parts = read_dsm(files[kind]), open_dsm(files[kind])
     assert (parts.height_px, parts.width_px) == whole.elevation_m.shape

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,13 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Ds
     heights = 100 + 5 * np.sin(x / 40) + 4 * np.cos(y / 31) + random.normal(0, 0.02, x.shape)
     heights[random.random(heights.shape) < 0.0004] = -9999.0
     heights[random.random(heights.shape) < 0.0002] += 12.0
-    layout = {"nodata": -9999.0, "tiled": True, "blockxsize": 64, "blockysize": 64, "compress": "deflate"}
+    layout: dict[str, Any] = {
+        "nodata": -9999.0,
+        "tiled": True,
+        "blockxsize": 64,
+        "blockysize": 64,
+        "compress": "deflate",
+    }
     paths = {
         name: write_raster(folder / f"{name}.tif", heights.astype(np.float32), crs=crs, transform=at, **layout)
         for name, (crs, at) in KINDS.items()

@@ -2,20 +2,66 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 import pytest
 
 from planning.demo import demo_dsm, demo_pois, demo_survey_polygon
+from planning.formats.wpl import write_wpl
 from planning.model import Poi, VehicleProfile
-from planning.poi_files import PoiFile
+from planning.plan import plan_mission
+from planning.poi_files import PoiFile, read_pois
 from planning.vehicle_profile import load_profile, shipped_profiles
 from server.documents import doc_from_profile, missing, profile_from_doc, request_from_doc, with_points
-from server.schemas import CameraDoc, MissionDoc, PathDoc, PlaceDoc, PlanDoc, PoiDoc, ProfileDoc, SurfaceDoc, SurveyDoc
+from server.planned_on import on_another_model, other_model
+from server.schemas import (
+    CameraDoc,
+    MissionDoc,
+    PathDoc,
+    PlaceDoc,
+    PlanDoc,
+    PoiDoc,
+    ProfileDoc,
+    SurfaceDoc,
+    SurveyDoc,
+    TerrainDoc,
+)
 
 DSM = demo_dsm()
 POIS = [PoiDoc(id=f"p{i}", lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name) for i, p in enumerate(demo_pois())]
 CORNERS = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]
+
+
+def test_imported_points_remember_the_model_that_they_were_planned_on() -> None:
+    mission = plan_mission(replace(DSM, name="spring.tif"), request_from_doc(PlanDoc(pois=POIS), DSM)).mission
+    found = read_pois("mission.waypoints", write_wpl(mission).encode())
+    document = with_points(PlanDoc(terrain_id="t"), found)
+    assert other_model(document, DSM) == ""
+    raised = replace(DSM.with_elevation(DSM.elevation_m + 2.0), sha256="ab" * 32, name="autumn.tif")
+    said = other_model(document, raised)
+    assert '"autumn.tif" (SHA-256 abababab)' in said
+    assert '"spring.tif" (SHA-256' in said
+    assert "home's ground is 2.00 m higher here" in said
+    assert with_points(document, PoiFile(found.pois)).planned_on is None
+
+
+def test_a_plan_that_is_given_another_model_remembers_its_first() -> None:
+    first, other, same = (
+        TerrainDoc.model_construct(id=name, name=f"{name}.tif", sha256=digest * 32)
+        for name, digest in (("first", "ab"), ("other", "cd"), ("same", "ab"))
+    )
+    terrains = [first, other, same]
+    before = PlanDoc(terrain_id="first", pois=POIS)
+    after = on_another_model(before, before.model_copy(update={"terrain_id": "other"}), terrains)
+    assert after.planned_on is not None
+    assert (after.planned_on.name, after.planned_on.sha256) == ("first.tif", "ab" * 32)
+    said = other_model(after, replace(DSM, sha256="cd" * 32, name="other.tif"))
+    assert said.endswith("heights are counted from home's ground, which may lie higher or lower here.")
+    assert other_model(after, replace(DSM, sha256="ab" * 32)) == ""
+    again = on_another_model(after, after.model_copy(update={"terrain_id": "same"}), terrains)
+    assert again.planned_on == after.planned_on
+    for unchanged in ({"terrain_id": "same"}, {"terrain_id": "other", "pois": []}, {"name": "x"}):
+        assert on_another_model(before, before.model_copy(update=unchanged), terrains).planned_on is None
 
 
 @pytest.mark.parametrize("name", shipped_profiles())

@@ -11,6 +11,7 @@ import pytest
 from planning.formats.wpl import write_wpl
 from planning.model import Home, PlannedFor
 from planning.vehicle_profile import dump_profile, load_profile
+from server.cli.review import figure_lines, summary
 from server.review import recording_of, review
 from server.review_curves import STRETCHES, thinned
 from server.schemas.flight import RecordingDoc
@@ -162,7 +163,12 @@ def test_a_recorded_plan_brings_its_mission_profile_and_certificate() -> None:
     assert doc.figures.predicted_s == pytest.approx(54, abs=3)
     assert doc.notes == ["The vehicle did not say what it reached: waypoints count where the track is nearest to them."]
     other = reviewed(with_plan(log_of(positions()), sha256="b" * 64), dsm=PLAIN)
-    assert any("another surface model (Hill)" in note for note in other.notes)
+    assert "another surface model, one with SHA-256" in other.other_surface
+    assert '"Hill" (SHA-256' in other.other_surface
+    assert other.notes[0] == other.other_surface
+    assert figure_lines(other)[0] == summary(other)["other_surface"] == other.other_surface
+    own = reviewed(with_plan(log_of(positions())), dsm=PLAIN)
+    assert (own.other_surface, summary(own)["other_surface"]) == ("", None)
 
 
 def test_a_broken_certificate_and_plan_do_not_stop_the_review() -> None:

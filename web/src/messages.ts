@@ -498,9 +498,21 @@ export interface ClearanceDoc {
   way: "auto" | "guided";
 }
 
+/** The surface model that points were planned on elsewhere, or before the plan was given another one. */
+export interface PlannedOnDoc {
+  name: string;
+  sha256: string;
+  home_lat_deg: number | null;
+  home_lon_deg: number | null;
+  /** Null: not known. */
+  home_alt_dsm_m: number | null;
+}
+
 export interface PlanDoc {
   name: string;
   terrain_id: string | null;
+  /** Null: no other than that of ``terrain_id``, as far as anybody knows. */
+  planned_on: PlannedOnDoc | null;
   orthophoto_id: string | null;
   /** What was seen and raises the surface model as columns; None: the model is as it was read. */
   seen_id: string | null;
@@ -644,6 +656,8 @@ export interface HomeDoc {
 }
 
 export interface ResultDoc {
+  /** That the points were planned on another surface model, and how far home moves; empty: they were not. */
+  other_surface: string;
   certified: boolean;
   /** Whether the vehicle can fly it; null: not all is known. */
   feasible: boolean | null;
@@ -1072,6 +1086,8 @@ export interface ReviewDoc {
   events: ReviewEvent[];
   plan_name: string;
   terrain_name: string;
+  /** That this is another surface model than the mission was planned on, and how far home moves; empty: it is not. */
+  other_surface: string;
   /** What had to be assumed or could not be told. */
   notes: string[];
 }

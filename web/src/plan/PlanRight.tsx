@@ -6,6 +6,7 @@ import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
 import { ErrorPanel } from "../ui/ErrorBox";
 import { Icon } from "../ui/Icon";
+import { OtherSurface } from "../ui/OtherSurface";
 import { computation, isFresh, known, result } from "../store/state";
 import { Clearance } from "./Clearance";
 import { Photos } from "./Photos";
@@ -46,6 +47,18 @@ function AgainstSeen({ result: { seen_columns: columns } }: { result: ResultDoc 
     <p class="against-seen" data-testid="against-seen">
       <Icon name="radar" size={16} /> Against the surface model and {count(columns, "seen column")}
     </p>
+  );
+}
+
+/** The points came from a mission over another surface model, or the plan was given another one. */
+function FromAnotherModel({ result: { other_surface: text } }: { result: ResultDoc }) {
+  const settle = () => edit("Plan on this surface model", "terrain", (doc) => ({ ...doc, planned_on: null }));
+  return (
+    <OtherSurface text={text}>
+      <Button testid="settle-surface" title="The points are meant for this surface model" onClick={settle}>
+        Plan on this one
+      </Button>
+    </OtherSurface>
   );
 }
 
@@ -159,6 +172,7 @@ export function PlanRight() {
   const shown = result.value;
   return (
     <div class="panel-scroll truth" tabIndex={0}>
+      {shown && <FromAnotherModel result={shown} />}
       <Headline />
       {now?.state === "error" && now.error && <ErrorPanel error={now.error} />}
       {shown ? (

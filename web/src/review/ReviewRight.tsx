@@ -9,6 +9,7 @@ import { ROWS, TrackList } from "../tracks/TrackList";
 import { review } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { Icon } from "../ui/Icon";
+import { OtherSurface } from "../ui/OtherSurface";
 import { EventList } from "./EventList";
 import { Figures } from "./Figures";
 import { StudyRight } from "./Studies";
@@ -18,7 +19,8 @@ type Part = "figures" | "instruments" | "events";
 const part = signal<Part>("figures");
 
 function Notes({ open }: { open: ReviewDoc }) {
-  const all = [...(open.recording.fault ? [open.recording.fault] : []), ...open.notes];
+  const others = open.notes.filter((note) => note !== open.other_surface);
+  const all = [...(open.recording.fault ? [open.recording.fault] : []), ...others];
   if (all.length === 0) return null;
   return (
     <section class="facts">
@@ -66,6 +68,7 @@ function FlightsRight() {
   return (
     <div class="review-right" data-part={part.value}>
       <Head open={open} />
+      <OtherSurface text={open.other_surface} />
       <div class="review-parts">
         <Segmented
           label="Part"
