@@ -155,7 +155,7 @@ def _samples(path: SampledPath, which: NDArray[np.intp]) -> F64:
 def _following_path(points_m: F64, path: SampledPath) -> tuple[F64, NDArray[np.intp]]:
     """Samples of the path are added where the mesh strays from it most, until it does so nowhere."""
     origin_m = points_m[0]
-    mesh = Delaunay(points_m[:, :2] - origin_m[:2])
+    mesh = Delaunay(points_m[:, :2] - origin_m[:2], incremental=True)
     for last in (*[False] * (_ROUNDS_MAX - 1), True):
         off_m = np.abs(_height_m(mesh, points_m, path.xy_m - origin_m[:2]) - path.surface_alt_dsm_m)
         # Beyond the outermost cells' centres there is no mesh to stray.
@@ -165,8 +165,10 @@ def _following_path(points_m: F64, path: SampledPath) -> tuple[F64, NDArray[np.i
         more = (
             np.flatnonzero(beyond) if last else _worst_of_each_run(np.where(beyond, np.nan_to_num(off_m, nan=1e9), 0))
         )
-        points_m = np.unique(np.vstack([points_m, _samples(path, more)]), axis=0)
-        mesh = Delaunay(points_m[:, :2] - origin_m[:2])
+        added_m = _samples(path, more)
+        points_m = np.vstack([points_m, added_m])
+        mesh.add_points(added_m[:, :2] - origin_m[:2])
+    mesh.close()
     return points_m, mesh.simplices.astype(np.intp)
 
 
