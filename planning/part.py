@@ -19,6 +19,8 @@ LARGE_PX = 4_000_000
 MARGIN_M = 10.0
 """Around the points, beside what the ball and the Gaussian reach."""
 GROWTH = 3.0
+FLIGHT_MARGIN_M = 300.0
+"""Around a flight: nothing that is farther from it than this decides anything about it."""
 T = TypeVar("T")
 
 

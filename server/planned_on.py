@@ -28,7 +28,8 @@ def other_model(document: PlanDoc, dsm: SurfaceModel) -> str:
     if planned is None or planned.sha256 == dsm.sha256:
         return ""
     places = (planned.home_lat_deg, planned.home_lon_deg, planned.home_alt_dsm_m)
-    home = Home(*(math.nan if value is None else value for value in places))
+    lat_deg, lon_deg, alt_m = (math.nan if value is None else value for value in places)
+    home = Home(lat_deg, lon_deg, alt_m)
     return other_surface(Mission(home, (), surface_sha256=planned.sha256, surface_name=planned.name), dsm) or ""
 
 

@@ -17,6 +17,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from planning.certify_part import mission_places
 from planning.dsm import Dsm
 from planning.formats.detect import read_mission
 from planning.model import Mission
@@ -28,7 +29,7 @@ from server.cli.mission_vehicle import Given, judged_by
 from server.cli.nodes import OPERATOR, Station, own_nodes
 from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
 from server.cli.review import answer, say_below
-from server.cli.terrain import ModelOptions, read_model
+from server.cli.terrain import ModelOptions, read_around
 from server.errors import StorageError
 from server.review import recording_of, review
 from server.schemas.review import ReviewDoc
@@ -94,7 +95,9 @@ def fly(
         given = Given(profile, position_error_m, vehicle_radius_m, following_m, dsm_rms_m, downwash_m, rtl_height_m)
         request = judged_by(flight, given, mode, required_clearance_m)
         model_options = ModelOptions(crs, z_scale, vertical_datum)
-        model = read_model(dsm, StepTimer(progress), model_options)[0] if dsm else None
+        model = None
+        if dsm is not None:
+            model = read_around(dsm, StepTimer(progress), model_options, lambda whole: mission_places(whole, flight))
         other = None if model is None else other_surface(flight, model)
         for warning in (*([other] if other is not None else []), *flight.warnings):
             say(f"Note: {warning}")
@@ -117,7 +120,7 @@ def fly(
         if doc.figures is not None:
             doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
         say_below(doc)
-        answer(doc, as_json=as_json, other=other)
+        answer(doc if other is None else doc.model_copy(update={"other_surface": other}), as_json=as_json)
         kept = doc.figures is None or doc.figures.below_required is None
         raise typer.Exit(DONE if completed and kept else FAILED)
 

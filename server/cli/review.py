@@ -5,19 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
+from planning.certify_part import mission_places
+from planning.dsm import F64, SurfaceModel
 from planning.formats.detect import read_mission
-from planning.other_surface import other_surface
+from planning.model import Mission
 from server.cli import options as o
 from server.cli.files import read_small
 from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
-from server.cli.terrain import ModelOptions, read_model
+from server.cli.terrain import ModelOptions, read_around
 from server.review import recording_of
 from server.review import review as judge
+from server.review_flight import flown_mission
 from server.schemas.review import ReviewDoc, ReviewFigures
 from server.stopwatch import StepTimer
-from telemetry.recording.flight_log import read_flight_log
+from telemetry.recording.flight_log import FlightLog, read_flight_log
 
 FIRST_KEYS = (
     "completed",
@@ -56,17 +60,30 @@ def review(
     with refusing(as_json=as_json):
         flown = read_mission(mission.name, read_small(mission)) if mission else None
         timer = StepTimer(progress)
-        model = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum))[0] if dsm else None
         timer("Reading the recording", None)
         log = read_flight_log(recording)
+        model = None
+        if dsm is not None:
+            options = ModelOptions(crs, z_scale, vertical_datum)
+            model = read_around(dsm, timer, options, lambda whole: _places(whole, log, flown))
         timer("Judging the flight", None)
         doc = judge(log, recording_of(log, recording), dsm=model or log.ground, mission=flown, truth=truth)
         end_progress()
         for note in doc.notes:
             say(f"Note: {note}")
         say_below(doc)
-        answer(doc, as_json=as_json, other=other_surface(flown, model) if flown and model else None)
+        answer(doc, as_json=as_json)
         raise typer.Exit(DONE if doc.figures is not None and doc.figures.below_required is None else FAILED)
+
+
+def _places(model: SurfaceModel, log: FlightLog, mission: Mission | None) -> F64:
+    """(N, 2) projected places of all tracks, of the mission and of home."""
+    tracks = [log.track] if log.truth is None else [log.track, log.truth]
+    flown = [np.column_stack([track.lat_deg, track.lon_deg]) for track in tracks]
+    planned = mission or flown_mission(log, [])
+    home = [] if log.home is None else [(log.home.lat_deg, log.home.lon_deg)]
+    xy_m = model.xy_from_lat_lon(np.vstack([*flown, np.reshape(home, (-1, 2))]))
+    return xy_m if planned is None else np.vstack([xy_m, mission_places(model, planned)])
 
 
 def say_below(doc: ReviewDoc) -> None:
@@ -75,13 +92,12 @@ def say_below(doc: ReviewDoc) -> None:
         say(f"WARNING: {doc.figures.below_required}")
 
 
-def answer(doc: ReviewDoc, *, as_json: bool, other: str | None = None) -> None:
-    """One JSON object, or a few lines. ``other``: that it is judged over another surface model than was planned on."""
-    said = {} if other is None else {"other_surface": other}
+def answer(doc: ReviewDoc, *, as_json: bool) -> None:
+    """One JSON object, or a few lines."""
     if as_json:
-        print_json(summary(doc) | said)
+        print_json(summary(doc))
     else:
-        typer.echo("\n".join([*said.values(), *figure_lines(doc)]))
+        typer.echo("\n".join(figure_lines(doc)))
 
 
 def summary(doc: ReviewDoc) -> dict[str, Any]:

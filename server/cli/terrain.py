@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from planning.dsm import Dsm, SurfaceModel
+from planning.dsm import F64, Dsm, SurfaceModel
 from planning.errors import RasterFormatError
 from planning.geotiff import open_dsm, read_dsm_reported
+from planning.part import FLIGHT_MARGIN_M, needed_part
 from planning.spikes import Spike, find_spikes
 from server.cli.output import end_progress, say
 from server.stopwatch import READ_STEP, StepTimer
@@ -58,6 +59,15 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
     if model.report is not None:
         _say_spikes(find_spikes(model.whole()), removed=False)
     return OpenedModel(model, {}, spikes_told=model.report is not None)
+
+
+def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Callable[[SurfaceModel], F64]) -> Dsm:
+    """The part around the projected (N, 2) ``places`` of a flight; all of a small model."""
+    opened = open_model(path, timer, options)
+    part = needed_part(opened.model, places(opened.model), FLIGHT_MARGIN_M)
+    end_progress()
+    opened.say_spikes(part)
+    return part
 
 
 def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:

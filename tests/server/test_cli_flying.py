@@ -161,13 +161,13 @@ def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp
 def test_a_flight_over_another_model_than_the_planned_one_says_so_first(
     ground: Ground, flight: tuple[Run, Path], tmp_path: Path
 ) -> None:
-    planned = replace(SHORT, surface_sha256="ab" * 32)
+    planned = replace(SHORT, surface_sha256="ab" * 32, surface_name="spring.tif")
     elsewhere = write_mission(tmp_path / "elsewhere.waypoints", planned)
     arguments = ("fly", elsewhere, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk")
     run = hedgehop(*arguments)
     assert run.code == 0, run.err
     first, second = run.out.splitlines()[:2]
-    assert "than the mission was planned on (abababab)" in first
+    assert 'than the mission was planned on, "spring.tif" (SHA-256 abababab)' in first
     assert second == "COMPLETED"
     notes = [line for line in run.err.splitlines() if line.startswith("Note: ")]
     assert notes[0] == f"Note: {first}"
