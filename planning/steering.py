@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.velocity_obstacles import Limits, Obstacles, Proposal, propose
+from planning.reachable import roomiest, shortfall
+from planning.velocity_obstacles import Limits, Obstacles, Proposal, proposal_of, propose
 
 F64 = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ SHARES = (1.0, 0.85, 0.7)
 """Of what is to be kept: where the whole of it leaves no velocity, somewhat less is better than nothing."""
 ONWARD_SHARE = 0.25
 """Slower than so much of the wanted speed there is no direction of its own to stay near to."""
+ENOUGH = 0.05
+"""So much of a radius may be cut on the way to a velocity that would keep it."""
 DISC_WIDER = 1.3
 """Discs of neighbouring directions overlap."""
 LEAST_DISC_M = 0.5
@@ -29,12 +32,19 @@ TOGETHER = 3
 
 
 def steer(
-    obstacles: Obstacles, wanted_enu_m_s: F64, velocity_enu_m_s: F64, limits: Limits, *, nearest_only: bool = False
+    obstacles: Obstacles,
+    wanted_enu_m_s: F64,
+    velocity_enu_m_s: F64,
+    limits: Limits,
+    *,
+    nearest_only: bool = False,
+    by_room: bool = False,
 ) -> Proposal | None:
     """Raises ParameterError for what is no number.
 
     It stays near to the present velocity, not to the wanted one: else it would change sides with every frame. None:
-    every velocity within the limits leads into something.
+    every velocity within the limits leads into something. ``by_room``: where the nearest velocity outside of all cones
+    cannot be reached in time, or there is none, it is the one that leaves the most room on the way to it.
     """
     straight = propose(obstacles, wanted_enu_m_s, replace(limits, max_turn_rad=math.pi), nearest_only=nearest_only)
     if straight is not None and not straight.evades:
@@ -42,6 +52,18 @@ def steer(
     speed, cruise = math.hypot(*velocity_enu_m_s), math.hypot(*wanted_enu_m_s)
     goes = speed > ONWARD_SHARE * cruise and speed > 0.0
     onward = velocity_enu_m_s * (cruise / speed) if goes else wanted_enu_m_s
+    edge = _on_an_edge(obstacles, onward, limits, nearest_only=nearest_only)
+    if not by_room:
+        return edge
+    looked_at = obstacles.nearest() if nearest_only else obstacles
+    also = None if edge is None else np.array([edge.velocity_enu_m_s])
+    if also is not None and shortfall(looked_at, velocity_enu_m_s, also)[0] <= ENOUGH:
+        return edge
+    chosen = roomiest(looked_at, onward, velocity_enu_m_s, limits, also=also)
+    return proposal_of(looked_at, onward, chosen)
+
+
+def _on_an_edge(obstacles: Obstacles, onward: F64, limits: Limits, *, nearest_only: bool) -> Proposal | None:
     for share in SHARES:
         smaller = replace(obstacles, radius_m=share * obstacles.radius_m)
         found = propose(smaller, onward, limits, nearest_only=nearest_only)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from planning.errors import ParameterError
 from planning.velocity_choice import Forbidden, Limits, within
 
-__all__ = ["Approach", "Cone", "Limits", "Obstacles", "Proposal", "approaches", "cones", "propose"]
+__all__ = ["Approach", "Cone", "Limits", "Obstacles", "Proposal", "approaches", "cones", "proposal_of", "propose"]
 
 F64 = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -177,6 +177,11 @@ def propose(
         if not hit.any():
             return _proposal(looked_at, velocity, chosen, active)
         active |= hit
+
+
+def proposal_of(obstacles: Obstacles, velocity: F64, chosen: F64) -> Proposal:
+    """Of a velocity that was chosen by other means: it evades whatever the present one leads into."""
+    return _proposal(obstacles, velocity, chosen, _forbidden(obstacles, Limits(), 0.0).contains(velocity[None])[0])
 
 
 def _proposal(obstacles: Obstacles, velocity: F64, chosen: F64, active: Bools) -> Proposal:

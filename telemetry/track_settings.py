@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Literal
+from typing import Literal, get_args
 
 from mapping.errors import ParameterError
 from mapping.perceiving.radar_evidence import EvidenceParams
 from mapping.tracker import TrackerParams
 from planning.velocity_obstacles import Limits
 
+Choice = Literal["room", "edge"]
 MOST_TRACKS = 400
 USUAL_MAX_SPEED_M_S = 5.0
 """Of a vehicle of which nothing is known."""
@@ -80,9 +81,18 @@ class VelocitySettings:
     """Kept from what stands still, between middles."""
     stands_s: float = 5.0
     """What stands still counts when it would be met within so long."""
+    choice: Choice = "room"
+    """Where the velocity nearest to the present one cannot be reached in time: the one that leaves the most room. edge:
+    always the nearest on a cone's edge, as in the paper."""
 
     def limits(self, vehicle: Limits) -> Limits:
-        """Those of the vehicle where nothing else is set."""
+        """Those of the vehicle where nothing else is set. Raises ParameterError for what nothing can keep to."""
+        if self.choice not in get_args(Choice):
+            raise ParameterError(
+                f'There is no choice "{self.choice}".',
+                where="choice",
+                advice=f"Choose of {', '.join(get_args(Choice))}.",
+            )
         return Limits(
             max_speed_m_s=self.max_speed_m_s or vehicle.max_speed_m_s,
             max_turn_rad=math.radians(self.max_turn_deg),
@@ -120,4 +130,6 @@ def _as_is(name: str, known: object, value: object) -> object:
         number = math.nan
     if not (math.isfinite(number) and number >= 0.0):
         raise ParameterError(f'"{value}" is no number to set it to.', where=name, advice="Give 0 or more.")
+    if isinstance(known, int) and number != int(number):
+        raise ParameterError(f'"{value}" is no whole number.', where=name, advice="Give one.")
     return int(number) if isinstance(known, int) else number

@@ -175,6 +175,8 @@ class VelocitySettingsBody(Strict):
     nearest_only: bool | None = None
     stands_m: Annotated[float, Field(ge=0.3, le=30)] | None = None
     stands_s: Annotated[float, Field(ge=1, le=30)] | None = None
+    choice: Literal["room", "edge"] | None = None
+    """edge: the velocity nearest on a cone's edge, as in the paper."""
 
 
 class PerceptionSettingsBody(Strict):

@@ -409,6 +409,7 @@ export interface VelocitySettings {
   nearest_only: boolean;
   stands_m: number;
   stands_s: number;
+  choice: "room" | "edge";
 }
 
 export interface PoiDoc {
@@ -1237,6 +1238,8 @@ export interface VelocitySettingsBody {
   nearest_only?: boolean | null;
   stands_m?: number | null;
   stands_s?: number | null;
+  /** edge: the velocity nearest on a cone's edge, as in the paper. */
+  choice?: "room" | "edge" | null;
 }
 
 /** What an operator may change; the rest stays. */

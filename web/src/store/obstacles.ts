@@ -90,6 +90,7 @@ const NOTHING: ObstaclesState = {
       nearest_only: false,
       stands_m: 2,
       stands_s: 5,
+      choice: "room",
     },
   },
   maps: [],

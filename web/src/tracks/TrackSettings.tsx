@@ -47,6 +47,11 @@ const TRACKER: readonly Field<Numbers<TrackerSettings>>[] = [
   { key: "apart_m", label: "Objects are apart by", unit: "m", min: 0, max: 20, step: 0.25 },
 ];
 
+const CHOICES: readonly { value: VelocitySettings["choice"]; label: string }[] = [
+  { value: "room", label: "The one with the most room" },
+  { value: "edge", label: "The nearest, as in the paper" },
+];
+
 const STATES: readonly { value: TrackerSettings["coordinates"]; label: string }[] = [
   { value: "cartesian", label: "Place and velocity over ground" },
   { value: "polar", label: "Range, bearing and their rates" },
@@ -70,6 +75,13 @@ export function TrackSettings({ settings: { tracker, velocities } }: { settings:
           />
         ))}
       </div>
+      <SelectField
+        label="Where it gets tight"
+        value={velocities.choice}
+        options={CHOICES}
+        testid="velocities-choice"
+        onChange={(choice) => void setPerception({ velocities: { choice } })}
+      />
       <Check
         label="As in the paper: only the nearest object"
         checked={velocities.nearest_only}
