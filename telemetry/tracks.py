@@ -43,7 +43,7 @@ class Track:
     lat_deg: float
     lon_deg: float
     remembered: bool = False
-    """It stands where the radar cannot see it now."""
+    """It is where the radar cannot see it now: it stood there, or moved there as it did when it was seen last."""
 
 
 @dataclass(frozen=True, slots=True)

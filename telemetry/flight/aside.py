@@ -8,52 +8,35 @@ vehicle that hears nothing more stops there.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.errors import ParameterError
-from planning.steering import steer, with_ground
-from planning.velocity_obstacles import Limits, Obstacles, Proposal
-from telemetry.flight.handover import METRES_PER_DEG
+from planning.velocity_obstacles import Proposal
 from telemetry.flight.helm import GUIDED, Helm, here_of, moved, stopping_place
+from telemetry.flight.passing import is_wanted, offset_of, scene_of, velocity_of, velocity_past
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.obstacles import PerceptionSettings
-from telemetry.tracks import Track, TracksStatus
+from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
 F64 = NDArray[np.float64]
 
 OLD_S = 0.7
 """Tracks older than this say nothing about now."""
-LATENCY_S = 0.3
-"""From measuring a frame to what is flown because of it."""
-SPARE, SIGMAS = 1.25, 2.0
-"""As a proposal has them: of the safety radius of what moves, and of the uncertainty of what stands."""
 LEAD_S, LEAST_LEAD_M = 3.0, 2.0
 """So far ahead is the place that is ordered."""
 CARROT_S, LEAST_CARROT_M = 3.0, 4.0
 """So far along the line ahead lies what it steers for."""
 BACK_M, BACK_S = 0.7, 0.6
 """So near to the line and for so long with nothing in the way, it is handed back to it."""
-PASSED_M, SAME_M_S = 0.7, 1e-6
+PASSED_M = 0.7
 STANDS_M_S, STUCK_S, GIVEN_UP_S = 0.2, 4.0, 20.0
 SPEED_STEP_M_S = 0.25
 """Speeds are ordered in steps: every order waits for its answer."""
 AGAIN_M, AGAIN_S = 0.25, 0.5
-MOST = 24
-
-
-@dataclass(frozen=True, slots=True)
-class _Scene:
-    """What is around the vehicle: it is at (0, 0)."""
-
-    obstacles: Obstacles
-    limits: Limits
-    nearest_only: bool
-    horizon_m: float
 
 
 class Aside:
@@ -109,10 +92,9 @@ class Aside:
         length_m = math.hypot(*towards)
         if length_m < PASSED_M:
             return False
-        scene = self._scene(state, targets[0].speed_m_s, now_s)
         wanted = towards * (targets[0].speed_m_s / length_m)
-        found = self._steered(scene, wanted, _velocity(state))
-        if found is None or _is_wanted(found, wanted):
+        found = self._past(state, wanted, targets[0].speed_m_s, now_s)
+        if found is None or is_wanted(found, wanted):
             return False
         return math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S
 
@@ -154,12 +136,11 @@ class Aside:
         if not self._targets:
             return []
         carrot, aside_m = self._carrot(at, self._targets[0].speed_m_s)
-        scene = self._scene(state, self._targets[0].speed_m_s, now_s)
         wanted = _with_speed(carrot[:2] - at[:2], self._targets[0].speed_m_s)
-        found = self._steered(scene, wanted, _velocity(state))
+        found = self._past(state, wanted, self._targets[0].speed_m_s, now_s)
         if found is None or math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
             return self._stand(state, "No velocity leads past: it holds. Resume goes on, or return home.", now_s)
-        is_free = _is_wanted(found, wanted)
+        is_free = is_wanted(found, wanted)
         if not (is_free and aside_m <= BACK_M):
             self._free_since_s = None
         elif self._free_since_s is None:
@@ -214,10 +195,10 @@ class Aside:
         """(3,) east, north and up of the vehicle, from where it began."""
         assert state.lat_deg is not None
         assert state.lon_deg is not None
-        return np.array([*_offset(self._origin, state.lat_deg, state.lon_deg), state.alt_rel_home_m or 0.0])
+        return np.array([*offset_of(self._origin, state.lat_deg, state.lon_deg), state.alt_rel_home_m or 0.0])
 
     def _point(self, target: GuidedTarget) -> F64:
-        return np.array([*_offset(self._origin, target.lat_deg, target.lon_deg), target.alt_rel_home_m])
+        return np.array([*offset_of(self._origin, target.lat_deg, target.lon_deg), target.alt_rel_home_m])
 
     def _drop_passed(self, at: F64) -> None:
         """A target is passed once the vehicle is beside it, or beyond."""
@@ -240,72 +221,16 @@ class Aside:
         carrot = a + leg * (ahead_m / length_m)
         return np.array([carrot[0], carrot[1], max(a[2] + leg[2] * along_m / length_m, carrot[2])]), beside_m
 
-    def _scene(self, state: VehicleState, speed_m_s: float, now_s: float) -> _Scene:
-        tracks = self._tracks
-        assert tracks is not None
-        settings, velocities = self.settings, self.settings.velocities
-        at_s = state.position_t_mono_s or now_s
-        later_s = max(0.0, at_s - tracks.t_mono_s) + LATENCY_S
-        horizon_m = max(speed_m_s, math.hypot(*_velocity(state))) * velocities.stands_s + velocities.stands_m
-        near = [t for t in tracks.tracks if t.moving or t.range_m < horizon_m][:MOST]
-        assert state.lat_deg is not None
-        assert state.lon_deg is not None
-        here = (state.lat_deg, state.lon_deg)
-        ahead = _velocity(state) * LATENCY_S
-        places = [
-            np.array(_offset(here, t.lat_deg, t.lon_deg)) + later_s * np.array(t.velocity_enu_m_s) - ahead for t in near
-        ]
-        obstacles = Obstacles.of(
-            [0.0, 0.0],
-            np.array(places).reshape(-1, 2),
-            np.array([t.velocity_enu_m_s for t in near]).reshape(-1, 2),
-            radius_m=np.array([_radius_m(t, settings) for t in near]),
-        )
-        limits = velocities.limits(Limits(max_speed_m_s=max(tracks.max_speed_m_s, speed_m_s)))
-        return _Scene(obstacles, limits, velocities.nearest_only, horizon_m)
-
-    def _steered(self, scene: _Scene, wanted: F64, velocity: F64) -> Proposal | None:
-        """The line itself is certified: ground is looked at only where it is left."""
-        tracks = self._tracks
-        assert tracks is not None
-        try:
-            straight = steer(scene.obstacles, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
-            if straight is None or _is_wanted(straight, wanted):
-                return straight
-            everything = with_ground(scene.obstacles, tracks.room_m, farthest_m=scene.horizon_m)
-            return steer(everything, wanted, velocity, scene.limits, nearest_only=scene.nearest_only)
-        except ParameterError:
-            return None
-
-
-def _is_wanted(found: Proposal, wanted: F64) -> bool:
-    """What is found may evade nothing and be another velocity all the same: the present one, where that is free."""
-    return math.dist(found.velocity_enu_m_s, wanted) < SAME_M_S
-
-
-def _radius_m(track: Track, settings: PerceptionSettings) -> float:
-    if track.moving:
-        return SPARE * settings.safety_radius_m
-    ee, en, nn = track.covariance_m2
-    worst_m2 = (ee + nn) / 2 + math.hypot((ee - nn) / 2, en)
-    stands_m = settings.velocities.stands_m
-    return stands_m + min(SIGMAS * math.sqrt(max(0.0, worst_m2)), stands_m / 4)
-
-
-def _offset(origin: tuple[float, float], lat_deg: float, lon_deg: float) -> tuple[float, float]:
-    """East and north in metres."""
-    shrink = math.cos(math.radians(origin[0]))
-    return (lon_deg - origin[1]) * METRES_PER_DEG * shrink, (lat_deg - origin[0]) * METRES_PER_DEG
+    def _past(self, state: VehicleState, wanted: F64, speed_m_s: float, now_s: float) -> Proposal | None:
+        assert self._tracks is not None
+        scene = scene_of(state, self._tracks, self.settings, speed_m_s=speed_m_s, now_s=now_s)
+        return velocity_past(scene, wanted, velocity_of(state))
 
 
 def _towards(state: VehicleState, target: GuidedTarget) -> F64:
     assert state.lat_deg is not None
     assert state.lon_deg is not None
-    return np.array(_offset((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
-
-
-def _velocity(state: VehicleState) -> F64:
-    return np.array([state.v_east_m_s or 0.0, state.v_north_m_s or 0.0])
+    return np.array(offset_of((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
 
 
 def _with_speed(direction: F64, speed_m_s: float) -> F64:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,16 @@ F64 = NDArray[np.float64]
 
 SIGNIFICANT = 13.8
 """Chi-square of two degrees of freedom that chance exceeds once in a thousand times."""
+STILL_SIGNIFICANT = 4.6
+"""The same, once in ten times: whose speed was told once is not taken for standing by the next frame's noise."""
 LEAST_M_S = 0.5
 DOPPLER_SHARE, DOPPLER_MEMORY = 0.4, 0.85
 """Of the newest echoes, those that move by their radial speed; what a frame before counts."""
 PLACE_S, PLACE_M, PLACE_SIGMAS, PLACE_HZ = 2.5, 7.0, 4.0, 5.0
 """What crosses the line of sight at right angles shows itself by its place alone: then it must have come so far, and
 been seen so often. Echoes of a wall wander over it, too, but not for long."""
+DRIFT_S, DRIFT_M, DRIFT_M_S = 2.0, 1.0, 0.3
+"""A slow walker's speed drowns in the noise of each frame; over seconds its way does not."""
 ENOUGH_UPDATES, UNSEEN_S = 5, 0.7
 _ECHO_M = 3.0
 
@@ -56,7 +60,9 @@ class Followed:
     unseen_s: float = 0.0
     """Since its last echo."""
     remembered: bool = False
-    """It stands where nothing can see it now."""
+    """It is where nothing can see it now."""
+    goes: bool = False
+    """Its speed is told from standing still, or was when it was seen last; what moves goes."""
 
     @property
     def id(self) -> int:
@@ -74,7 +80,8 @@ class Followed:
     @property
     def velocity_enu_m_s(self) -> F64:
         """(2,) Zero where what was measured is not told from standing still: five seconds of it would be metres."""
-        return velocity_of(self.state)
+        goes = self.goes or self.moving
+        return np.asarray(self.state.velocity_enu_m_s, np.float64) if goes else np.zeros(2)
 
     @property
     def sigma_m(self) -> float:
@@ -94,6 +101,16 @@ class _Memory:
     born_m: F64
     seen_s: float
     doppler: float = 0.0
+    goes: bool = False
+    moving: bool = False
+    confirmed: TrackState | None = None
+    """As it was when it was first sure of it."""
+    drift_enu_m_s: F64 | None = None
+    """Its mean velocity since then, where that is no chance."""
+
+    def known_by(self, state: TrackState) -> TrackState:
+        """With the mean velocity where the frames show none."""
+        return state if self.drift_enu_m_s is None else replace(state, velocity_enu_m_s=self.drift_enu_m_s)
 
 
 class Memory:
@@ -111,34 +128,37 @@ class Memory:
         return self._followed([state for state in states if state.confirmed], pose)
 
     def _note(self, state: TrackState, memory: _Memory, blobs: Blobs, echoes: F64, t_s: float) -> None:
+        """What nobody sees goes on as it went: its speed is no less for being known worse."""
         if not state.seen:
             return
         memory.seen_s = t_s
         away_m = np.hypot(*(echoes - state.position_enu_m).T)
-        if not len(away_m) or away_m.min() > _ECHO_M:
-            return
-        moves = float(blobs.moving[int(np.argmin(away_m))])
-        memory.doppler = (
-            moves if state.updates <= 1 else memory.doppler + (1 - DOPPLER_MEMORY) * (moves - memory.doppler)
-        )
+        if len(away_m) and away_m.min() <= _ECHO_M:
+            moves = float(blobs.moving[int(np.argmin(away_m))])
+            share = 1.0 if state.updates <= 1 else 1 - DOPPLER_MEMORY
+            memory.doppler += share * (moves - memory.doppler)
+        shows = _shows_speed(state, STILL_SIGNIFICANT if memory.goes else SIGNIFICANT)
+        if state.confirmed and memory.confirmed is None:
+            memory.confirmed = state
+        memory.drift_enu_m_s = None if shows or memory.confirmed is None else _drift(memory.confirmed, state)
+        memory.goes = shows or memory.drift_enu_m_s is not None
+        memory.moving = shows and _is_borne_out(state, memory)
 
     def _followed(self, states: list[TrackState], pose: Pose) -> list[Followed]:
         places = np.array([s.position_enu_m for s in states]).reshape(-1, 2)
-        velocities = np.array([velocity_of(s) for s in states]).reshape(-1, 2)
+        states = [self._of[s.id].known_by(s) for s in states]
+        known = [self._of[s.id] for s in states]
+        pairs = zip(states, known, strict=True)
+        velocities = np.array([s.velocity_enu_m_s if m.goes else (0.0, 0.0) for s, m in pairs])
         coming = approaches(
             Obstacles.of(pose.position_enu_m[:2], places, velocities, radius_m=0.0), pose.velocity_enu_m_s[:2]
         )
+        offsets, unseen_s = places - pose.position_enu_m[:2], [pose.t_mono_s - one.seen_s for one in known]
+        closest = zip(coming.closest_m.tolist(), coming.after_s.tolist(), strict=True)
         return [
-            Followed(
-                s, _moves(s, self._of[s.id]), place - pose.position_enu_m[:2], closest_m, in_s, self._unseen_s(s, pose)
-            )
-            for s, place, closest_m, in_s in zip(
-                states, places, coming.closest_m.tolist(), coming.after_s.tolist(), strict=True
-            )
+            Followed(s, m.moving, offset, closest_m, in_s, silent_s, goes=m.goes)
+            for s, m, offset, (closest_m, in_s), silent_s in zip(states, known, offsets, closest, unseen_s, strict=True)
         ]
-
-    def _unseen_s(self, state: TrackState, pose: Pose) -> float:
-        return pose.t_mono_s - self._of[state.id].seen_s
 
 
 def _places(blobs: Blobs, pose: Pose) -> F64:
@@ -147,10 +167,8 @@ def _places(blobs: Blobs, pose: Pose) -> F64:
     return pose.position_enu_m[:2] + np.column_stack([np.sin(bearing), np.cos(bearing)]) * blobs.range_m[:, None]
 
 
-def _moves(state: TrackState, memory: _Memory) -> bool:
-    """Its speed is more than its uncertainty accounts for, and its echoes or its way bear it out."""
-    if not _shows_speed(state):
-        return False
+def _is_borne_out(state: TrackState, memory: _Memory) -> bool:
+    """Whether the echoes of what shows a speed, or its way, say that it moves."""
     if memory.doppler >= DOPPLER_SHARE:
         return True
     if state.age_s < PLACE_S or state.updates < PLACE_HZ * state.age_s:
@@ -160,15 +178,20 @@ def _moves(state: TrackState, memory: _Memory) -> bool:
     return way_m > max(PLACE_M, PLACE_SIGMAS * math.sqrt(np.trace(spread[:2, :2])))
 
 
-def velocity_of(state: TrackState) -> F64:
-    """(2,) Over ground; zero where it is not told from standing still."""
-    return np.asarray(state.velocity_enu_m_s, np.float64) if _shows_speed(state) else np.zeros(2)
+def _drift(then: TrackState, now: TrackState) -> F64 | None:
+    """(2,) Mean velocity between the two, where it is more than chance."""
+    took_s = now.age_s - then.age_s
+    way = np.asarray(now.position_enu_m, np.float64) - then.position_enu_m
+    if took_s < DRIFT_S or math.hypot(*way) < max(DRIFT_M, DRIFT_M_S * took_s):
+        return None
+    spread = np.asarray(now.covariance, np.float64)[:2, :2] + then.covariance[:2, :2]
+    return way / took_s if way @ np.linalg.solve(spread, way) >= SIGNIFICANT else None
 
 
-def _shows_speed(state: TrackState) -> bool:
+def _shows_speed(state: TrackState, significant: float) -> bool:
     """Whether the track's speed is more than chance."""
     east, north = float(state.velocity_enu_m_s[0]), float(state.velocity_enu_m_s[1])
     if math.hypot(east, north) < LEAST_M_S:
         return False
     ee, en, nn = (float(state.covariance[at]) for at in ((2, 2), (2, 3), (3, 3)))
-    return nn * east * east - 2 * en * east * north + ee * north * north >= SIGNIFICANT * (ee * nn - en * en)
+    return nn * east * east - 2 * en * east * north + ee * north * north >= significant * (ee * nn - en * en)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -174,31 +174,33 @@ class Following:
             return ()
         up_m = float(self.perceiver.perception.pose.position_enu_m[2])
         places = np.array([[*one.state.position_enu_m, up_m] for one in shown])
-        geodetic = frame.to_geodetic(places)
+        geodetic, keep = frame.to_geodetic(places), keep_of(self.perceiver.settings)
         return tuple(
-            self._track(one, place, lat_lon)
+            track_of(one, place, lat_lon, keep)
             for one, place, lat_lon in zip(shown, places.tolist(), geodetic[:, :2].tolist(), strict=True)
         )
 
-    def _track(self, one: Followed, place: list[float], lat_lon: list[float]) -> Track:
-        settings, state, spread = self.perceiver.settings, one.state, one.state.covariance
-        return Track(
-            id=state.id,
-            enu_m=(place[0], place[1], place[2]),
-            velocity_enu_m_s=_flat(one.velocity_enu_m_s),
-            covariance_m2=(float(spread[0, 0]), float(spread[0, 1]), float(spread[1, 1])),
-            age_s=state.age_s,
-            updates=state.updates,
-            moving=one.moving,
-            range_m=one.range_m,
-            bearing_deg=math.degrees(one.bearing_rad) % 360.0,
-            closest_m=one.closest_m,
-            closest_in_s=one.closest_in_s,
-            dangerous=one.is_dangerous(keep_of(settings)),
-            lat_deg=lat_lon[0],
-            lon_deg=lat_lon[1],
-            remembered=one.remembered,
-        )
+
+def track_of(one: Followed, place: Sequence[float], lat_lon: Sequence[float], keep: Keep) -> Track:
+    """As it travels on the bus: ``place`` east, north and up, ``lat_lon`` in degrees."""
+    state, spread = one.state, one.state.covariance
+    return Track(
+        id=state.id,
+        enu_m=(place[0], place[1], place[2]),
+        velocity_enu_m_s=_flat(one.velocity_enu_m_s),
+        covariance_m2=(float(spread[0, 0]), float(spread[0, 1]), float(spread[1, 1])),
+        age_s=state.age_s,
+        updates=state.updates,
+        moving=one.moving,
+        range_m=one.range_m,
+        bearing_deg=math.degrees(one.bearing_rad) % 360.0,
+        closest_m=one.closest_m,
+        closest_in_s=one.closest_in_s,
+        dangerous=one.is_dangerous(keep),
+        lat_deg=lat_lon[0],
+        lon_deg=lat_lon[1],
+        remembered=one.remembered,
+    )
 
 
 def keep_of(settings: PerceptionSettings) -> Keep:

@@ -6,18 +6,18 @@ import time
 
 import numpy as np
 
-from tests.planning.bluesky_mvp import is_installed
-from tests.planning.sidesteps_compared import (
+from tests.telemetry.bluesky_mvp import is_installed
+from tests.telemetry.sidesteps_compared import (
+    COUNT,
     KEEP_M,
     NORTH,
+    SEED,
     Policy,
     encounters,
     modified_voltage_potential,
     nearest_m,
     velocity_obstacles,
 )
-
-COUNT, SEED = 1000, 7
 
 
 def main(count: int = COUNT) -> None:

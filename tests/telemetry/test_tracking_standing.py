@@ -15,7 +15,7 @@ from telemetry.obstacles import PerceptionSettings
 from telemetry.track_settings import TrackerSettings, VelocitySettings
 from telemetry.tracking.followed import Followed
 from telemetry.tracking.ground_room import DIRECTIONS, FARTHEST_M, GroundRoom
-from telemetry.tracking.remembered import GONE_S, LONGEST_S, Remembered
+from telemetry.tracking.remembered import GONE_S, LONGEST_MOVING_S, LONGEST_S, Remembered
 from tests.telemetry.moving_flights import Flight, straight
 
 NORTHWARDS = np.array([1.0, 0.0, 0.0, 0.0])
@@ -51,8 +51,36 @@ def test_a_pole_beside_the_vehicle_that_it_cannot_see_any_more_is_still_there() 
     assert one.closest_in_s == 0.0
 
 
-def test_what_moves_is_not_remembered_where_it_was() -> None:
+def test_what_moves_and_is_lost_in_plain_sight_is_not_remembered() -> None:
     assert lost(moving=True).observe([], pose(100.1, 2.0)) == []
+
+
+def test_what_moves_and_has_left_the_view_goes_on_as_it_did_and_is_known_worse() -> None:
+    memory = lost((12.0, 10.0), moving=True)
+    (one,) = memory.observe([], pose(101.0, 4.0))
+    assert one.remembered
+    assert one.moving
+    assert one.offset_m == pytest.approx([12.0, 10.0 - 4.0 - 4.0])
+    assert one.velocity_enu_m_s.tolist() == [0.0, -4.0]
+    assert one.sigma_m == pytest.approx(0.1 * math.hypot(1.0, 1.0))
+    assert memory.observe([], pose(100.0 + LONGEST_MOVING_S - 0.1, 4.0))
+    assert memory.observe([], pose(100.1 + LONGEST_MOVING_S, 4.0)) == []
+
+
+def test_what_comes_back_into_view_is_one_thing_not_two() -> None:
+    memory, here = lost((12.0, 10.0), moving=True), pose(101.0, 4.0)
+    found = memory.observe([pole((12.5, 6.5), here, number=2, moving=True)], here)
+    assert [one.id for one in found] == [2]
+
+
+@pytest.mark.parametrize(("north_m", "is_there"), [(1.2, True), (6.0, False)])
+def test_what_was_followed_briefly_is_remembered_only_where_the_radar_cannot_see(
+    north_m: float, is_there: bool
+) -> None:
+    memory, here = Remembered(), pose(100.0, 0.0)
+    one = pole((0.1, north_m), here)
+    memory.observe([replace(one, state=replace(one.state, updates=4, age_s=0.4))], here)
+    assert bool(memory.observe([], pose(100.1, 0.0))) == is_there
 
 
 def test_in_plain_sight_without_an_echo_it_is_gone() -> None:

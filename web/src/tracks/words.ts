@@ -31,7 +31,7 @@ export function trackWords(track: Track, off_nose_deg: number | null): string {
   const where = off_nose_deg === null ? "" : `, ${offNose(off_nose_deg)}`;
   const closest = isComing(track) ? `closest ${closestWords(track)}` : "not getting nearer";
   const age = `followed for ${withUnit(track.age_s, "s")}, ${number(track.updates)} times seen`;
-  const pace = track.remembered ? "out of the radar's sight, where it stood" : trackSpeed(track);
+  const pace = track.remembered ? "out of the radar's sight" : trackSpeed(track);
   return `${trackName(track.id)}: ${distance(track.range_m)}${where}, ${pace}, ${closest}; ${age}`;
 }
 
