@@ -123,10 +123,15 @@ class Avoiding:
         self.enabled, self.by, self._now_s = True, by, now_s
 
     def disable(self, now_s: float) -> list[Action]:
-        """A vehicle that has been taken over goes on as it is: higher than planned, and nothing stops it any more."""
+        """A vehicle that has been taken over goes on as it is: higher than planned, and nothing stops it any more. On
+        its way aside it holds: it does not go on choosing where to fly."""
         self.enabled, self._now_s = False, now_s
         self.detour.count_on_nobody()
-        return []
+        return self._end_aside(now_s)
+
+    def _end_aside(self, now_s: float) -> list[Action]:
+        wanted = self.enabled and self.by == "sidestep"
+        return self.detour.stop_aside(now_s) if self.detour.phase == "aside" and not wanted else []
 
     def fly(self, request: FlyManoeuvre, rest: Rest, now_s: float) -> list[Action]:
         """A prepared way, then ``rest`` higher by what the request says. Raises NotAllowedError."""
@@ -230,6 +235,8 @@ class Avoiding:
             return []
         if self._watch.words and (self.enabled or self.is_engaged):
             return self._release(state, now_s)
+        if ended := self._end_aside(now_s):
+            return ended
         was_ending = self.detour.phase == "ending"
         actions = self.detour.look(state, now_s)
         if self.detour.phase == "ending" and not was_ending:

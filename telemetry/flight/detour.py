@@ -180,9 +180,15 @@ class Detour:
 
     def stop_short(self, now_s: float) -> list[Action]:
         """The prepared way is not clear: it holds, and whoever ordered it decides."""
+        return self._stay("Something stands on the way past: it holds. Fly another way, or return.", now_s)
+
+    def stop_aside(self, now_s: float) -> list[Action]:
+        """Nobody wants it to step aside any more: beside its line it holds, and goes back there at an order only."""
+        return self._stay("Stepping aside was switched off: it holds. Resume goes on along its line.", now_s)
+
+    def _stay(self, why: str, now_s: float) -> list[Action]:
         actions = self._stop(now_s, then="go")
-        self.phase, self._paused = "holding", True
-        self.why = "Something stands on the way past: it holds. Fly another way, or return."
+        self.phase, self._paused, self.why = "holding", True, why
         return actions
 
     def climb_on(self, seen_by: frozenset[Sensor], now_s: float) -> list[Action]:
