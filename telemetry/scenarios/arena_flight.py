@@ -97,7 +97,7 @@ class _Way:
     ) -> None:
         self._approach, self._flown = approach, Flown()
         seed = int(random.integers(2**31))
-        self._wire = Wire(_vehicle(seed), order_latency_s=ORDER_S)
+        self._wire = Wire(_vehicle(seed, approach.heading_rad), order_latency_s=ORDER_S)
         self._radar: Radar = _radar_of(radar, approach, np.random.default_rng(seed))
         self._radar_due_s = 0.0
         self._waiting: deque[RadarFrame] = deque()
@@ -199,10 +199,13 @@ class _Detections:
         return self._radar.told(truth, self._number, self._radar.frame(np.array(rows), self._random))
 
 
-def _vehicle(seed: int) -> SimulatedVehicle:
+def _vehicle(seed: int, heading_rad: float) -> SimulatedVehicle:
+    """Its nose along its way, as the paper's: a radar on the nose sees nothing of a way that begins behind it."""
     parameters = Parameters()
     parameters.set("WPNAV_SPEED", 100 * CRUISE_M_S)
-    return SimulatedVehicle(FRAME, seed=seed, parameters=parameters, boot_s=3.0)
+    vehicle = SimulatedVehicle(FRAME, seed=seed, parameters=parameters, boot_s=3.0)
+    vehicle.truth.heading_rad = heading_rad % math.tau
+    return vehicle
 
 
 def _mission(approach: Approach):

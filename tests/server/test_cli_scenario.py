@@ -109,6 +109,54 @@ def test_curves_are_asked_for_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_pat
         assert len(set(image.convert("L").get_flattened_data())) > 20
 
 
+def test_of_the_arena_radar_and_figures_can_be_chosen(flights: list[tuple[str, Wanted]]) -> None:
+    sets = ("tracker.coordinates=polar", "tracker.gate=9", "velocities.max_turn_deg=60", "tracker.gate=8.5")
+    run = hedgehop("scenario", "arena", "--radar", "iq", *(word for one in sets for word in ("--set", one)))
+    assert run.code == 0
+    settings = {"tracker": {"coordinates": "polar", "gate": "8.5"}, "velocities": {"max_turn_deg": "60"}}
+    assert flights == [("arena", Wanted(0, radar="iq", settings=settings))]
+    hedgehop("scenario", "arena", "--set", "velocities.choice=edge")
+    assert flights[-1] == ("arena", Wanted(0, settings={"velocities": {"choice": "edge"}}))
+
+
+def test_what_cannot_be_chosen_is_refused_by_its_name(flights: list[tuple[str, Wanted]]) -> None:
+    wrong = {
+        ("arena", "--set", "tracker.gate"): '"tracker.gate" sets nothing',
+        ("arena", "--set", "gate=9"): '"gate=9" sets nothing',
+        ("arena", "--set", "engine.power=9"): '"engine.power=9" sets nothing',
+        ("arena", "--set", "=9"): '"=9" sets nothing',
+        ("arena", "--radar", "sonar"): "--radar",
+        ("wood", "--set", "tracker.gate=9"): "arena only",
+        ("wood", "--radar", "iq"): "arena only",
+    }
+    for arguments, words in wrong.items():
+        run = hedgehop("scenario", *arguments)
+        assert run.code == 2, arguments
+        assert words in run.err
+    assert flights == []
+
+
+@pytest.mark.parametrize(
+    ("figure", "words"),
+    [
+        ("tracker.gates=9", 'There is no "gates"'),
+        ("tracker.gate=wide", '"wide" is no number'),
+        ("tracker.birth_updates=4.7", '"4.7" is no whole number'),
+        ("tracker.coordinates=round", 'There are no coordinates "round"'),
+        ("tracker.detection_probability=1", "detection_probability"),
+        ("velocities.nearest_only=7", "neither true nor false"),
+        ("velocities.choice=wide", 'There is no choice "wide"'),
+        ("velocities.max_turn_deg=-1", '"-1" is no number'),
+    ],
+)
+def test_a_wrong_figure_is_refused_before_anything_flies(figure: str, words: str) -> None:
+    run = hedgehop("scenario", "arena", "--set", figure)
+    assert run.code == 2
+    assert words in run.err
+    named = hedgehop("scenario", "arena", "--set", figure, "--json")
+    assert named.json["error"]["where"] == figure.partition("=")[0].partition(".")[2]
+
+
 def test_a_broken_world_is_refused_with_its_place(tmp_path: Path) -> None:
     world = tmp_path / "broken.json"
     world.write_text(json.dumps({"format": "hedgehop-world", "version": 1, "objects": [{"type": "box"}]}))

@@ -91,13 +91,25 @@ def test_a_pole_straight_ahead_is_passed_by_what_avoids_live(nearest_only, radar
 
 def test_while_its_present_velocity_is_free_and_the_wanted_is_not_it_flies_on_and_not_to_the_line():
     """A way on which it flew to its line through a pole that it remembered beside it."""
-    random = np.random.default_rng([31, 5])
-    ways = approaches(78, random)
-    for _ in range(61):
-        random.integers(2**31)  # the seeds of the ways before it
-    way = fly(ways[61], random, settings=arena_settings(nearest_only=False), radar="model")
+    way = one_of(31, 61)
     assert way.nearest_gap_m > 0.2
     assert way.arrived
+
+
+def one_of(seed: int, number: int, *, nearest_only: bool = False) -> Flown:
+    random = np.random.default_rng([seed, 6 if nearest_only else 5])
+    ways = approaches(26 if nearest_only else 78, random)
+    for _ in range(number):
+        random.integers(2**31)  # the seeds of the ways before it
+    return fly(ways[number], random, settings=arena_settings(nearest_only=nearest_only), radar="model")
+
+
+def test_a_way_to_the_south_begins_with_the_nose_along_it_and_the_pole_in_view():
+    """It began with its nose to the north, and saw a pole that stood 3 m ahead when it was 1 m away."""
+    way = one_of(32, 0, nearest_only=True)
+    assert way.nearest_gap_m > 0.3
+    assert way.first_evasion_s is not None
+    assert way.first_evasion_s < 2.0
 
 
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
@@ -122,15 +134,20 @@ def test_a_few_ways_reach_the_figures_and_the_same_seed_flies_them_again():
 
 
 def test_figures_that_are_set_are_the_ones_that_fly_and_wrong_ones_are_named():
-    settings = {"tracker": {"coordinates": "polar", "birth_updates": "4"}, "velocities": {"max_turn_deg": "60"}}
+    settings = {
+        "tracker": {"coordinates": "polar", "birth_updates": "4"},
+        "velocities": {"max_turn_deg": "60", "choice": "edge"},
+    }
     made = arena._settings(Wanted(settings=settings), nearest_only=True)
     assert made.tracker == replace(Position2Go().tracker(), coordinates="polar", birth_updates=4)
-    assert made.velocities == replace(arena_settings(nearest_only=True).velocities, max_turn_deg=60.0)
+    assert made.velocities == replace(arena_settings(nearest_only=True).velocities, max_turn_deg=60.0, choice="edge")
     for part, name, value in (
         ("tracker", "gates", "9"),
         ("tracker", "gate", "wide"),
         ("tracker", "coordinates", "round"),
+        ("tracker", "birth_updates", "4.7"),
         ("velocities", "nearest_only", "7"),
+        ("velocities", "choice", "wide"),
         ("velocities", "max_turn_deg", "-1"),
     ):
         with pytest.raises(ParameterError):
