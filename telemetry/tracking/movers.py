@@ -72,7 +72,7 @@ class Movers(RadarPerception):
         columns = self._columns(scan)
         if columns is None:
             return self._drop(scan, "columns of different length", now_mono_s)
-        xyz, speed, snr, ghost = self._kept(*columns)
+        xyz, speed, snr, ghost = self._kept(scan.t_mono_s, *columns)
         self.pose, self.blobs = pose, self._believed(scan.t_mono_s, pose, xyz, speed, snr, ghost)
         self.states = self._tracker.step(
             scan.t_mono_s,
