@@ -18,7 +18,7 @@ from telemetry.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SimTruth, SlamPose
+from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SimTruth, SlamPose, UwbScan
 from telemetry.tracks import TracksStatus
 from telemetry.vehicle import VehicleState
 
@@ -40,6 +40,7 @@ class Topic(StrEnum):
     CLOUD_FRAME = "sensor/cloud"  # CloudFrame, latest wins: a node that is behind takes the newest
     SLAM_POSE = "sensor/slam"  # SlamPose, each arrives
     RANGE_FRAME = "sensor/ranges"  # RangeFrame, each arrives
+    UWB_SCAN = "sensor/uwb"  # UwbScan, each arrives
     MAP_RADAR = "map/radar"  # MapDelta, each arrives
     MAP_VISION = "map/vision"
     MAP_VISION_FLIGHT = "map/vision_flight"
@@ -314,6 +315,7 @@ Published = (
     | CloudFrame
     | SlamPose
     | RangeFrame
+    | UwbScan
     | MapDelta
     | RadarLook
     | CloudLook
@@ -343,6 +345,7 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.CLOUD_FRAME: CloudFrame,
     Topic.SLAM_POSE: SlamPose,
     Topic.RANGE_FRAME: RangeFrame,
+    Topic.UWB_SCAN: UwbScan,
     Topic.MAP_RADAR: MapDelta,
     Topic.MAP_VISION: MapDelta,
     Topic.MAP_VISION_FLIGHT: MapDelta,

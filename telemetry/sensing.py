@@ -7,6 +7,7 @@ MEASURED, on this machine's monotonic clock; who brings frames in from elsewhere
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -94,6 +95,26 @@ class RangeFrame:
     nearest_m: float = 0.0
     farthest_m: float = 0.0
     """What is nearer or farther is not measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class UwbScan:
+    """What a UWB radar returned over range, looking level in one direction from the vehicle."""
+
+    t_mono_s: float
+    t_utc_s: float
+    number: int
+    """Counts up by one per scan of this source; gaps are lost scans."""
+    source: str
+    intensity: bytes
+    """(bins,) in the radar's own counts"""
+    bin_m: float = 0.30
+    first_bin_m: float = 0.0
+    """Range of the middle of the first bin."""
+    beamwidth_rad: float = math.radians(40.0)
+    """Of the whole beam."""
+    bearing_rad: float = 0.0
+    """Of the beam's axis, clockwise from the nose."""
 
 
 @dataclass(frozen=True, slots=True)

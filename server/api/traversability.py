@@ -57,6 +57,13 @@ async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbC
     return answer(workspace.traversability.clear_foliage(upload, shown, params), 202)
 
 
+@router.put("/uwb/live", response_model=TraversabilityState)
+async def fuse_live(workspace: Work, asked: Annotated[UwbRule, Query()]) -> Response:
+    """How the scans of a radar that scans now are fused, those before as well."""
+    workspace.traversability.live_params(uwb_params(asked))
+    return answer(workspace.traversability.state)
+
+
 @router.post("/sites", response_model=TraversabilityState)
 async def landing_sites(body: LandingSitesBody, workspace: Work) -> Response:
     """The five best places near a point, from the map before clearing; 409 before there is one."""

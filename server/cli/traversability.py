@@ -29,7 +29,7 @@ from server.cli.output import DONE, FAILED, end_progress, print_json, progress, 
 from server.cli.places import parse_place
 from server.cli.terrain import ModelOptions, read_model
 from server.stopwatch import StepTimer
-from telemetry.sensors.uwb_log import read_uwb_log
+from telemetry.perception.uwb_drive import read_scans
 
 Layers = dict[str, NDArray[np.float32]]
 
@@ -43,7 +43,8 @@ def traversability(
         typer.Option("--out", metavar="DIR|FILE", help="A directory for all layers, or one .tif.", show_default=False),
     ],
     uwb: Annotated[
-        Path | None, typer.Option("--uwb", metavar="LOG", help="UWB radar log (.npz) that clears foliage.")
+        Path | None,
+        typer.Option("--uwb", metavar="LOG", help="UWB radar log (.npz), or a recording (.mcap), that clears foliage."),
     ] = None,
     uwb_rule: Annotated[
         Rule,
@@ -96,7 +97,7 @@ def traversability(
             prior=prior,
         )
         _check_out(out)
-        scans = None if uwb is None else read_uwb_log(o.existing(uwb) or uwb, uwb.name)
+        scans = None if uwb is None else read_scans(o.existing(uwb) or uwb, uwb.name)
         timer = StepTimer(progress)
         source, _ = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
         timer(WORK_STEP, None)

@@ -9,7 +9,7 @@ from typing import Protocol
 from server.errors import BusyError
 from telemetry.agent.intake import Frame, Intake
 from telemetry.messages import Published, Topic, VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame
+from telemetry.sensing import CloudFrame, RadarFrame, UwbScan
 
 AGENTS_MAX = 4
 
@@ -46,5 +46,7 @@ class Agents:
                 self._bus.publish(Topic.RADAR_FRAME, frame)
             case CloudFrame():
                 self._bus.publish(Topic.CLOUD_FRAME, frame)
+            case UwbScan():
+                self._bus.publish(Topic.UWB_SCAN, frame)
             case _:
                 self._bus.publish(Topic.SLAM_POSE, frame)

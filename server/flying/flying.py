@@ -41,6 +41,7 @@ from server.schemas import (
     TransferMessage,
 )
 from server.settings import Settings
+from server.traversability.live import LiveUwb
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.link_client import LinkClient
@@ -138,6 +139,7 @@ class Flying:
         self.on_armed: Callable[[], None] = lambda: None
         """What must make way for a flight hears that one begins."""
         self._followed = PlanFollowed(library, self.live, open_dsm=lambda: workspace.dsm)
+        self._uwb = LiveUwb(workspace.traversability, library, tell_pilot=lambda text: bus.publish(Topic.TEXT, text))
         self._track_so_far = TrackSoFar(self.shelf.folder, self.live, self._lane)
 
     @classmethod
@@ -161,6 +163,7 @@ class Flying:
             self._beat(),
             self._scenery.run(),
             self._followed.run(),
+            *self._uwb.loops(),
             *self._obstacles.loops(),
             *starts,
         ]
@@ -222,6 +225,7 @@ class Flying:
         relay.on(Topic.VEHICLE, self._on_state)
         relay.on(Topic.TEXT, self.live.on_text, each=True)
         relay.on(Topic.LINK, self._on_link)
+        relay.on(Topic.UWB_SCAN, self._uwb.on_scan, each=True)
         relay.on(Topic.TRANSFER, lambda transfer: tell(TransferMessage(transfer=transfer)))
         relay.on(Topic.FLIGHT, self._on_flight)
         relay.on(Topic.RECORDER, self._on_recorder)
@@ -236,6 +240,7 @@ class Flying:
     def _on_state(self, state: VehicleState) -> None:
         was_armed, home = self.armed, self._home
         self.live.on_state(state)
+        self._uwb.on_state(state)
         if self.armed != was_armed or self._home != home:
             self._workspace.picture.again()
         if was_armed and not state.armed:

@@ -156,6 +156,7 @@ from server.schemas.traversability import (
     LayerName,
     TraversabilityBody,
     TraversabilityState,
+    UwbLiveDoc,
     UwbRule,
 )
 from server.schemas.view import (
@@ -292,6 +293,7 @@ __all__ = [
     "TraversabilityMessage",
     "TraversabilityState",
     "UploadPlan",
+    "UwbLiveDoc",
     "UwbRule",
     "VehicleMessage",
     "VelocitySettingsBody",

@@ -30,6 +30,28 @@ class LandingSiteDoc(Strict):
     """For the pilot, such as "Slope 3.1 deg" and "6.4 m from the nearest obstacle"."""
 
 
+class UwbLiveDoc(Strict):
+    """A UWB radar whose scans come in now."""
+
+    state: Literal["none", "live", "silent"] = "none"
+    source: str = ""
+    """The agent that sends them."""
+    silent_s: int = 0
+    """So long nothing has come, where it is silent."""
+    scans: int = 0
+    """Since it began; those with a place."""
+    per_s: float = 0.0
+    unplaced: int = 0
+    """Left out: where the vehicle was then is not known."""
+    other_geometry: int = 0
+    """Left out: they lie otherwise in range than the first one."""
+    is_full: bool = False
+    """No more are taken until the maps are put away."""
+    problem: str = ""
+    """Why they could not be fused; empty: they were."""
+    rule: str = ""
+
+
 class TraversabilityState(Strict):
     """Of the open surface model; everything is 0 or empty until it has been worked out."""
 
@@ -61,6 +83,7 @@ class TraversabilityState(Strict):
     sites: list[LandingSiteDoc] = Field(default_factory=list)
     no_site: str = ""
     """Why there is none, if one was asked for."""
+    live: UwbLiveDoc = Field(default_factory=UwbLiveDoc)
 
 
 class TraversabilityBody(Strict):

@@ -23,6 +23,7 @@ from server.schemas import (
     TraversabilityBody,
     TraversabilityMessage,
     TraversabilityState,
+    UwbLiveDoc,
     ViewDoc,
 )
 from server.traversability import task
@@ -63,6 +64,10 @@ class TraversabilityDesk:
         """The surface model whose maps are known, or are being worked out."""
         self._jobs: dict[str, str] = {}
         """Those that run or wait, in their order, and what each does."""
+        self.forgotten: Callable[[], None] = lambda: None
+        """Called when operators put the maps away."""
+        self.live_params: Callable[[UwbParams], None] = lambda params: None
+        """Called with how live scans are to be fused."""
 
     @property
     def state(self) -> TraversabilityState:
@@ -100,7 +105,7 @@ class TraversabilityDesk:
                 task.clear_foliage, directory, source, target, upload, name, params, progress=progress
             )
 
-        return self._start(f"Reading {name}", "Clearing foliage", terrain_id, work, made=target, used_up=upload)
+        return self._start(f"Traversability with {name}", "Clearing foliage", terrain_id, work, made=target, used_up=upload)
 
     async def sites(self, body: LandingSitesBody) -> TraversabilityState:
         """The best landing sites near a point, from the map before clearing. Raises NotReadyError, PlanningError."""
@@ -121,11 +126,42 @@ class TraversabilityDesk:
         return await self._lane.call(task.layer_file, kept.file, layer)
 
     def forget(self) -> None:
-        """Nothing is kept any more; what is being worked out is cancelled."""
+        """Nothing is kept any more, nor of live scans; what is being worked out is cancelled."""
         self._close()
+        self.forgotten()
         directory = self._folder(self._terrain_id())
         if directory is not None:
             kept_in(directory).unlink(missing_ok=True)
+
+    # A radar that scans now
+
+    @property
+    def open_terrain_id(self) -> str | None:
+        return self._terrain_id()
+
+    def tell_live(self, live: UwbLiveDoc) -> None:
+        self._told.live = live
+        self._told.publish()
+
+    async def clear_live(self, log: Path, name: str, params: UwbParams) -> None:
+        """As ``clear_foliage``, for what no operator waits for: in turn with the jobs, and without a word of it.
+
+        Raises NotReadyError without a surface model, and what stands against the log.
+        """
+        terrain_id, target = self._open_terrain(), self._library.new_upload(".npz")
+        directory, kept = self._library.terrain_dir(terrain_id), self._told.kept
+        source = None if kept is None or kept.terrain_id != terrain_id else kept.file
+
+        async def work(lane: Lane) -> None:
+            worked = await lane.call(task.clear_foliage, directory, source, target, log, name, params)
+            if self._terrain_id() == terrain_id and self._told.kept is kept:
+                self._take(Kept(terrain_id, keep(target, directory), worked))
+                await asyncio.to_thread(settle, directory)
+
+        try:
+            await self._board.unseen(work)
+        finally:
+            target.unlink(missing_ok=True)
 
     # What else changes
 

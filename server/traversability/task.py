@@ -21,7 +21,7 @@ from server.scene.payload import OverlayScene
 from server.schemas import LayerName
 from server.traversability.legend import chance_classes, classes, legend_of, painted, time_classes
 from server.traversability.maps import Maps, Radar, read_maps, write_maps
-from telemetry.sensors.uwb_log import read_uwb_log
+from telemetry.perception.uwb_drive import read_scans
 
 DRAWN_CELLS = 1024
 """Per side at most, of what the 3D view lays over the model."""
@@ -80,7 +80,7 @@ def clear_foliage(
     Raises MappingError, PlanningError.
     """
     report("Reading the radar log", None)
-    scans = read_uwb_log(log, name)
+    scans = read_scans(log, name)
     if source is None:
         report("Working out slope and roughness", None)
         maps = Maps(traversable_ground(load_terrain(directory)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.scene.payload import OverlayScene, SiteMark
-from server.schemas import ServerMessage, TraversabilityMessage, TraversabilityState, ViewDoc
+from server.schemas import ServerMessage, TraversabilityMessage, TraversabilityState, UwbLiveDoc, ViewDoc
 from server.traversability.legend import legend_of
 from server.traversability.task import Worked
 
@@ -49,6 +49,8 @@ class Told:
     ) -> None:
         self._view, self._tell, self._show = view, tell, show
         self.kept: Kept | None = None
+        self.live = UwbLiveDoc()
+        """Whatever becomes of the map, the radar does as it does."""
         self._on_show: tuple[object, ...] = ()
         self._last = self.state = TraversabilityState()
 
@@ -69,7 +71,7 @@ class Told:
         legend = legend_of(view.traversability_layer, with_radar=bool(self.state.uwb_log))
         shown = legend if self.kept is not None else ()
         texts, colors = [each.text for each in shown], [each.color for each in shown]
-        self.state = self.state.model_copy(update={"legend": texts, "legend_colors": colors})
+        self.state = self.state.model_copy(update={"legend": texts, "legend_colors": colors, "live": self.live})
         if self.state != self._last:
             self._last = self.state
             self._tell(self.message())

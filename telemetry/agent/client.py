@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit, urlunsplit
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection, connect
@@ -34,6 +35,7 @@ from telemetry.agent.wire import (
     Radar,
     Report,
     Slam,
+    Uwb,
     Welcome,
     cloud,
     decode_from_server,
@@ -77,6 +79,13 @@ class SlamReading:
 
 
 @dataclass(frozen=True, slots=True)
+class UwbReading:
+    t_s: float
+    scan: Uwb
+    """Its own ``number`` and ``t_s`` are not looked at."""
+
+
+@dataclass(frozen=True, slots=True)
 class NoticeReading:
     """Words for the pilot, about the sensor itself."""
 
@@ -85,7 +94,7 @@ class NoticeReading:
     text: str
 
 
-Reading = RadarReading | CloudReading | SlamReading | NoticeReading
+Reading = RadarReading | CloudReading | SlamReading | UwbReading | NoticeReading
 
 
 @dataclass(slots=True)
@@ -260,6 +269,8 @@ class Agent:
         if isinstance(reading, NoticeReading):
             return encode(Notice(reading.warning, reading.text[:NOTICE_LONGEST]))
         number = self._number(reading)
+        if isinstance(reading, UwbReading):
+            return encode(msgspec.structs.replace(reading.scan, number=number, t_s=t_s))
         if isinstance(reading, RadarReading):
             return encode(Radar(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
         points, not_finite, out_of_reach = sendable(reading.xyz_m, REACH_M)

@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading
-from telemetry.agent.wire import TARGET_COLUMNS, Slam
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
+from telemetry.agent.wire import BINS_MAX, TARGET_COLUMNS, Slam, Uwb, intensity_of
 from telemetry.errors import SensorLinkError
 
 HOPELESS = 20
@@ -138,8 +138,10 @@ def _reading(record: dict[str, Any], t_s: float) -> Reading:
             return CloudReading(t_s, _table(record["points"], 3))
         case "slam":
             return SlamReading(t_s, _slam(record))
+        case "uwb":
+            return UwbReading(t_s, _uwb(record))
         case other:
-            raise BadLineError("unknown type", f"{json.dumps(other)[:40]}; there are radar, cloud and slam.")
+            raise BadLineError("unknown type", f"{json.dumps(other)[:40]}; there are radar, cloud, slam and uwb.")
 
 
 def _table(values: Any, columns: int) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -159,3 +161,17 @@ def _slam(record: dict[str, Any]) -> Slam:
     if tracking not in _TRACKING:
         raise ValueError(f"tracking is one of {', '.join(_TRACKING)}")
     return Slam(0.0, (x, y, z), (qw, qx, qy, qz), tracking)
+
+
+def _uwb(record: dict[str, Any]) -> Uwb:
+    intensity = np.asarray(record["intensity"], dtype=np.float32)
+    if intensity.ndim != 1 or len(intensity) > BINS_MAX:
+        raise ValueError(f"a scan is one row of at most {BINS_MAX} numbers")
+    names = ("bin_m", "first_bin_m", "beamwidth_deg", "bearing_deg")
+    told = {name: float(record[name]) for name in names if name in record}
+    scan = Uwb(0, 0.0, intensity.astype("<f4").tobytes(), **told)
+    try:
+        intensity_of(scan)
+    except SensorLinkError as error:
+        raise ValueError(error.what) from error
+    return scan

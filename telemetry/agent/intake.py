@@ -19,14 +19,16 @@ from telemetry.agent.wire import (
     Radar,
     Report,
     Slam,
+    Uwb,
     Welcome,
     decode_from_agent,
+    intensity_of,
     points_of,
     targets_of,
 )
 from telemetry.errors import SensorLinkError
 from telemetry.messages import VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, packed
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, packed
 
 LATE_S = 0.5
 FUTURE_S = 0.05
@@ -34,10 +36,12 @@ FUTURE_S = 0.05
 RATE_OVER_S = 5.0
 NAME_MAX = 40
 NOTICE_EVERY_S = 1.0
+SCANS_MOST_HZ = 200
+"""Of a UWB radar: what comes faster says nothing new of the ground, and fills recordings."""
 WARNING, INFO = 4, 6
 """MAV_SEVERITY"""
 
-Frame = RadarFrame | CloudFrame | SlamPose
+Frame = RadarFrame | CloudFrame | SlamPose | UwbScan
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,8 @@ class Intake:
         self._numbers: dict[type[FromAgent], int] = {}
         self._sizes: deque[tuple[float, int]] = deque()
         self._noticed_s = -math.inf
+        self._scans: deque[float] = deque(maxlen=SCANS_MOST_HZ)
+        """When the last ones came."""
 
     def on_data(self, data: bytes, *, now_mono_s: float, now_utc_s: float) -> Taken:
         """Raises SensorLinkError where the connection must end: no hello, or one of another version.
@@ -119,7 +125,7 @@ class Intake:
         text = "".join(c if c.isprintable() else " " for c in message.text[:NOTICE_LONGEST])
         return VehicleText(now_utc_s, WARNING if message.warning else INFO, f"{self.name}: {text}")
 
-    def _frame(self, message: Radar | Cloud | Slam, now_mono_s: float, now_utc_s: float) -> Frame:
+    def _frame(self, message: Radar | Cloud | Slam | Uwb, now_mono_s: float, now_utc_s: float) -> Frame:
         age_s = now_mono_s - message.t_s
         if not -FUTURE_S <= age_s < 3600.0:
             raise SensorLinkError(f"A frame was measured {-age_s:.2f} s from now.", where=type(message).__name__)
@@ -128,6 +134,8 @@ class Intake:
             if not all(math.isfinite(value) for value in (*message.position_m, *message.q_wxyz)):
                 raise SensorLinkError("A pose holds what is no number.", where="slam")
             return SlamPose(message.t_s, message.position_m, message.q_wxyz, message.tracking)
+        if isinstance(message, Uwb):
+            return self._scan(message, now_mono_s, now_utc_s - age_s)
         if isinstance(message, Radar):
             targets = targets_of(message)
             self._count(message)
@@ -138,7 +146,17 @@ class Intake:
         xyz_m = packed(points)
         return CloudFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, message.voxel_m)
 
-    def _count(self, message: Radar | Cloud) -> None:
+    def _scan(self, message: Uwb, now_mono_s: float, t_utc_s: float) -> UwbScan:
+        intensity = packed(intensity_of(message))
+        self._count(message)
+        if len(self._scans) == SCANS_MOST_HZ and now_mono_s - self._scans[0] < 1.0:
+            raise SensorLinkError(f"More than {SCANS_MOST_HZ} scans a second come.", where="uwb", advice="Send fewer.")
+        self._scans.append(now_mono_s)
+        angles_rad = math.radians(message.beamwidth_deg), math.radians(message.bearing_deg)
+        lies = message.bin_m, message.first_bin_m
+        return UwbScan(message.t_s, t_utc_s, message.number, self.name, intensity, *lies, *angles_rad)
+
+    def _count(self, message: Radar | Cloud | Uwb) -> None:
         """Numbers count up by one; a smaller one is an agent that began anew, or a frame out of order."""
         last = self._numbers.get(type(message))
         if last is not None and message.number > last + 1:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading
-from telemetry.agent.wire import Slam
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
+from telemetry.agent.wire import Slam, Uwb
 from telemetry.messages import Topic
 from telemetry.recording.reader import open_recording
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 
-_RECORDED = (Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE)
+_RECORDED = (Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.UWB_SCAN)
 
 
 def recorded_readings(path: Path) -> Iterator[tuple[float, Reading]]:
@@ -23,7 +23,7 @@ def recorded_readings(path: Path) -> Iterator[tuple[float, Reading]]:
         first_s = math.nan
         for entry in recording.entries(_RECORDED):
             message = entry.message
-            if not isinstance(message, RadarFrame | CloudFrame | SlamPose):
+            if not isinstance(message, RadarFrame | CloudFrame | SlamPose | UwbScan):
                 continue
             if math.isnan(first_s):
                 first_s = message.t_mono_s
@@ -39,11 +39,13 @@ def at(reading: Reading, t_s: float) -> Reading:
             return CloudReading(t_s, xyz_m)
         case SlamReading(_, slam):
             return SlamReading(t_s, slam)
+        case UwbReading(_, scan):
+            return UwbReading(t_s, scan)
         case NoticeReading(_, warning, text):
             return NoticeReading(t_s, warning, text)
 
 
-def _reading(message: RadarFrame | CloudFrame | SlamPose) -> Reading:
+def _reading(message: RadarFrame | CloudFrame | SlamPose | UwbScan) -> Reading:
     t_s = message.t_mono_s
     match message:
         case RadarFrame():
@@ -51,5 +53,12 @@ def _reading(message: RadarFrame | CloudFrame | SlamPose) -> Reading:
             return RadarReading(t_s, np.hstack(columns))
         case CloudFrame():
             return CloudReading(t_s, rows(message.xyz_m, 3))
+        case UwbScan():
+            return UwbReading(t_s, _scan(message))
         case SlamPose():
             return SlamReading(t_s, Slam(t_s, message.position_m, message.q_wxyz, message.tracking))
+
+
+def _scan(message: UwbScan) -> Uwb:
+    angles_deg = math.degrees(message.beamwidth_rad), math.degrees(message.bearing_rad)
+    return Uwb(message.number, message.t_mono_s, message.intensity, message.bin_m, message.first_bin_m, *angles_deg)

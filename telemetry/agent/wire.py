@@ -6,12 +6,15 @@ station's monotonic clock; the agent learns it by ``ping`` and ``pong``.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.errors import ParameterError
+from mapping.uwb import UwbGeometry
 from telemetry.errors import SensorLinkError
 
 PROTOCOL_VERSION = 1
@@ -19,7 +22,7 @@ SUBPROTOCOL = "hedgehop.sensors.v1"
 PATH = "/api/sensors"
 TARGET_COLUMNS = 5
 """x, y, z, radial speed (positive: away), SNR in dB"""
-TARGETS_MAX, POINTS_MAX = 1000, 100_000
+TARGETS_MAX, POINTS_MAX, BINS_MAX = 1000, 100_000, 4096
 NOTICE_LONGEST = 200
 STEP_M = 0.005
 """Of the coordinates of points."""
@@ -69,6 +72,19 @@ class Slam(msgspec.Struct, frozen=True, tag="slam", forbid_unknown_fields=True):
     tracking: Literal["good", "poor", "lost"]
 
 
+class Uwb(msgspec.Struct, frozen=True, tag="uwb", forbid_unknown_fields=True):
+    """One scan of a UWB radar: ``intensity`` is (bins,) little-endian float32; ``bearing_deg`` of its axis, clockwise
+    from the nose."""
+
+    number: int
+    t_s: float
+    intensity: bytes
+    bin_m: float = 0.30
+    first_bin_m: float = 0.0
+    beamwidth_deg: float = 40.0
+    bearing_deg: float = 0.0
+
+
 class Notice(msgspec.Struct, frozen=True, tag="notice", forbid_unknown_fields=True):
     """What the pilot should know of a sensor: why it says nothing, or that it is back."""
 
@@ -100,7 +116,7 @@ class Report(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=Tr
     text: str
 
 
-FromAgent = Hello | Ping | Radar | Cloud | Slam | Notice
+FromAgent = Hello | Ping | Radar | Cloud | Slam | Uwb | Notice
 FromServer = Welcome | Pong | Report
 _from_agent = msgspec.msgpack.Decoder(FromAgent)
 _from_server = msgspec.msgpack.Decoder(FromServer)
@@ -139,6 +155,18 @@ def points_of(message: Cloud) -> F32:
 def targets_of(message: Radar) -> F32:
     """(N, 5). Raises SensorLinkError for bytes that are no targets, or too many."""
     return _rows(message.targets, "<f4", TARGET_COLUMNS, TARGETS_MAX, "radar").astype(np.float32)
+
+
+def intensity_of(message: Uwb) -> F32:
+    """(bins,). Raises SensorLinkError for bytes that are no scan, and for numbers that no UWB radar has."""
+    intensity = _rows(message.intensity, "<f4", 1, BINS_MAX, "uwb").astype(np.float32)[:, 0]
+    try:
+        UwbGeometry(len(intensity), message.bin_m, message.first_bin_m, math.radians(message.beamwidth_deg))
+    except ParameterError as error:
+        raise SensorLinkError(error.what, where="uwb", advice=error.advice) from error
+    if not (np.isfinite(intensity).all() and abs(message.bearing_deg) <= 360.0):
+        raise SensorLinkError("A scan holds what is no number, or looks nowhere.", where="uwb")
+    return intensity
 
 
 def _rows(data: bytes, dtype: str, columns: int, most: int, where: str) -> NDArray[Any]:

@@ -20,6 +20,7 @@ EACH_ARRIVES = frozenset(
         Topic.RADAR_FRAME,
         Topic.SLAM_POSE,
         Topic.RANGE_FRAME,
+        Topic.UWB_SCAN,
         Topic.MAP_RADAR,
         Topic.MAP_VISION,
         Topic.MAP_VISION_FLIGHT,

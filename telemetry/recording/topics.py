@@ -7,7 +7,7 @@ from telemetry.messages import MESSAGE_TYPES, Topic
 MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, Topic.MAP_RANGES})
 """Told in steps that build on each other: a replay adds them up."""
 
-FRAMES = frozenset({Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.RANGE_FRAME})
+FRAMES = frozenset({Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.RANGE_FRAME, Topic.UWB_SCAN})
 """What sensors sent: from these maps are built again; a replay does not show them."""
 
 BULKY = MAPS | {Topic.CLOUD_FRAME, Topic.CLOUD_LOOK}

@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 
 from server.api import sensors as sensors_door
 from server.sensor_token import FILE, sensor_token
-from telemetry.agent.client import Agent, CloudReading, RadarReading, SlamReading
+from telemetry.agent.client import Agent, CloudReading, RadarReading, SlamReading, UwbReading
 from telemetry.agent.wire import (
     SUBPROTOCOL,
     Hello,
@@ -28,13 +28,14 @@ from telemetry.agent.wire import (
     Radar,
     Report,
     Slam,
+    Uwb,
     Welcome,
     decode_from_server,
     encode,
 )
 from telemetry.errors import SensorLinkError
 from telemetry.messages import Topic, VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 from tests.server.running import Running, running
 
 pytestmark = pytest.mark.xdist_group("sensor-link")
@@ -77,7 +78,8 @@ async def send_all(server: Running, token: str, **options: Any) -> Agent:
             agent.put(RadarReading(now_s, np.array([[1, 50, 0, -3, 20 + number]], np.float32)))
             agent.put(CloudReading(now_s, np.array([[0, 5, 1], [0.01, 5.01, 1.01], [3, 9, 1]], np.float32)))
             agent.put(SlamReading(now_s, Slam(0.0, (1.0, 2.0, float(number)), (1.0, 0.0, 0.0, 0.0), "good")))
-        await until(lambda: agent.counts.report is not None and agent.counts.report.received >= 9)
+            agent.put(UwbReading(now_s, Uwb(0, 0.0, np.full(16, number, "<f4").tobytes(), bearing_deg=90.0)))
+        await until(lambda: agent.counts.report is not None and agent.counts.report.received >= 12)
         task.cancel()
     return agent
 
@@ -88,6 +90,9 @@ def test_frames_reach_the_bus_with_their_times(server: Running, token: str) -> N
     radar = [m for topic, m in published if topic == Topic.RADAR_FRAME and isinstance(m, RadarFrame)]
     clouds = [m for topic, m in published if topic == Topic.CLOUD_FRAME and isinstance(m, CloudFrame)]
     poses = [m for topic, m in published if topic == Topic.SLAM_POSE and isinstance(m, SlamPose)]
+    scans = [m for topic, m in published if topic == Topic.UWB_SCAN and isinstance(m, UwbScan)]
+    assert [rows(scan.intensity, 1)[0, 0] for scan in scans] == [scan.number for scan in scans] == [0, 1, 2]
+    assert all(abs(time.monotonic() - scan.t_mono_s) < PATIENCE_S and scan.source == "drone" for scan in scans)
     assert [frame.number for frame in radar] == [frame.number for frame in clouds] == [0, 1, 2]
     assert [pose.position_m[2] for pose in poses] == [0.0, 1.0, 2.0]
     # Agent and server share a clock here: what the link makes of it is off by half a round trip at most.

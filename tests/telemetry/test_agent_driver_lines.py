@@ -7,11 +7,12 @@ import json
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
 from telemetry.agent.driver_lines import HOPELESS, NOTICE_EVERY_S, BadLineError, DriverLines, reading_of
 from telemetry.errors import SensorLinkError
 
@@ -41,8 +42,12 @@ def test_lines_become_readings() -> None:
         b"",
         b'{"type": "cloud", "t_s": 2, "points": []}',
         b'{"type": "slam", "position_m": [1, 2, 3], "q_wxyz": [1, 0, 0, 0]}',
+        b'{"type": "uwb", "t_s": 3, "intensity": [1, 2, 3, 4, 5, 6, 7, 8], "bin_m": 0.15, "bearing_deg": 10}',
     )
-    radar, cloud, slam = driver.readings()
+    radar, cloud, slam, uwb = driver.readings()
+    assert isinstance(uwb, UwbReading)
+    assert (uwb.t_s, uwb.scan.bin_m, uwb.scan.bearing_deg) == (3.0, 0.15, 10.0)
+    assert np.frombuffer(uwb.scan.intensity, "<f4").tolist() == [1, 2, 3, 4, 5, 6, 7, 8]
     assert isinstance(radar, RadarReading)
     assert radar.targets.tolist() == [[1, 2, 3, 4, 5]]
     assert isinstance(cloud, CloudReading)
@@ -50,7 +55,7 @@ def test_lines_become_readings() -> None:
     assert isinstance(slam, SlamReading)
     assert (slam.t_s, slam.slam.tracking) == (100.0, "good")
     assert driver.told == []
-    assert driver.lines.counts.as_dict() == {"good": 3, "bad": 0, "reasons": {}, "last_bad": ""}
+    assert driver.lines.counts.as_dict() == {"good": 4, "bad": 0, "reasons": {}, "last_bad": ""}
 
 
 @pytest.mark.parametrize(
@@ -63,6 +68,11 @@ def test_lines_become_readings() -> None:
      (b'{"type": "cloud", "points": [1, 2]}', "wrong values"),
      (b'{"type": "cloud", "points": [[1, 2, ' + b"9" * 400 + b"]]}", "wrong values"),
      (b'{"type": "slam", "position_m": [1], "q_wxyz": [1, 0, 0, 0]}', "wrong values"),
+     (b'{"type": "uwb"}', "a field is missing"),
+     (b'{"type": "uwb", "intensity": [[1, 2]]}', "wrong values"),
+     (b'{"type": "uwb", "intensity": [1, 2, 3, 4, 5, 6, 7]}', "wrong values"),
+     (b'{"type": "uwb", "intensity": [1, 2, 3, 4, 5, 6, 7, null]}', "wrong values"),
+     (b'{"type": "uwb", "intensity": [1, 2, 3, 4, 5, 6, 7, 8], "bin_m": "x"}', "wrong values"),
      (b'{"type": "radar", "t_s": "x", "targets": []}', "wrong values"),
      (b'{"type": "radar", "t_s": NaN, "targets": []}', "wrong values"),
      (b'{"type": "slam", "position_m": [1, 2, 3], "q_wxyz": [1, 0, 0, 0], "tracking": "fine"}', "wrong values")],

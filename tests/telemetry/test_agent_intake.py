@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.agent.intake import Intake, Taken
+from telemetry.agent.intake import SCANS_MOST_HZ, Intake, Taken
 from telemetry.agent.wire import (
     NOTICE_LONGEST,
     STEP_M,
@@ -17,6 +17,7 @@ from telemetry.agent.wire import (
     Pong,
     Radar,
     Slam,
+    Uwb,
     Welcome,
     cloud,
     decode_from_agent,
@@ -24,7 +25,7 @@ from telemetry.agent.wire import (
     points_of,
 )
 from telemetry.errors import SensorLinkError
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
+from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 
 TARGETS = np.array([[1, 50, 0.5, -3, 20], [2, 60, 1, 0.31, 15]], np.float32)
 
@@ -74,6 +75,38 @@ def test_a_pose_passes_and_one_without_numbers_does_not() -> None:
     assert give(intake, pose).frame == SlamPose(99.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), "poor")
     assert give(intake, Slam(99.0, (float("nan"), 0, 0), (1.0, 0, 0, 0), "good")).frame is None
     assert intake.refused == 1
+
+
+def uwb(number: int, **changes: float) -> Uwb:
+    return msgspec.structs.replace(Uwb(number, 99.9, np.arange(16, dtype="<f4").tobytes()), **changes)
+
+
+def test_a_uwb_scan_becomes_one_for_the_bus() -> None:
+    scan = give(greeted(), uwb(3, beamwidth_deg=30.0, bearing_deg=-90.0)).frame  # type: ignore[arg-type]
+    assert isinstance(scan, UwbScan)
+    assert (scan.number, scan.source, scan.t_mono_s, scan.bin_m) == (3, "drone", 99.9, 0.30)
+    assert (scan.beamwidth_rad, scan.bearing_rad) == pytest.approx((np.radians(30.0), np.radians(-90.0)))
+    assert rows(scan.intensity, 1)[:, 0].tolist() == list(range(16))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"intensity": b"abc"}, {"intensity": bytes(4 * 4097)}, {"intensity": bytes(4 * 7)}, {"bin_m": 0.0},
+     {"bin_m": float("nan")}, {"first_bin_m": float("inf")}, {"beamwidth_deg": 181.0}, {"bearing_deg": 1e9},
+     {"intensity": np.full(16, np.nan, "<f4").tobytes()}, {"t_s": 200.0}],
+)  # fmt: skip
+def test_a_scan_that_is_none_is_refused(wrong: dict[str, float]) -> None:
+    intake = greeted()
+    assert give(intake, uwb(0, **wrong)).frame is None  # type: ignore[arg-type]
+    assert (intake.received, intake.refused) == (0, 1)
+
+
+def test_scans_come_no_faster_than_they_may() -> None:
+    intake = greeted()
+    for number in range(SCANS_MOST_HZ + 50):
+        give(intake, uwb(number), 100.0 + number * 0.001)  # type: ignore[arg-type]
+    assert (intake.received, intake.refused, intake.lost) == (SCANS_MOST_HZ, 50, 0)
+    assert isinstance(give(intake, uwb(999), 101.5).frame, UwbScan)  # type: ignore[arg-type]
 
 
 def test_a_notice_is_for_the_pilot_once_a_second() -> None:

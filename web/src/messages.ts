@@ -1301,6 +1301,27 @@ export interface LandingSiteDoc {
   reasons: string[];
 }
 
+/** A UWB radar whose scans come in now. */
+export interface UwbLiveDoc {
+  state: "none" | "live" | "silent";
+  /** The agent that sends them. */
+  source: string;
+  /** So long nothing has come, where it is silent. */
+  silent_s: number;
+  /** Since it began; those with a place. */
+  scans: number;
+  per_s: number;
+  /** Left out: where the vehicle was then is not known. */
+  unplaced: number;
+  /** Left out: they lie otherwise in range than the first one. */
+  other_geometry: number;
+  /** No more are taken until the maps are put away. */
+  is_full: boolean;
+  /** Why they could not be fused; empty: they were. */
+  problem: string;
+  rule: string;
+}
+
 /** Of the open surface model; everything is 0 or empty until it has been worked out. */
 export interface TraversabilityState {
   state: "none" | "working" | "ready" | "failed";
@@ -1331,6 +1352,7 @@ export interface TraversabilityState {
   sites: LandingSiteDoc[];
   /** Why there is none, if one was asked for. */
   no_site: string;
+  live: UwbLiveDoc;
 }
 
 /** Works out the traversability of the open surface model. */

@@ -1,6 +1,8 @@
 import { beforeEach, describe, expect, it } from "vitest";
+import type { UwbLiveDoc } from "../src/messages";
 import { receive } from "../src/store/reduce";
 import {
+  NO_RADAR,
   dismissGroundError,
   forgetTraversability,
   groundError,
@@ -9,8 +11,8 @@ import {
   tellGroundErrors,
   traversability,
 } from "../src/store/traversability";
-import { isRadarLog } from "../src/store/files";
-import { figures, legendOf, reasonsOf, shownLayer } from "../src/traversability/words";
+import { isRadarLog, ruleQuery } from "../src/store/files";
+import { figures, leftOut, legendOf, liveWords, reasonsOf, shownLayer } from "../src/traversability/words";
 import { ground } from "./track_samples";
 
 const plain = (text: string) => text.replace(/\u00a0/g, " ").replace(/\u202f/g, "");
@@ -49,9 +51,38 @@ describe("traversability", () => {
   });
 
   it("has jobs and files of its own", () => {
-    const labels = ["Traversability", "Reading wood.npz", "Reading etna.tif"];
+    const labels = ["Traversability", "Traversability with wood.npz", "Reading etna.tif"];
     expect(labels.map((label) => isGroundJob({ label }))).toEqual([true, true, false]);
     expect(["wood.NPZ", "etna.tif"].map((name) => isRadarLog(new File([], name)))).toEqual([true, false]);
+  });
+});
+
+describe("a radar that scans now", () => {
+  const live = (fields: Partial<UwbLiveDoc>): UwbLiveDoc => ({ ...NO_RADAR, source: "rover", ...fields });
+
+  it("says how it does, and its silence", () => {
+    expect(plain(liveWords(live({ state: "live", scans: 1240, per_s: 9.8 })))).toBe(
+      "rover: 1240 live scans, 9.8 a second.",
+    );
+    expect(plain(liveWords(live({ state: "silent", silent_s: 12, scans: 1240 })))).toBe(
+      "rover: the UWB radar has sent nothing for 12 s.",
+    );
+  });
+
+  it("says what was left out and why", () => {
+    expect(leftOut(live({}))).toEqual([]);
+    expect(leftOut(live({ unplaced: 3, other_geometry: 1, is_full: true })).map(plain)).toEqual([
+      "3 left out: where the vehicle was is not known.",
+      "1 left out: other range bins than at first.",
+      "No more are taken: put the maps away to begin anew.",
+    ]);
+  });
+
+  it("is fused by the rule that is set, and by nothing that is not", () => {
+    expect(ruleQuery({ rule: "paper", p_o: 0.7, c_th: null })).toEqual([
+      ["rule", "paper"],
+      ["p_o", "0.7"],
+    ]);
   });
 });
 

@@ -1,4 +1,5 @@
 import type { Track, TracksMessage, TracksStatus, TraversabilityState, VelocityCone } from "../src/messages";
+import { NO_RADAR } from "../src/store/traversability";
 
 /** A few moving objects and maps of ground for the tests. */
 
@@ -80,5 +81,6 @@ export const ground = (fields: Partial<TraversabilityState> = {}): Traversabilit
   sites_near: null,
   sites: [],
   no_site: "",
+  live: NO_RADAR,
   ...fields,
 });

@@ -125,16 +125,18 @@ export async function sendRecording(file: File, then: (recording: RecordingDoc) 
 /** Name of the radar log that is on its way, or being worked on before the server says so. */
 export const radarLog = signal<string | null>(null);
 
+/** What of a rule is set, for a query. */
+export const ruleQuery = (rule: UwbRule): [string, string][] =>
+  Object.entries(rule).flatMap(([key, value]): [string, string][] =>
+    value === null || value === undefined ? [] : [[key, String(value)]],
+  );
+
 /** A UWB radar's log, to clear the foliage; whether the server took it. */
 export async function sendRadarLog(file: File, rule: UwbRule): Promise<boolean> {
   setError("traversability", null);
   radarLog.value = file.name;
   try {
-    const set = Object.entries(rule).filter(([, value]) => value !== null && value !== undefined);
-    const query = new URLSearchParams([
-      ["name", file.name],
-      ...set.map(([key, value]) => [key, String(value)]),
-    ]);
+    const query = new URLSearchParams([["name", file.name], ...ruleQuery(rule)]);
     await sendFile(`/api/traversability/uwb?${query}`, file);
     return true;
   } catch (error) {

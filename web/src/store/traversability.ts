@@ -1,7 +1,20 @@
 import { computed, signal } from "@preact/signals";
-import type { ErrorDoc, JobDoc, TraversabilityState } from "../messages";
+import type { ErrorDoc, JobDoc, TraversabilityState, UwbLiveDoc } from "../messages";
 
 /** Where the open surface model can be driven on and landed on, as the server last said. */
+
+export const NO_RADAR: UwbLiveDoc = {
+  state: "none",
+  source: "",
+  silent_s: 0,
+  scans: 0,
+  per_s: 0,
+  unplaced: 0,
+  other_geometry: 0,
+  is_full: false,
+  problem: "",
+  rule: "",
+};
 
 const NOTHING: TraversabilityState = {
   state: "none",
@@ -21,6 +34,7 @@ const NOTHING: TraversabilityState = {
   sites_near: null,
   sites: [],
   no_site: "",
+  live: NO_RADAR,
 };
 
 export const traversability = signal<TraversabilityState>(NOTHING);

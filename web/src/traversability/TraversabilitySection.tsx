@@ -15,6 +15,7 @@ import { AutoField } from "../ui/fields";
 import { Figures, Files, Layers } from "./GroundMap";
 import { Fusion } from "./Fusion";
 import { LandingSites } from "./LandingSites";
+import { LiveRadar } from "./LiveRadar";
 import { TRAVERSABILITY, putAway, resolution_m, takeRadarLogs, workOut } from "./commands";
 
 const DEFAULT_M = 0.3;
@@ -56,13 +57,14 @@ function RadarLog({ state, isBusy }: { state: TraversabilityState; isBusy: boole
       </p>
       {state.uwb_rule !== "" && <p class="hint">{state.uwb_rule}</p>}
       <Fusion />
+      <LiveRadar live={state.live} hasTerrain />
       <Button
         class="wide"
         icon="import"
         disabled={isBusy}
-        title="A UWB radar's log (.npz): what it saw through is foliage"
+        title="A UWB radar's log (.npz), or a recording with its scans (.mcap): what it saw through is foliage"
         testid="radar-log-open"
-        onClick={() => chooseFiles(".npz", takeRadarLogs)}
+        onClick={() => chooseFiles(".npz,.mcap", takeRadarLogs)}
       >
         {hasLog ? "Open another radar log…" : "Open a radar log…"}
       </Button>
@@ -150,6 +152,7 @@ export function TraversabilitySection({ plan }: { plan: PlanDoc }) {
       {hasMap && <Maps plan={plan} state={state} isBusy={isWorking} />}
       <WorkOut plan={plan} state={state} isBusy={isWorking} hasMap={hasMap} />
       {!hasMap && plan.terrain_id !== null && <RadarLog state={state} isBusy={isWorking} />}
+      {plan.terrain_id === null && <LiveRadar live={state.live} hasTerrain={false} />}
       <Done place={TRAVERSABILITY} />
     </Section>
   );

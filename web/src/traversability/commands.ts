@@ -1,6 +1,6 @@
 import { effect, signal } from "@preact/signals";
 import type { LandingSitesBody, PlaceDoc, TraversabilityBody, UwbRule, ViewDoc } from "../messages";
-import { sendRadarLog } from "../store/files";
+import { ruleQuery, sendRadarLog } from "../store/files";
 import { order } from "../store/outcomes";
 import { document_, selection } from "../store/state";
 import { setSelection, setView } from "../store/stream";
@@ -11,6 +11,7 @@ import { setSection } from "../ui/Section";
 
 export const TRAVERSABILITY = "traversability";
 export const LANDING = "landing";
+export const LIVE_RADAR = "live-radar";
 
 export type MapLayer = ViewDoc["traversability_layer"];
 
@@ -28,6 +29,14 @@ export async function workOut(): Promise<void> {
 
 /** How the next radar log is fused; null: the paper's number. */
 export const uwbRule = signal<UwbRule>({ rule: "explained" });
+
+/** The same for a radar that scans now, all its scans so far included. */
+export const fuseLive = () =>
+  order({
+    place: LIVE_RADAR,
+    method: "PUT",
+    path: `/api/traversability/uwb/live?${new URLSearchParams(ruleQuery(uwbRule.value))}`,
+  });
 
 /** A radar log clears the foliage: what it cleared is shown at once. */
 export async function clearWith(log: File): Promise<void> {

@@ -1,5 +1,5 @@
 import { number, percent } from "../format";
-import type { LandingSiteDoc, TraversabilityState } from "../messages";
+import type { LandingSiteDoc, TraversabilityState, UwbLiveDoc } from "../messages";
 import type { MapLayer } from "./commands";
 
 /** Traversability in a few words. */
@@ -82,3 +82,18 @@ export const reasonsOf = ({ reasons }: Pick<LandingSiteDoc, "reasons">) =>
 export const siteMark = ({ rank }: Pick<LandingSiteDoc, "rank">) => `L${rank}`;
 
 export const siteTitle = (site: LandingSiteDoc) => `Landing site ${siteMark(site)}`;
+
+/** How a radar that scans now does, in one line. */
+export function liveWords({ state, source, silent_s, scans, per_s }: UwbLiveDoc): string {
+  if (state === "silent") return `${source}: the UWB radar has sent nothing for ${number(silent_s)} s.`;
+  return `${source}: ${number(scans)} live scans, ${number(per_s, 1)} a second.`;
+}
+
+/** Scans that count for nothing, and why. */
+export function leftOut({ unplaced, other_geometry, is_full }: UwbLiveDoc): string[] {
+  const notes = [];
+  if (unplaced > 0) notes.push(`${number(unplaced)} left out: where the vehicle was is not known.`);
+  if (other_geometry > 0) notes.push(`${number(other_geometry)} left out: other range bins than at first.`);
+  if (is_full) notes.push("No more are taken: put the maps away to begin anew.");
+  return notes;
+}
