@@ -43,7 +43,7 @@ def test_it_is_worked_out_as_finely_as_was_asked_for(served: Running) -> None:
 
 def test_a_log_arrives_as_it_is_under_a_plain_name(served: Running) -> None:
     answer = served.http.post(f"{PATH}/uwb", params={"name": "../trial a.npz"}, content=b"PK\x03\x04", headers=RAW)
-    assert (answer.status_code, answer.json()["label"]) == (202, "Traversability with trial a.npz")
+    assert (answer.status_code, answer.json()["label"]) == (202, "Reading trial a.npz")
     assert served.workspace.traversability.uploads["trial a.npz"] == b"PK\x03\x04"
     assert served.http.post(f"{PATH}/uwb", params={"name": "a.npz"}, content=b"", headers=RAW).status_code == 422
     assert served.http.post(f"{PATH}/uwb", content=b"PK", headers=RAW).status_code == 422

@@ -1,6 +1,7 @@
 """Reading parameters: both ways of writing integers, what a vehicle does not have, silence."""
 
 import struct
+from random import Random
 from typing import Any
 
 import pytest
@@ -97,3 +98,20 @@ def test_other_vehicles_answers_do_not_count() -> None:
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
 def test_a_value_that_is_no_number_is_none(number: float) -> None:
     assert result(read("A").on_message(value("A", number), 0.1)) == {"A": None}
+
+
+def test_over_a_link_that_loses_every_third_message_all_are_read() -> None:
+    """In each direction; the names that a start is judged by, 300 times over."""
+    names = ("RTL_ALT", "RTL_SPEED", "WPNAV_SPEED")
+    for seed in range(300):
+        random = Random(seed)
+        machine = ParameterRead(names, target=(1, 1), bytewise=False)
+        actions, now_s = machine.start(0.0), 0.0
+        while ended(actions) is None:
+            asked = [_name(action.message) for action in actions if isinstance(action, Send)]
+            actions = [
+                a for name in asked if random.random() > 0.51 for a in machine.on_message(value(name, 15), now_s)
+            ]
+            now_s += ASK_AGAIN_S
+            actions += machine.on_tick(now_s) if ended(actions) is None else []
+        assert result(actions) == dict.fromkeys(names, 15.0), seed
