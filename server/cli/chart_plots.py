@@ -38,9 +38,11 @@ def _write(folder: Path, title: str, charts: tuple[Chart, ...], whole: str) -> P
 
 
 def _draw(axes: Axes, chart: Chart) -> None:
-    named = -1
+    named, last = -1, ""
     for one in chart.series:
-        named += bool(one.name)
+        # "ours" and "ours, in use" are of one colour, as is what has no name and the one before it.
+        if one.name and not (last and one.name.startswith(f"{last},")):
+            named, last = named + 1, one.name
         colour = _PRINTED if one.printed else _COLOURS[max(named, 0) % len(_COLOURS)]
         axes.plot(one.x, one.y, color=colour, linewidth=1.2, label=one.name or None, **_style(one))
     x_span, y_span = ends(chart)

@@ -30,7 +30,7 @@ interface Props {
 
 const EDGE = { left: 52, right: 12, top: 8, bottom: 40 };
 const LEAST = { width: 160, height: 120 };
-const [PX_PER_X_TICK, PX_PER_Y_TICK] = [80, 48];
+const [PX_PER_X_TICK, PX_PER_Y_TICK] = [56, 40];
 
 function areaIn(size: { width: number; height: number }, props: Props): Area {
   const { xSpan, ySpan } = props;

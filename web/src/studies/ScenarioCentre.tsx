@@ -11,9 +11,13 @@ function FigureRow({ figure }: { figure: ScenarioFigureDoc }) {
   return (
     <tr class={kind} data-testid="scenario-figure" data-verdict={verdict ?? "none"}>
       <th scope="row">{figure.words}</th>
-      <td class="value">{withUnit(measuredText(figure.value), figure.unit)}</td>
-      <td>{figure.paper}</td>
-      <td>{limitText(figure)}</td>
+      <td class="value" data-label="Measured">
+        {withUnit(measuredText(figure.value), figure.unit)}
+      </td>
+      <td data-label="Paper">{figure.paper}</td>
+      <td class="limit" data-label="Held to">
+        {limitText(figure)}
+      </td>
       <td class="verdict-cell">
         {verdict && <Icon name={kind === "good" ? "check" : "cross"} size={16} />} {verdict?.toLowerCase()}
       </td>

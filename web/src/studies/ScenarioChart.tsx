@@ -9,15 +9,14 @@ const COLOURS = [
   "var(--replayed)",
 ] as const;
 
-/** A series without a name goes on with the one before it. */
+/** A series without a name, or one that is named after the one before it ("ours", "ours, in use"), has its colour. */
 function coloured(series: readonly SeriesDoc[]): { one: SeriesDoc; colour: string }[] {
-  let named = -1;
+  let [named, last] = [-1, ""];
   return series.map((one) => {
-    if (one.name !== "") named += 1;
-    return {
-      one,
-      colour: one.printed ? "var(--text)" : (COLOURS[Math.max(0, named) % COLOURS.length] ?? COLOURS[0]),
-    };
+    const goesOn = one.name === "" || (last !== "" && one.name.startsWith(`${last},`));
+    if (!goesOn) [named, last] = [named + 1, one.name];
+    const colour = COLOURS[Math.max(0, named) % COLOURS.length] ?? COLOURS[0];
+    return { one, colour: one.printed ? "var(--text)" : colour };
   });
 }
 
