@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pyproj import Proj
 
 import planning
+from planning.cells.cells import Layout
 from planning.certificate.as_json import certificate_json
 from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
@@ -91,21 +92,23 @@ def certify(
 def _judged(
     dsm: Dsm, ground: SurfaceModel, line: FlownLine, params: ClearanceParams, trend_step_m: float
 ) -> Certificate:
-    pyramid = cells_pyramid(dsm.cells)
-    points_m = dsm.cells.layout.in_frame(line.points_m)
+    cells = dsm.cells.measured_in(_stretch(dsm, line))
+    layout, pyramid = cells.layout, cells_pyramid(cells)
+    points_m = layout.in_frame(line.points_m)
     start_m, end_m = points_m[:-1], points_m[1:]
     distance_m, share = nearest_distances(pyramid, start_m, end_m)
     lowest_m, highest_m = height_range(pyramid, start_m, end_m)
     legs = _legs(line, distance_m, share, lowest_m)
     worst = _worst_point(dsm, line, distance_m, share)
-    trend_places, trend_s_m = places_along(points_m, trend_step_m)
+    trend_places, trend_s_m = places_along(line.points_m, trend_step_m)
+    trend_places = layout.in_frame(trend_places)
     trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
     at_home = ground_at_home(ground, line.home_xy_m, params)
     stand = home_stand(at_home, line, params)
     low_line = lowered(line, stand)
-    low_points_m = dsm.cells.layout.in_frame(low_line.points_m)
-    needed_m, needed_from = _return_height(pyramid, dsm, low_line, params)
-    near_m, near_from = _near_return(pyramid, dsm, low_line, params)
+    low_points_m = layout.in_frame(low_line.points_m)
+    needed_m, needed_from = _return_height(pyramid, layout, low_line, params)
+    near_m, near_from = _near_return(pyramid, layout, low_line, params)
     nearest_low = _nearest_low(pyramid, line, low_points_m, stand, distance_m)
     stand = _with_distance(stand, nearest_low)
     planned_m = float(distance_m.min())
@@ -117,7 +120,7 @@ def _judged(
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
     too_near = not planned_m >= params.required_clearance_m
-    worst_is_unknown = too_near and _is_unknown_near(pyramid, dsm, worst, distance_m)
+    worst_is_unknown = too_near and _is_unknown_near(pyramid, layout, worst, distance_m)
     found = [
         *unjudged_reasons(line),
         *line_reasons(legs, worst, params, worst_is_unknown=worst_is_unknown),
@@ -203,34 +206,37 @@ def _worst_point(dsm: Dsm, line: FlownLine, distance_m: F64, share: F64) -> Wors
     )
 
 
-def _is_unknown_near(pyramid: MaxPyramid, dsm: Dsm, worst: WorstPoint, distance_m: F64) -> bool:
+def _is_unknown_near(pyramid: MaxPyramid, layout: Layout, worst: WorstPoint, distance_m: F64) -> bool:
     """Whether a column of infinite height is what the worst point is near: then climbing does not help."""
-    far_above = dsm.cells.layout.in_frame(np.array([[worst.x_m, worst.y_m, 1e6]]))
+    far_above = layout.in_frame(np.array([[worst.x_m, worst.y_m, 1e6]]))
     unknown_m, _ = nearest_distances(pyramid, far_above, far_above)
     return bool(unknown_m[0] <= distance_m.min() + 1e-6)
 
 
-def _return_height(pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[float, F64 | None]:
+def _return_height(
+    pyramid: MaxPyramid, layout: Layout, line: FlownLine, params: ClearanceParams
+) -> tuple[float, F64 | None]:
     """Height above home that every way home needs, 0 when none needs any, and the place that needs it."""
     places_m, _ = places_along(line.points_m, RETURN_STEP_M)
-    return _needed(pyramid, dsm, line, places_m, places_m, params)
+    return _needed(pyramid, layout, line, places_m, places_m, params)
 
 
-def _near_return(pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, params: ClearanceParams) -> tuple[float, F64 | None]:
+def _near_return(
+    pyramid: MaxPyramid, layout: Layout, line: FlownLine, params: ClearanceParams
+) -> tuple[float, F64 | None]:
     """As `_return_height`, regarding that close to home autopilots do not climb to the return height."""
     places_m, _ = places_along(line.points_m, RETURN_STEP_M)
     raised_m = places_m.copy()
     raised_m[:, 2] = return_altitudes(
         places_m, np.array(line.home_xy_m), line.home_alt_dsm_m, rtl_height_m=params.rtl_height_m, step_m=RETURN_STEP_M
     )
-    return _needed(pyramid, dsm, line, places_m, raised_m, params)
+    return _needed(pyramid, layout, line, places_m, raised_m, params)
 
 
 def _needed(
-    pyramid: MaxPyramid, dsm: Dsm, line: FlownLine, places_m: F64, flown_m: F64, params: ClearanceParams
+    pyramid: MaxPyramid, layout: Layout, line: FlownLine, places_m: F64, flown_m: F64, params: ClearanceParams
 ) -> tuple[float, F64 | None]:
     """Height above home, and the place, that returns flown at the altitudes of ``flown_m`` do not reach."""
-    layout = dsm.cells.layout
     home_xy_m = layout.in_frame(np.array([line.home_xy_m]))[0]
     altitude_m, place = return_altitude(pyramid, layout.in_frame(flown_m), home_xy_m, params.required_clearance_m)
     if place < 0:
@@ -257,6 +263,16 @@ def _landing_obstacle(ground: SurfaceModel, line: FlownLine, params: ClearancePa
     if line.landing_xy_m is None or line.landing_xy_m == line.home_xy_m:
         return None
     return ground_at(ground, line.landing_xy_m, params).obstacle
+
+
+def _stretch(dsm: Dsm, line: FlownLine) -> float:
+    """Metres of the CRS that a metre on the ground may have along the line, where that is more than one.
+
+    Where it is less, distances are longer on the ground than in the CRS, in which they are judged then.
+    """
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(line.points_m[:, :2]).T
+    longest = float(np.max(Proj(dsm.crs).get_factors(lon_deg, lat_deg).tissot_semimajor))
+    return min(max(1.0, longest), 1.0 + SCALE_TOLERANCE) if math.isfinite(longest) else 1.0
 
 
 def _scale(dsm: Dsm, worst: WorstPoint) -> float:
@@ -286,7 +302,9 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
             "solid columns over the file's own cells at full resolution;"
             " unknown cells and everything outside: infinitely high"
         ),
-        "earth": "straight lines in the model's projected CRS",
+        "earth": (
+            "straight lines in the model's projected CRS; distances on the ground where its metres are too short"
+        ),
         "following": _following_words(params),
         "home_alt_dsm_m": line.home_alt_dsm_m,
         "home_height": (

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from affine import Affine
 
+from planning.clearance import SCALE_TOLERANCE
 from planning.dsm import F64, Dsm, SurfaceModel
 from planning.holes import HoleReport, fill_holes
 from planning.model import Certificate, FlownLine
@@ -103,7 +104,8 @@ def was_enough(
         certificate.required_clearance_m,
         felt_m,
     )
-    return found_m < to_cut_m - _cut_holes_m(ground, model)
+    # Distances to cuts are in metres of the CRS.
+    return (1.0 + SCALE_TOLERANCE) * found_m < to_cut_m - _cut_holes_m(ground, model)
 
 
 def _needed_box(model: SurfaceModel, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:

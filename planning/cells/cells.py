@@ -17,9 +17,10 @@ F64 = NDArray[np.float64]
 Mapping = Callable[[F64, F64], tuple[F64, F64]]
 """Raster column, row (fractional) -> projected x, y."""
 
-NODE_M = 48.0
-"""Between corners that are projected exactly: a map projection bends by less than 0.1 mm over such a span."""
-_LEAST_NODE_PX, _MOST_NODE_PX = 8, 64
+NODE_M, FARTHEST_NODE_M = 48.0, 100.0
+"""Between corners that are projected exactly: a map projection bends by less than 0.1 and 1 mm over such spans."""
+_FEW_PX, _MOST_NODE_PX = 8, 64
+"""Over fewer cells than these the span is the longer one, and what is kept of a large model stays small."""
 _STRAIGHT_M = 1e-5
 """Cells nowhere farther than this from parallelograms are taken as such."""
 _RECTANGULAR_M = 1e-6
@@ -38,11 +39,13 @@ class Layout:
     """(2, 2) orthogonal: projected metres from the origin -> the lattice's frame."""
     shape: tuple[int, int]
     """Rows, columns."""
+    stretch: float = 1.0
+    """Projected metres in one of the lattice's frame, which are then true on the ground."""
 
     def in_frame(self, points_m: F64) -> F64:
         """Projected (N, 2) or (N, 3) points in the lattice's frame; altitudes stay."""
         points = np.asarray(points_m, dtype=np.float64)
-        flat = (points[:, :2] - np.array(self.origin_xy_m)) @ self.turn.T
+        flat = (points[:, :2] - np.array(self.origin_xy_m)) @ self.turn.T / self.stretch
         return np.ascontiguousarray(np.column_stack([flat, points[:, 2:]]))
 
     def places(self, xy_m: F64) -> F64:
@@ -54,16 +57,30 @@ class Layout:
 
     def xy_of(self, row: float, column: float) -> tuple[float, float]:
         """Projected place of a row and column, in cells."""
-        x, y = np.array(self.origin_xy_m) + self.turn.T @ np.array(corner(self.lattice, float(row), float(column)))
+        return self._projected(np.array(corner(self.lattice, float(row), float(column))))
+
+    def _projected(self, place_m: F64) -> tuple[float, float]:
+        """Of a place in the frame."""
+        x, y = np.array(self.origin_xy_m) + self.stretch * (self.turn.T @ place_m)
         return float(x), float(y)
 
     def part(self, row0: int, column0: int, shape: tuple[int, int]) -> Layout:
         """The layout of a block of cells, which may reach outside."""
         grid = self.lattice
         first = np.array([column0 * grid.width_m + row0 * grid.shear_m, row0 * grid.height_m])
-        x, y = np.array(self.origin_xy_m) + self.turn.T @ first
         lattice = grid._replace(first_row=grid.first_row + row0, first_column=grid.first_column + column0)
-        return Layout(lattice, (float(x), float(y)), self.turn, shape)
+        return replace(self, lattice=lattice, origin_xy_m=self._projected(first), shape=shape)
+
+    def measured_in(self, stretch: float) -> Layout:
+        """The same places in a frame whose metre is ``stretch`` projected ones."""
+        grid, ratio = self.lattice, self.stretch / stretch
+        lattice = grid._replace(
+            width_m=ratio * grid.width_m,
+            height_m=ratio * grid.height_m,
+            shear_m=ratio * grid.shear_m,
+            bend_m=ratio * grid.bend_m,
+        )
+        return replace(self, lattice=lattice, stretch=stretch)
 
     def reach(self, low_xy_m: F64, high_xy_m: F64) -> tuple[slice, slice]:
         """Rows and columns that hold every cell touching the projected rectangle; may be empty."""
@@ -105,6 +122,10 @@ class Cells:
         inside = (row >= 0) & (row < height_px) & (column >= 0) & (column < width_px)
         out[inside] = self.elevation_m[row[inside].astype(np.intp), column[inside].astype(np.intp)]
         return out
+
+    def measured_in(self, stretch: float) -> Cells:
+        """The same cells in a frame whose metre is ``stretch`` projected ones."""
+        return self if stretch == self.layout.stretch else replace(self, layout=self.layout.measured_in(stretch))
 
     def with_elevation(self, elevation_m: F32) -> Cells:
         """The same cells with other heights."""
@@ -184,7 +205,9 @@ def _laid_out(shape: tuple[int, int], forward: Mapping) -> Layout:
         shear_m = 0.0
     corner_x, corner_y = np.array([x[4], y[4]]) - along * width / 2 - down * height / 2
     layout = Layout(straight(width_m, height_m, shear_m), (float(corner_x), float(corner_y)), turn, shape)
-    node_px = int(np.clip(NODE_M / max(width_m, height_m), _LEAST_NODE_PX, _MOST_NODE_PX))
+    side_m = max(width_m, height_m)
+    least_px = np.clip(FARTHEST_NODE_M / side_m, 1, _FEW_PX)
+    node_px = int(np.clip(NODE_M / side_m, least_px, _MOST_NODE_PX))
     bend_m = _bend(layout, forward, node_px)
     if np.abs(bend_m).max() < _STRAIGHT_M:
         return layout

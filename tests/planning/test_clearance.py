@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from affine import Affine
-from pyproj import CRS
+from pyproj import CRS, Geod
 
 from planning.clearance import certificate_json, certify
 from planning.dsm import Dsm
@@ -259,6 +259,24 @@ def test_a_crs_whose_metre_is_not_a_metre_is_refused():
     certificate = certify(dsm_of(flat(), epsg=3857), line_of(*PLAIN), PARAMS)
     assert codes(certificate) == ["crs_scale"]
     assert "1.32" in certificate.reasons[0].text
+
+
+def test_distances_are_those_on_the_ground_where_the_crs_stretches_them():
+    """At 5.4 degrees of latitude a metre is 1.0044 m of EPSG:3857."""
+    cells = flat()
+    cells[:, 80:] = 200.0
+    dsm = replace(dsm_of(cells, epsg=3857), transform=Affine(1.0, 0.0, 1.67e6, 0.0, -1.0, 6.0e5))
+    points_m = np.array([[1.67e6 + x, 6.0e5 - 50.0, 90.0] for x in (50.0, 60.0)])
+    line = replace(line_of(*PLAIN), points_m=points_m, home_xy_m=(1.67e6 + 50.0, 6.0e5 - 50.0))
+    ends = dsm.lat_lon_from_xy(np.array([[1.67e6 + x, 6.0e5 - 50.0] for x in (60.0, 80.0)]))
+    true_m = Geod(ellps="WGS84").inv(*ends[0, ::-1], *ends[1, ::-1])[2]
+    assert true_m == pytest.approx(19.91, abs=0.01)
+    certificate = certify(dsm, line, PARAMS)
+    assert certificate.min_distance_m == pytest.approx(true_m, abs=1e-3)
+    assert certificate.trend_distance_m.min() == pytest.approx(true_m, abs=1e-3)
+    assert codes(certify(dsm, line, replace(PARAMS, required_clearance_m=true_m - 0.01))) == []
+    too_near = certify(dsm, line, replace(PARAMS, required_clearance_m=true_m + 0.01))
+    assert codes(too_near) == ["clearance", "return_height"]
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyproj import CRS
 
-from planning.cells.cells import Cells, Layout, square_cells
-from planning.cells.lattice import Lattice, bend_at, bend_range, quad_of, straight
+from planning.cells.cells import Cells, Layout, place_cells, square_cells
+from planning.cells.lattice import Lattice, bend_at, bend_range, corner, quad_of, straight
 from planning.certificate.around import cells_around
 from planning.certificate.home_ground import home_ground
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import LEAF_PX, cells_pyramid
 from planning.certificate.quads import quad_distance_sq
+from planning.rasters.mapping import source_mapping
 from tests.planning.test_clearance import NORTH, WEST, dsm_of
 
 ROWS, COLUMNS = 43, 50
@@ -127,3 +130,32 @@ def test_a_vehicle_is_not_set_down_between_leaning_cells_that_differ_too_much() 
     place = leaning.layout.xy_of(20.5, 20.5)
     assert home_ground(dsm, place, centre_m=0.35, radius_m=0.35).obstacle is not None
     assert home_ground(dsm, place, centre_m=0.35, radius_m=0.25).obstacle is None
+
+
+@pytest.mark.parametrize("cell_m", [0.01, 1.0, 10.0, 30.0, 90.0])
+@pytest.mark.parametrize("lat_deg", [37.7, 60.0])
+def test_corners_lie_where_the_projection_puts_them(cell_m: float, lat_deg: float) -> None:
+    """To the millimetre, also where cells are as large as those of a satellite's model."""
+    step_deg = cell_m / 111_000
+    degrees = Affine(step_deg / np.cos(np.radians(lat_deg)), 0, 10.4, 0, -step_deg, lat_deg)
+    forward, _ = source_mapping(degrees, CRS.from_epsg(4326), CRS.from_epsg(32632))
+    shape = (200, 260)
+    layout = place_cells(shape, forward).layout
+    rows, columns = (grid.ravel() for grid in np.mgrid[0 : shape[0] + 1, 0 : shape[1] + 1].astype(np.float64))
+    placed = np.array([corner(layout.lattice, row + 1, column + 1) for row, column in zip(rows, columns, strict=True)])
+    off_m = placed - layout.in_frame(np.column_stack(forward(columns, rows)))
+    assert np.hypot(*off_m.T).max() < 1e-3
+
+
+@pytest.mark.parametrize("shear_m", [0.0, 0.4])
+def test_places_are_the_same_whatever_metre_they_are_measured_in(shear_m: float) -> None:
+    turn = np.array([[0.6, 0.8], [0.8, -0.6]])
+    layout = Layout(bent(1, shear_m=shear_m), (WEST, NORTH), turn, (ROWS, COLUMNS))
+    longer = layout.measured_in(1.004)
+    for row, column in ((0.0, 0.0), (7.3, 31.8)):
+        assert longer.xy_of(row, column) == pytest.approx(layout.xy_of(row, column), abs=1e-8)
+        assert longer.places(np.array([layout.xy_of(row, column)]))[0] == pytest.approx((row, column), abs=1e-6)
+    part = longer.part(5, 9, (10, 10))
+    assert part.xy_of(2.0, 3.0) == pytest.approx(layout.xy_of(7.0, 12.0), abs=1e-8)
+    apart_m = longer.in_frame(np.array([[WEST, NORTH], [WEST + 10.04, NORTH]]))
+    assert np.linalg.norm(apart_m[1] - apart_m[0]) == pytest.approx(10.0)

@@ -42,6 +42,7 @@ GRIDS: dict[str, tuple[str, Affine]] = {
     "feet": ("EPSG:2994", Affine(3, 0, 640000, 0, -3, 850000)),
     "feet, oblong": ("EPSG:2994", Affine(3, 0, 640000, 0, -4, 850000)),
     "mirrored, sheared": ("EPSG:32633", Affine(-1, 0.2, 5e5, 0.1, -1.1, 4.17e6)),
+    "long metres": ("EPSG:3857", Affine(1, 0, 1.67e6, 0, -1, 6.0e5)),
     "untrue metres": ("EPSG:3857", Affine(1, 0, 1.67e6, 0, -1, 4.54e6)),
 }
 

@@ -49,6 +49,7 @@ def read_ground(path: Path, *, crs: str | None = None, height_scale: float = 1.0
     rows, columns = height_m.shape
     metres, unit_m = _metres(horizontal, affine @ (columns / 2, rows / 2))
     there = Transformer.from_crs(horizontal, metres, always_xy=True)
+    unit_m = _true_length(metres, there.transform(*affine @ (columns / 2, rows / 2)), unit_m)
     c, r = np.meshgrid(np.arange(-2.0, columns + 3), np.arange(-2.0, rows + 3))
     x, y = affine.a * c + affine.b * r + affine.c, affine.d * c + affine.e * r + affine.f
     if metres != horizontal:
@@ -108,6 +109,14 @@ def _metres(horizontal: CRS, centre: tuple[float, float]) -> tuple[CRS, float]:
             return horizontal, unit_m
     zone = int((lon + 180) // 6) % 60 + 1
     return CRS.from_epsg((32600 if lat >= 0 else 32700) + zone), 1.0
+
+
+def _true_length(metres: CRS, centre: tuple[float, float], unit_m: float) -> float:
+    """Of its unit on the ground, by the geodesic between two places: no map projection is true everywhere."""
+    to_degrees = Transformer.from_crs(metres, CRS.from_epsg(4326), always_xy=True)
+    half = 50.0 / unit_m
+    ends = [to_degrees.transform(centre[0] + side, centre[1]) for side in (-half, half)]
+    return float(Geod(ellps="WGS84").inv(*ends[0], *ends[1])[2]) / (2 * half)
 
 
 def _cell_area(corners: F64) -> float:
