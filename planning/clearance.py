@@ -40,6 +40,7 @@ from planning.certificate.reasons import (
 )
 from planning.certificate.returns import return_altitude
 from planning.certificate.threads import threads_for
+from planning.certificate.true_metres import SCALE_TOLERANCE, true_cells
 from planning.certificate.unjudged import unjudged_reasons
 from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError, ParameterError
@@ -61,8 +62,6 @@ RETURN_STEP_M = 0.5
 """Ways home are judged from pieces of the line at most this long; inside one, the lower altitude counts."""
 LONGEST_LINE_M = 100_000.0
 """Farther than any battery: a longer line is a mistaken coordinate."""
-SCALE_TOLERANCE = 0.01
-"""Largest deviation of the CRS's metre from the true one."""
 
 
 def certify(
@@ -92,7 +91,7 @@ def certify(
 def _judged(
     dsm: Dsm, ground: SurfaceModel, line: FlownLine, params: ClearanceParams, trend_step_m: float
 ) -> Certificate:
-    cells = dsm.cells.measured_in(_stretch(dsm, line))
+    cells = true_cells(dsm, line.points_m[:, :2])
     layout, pyramid = cells.layout, cells_pyramid(cells)
     points_m = layout.in_frame(line.points_m)
     start_m, end_m = points_m[:-1], points_m[1:]
@@ -263,16 +262,6 @@ def _landing_obstacle(ground: SurfaceModel, line: FlownLine, params: ClearancePa
     if line.landing_xy_m is None or line.landing_xy_m == line.home_xy_m:
         return None
     return ground_at(ground, line.landing_xy_m, params).obstacle
-
-
-def _stretch(dsm: Dsm, line: FlownLine) -> float:
-    """Metres of the CRS that a metre on the ground may have along the line, where that is more than one.
-
-    Where it is less, distances are longer on the ground than in the CRS, in which they are judged then.
-    """
-    lat_deg, lon_deg = dsm.lat_lon_from_xy(line.points_m[:, :2]).T
-    longest = float(np.max(Proj(dsm.crs).get_factors(lon_deg, lat_deg).tissot_semimajor))
-    return min(max(1.0, longest), 1.0 + SCALE_TOLERANCE) if math.isfinite(longest) else 1.0
 
 
 def _scale(dsm: Dsm, worst: WorstPoint) -> float:

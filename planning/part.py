@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from affine import Affine
 
-from planning.clearance import SCALE_TOLERANCE
+from planning.certificate.true_metres import SCALE_TOLERANCE
 from planning.dsm import F64, Dsm, SurfaceModel
 from planning.holes import HoleReport, fill_holes
 from planning.model import Certificate, FlownLine

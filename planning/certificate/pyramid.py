@@ -61,7 +61,7 @@ def _pyramid(elevation_m: F32, lattice: Lattice) -> MaxPyramid:
     flat = np.concatenate([level.ravel() for level in levels])
     flat_layout = np.column_stack([offsets, layout]).astype(np.int64)
     boxes = np.empty((0 if is_rectangular(lattice) else flat.size, 4))
-    _block_boxes(lattice, *elevation_m.shape, flat_layout, boxes)
+    _block_boxes(lattice, elevation_m.shape[0], elevation_m.shape[1], flat_layout, boxes)
     return MaxPyramid(elevation_m, flat, flat_layout, lattice, boxes)
 
 
@@ -96,8 +96,9 @@ def _block_boxes(lattice, height, width, layout, out):
         for i in range(rows):
             for j in range(columns):
                 if level == 0:
-                    block = i * LEAF_PX, j * LEAF_PX, min(height, (i + 1) * LEAF_PX), min(width, (j + 1) * LEAF_PX)
-                    box = block_around(lattice, bend_range(lattice, *block), *block)
+                    r0, c0 = i * LEAF_PX, j * LEAF_PX
+                    r1, c1 = min(height, r0 + LEAF_PX), min(width, c0 + LEAF_PX)
+                    box = block_around(lattice, bend_range(lattice, r0, c0, r1, c1), r0, c0, r1, c1)
                 else:
                     box = _around_children(out, layout[level - 1], i, j)
                 k = offset + i * columns + j

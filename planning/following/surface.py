@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from planning.certificate.nearest import nearest_distances
-from planning.certificate.pyramid import MaxPyramid, cells_pyramid
+from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.threads import threads_for
+from planning.certificate.true_metres import true_cells
 from planning.dsm import Dsm
 from planning.holes import fill_holes
 from planning.model import F64
@@ -22,7 +23,9 @@ class SurfaceDistance:
 
     def __init__(self, dsm: Dsm, *, fill_hole_area_m2: float = SMALL_HOLE_M2) -> None:
         self.dsm, _ = fill_holes(dsm, max_area_m2=fill_hole_area_m2)
-        self._pyramid: MaxPyramid = cells_pyramid(self.dsm.cells)
+        west, south, east, north = self.dsm.bounds_m
+        cells = true_cells(self.dsm, np.array([(west, south), (west, north), (east, south), (east, north)]))
+        self._layout, self._pyramid = cells.layout, cells_pyramid(cells)
 
     def heights_m(self, xyz_m: F64) -> F64:
         """(N,) height of (N, 3) positions (x, y, alt_dsm) above the cell below; NaN over unknown cells and outside."""
@@ -31,7 +34,7 @@ class SurfaceDistance:
     def distances_m(self, xyz_m: F64) -> F64:
         """(N,) distance in space of (N, 3) positions to the nearest cell, 0 inside one; NaN over unknown cells."""
         dsm = self.dsm
-        places = dsm.cells.layout.in_frame(xyz_m)
+        places = self._layout.in_frame(xyz_m)
         known = np.isfinite(places).all(axis=1) & np.isfinite(dsm.elevation_at(xyz_m[:, :2]))
         out = np.full(len(places), np.nan)
         with threads_for(0 if known.sum() <= ALONE else dsm.elevation_m.size):

@@ -10,6 +10,7 @@ import numpy as np
 from planning.certificate.commands import STRAIGHT, TAKEOFF, stays
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
+from planning.certificate.true_metres import true_cells
 from planning.clearance import certify
 from planning.dsm import Dsm
 from planning.flown import AMSL_FRAMES, flown_line
@@ -94,9 +95,10 @@ def _heights(mission: Mission, item: MissionItem, dsm: Dsm, clearance: Clearance
     """Height above home from which the level way to an item is clear, and the item's own."""
     home, home_alt_m = mission.home, flown_line(mission, dsm).home_alt_dsm_m
     xy_m = dsm.xy_from_lat_lon(np.array([[item.lat_deg, item.lon_deg], [home.lat_deg, home.lon_deg]]))
-    over_m, home_m = dsm.cells.layout.in_frame(xy_m)
+    cells = true_cells(dsm, xy_m)
+    over_m, home_m = cells.layout.in_frame(xy_m)
     place = np.array([[*over_m, -math.inf]])
-    altitude_m, _ = return_altitude(cells_pyramid(dsm.cells), place, home_m, clearance.required_clearance_m)
+    altitude_m, _ = return_altitude(cells_pyramid(cells), place, home_m, clearance.required_clearance_m)
     own_m = item.alt_m - home_alt_m if item.frame in AMSL_FRAMES else item.alt_m
     return altitude_m - home_alt_m, own_m
 

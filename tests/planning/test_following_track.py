@@ -10,7 +10,7 @@ import pytest
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyproj import CRS
+from pyproj import CRS, Geod
 
 from planning.dsm import Dsm
 from planning.following.figures import judge, track_figures
@@ -145,7 +145,8 @@ def hills(unknown=()):
     cells = rng.uniform(0.0, 6.0, (80, 90)).astype(np.float32)
     for row, col in unknown:
         cells[row, col] = np.nan
-    return Dsm(cells, Affine(1.0, 0.0, -5.0, 0.0, -1.0, 75.0), CRS.from_epsg(32633), None, "")
+    true_here = CRS.from_user_input("+proj=tmerc +lat_0=37 +lon_0=15 +k=1 +ellps=WGS84")
+    return Dsm(cells, Affine(1.0, 0.0, -5.0, 0.0, -1.0, 75.0), true_here, None, "")
 
 
 def test_distances_agree_with_the_slow_ones():
@@ -237,3 +238,15 @@ def test_the_plans_own_clock_tells_its_height_and_waits_where_it_holds():
     assert np.isnan(planned_alt_dsm_m(held, outside)).all()
     untimed = replace(held, arrive_s=np.full(len(heights), np.nan), leave_s=np.full(len(heights), np.nan))
     assert np.isnan(planned_alt_dsm_m(untimed, np.array([0.0]))).all()
+
+
+def test_distances_to_the_surface_are_those_on_the_ground():
+    """At 5.4 degrees of latitude a metre is 1.0044 m of EPSG:3857."""
+    cells = np.zeros((60, 100), np.float32)
+    cells[:, 60:] = 200.0
+    dsm = Dsm(cells, Affine(1.0, 0.0, 1.67e6, 0.0, -1.0, 6.0e5), CRS.from_epsg(3857), None, "")
+    place = 1.67e6 + 40.0, 6.0e5 - 30.0
+    ends = dsm.lat_lon_from_xy(np.array([place, (1.67e6 + 60.0, place[1])]))
+    true_m = Geod(ellps="WGS84").inv(*ends[0, ::-1], *ends[1, ::-1])[2]
+    assert true_m == pytest.approx(19.91, abs=0.01)
+    assert SurfaceDistance(dsm).distance_m((*place, 90.0)) == pytest.approx(true_m, abs=1e-3)

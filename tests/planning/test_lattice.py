@@ -84,9 +84,9 @@ def test_skipping_by_boxes_loses_no_cell(seed: int, shear_m: float) -> None:
     start_m, end_m = random.uniform([14, 12, 3], [22, 34, 9], (2, 25, 3))
     found_m, _ = nearest_distances(pyramid, start_m, end_m)
     for a, b, distance_m in zip(start_m, end_m, found_m, strict=True):
+        move: tuple[float, float, float, float, float, float] = (*a.tolist(), *(b - a).tolist())
         every = [
-            quad_distance_sq(*a, *(b - a), quad_of(lattice, r, c), float(elevation_m[r, c]))[0]
-            for r, c in np.ndindex(shape)
+            quad_distance_sq(*move, quad_of(lattice, r, c), float(elevation_m[r, c]))[0] for r, c in np.ndindex(shape)
         ]
         assert distance_m == pytest.approx(np.sqrt(min(every)), abs=1e-9)
 
