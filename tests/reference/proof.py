@@ -47,16 +47,17 @@ def read_ground(path: Path, *, crs: str | None = None, height_scale: float = 1.0
     height_m = (height_m * np.float32(height_scale)).astype(np.float64)
     horizontal = source.sub_crs_list[0] if source.is_compound else source.to_2d()
     rows, columns = height_m.shape
-    metres, unit_m = _metres(horizontal, affine @ (columns / 2, rows / 2))
+    metres, map_unit_m = _metres(horizontal, affine @ (columns / 2, rows / 2))
     there = Transformer.from_crs(horizontal, metres, always_xy=True)
-    unit_m = _true_length(metres, there.transform(*affine @ (columns / 2, rows / 2)), unit_m)
+    unit_m = _true_length(metres, there.transform(*affine @ (columns / 2, rows / 2)), map_unit_m)
     c, r = np.meshgrid(np.arange(-2.0, columns + 3), np.arange(-2.0, rows + 3))
     x, y = affine.a * c + affine.b * r + affine.c, affine.d * c + affine.e * r + affine.f
     if metres != horizontal:
         x, y = there.transform(x, y)
-    corners = np.stack([x, y], axis=2) * unit_m
+    on_map = np.stack([x, y], axis=2) * map_unit_m
+    corners, cell_m2 = on_map * (unit_m / map_unit_m), _cell_area(on_map)  # holes are measured on the map
     top = np.full((rows + 4, columns + 4), np.inf)
-    top[2:-2, 2:-2] = _filled(height_m, _cell_area(corners))
+    top[2:-2, 2:-2] = _filled(height_m, cell_m2)
     to_metres = Transformer.from_crs(CRS.from_epsg(4326), metres, always_xy=True)
     to_source = Transformer.from_crs(CRS.from_epsg(4326), horizontal, always_xy=True)
     return Ground(top, corners, to_metres, metres.to_wkt(), unit_m, ~affine, to_source, horizontal.is_geographic)
