@@ -16,8 +16,8 @@ Kind = Literal["over", "around", "sidestep"]
 class AvoidanceParams:
     radius_m: float = 0.5
     """Of the vehicle."""
-    clearance_m: float = 1.5
-    """Kept beside the radius: position error, voxel errors, downwash."""
+    required_m: float = 2.0
+    """Between the vehicle's middle and anything else: the mission's own required clearance."""
     least_beside_m: float = 0.5
     """Beside the hull, where the vehicle stands: nearer to anything it is not moved by a prepared way."""
     ceiling_m: float = 30.0
@@ -33,8 +33,8 @@ class AvoidanceParams:
 
     @property
     def keep_m(self) -> float:
-        """Between the vehicle's middle and anything else."""
-        return self.radius_m + self.clearance_m
+        """Between the vehicle's middle and anything else, its hull at least."""
+        return max(self.required_m, self.radius_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import dataclass
@@ -112,7 +113,9 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     seen = [_seen(voxels, situation.origin, frame, position, reach_up) for voxels in situation.maps if len(voxels.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
     params = AvoidanceParams(
-        radius_m=situation.radius_m, ceiling_m=max(0.0, situation.ceiling_m - situation.height_offset_m)
+        radius_m=situation.radius_m,
+        required_m=required_m(situation.record),
+        ceiling_m=max(0.0, situation.ceiling_m - situation.height_offset_m),
     )
     prepared: list[Prepared] = []
     if (alert := situation.alert) is not None and ahead is not None:
@@ -123,6 +126,18 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
             sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
         )
     return tuple(prepared)
+
+
+def required_m(record: PlanRecord) -> float:
+    """That the mission keeps from the ground, or was certified for; else all that its vehicle needs."""
+    from planning.margins.vehicle_terms import budget_of
+    from server.flying.check_task import clearance_of
+
+    if record.plan_json:
+        return clearance_of(record).required_clearance_m
+    if record.certificate_json:
+        return float(json.loads(record.certificate_json)["required_clearance_m"])
+    return budget_of(parse_profile(record.profile_toml.encode(), where="the plan's profile")).total_m
 
 
 def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64, reach_up: float) -> Seen:

@@ -12,13 +12,15 @@ import pytest
 
 from planning.dsm import Dsm
 from planning.formats.wpl import write_wpl
+from planning.margins.vehicle_terms import budget_of
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.vehicle_profile import dump_profile
 from server.library.terrains import store_terrain
-from server.obstacles.manoeuvre_task import Situation, prepare
+from server.obstacles.manoeuvre_task import Situation, prepare, required_m
 from server.obstacles.mirror import MapMirror
+from server.schemas.plan import ClearanceDoc, PlanDoc
 from telemetry.messages import FlightStatus, PlanRecord
 from telemetry.obstacles import MapOrigin, Sensor
 from telemetry.perception.mission_line import mission_line
@@ -31,7 +33,7 @@ from tests.server.track_messages import track, tracks_status
 
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Dsm, PlanRecord, Path]:
-    """A flight along the foot of the hill."""
+    """A flight along the foot of the hill, certified for 2 m."""
     root, dsm = tmp_path_factory.mktemp("data"), hill(hole=False)
     xy = np.array([[500_008.0, 3_999_945.0], [500_072.0, 3_999_945.0]])
     pois = tuple(Poi(lat, lon) for lat, lon in dsm.lat_lon_from_xy(xy).tolist())
@@ -50,7 +52,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Dsm, PlanRecord, 
         home_alt_dsm_m=plan.line.home_alt_dsm_m,
         vertical_datum=None,
         profile_toml=dump_profile(VehicleProfile("quad")),
-        certificate_json="",
+        certificate_json='{"required_clearance_m": 2.0}',
     )
     return dsm, record, root / "terrains" / doc.id
 
@@ -93,6 +95,26 @@ def test_over_and_around_a_wall_on_the_mission(planned: tuple[Dsm, PlanRecord, P
         assert [t.alt_rel_home_m for t in way.targets] == pytest.approx(ups[1:])
         assert all(t.speed_m_s > 0 for t in way.targets)
     assert ways[0].height_offset_m > 4.0
+
+
+def test_a_way_keeps_what_the_mission_itself_must_keep(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    there = situation(planned, 4)
+    quad = VehicleProfile("quad")
+    asked = PlanDoc(clearance=ClearanceDoc(required_clearance_m=3.4)).model_dump_json()
+    records = {
+        2.0: there.record,
+        3.4: replace(there.record, plan_json=asked),
+        budget_of(quad).total_m: replace(there.record, certificate_json=""),
+    }
+    climbs = []
+    for must_m, record in records.items():
+        assert required_m(record) == pytest.approx(must_m)
+        over = prepare(replace(there, record=record), report=lambda *_: None)[0]
+        assert over.doc.clearance_m is not None
+        assert over.doc.clearance_m >= must_m - 0.01
+        climbs.append(over.doc.climb_m)
+    assert climbs == sorted(climbs)
+    assert climbs[0] < climbs[-1]
 
 
 def test_of_a_wall_that_a_radar_has_seen_the_top_is_not_known(planned: tuple[Dsm, PlanRecord, Path]) -> None:
@@ -143,7 +165,7 @@ def test_the_ceiling_counts_from_the_plan_and_the_vehicle_is_as_large_as_it_is(
     over = prepare(low_wall, report=lambda *_: None)[0]
     assert not over.doc.possible
     assert "up to 2 m" in over.doc.text
-    usual, large = (prepare(each, report=lambda *_: None)[0] for each in (here, replace(here, radius_m=1.5)))
+    usual, large = (prepare(each, report=lambda *_: None)[0] for each in (here, replace(here, radius_m=2.5)))
     assert usual.doc.climb_m is not None
     assert large.doc.climb_m is not None
     assert large.doc.climb_m > usual.doc.climb_m
