@@ -18,9 +18,11 @@ from server.schemas import (
     ObstaclesMessage,
     ObstaclesState,
     PerceptionMessage,
+    SeesEnough,
     ServerMessage,
     Source,
 )
+from telemetry.flight.regions import sees_enough_for
 from telemetry.looks import CloudLook, RadarLook
 from telemetry.obstacles import (
     MAP_NAMES,
@@ -88,6 +90,7 @@ class Watch:
             manoeuvres=list(self.manoeuvres),
             avoidance=self.avoidance,
             settings=self.settings,
+            sees_enough=SeesEnough(**{sensor: sees_enough_for(self.settings, sensor) for sensor in SENSORS}),
             maps=list(self._maps_drawn),
             seen_in_plan=self.seen_in_plan,
             busy=self.busy,

@@ -62,6 +62,14 @@ class MapDrawn(Strict):
     """Such as "drawn coarser: 1 box for 2 x 2 x 2 voxels"."""
 
 
+class SeesEnough(Strict):
+    """Speeds in m/s from which a vehicle can stop in each sensor's region, as it is set."""
+
+    radar: float = 0.0
+    vision: float = 0.0
+    ranges: float = 0.0
+
+
 class ObstaclesState(Strict):
     """Everything about obstacles but the sensors' own status, which comes with every frame."""
 
@@ -70,6 +78,7 @@ class ObstaclesState(Strict):
     manoeuvres: list[ManoeuvreDoc] = Field(default_factory=list)
     avoidance: AvoidanceStatus = Field(default_factory=AvoidanceStatus)
     settings: PerceptionSettings = Field(default_factory=PerceptionSettings)
+    sees_enough: SeesEnough = Field(default_factory=SeesEnough)
     maps: list[MapDrawn] = Field(default_factory=list)
     seen_in_plan: int = 0
     """Columns of the open plan's surface model that were raised by what was seen; 0: it is as it was read."""

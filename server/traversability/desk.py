@@ -105,7 +105,9 @@ class TraversabilityDesk:
                 task.clear_foliage, directory, source, target, upload, name, params, progress=progress
             )
 
-        return self._start(f"Traversability with {name}", "Clearing foliage", terrain_id, work, made=target, used_up=upload)
+        return self._start(
+            f"Traversability with {name}", "Clearing foliage", terrain_id, work, made=target, used_up=upload
+        )
 
     async def sites(self, body: LandingSitesBody) -> TraversabilityState:
         """The best landing sites near a point, from the map before clearing. Raises NotReadyError, PlanningError."""

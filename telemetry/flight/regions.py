@@ -24,6 +24,8 @@ FASTER_M_S = 0.1
 """Than allowed, before it is slowed: a vehicle does not keep a speed any better."""
 SLOWEST_M_S = 0.3
 """No vehicle is told to fly slower than this: its sensors see nothing that it could stop for."""
+USUAL_PERIOD_S: dict[Sensor, float] = {"radar": 0.1, "vision": 0.2, "ranges": 0.1}
+"""Between frames."""
 PERIOD_FADES = 0.95
 """A longer time between two frames counts on, less and less: what came late once may again."""
 
@@ -67,6 +69,27 @@ class Sight:
 def largest_speed(sees_enough_for_m_s: float) -> float:
     """As it is ordered."""
     return max(SLOWEST_M_S, math.floor(10 * sees_enough_for_m_s) / 10)
+
+
+def stopping_of(settings: PerceptionSettings, sensor: Sensor, *, latency_s: float) -> Stopping:
+    """``latency_s``: from being in the region to being told of."""
+    voxel_m = settings.radar_resolution_m if sensor == "radar" else settings.vision_resolution_m
+    return Stopping(
+        Braking(settings.brake_decel_m_s2, settings.brake_jerk_m_s3),
+        latency_s,
+        settings.vehicle_radius_m + settings.position_error_m + voxel_m / 2,
+    )
+
+
+def sees_enough_for(settings: PerceptionSettings, sensor: Sensor) -> float:
+    """The speed from which a vehicle can stop in a sensor's region, before any frame has told how late it is."""
+    usual = stopping_of(settings, sensor, latency_s=LEAST_LATENCY_S + USUAL_PERIOD_S[sensor])
+    return usual.largest_speed_m_s(depth_of(settings, sensor))
+
+
+def depth_of(settings: PerceptionSettings, sensor: Sensor) -> float:
+    of = {"radar": settings.radar_depth_m, "vision": settings.vision_depth_m, "ranges": settings.ranges_depth_m}
+    return of[sensor]
 
 
 class Regions:
@@ -165,13 +188,8 @@ class Regions:
 
     def stopping(self, sight: Sight) -> Stopping:
         """Before what this sensor sees."""
-        s = self.settings
-        voxel_m = s.radar_resolution_m if sight.sensor == "radar" else s.vision_resolution_m
-        return Stopping(
-            Braking(s.brake_decel_m_s2, s.brake_jerk_m_s3),
-            max(LEAST_LATENCY_S, sight.latency_s + REACTION_S) + sight.period_s,
-            s.vehicle_radius_m + s.position_error_m + voxel_m / 2,
-        )
+        latency_s = max(LEAST_LATENCY_S, sight.latency_s + REACTION_S) + sight.period_s
+        return stopping_of(self.settings, sight.sensor, latency_s=latency_s)
 
     def eyes(self, now_s: float) -> list[Sight]:
         """Those that work, one late frame or not."""
@@ -189,12 +207,7 @@ class Regions:
     def _depth_m(self, status: PerceptionStatus) -> float:
         if status.region is not None:
             return status.region.depth_m
-        of = {
-            "radar": self.settings.radar_depth_m,
-            "vision": self.settings.vision_depth_m,
-            "ranges": self.settings.ranges_depth_m,
-        }
-        return of[status.sensor]
+        return depth_of(self.settings, status.sensor)
 
     def _in_the_way_m(self, status: PerceptionStatus) -> float | None:
         """Distance of what is in the region, or in the corridor no farther than the region is deep and not below it.

@@ -123,7 +123,7 @@ def test_a_survey_under_an_orthophoto(station: Station, page_3d: Page, shared_da
     expect(page.get_by_test_id("height")).to_have_count(0)
     expect(page.get_by_test_id("photographed")).to_contain_text("of ")
     expect(page.get_by_test_id("front-overlap")).to_contain_text("of 80 % asked")
-    expect(page.get_by_test_id("survey-faults")).to_have_count(0)
+    expect(page.locator("[data-testid=reasons] [data-code=photos]")).to_have_count(0)
     before = page.get_by_test_id("length").inner_text()
     overlap = page.get_by_test_id("side-overlap-input")
     overlap.fill("85")

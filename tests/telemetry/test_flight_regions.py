@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from telemetry.flight.regions import CLEAR_FRAMES, Regions
+from telemetry.flight.regions import CLEAR_FRAMES, Regions, sees_enough_for
 from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
 from tests.telemetry.avoiding_bench import seen_at
 
@@ -129,3 +129,11 @@ def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None
     assert not regions.is_clear(frozenset({"vision"}), 1.4)
     regions.take(status(1.4))
     assert regions.sights["vision"].t_mono_s == 1.4
+
+
+def test_before_any_frame_a_region_allows_the_speed_from_which_the_vehicle_stops_in_it() -> None:
+    usual = PerceptionSettings()
+    assert sees_enough_for(usual, "radar") == pytest.approx(4.1, abs=0.1)
+    assert sees_enough_for(usual, "vision") < sees_enough_for(usual, "radar")
+    assert sees_enough_for(replace(usual, radar_depth_m=20.0), "radar") > 7.0
+    assert sees_enough_for(replace(usual, brake_jerk_m_s3=2.5), "radar") < 3.6

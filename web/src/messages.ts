@@ -1135,6 +1135,13 @@ export interface MapDrawn {
   text: string;
 }
 
+/** Speeds in m/s from which a vehicle can stop in each sensor's region, as it is set. */
+export interface SeesEnough {
+  radar: number;
+  vision: number;
+  ranges: number;
+}
+
 /** Everything about obstacles but the sensors' own status, which comes with every frame. */
 export interface ObstaclesState {
   /** Newest first, at most 20. */
@@ -1142,6 +1149,7 @@ export interface ObstaclesState {
   manoeuvres: ManoeuvreDoc[];
   avoidance: AvoidanceStatus;
   settings: PerceptionSettings;
+  sees_enough: SeesEnough;
   maps: MapDrawn[];
   /** Columns of the open plan's surface model that were raised by what was seen; 0: it is as it was read. */
   seen_in_plan: number;

@@ -1,6 +1,5 @@
 import { number, percent } from "../format";
 import type { SurveyResult } from "../messages";
-import { Icon } from "../ui/Icon";
 
 /** Rounded down: no share is flattered. */
 const least = (share: number | null) => percent(Math.floor(Math.max(0, share ?? 0) * 100 + 1e-6) / 100);
@@ -47,16 +46,6 @@ export function Photos({ survey }: { survey: SurveyResult | null }) {
           {number(survey.gsd_cm, 2)} cm <span class="muted">or finer</span>
         </dd>
       </dl>
-      {survey.faults.length > 0 && (
-        <ul class="warnings" data-testid="survey-faults">
-          {survey.faults.map((fault) => (
-            <li key={fault}>
-              <Icon name="warning" />
-              <span>{fault}</span>
-            </li>
-          ))}
-        </ul>
-      )}
     </section>
   );
 }

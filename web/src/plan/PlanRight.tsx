@@ -10,6 +10,7 @@ import { OtherSurface } from "../ui/OtherSurface";
 import { computation, isFresh, known, result } from "../store/state";
 import { Clearance } from "./Clearance";
 import { Photos } from "./Photos";
+import { SeesEnough } from "./SeesEnough";
 import { verdict, VerdictShape, verdictWord } from "./Verdict";
 
 /** "Computed 12 s ago", counting by itself. */
@@ -179,6 +180,7 @@ export function PlanRight() {
         <div class={`figures ${isFresh.value ? "" : "stale"}`} aria-busy={!isFresh.value}>
           <AgainstSeen result={shown} />
           <Reasons result={shown} />
+          <SeesEnough />
           <Clearance result={shown} />
           <Flight result={shown} />
           <Photos survey={shown.survey} />

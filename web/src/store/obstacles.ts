@@ -93,6 +93,7 @@ const NOTHING: ObstaclesState = {
       choice: "room",
     },
   },
+  sees_enough: { radar: 0, vision: 0, ranges: 0 },
   maps: [],
   seen_in_plan: 0,
   busy: "",

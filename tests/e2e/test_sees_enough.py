@@ -1,0 +1,33 @@
+"""A plan that is faster than the sensors see to stop for, in a real browser."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.stations import Station
+from tests.e2e.steps import start_simulator, visit
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+
+def test_a_plan_that_is_faster_than_seen_says_so_in_plan_and_is_slowed_by_one_press(
+    sighted: Station, page: Page
+) -> None:
+    sighted.open_demo(lambda points: list(points.values()), {"max_speed_m_s": 9.0, "mean_speed_m_s": 8.5})
+    visit(page, sighted)
+    hint = page.get_by_test_id("sees-enough")
+    expect(page.get_by_test_id("length")).to_be_visible()
+    expect(hint).to_have_count(0)  # nothing is known of any sensor
+
+    start_simulator(page)
+    page.get_by_test_id("tab-plan").click()
+    expect(hint).to_contain_text("9.0 m/s")
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.get_by_test_id("drawer-right").click()
+    expect(hint).to_be_visible()
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.get_by_test_id("fly-as-seen").click()
+    expect(hint).to_have_count(0)
+    profile = sighted.state["plan"]["document"]["profile"]
+    assert profile["mean_speed_m_s"] <= profile["max_speed_m_s"] < 9.0

@@ -1,0 +1,38 @@
+import { metres, withUnit } from "../format";
+import { document_ } from "../store/state";
+import { edit } from "../store/plan";
+import { obstacles, sensed } from "../store/obstacles";
+import { slowestOf } from "../obstacles/sees_enough";
+import { SENSOR_WORDS } from "../obstacles/words";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+
+/** A plan that is faster than the sensors see to stop for says so, with the speed that would do. */
+export function SeesEnough() {
+  const profile = document_.value?.profile;
+  const slowest = slowestOf(obstacles.live.value, sensed.live.value.keys());
+  if (!profile || !slowest || profile.max_speed_m_s <= slowest.speed_m_s) return null;
+  const { speed_m_s } = slowest;
+  const slow = () =>
+    edit("Speed that sensors see enough for", "speeds", (doc) => ({
+      ...doc,
+      profile: {
+        ...doc.profile,
+        max_speed_m_s: speed_m_s,
+        mean_speed_m_s: Math.min(doc.profile.mean_speed_m_s, speed_m_s),
+      },
+    }));
+  const speed = withUnit(speed_m_s, "m/s", 1);
+  return (
+    <div class="sees-enough" data-testid="sees-enough">
+      <Icon name="warning" size={16} />
+      <p>
+        Faster than seen ahead: {SENSOR_WORDS[slowest.sensor].toLowerCase()} {metres(slowest.depth_m)} deep
+        stops it from {speed}, the plan flies up to {withUnit(profile.max_speed_m_s, "m/s", 1)}.
+      </p>
+      <Button testid="fly-as-seen" onClick={slow}>
+        Fly {speed}
+      </Button>
+    </div>
+  );
+}
