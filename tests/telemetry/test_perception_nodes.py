@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -14,8 +15,9 @@ import pytest
 from typer.testing import CliRunner
 
 from server.cli import app
+from telemetry.looks import CloudLook, points_enu_m
 from telemetry.messages import Topic
-from telemetry.obstacles import PerceptionSettings
+from telemetry.obstacles import MapDelta, PerceptionSettings
 from telemetry.perception.deltas import FoldedMap
 from telemetry.perception.kinds import KINDS
 from telemetry.perception.rebuild import rebuild
@@ -110,6 +112,34 @@ def test_a_node_that_gets_garbage_says_so_and_goes_on(processes: Processes) -> N
         assert processes.nodes["radar"].poll() is None
 
     fly(processes, act, sensors=("radar",))
+
+
+def test_the_camera_tells_its_map_of_the_whole_flight_and_what_its_newest_frame_showed(processes: Processes) -> None:
+    processes.start("vision")
+
+    async def act(sky: Sky) -> None:
+        deltas: list[MapDelta] = []
+        looks: list[CloudLook] = []
+        hearing = [
+            asyncio.ensure_future(sky.hear(Topic.MAP_VISION_FLIGHT, deltas)),
+            asyncio.ensure_future(sky.hear(Topic.CLOUD_LOOK, looks)),
+        ]
+        await sky.until(lambda: len(deltas) > 1 and len(looks) > 1)
+        sky.frames = sky.again = False
+        await sky.until(lambda: sky.statuses["vision"][-1].state == "stale")
+        told = len(deltas)
+        await sky.bus.call("vision", WholeMap(), result=type(None), timeout_s=PATIENCE_S)
+        await sky.until(lambda: len(deltas) > told)
+        status = sky.statuses["vision"][-1].flight_map
+        assert status is not None
+        late = FoldedMap().folded(deltas[told:]).voxels
+        assert len(late.keys) == status.voxels_occupied > 20
+        np.testing.assert_array_equal(late.keys, FoldedMap().folded(deltas[:told]).voxels.occupied().keys)
+        assert np.abs(points_enu_m(looks[-1])[:, 1] - flights.WALL_NORTH_M).max() < 5.0
+        for task in hearing:
+            task.cancel()
+
+    fly(processes, act, sensors=("vision",))
 
 
 def test_it_speaks_every_second_without_frames_and_gives_its_map_to_who_comes_late(processes: Processes) -> None:
