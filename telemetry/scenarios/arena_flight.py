@@ -75,7 +75,7 @@ def arena_settings(*, nearest_only: bool, tracker: TrackerSettings | None = None
     return PerceptionSettings(
         vehicle_radius_m=VEHICLE_RADIUS_M,
         position_error_m=0.1,
-        tracker=tracker or Position2Go().tracker(),
+        tracker=tracker or Position2Go().errors,
         velocities=VelocitySettings(
             max_speed_m_s=MAX_SPEED_M_S,
             max_turn_deg=MAX_TURN_DEG,

@@ -20,6 +20,19 @@ F64 = NDArray[np.float64]
 POLES_M = 6.0
 """High."""
 
+ERRORS = TrackerSettings(
+    range_sigma_m=0.15,
+    bearing_sigma_deg=2.0,
+    bearing_edge_deg=20.0,
+    bearing_edge_sigma_deg=8.0,
+    radial_speed_sigma_m_s=0.25,
+    radial_speed_folded_m_s=0.0,
+    extent_m=0.1,
+    acceleration_m_s2=1.0,
+    speed_m_s=1.0,
+)
+"""As the paper prints them, with cells of 0.78 m/s (16 chirps in 8 ms), for poles in a hall."""
+
 
 @dataclass(frozen=True, slots=True)
 class Position2Go:
@@ -30,32 +43,14 @@ class Position2Go:
     nearest_m: float = 1.0
     farthest_m: float = 12.0
     every_s: float = 1 / 15
-    range_sigma_m: float = 0.15
-    bearing_sigma_rad: float = math.radians(2.0)
-    bearing_edge_rad: float = math.radians(20.0)
-    bearing_edge_sigma_rad: float = math.radians(8.0)
-    radial_speed_sigma_m_s: float = 0.25
-    """Of cells of 0.78 m/s: 16 chirps in 8 ms."""
+    errors: TrackerSettings = ERRORS
+    """What it measures with, and what a tracker must be told of it."""
     range_bin_m: float = 0.75
     most_per_bin: int = 2
     """Two receivers tell no more apart."""
     detection_probability: float = 0.9
     false_alarms: float = 0.3
     """Per frame."""
-
-    def tracker(self) -> TrackerSettings:
-        """As it must be told of this radar, and of a hall."""
-        return TrackerSettings(
-            range_sigma_m=self.range_sigma_m,
-            bearing_sigma_deg=math.degrees(self.bearing_sigma_rad),
-            bearing_edge_deg=math.degrees(self.bearing_edge_rad),
-            bearing_edge_sigma_deg=math.degrees(self.bearing_edge_sigma_rad),
-            radial_speed_sigma_m_s=self.radial_speed_sigma_m_s,
-            radial_speed_folded_m_s=0.0,
-            extent_m=0.1,
-            acceleration_m_s2=1.0,
-            speed_m_s=1.0,
-        )
 
     def told(self, truth: SimTruth, number: int, detections: F64) -> RadarFrame:
         """As a sensor's frame: on its axis' level, each as strong as 1 m2 is to the radar that flies live."""
@@ -69,12 +64,13 @@ class Position2Go:
     def frame(self, true: F64, random: np.random.Generator) -> F64:
         """(M, 3) detections of objects at ``true`` (N, 3): range, bearing from the nose, radial speed."""
         inside = self.sees(true[:, 0], true[:, 1]) & (random.random(len(true)) < self.detection_probability)
-        edge = np.abs(true[:, 1]) > self.bearing_edge_rad
+        known = self.errors.params()
+        edge = np.abs(true[:, 1]) > known.bearing_edge_rad
         sigma = np.column_stack(
             [
-                np.full(len(true), self.range_sigma_m),
-                np.where(edge, self.bearing_edge_sigma_rad, self.bearing_sigma_rad),
-                np.full(len(true), self.radial_speed_sigma_m_s),
+                np.full(len(true), known.range_sigma_m),
+                np.where(edge, known.bearing_edge_sigma_rad, known.bearing_sigma_rad),
+                np.full(len(true), known.radial_speed_sigma_m_s),
             ]
         )
         echoes = (true + random.normal(size=true.shape) * sigma)[inside]

@@ -58,7 +58,7 @@ def compared(
 ) -> Comparison:
     """``offset_s``: how long after the capture's first row the radar's first frame was. Raises RadarDataError."""
     radar = Position2Go()
-    tracker = Tracker(radar.tracker().params())
+    tracker = Tracker(radar.errors.params())
     found = Comparison([Pole((float(east), float(north))) for east, north in poles_en_m])
     for t_radar_s, detections in frames:
         t_s = t_radar_s + offset_s

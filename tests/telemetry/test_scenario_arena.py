@@ -60,7 +60,9 @@ def test_the_radars_errors_are_the_printed_ones():
 
 
 def test_of_three_things_in_one_range_bin_two_are_seen():
-    exact = Position2Go(detection_probability=1.0, false_alarms=0.0, range_sigma_m=1e-6)
+    exact = Position2Go(
+        detection_probability=1.0, false_alarms=0.0, errors=replace(Position2Go().errors, range_sigma_m=1e-6)
+    )
     true = np.array([[5.4, -0.2, 0.0], [5.5, 0.0, 0.0], [5.6, 0.2, 0.0], [8.0, 0.0, 0.0]])
     assert len(exact.frame(true, np.random.default_rng(0))) == 3
 
@@ -80,7 +82,7 @@ def flown(*, nearest_only: bool = False, radar: RadarKind = "model", tracker: Tr
     ],
 )
 def test_a_pole_straight_ahead_is_passed_by_what_avoids_live(nearest_only, radar, coordinates):
-    tracker = replace(Position2Go().tracker(), coordinates=coordinates)
+    tracker = replace(Position2Go().errors, coordinates=coordinates)
     way = flown(nearest_only=nearest_only, radar=radar, tracker=tracker)
     assert way.arrived
     assert way.nearest_gap_m > 0.1
@@ -139,7 +141,7 @@ def test_figures_that_are_set_are_the_ones_that_fly_and_wrong_ones_are_named():
         "velocities": {"max_turn_deg": "60", "choice": "edge"},
     }
     made = arena._settings(Wanted(settings=settings), nearest_only=True)
-    assert made.tracker == replace(Position2Go().tracker(), coordinates="polar", birth_updates=4)
+    assert made.tracker == replace(Position2Go().errors, coordinates="polar", birth_updates=4)
     assert made.velocities == replace(arena_settings(nearest_only=True).velocities, max_turn_deg=60.0, choice="edge")
     for part, name, value in (
         ("tracker", "gates", "9"),
