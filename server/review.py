@@ -16,6 +16,7 @@ from server.review_flight import Flight, placed_flight
 from server.schemas.flight import RecordingDoc
 from server.schemas.review import ReviewDoc, ReviewSeries
 from telemetry.recording.flight_log import FlightLog
+from telemetry.track_settings import unusual
 
 EMPTY = ReviewSeries(
     t_s=[],
@@ -80,10 +81,19 @@ def _judged(flight: Flight | None) -> Judged | None:
     return judge(flight.reference, flight.track, flight.surface)
 
 
+def _followed_by(log: FlightLog) -> list[str]:
+    """How objects were followed, where that was not as usual; while it was changed in flight, each time."""
+    told = [", ".join(unusual(settings.tracker, settings.velocities)) for _, settings in log.settings]
+    changes = [words for k, words in enumerate(told) if k == 0 or told[k - 1] != words]
+    if not any(changes):
+        return []
+    return [f"Objects were followed with {', then '.join(words or 'the usual figures' for words in changes)}."]
+
+
 def _notes(flight: Flight | None, judged: Judged | None, dsm: Dsm | None, log: FlightLog) -> list[str]:
     if flight is None:
-        return list(dict.fromkeys([*log.faults, "The recording holds no position of the vehicle."]))
-    notes = list(flight.notes)
+        return list(dict.fromkeys([*log.faults, "The recording holds no position of the vehicle.", *_followed_by(log)]))
+    notes = [*flight.notes, *_followed_by(log)]
     if dsm is None:
         notes.append("There is no surface model: distances to the ground are not known.")
     if judged is None:

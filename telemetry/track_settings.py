@@ -116,6 +116,21 @@ def with_figures(part: TrackerSettings | VelocitySettings, figures: Mapping[str,
     return changed
 
 
+def unusual(tracker: TrackerSettings, velocities: VelocitySettings) -> tuple[str, ...]:
+    """ "tracker.gate=9": all that is set otherwise than usual, as ``with_figures`` takes it."""
+    parts = (("tracker", tracker, TrackerSettings()), ("velocities", velocities, VelocitySettings()))
+    return tuple(
+        f"{part}.{field.name}={_told(getattr(now, field.name))}"
+        for part, now, usual in parts
+        for field in fields(now)
+        if getattr(now, field.name) != getattr(usual, field.name)
+    )
+
+
+def _told(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value).lower()
+
+
 def _as_is(name: str, known: object, value: object) -> object:
     """Text as the kind of value that ``known`` is."""
     if isinstance(known, bool):

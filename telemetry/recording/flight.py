@@ -13,7 +13,7 @@ import numpy.typing as npt
 from planning.dsm import Dsm
 from planning.model import Mission
 from telemetry.messages import CommandRecord, PlanRecord, VehicleText
-from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
+from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
 from telemetry.recording.frame_facts import SentTarget, TruePosition
 from telemetry.vehicle import VehicleState
 
@@ -84,6 +84,8 @@ class FlightLog:
     """Obstacles as they were alerted, in the order of time: where each begins and where it ends."""
     avoidance: tuple[tuple[float, AvoidanceStatus], ...] = ()
     """(t_utc_s, what it said of itself) whenever its state changed."""
+    settings: tuple[tuple[float, PerceptionSettings], ...] = ()
+    """(t_utc_s, how objects were followed and obstacles looked for) at every change, the first known included."""
     ground: Dsm | None = None
     """The surface model that the recording itself carries."""
 

@@ -13,7 +13,7 @@ from planning.formats.wpl import read_wpl
 from planning.model import Mission
 from telemetry.errors import RecordingError
 from telemetry.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
-from telemetry.obstacles import AvoidanceStatus, ObstacleAlert
+from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
 from telemetry.recording.carried_ground import carried_ground
 from telemetry.recording.flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
@@ -23,7 +23,16 @@ from telemetry.recording.tlog_flight import mission_flown
 from telemetry.reduce import reduce
 from telemetry.vehicle import VehicleState
 
-_READ = (Topic.VEHICLE, Topic.TEXT, Topic.RAW, Topic.PLAN, Topic.COMMAND, Topic.ALERT, Topic.AVOIDANCE)
+_READ = (
+    Topic.VEHICLE,
+    Topic.TEXT,
+    Topic.RAW,
+    Topic.PLAN,
+    Topic.COMMAND,
+    Topic.ALERT,
+    Topic.AVOIDANCE,
+    Topic.PERCEPTION_SETTINGS,
+)
 _GLOBAL_POSITION = 33
 _DECODED = frozenset({_GLOBAL_POSITION, 39, 44, 46, 47, 73, 86, 108})
 """Message ids of positions, missions, reached items, sent targets and the simulator's truth."""
@@ -44,6 +53,7 @@ class _Parts:
         self.plans: list[PlanRecord] = []
         self.alerts: list[ObstacleAlert] = []
         self.avoidance: list[tuple[float, AvoidanceStatus]] = []
+        self.settings: list[tuple[float, PerceptionSettings]] = []
         self._decoder = mavlink.MAVLink(None)
 
     def on_state(self, state: VehicleState, t_utc_s: float) -> None:
@@ -56,6 +66,10 @@ class _Parts:
     def on_avoidance(self, status: AvoidanceStatus, t_utc_s: float) -> None:
         if not self.avoidance or self.avoidance[-1][1].state != status.state:
             self.avoidance.append((t_utc_s, status))
+
+    def on_settings(self, settings: PerceptionSettings, t_utc_s: float) -> None:
+        if not self.settings or self.settings[-1][1] != settings:
+            self.settings.append((t_utc_s, settings))
 
     def _when(self, state: VehicleState, t_utc_s: float) -> float:
         """A new position counts from when it came, though the state may have been published a little later."""
@@ -105,6 +119,8 @@ def read_mcap_flight(path: Path, data: Data) -> FlightLog:
             parts.alerts.append(message)
         elif isinstance(message, AvoidanceStatus):
             parts.on_avoidance(message, entry.t_utc_s)
+        elif isinstance(message, PerceptionSettings):
+            parts.on_settings(message, entry.t_utc_s)
     return _flight_log(recording, parts)
 
 
@@ -140,6 +156,7 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
         faults=tuple(faults),
         alerts=tuple(parts.alerts),
         avoidance=tuple(parts.avoidance),
+        settings=tuple(parts.settings),
         ground=ground,
     )
 
