@@ -107,7 +107,7 @@ def test_maps_and_slider_are_there_at_every_width(
     page.get_by_test_id("radar-sensor").select_option("position2go")
     shown(page, 0)
     if opens_left.is_visible():
-        page.get_by_role("button", name="Close panel").click(position={"x": size[0] - 10, "y": 200})
+        page.get_by_role("button", name="Close panel").click(position={"x": 370, "y": 200})
     expect(page.get_by_test_id("frame-slider")).to_be_in_viewport(ratio=1)
     expect(page.get_by_test_id("doppler-map")).to_be_in_viewport(ratio=0.9)
     opens_right = page.get_by_test_id("drawer-facts")

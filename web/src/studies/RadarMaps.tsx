@@ -124,47 +124,49 @@ function FanMap({ frame, map }: { frame: RadarFrame; map: RadarMap }) {
   );
 }
 
-function ColourBar({ map }: { map: RadarMap }) {
+/** What a map's colours mean: each map has its own strongest cell. */
+function ColourBar({ map, id }: { map: RadarMap; id: string }) {
   return (
-    <div class="colour-bar" data-testid="colour-bar">
+    <span class="colour-bar" data-testid={`${id}-bar`}>
       <span class="number">{number(map.floor_db)}</span>
       <svg viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">
         <defs>
-          <linearGradient id="viridis">
+          <linearGradient id={`${id}-colours`}>
             {GRADIENT.map(({ offset, colour }) => (
               <stop key={offset} offset={offset} stop-color={colour} />
             ))}
           </linearGradient>
         </defs>
-        <rect width="100" height="10" fill="url(#viridis)" />
+        <rect width="100" height="10" fill={`url(#${id}-colours)`} />
       </svg>
       <span class="number">{number(map.top_db)} dB</span>
-      <span class="muted pointed" data-testid="pointed">
-        {pointed.value ?? ""}
-      </span>
-    </div>
+    </span>
   );
 }
 
 /** A frame's two maps, each with its detections. */
 export function RadarMaps({ frame }: { frame: RadarFrame }) {
   return (
-    <>
-      <ColourBar map={frame.doppler} />
-      <div class="radar-maps">
-        <figure>
-          <figcaption>Range and speed</figcaption>
-          <DopplerMap frame={frame} />
-        </figure>
-        <figure>
-          <figcaption>From above, all speeds</figcaption>
-          {frame.azimuth ? (
-            <FanMap frame={frame} map={frame.azimuth} />
-          ) : (
-            <p class="muted chart-empty">One antenna tells no azimuth.</p>
-          )}
-        </figure>
-      </div>
-    </>
+    <div class="radar-maps">
+      <figure>
+        <figcaption>
+          Range and speed <ColourBar map={frame.doppler} id="doppler" />
+          <span class="pointed" data-testid="pointed">
+            {pointed.value ?? ""}
+          </span>
+        </figcaption>
+        <DopplerMap frame={frame} />
+      </figure>
+      <figure>
+        <figcaption>
+          From above, all speeds {frame.azimuth && <ColourBar map={frame.azimuth} id="azimuth" />}
+        </figcaption>
+        {frame.azimuth ? (
+          <FanMap frame={frame} map={frame.azimuth} />
+        ) : (
+          <p class="muted chart-empty">One antenna tells no azimuth.</p>
+        )}
+      </figure>
+    </div>
   );
 }
