@@ -63,8 +63,6 @@ class Perception:
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         self.settings = settings
         self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
-        self.flight: FlightMap | None = None
-        """All that was seen on the flight, where ``map`` is local."""
         self.track = PoseTrack()
         self.alerts = AlertBook(self.name, prefix=alert_prefix)
         self.dropped: Counter[str] = Counter()
@@ -120,6 +118,11 @@ class Perception:
             self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
             self._forget()
         self.settings, self._sector = settings, sector
+
+    @property
+    def flight(self) -> FlightMap | None:
+        """All that was seen on the flight, where ``map`` is local."""
+        return None
 
     def accumulate(self) -> None:
         """What of a frame can wait until it has been told."""

@@ -68,7 +68,7 @@ class VisionPerception(Perception):
 
     def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
         super().__init__(settings, alert_prefix=alert_prefix)
-        self.flight = FlightMap(settings)
+        self._flight = FlightMap(settings)
         self.newest: SeenCloud | None = None
         self._path = PathWatch()
         self._breaks: deque[Break] = deque(maxlen=MOST_BREAKS)
@@ -107,15 +107,19 @@ class VisionPerception(Perception):
         is_another = self.settings.makes_another_map(settings)
         super().set_settings(settings)
         if is_another:
-            self.flight = FlightMap(settings)
+            self._flight = FlightMap(settings)
+
+    @property
+    def flight(self) -> FlightMap:
+        return self._flight
 
     def accumulate(self) -> None:
         """The last frame into the map of the whole flight."""
-        self.flight.put_in()
+        self._flight.put_in()
 
     def _forget(self) -> None:
         super()._forget()
-        self.flight.clear()
+        self._flight.clear()
 
     def on_frame(self, cloud: Cloud, now_mono_s: float) -> FrameResult:
         """Take one cloud; never raises for what is in it."""
@@ -141,7 +145,7 @@ class VisionPerception(Perception):
             return f"camera: {seen}"
         own = self.track.at(t_mono_s) if self._has_fix else "no GNSS position"
         if self._aligned is None:
-            self.flight.begin_part("The camera had lost its way", t_mono_s)
+            self._flight.begin_part("The camera had lost its way", t_mono_s)
             if self._placed and isinstance(own, Pose):
                 self._aligned = self._align(seen, own)
             elif self._last is not None:
@@ -175,7 +179,7 @@ class VisionPerception(Perception):
         shift_m = new_m - R_new_old @ old_m
         self.alerts.move(R_new_old, shift_m)
         self._remembered.move(R_new_old, shift_m)
-        self.flight.move(R_new_old, shift_m)
+        self._flight.move(R_new_old, shift_m)
         self._aligned, self._placed = aligned, True
 
     def _align(self, seen: Pose, own: Pose) -> tuple[F64, F64]:
@@ -235,7 +239,7 @@ class VisionPerception(Perception):
         explained = self._explained(centres, pose)
         self.map.insert_hits(centres, explained=explained)
         if self._stands_on_one_path(pose.t_mono_s):
-            self.flight.take(centres, explained)
+            self._flight.take(centres, explained)
 
     def _explained(self, centres: F64, pose: Pose) -> NDArray[np.bool_] | None:
         """(N,) Which voxels are known ground; None: nothing is known of it."""
@@ -251,7 +255,7 @@ class VisionPerception(Perception):
     def _stands_on_one_path(self, t_mono_s: float) -> bool:
         """Not between the two poses of a break; after one the map of the flight begins a new part."""
         while self._breaks and t_mono_s >= self._breaks[0].from_t_s:
-            self.flight.begin_part(self._breaks.popleft().why, t_mono_s)
+            self._flight.begin_part(self._breaks.popleft().why, t_mono_s)
         return not self._breaks or t_mono_s <= self._breaks[0].after_t_s
 
     def _pose_state(self, now_mono_s: float) -> tuple[State, str]:

@@ -148,7 +148,8 @@ def test_it_is_emptied_and_begun_anew_with_the_local_one() -> None:
 def test_its_memory_is_bounded_and_what_is_left_out_counted() -> None:
     whole = FlightMap(Settings(resolution_m=0.5, memory_limit_bytes=200_000))
     for k in range(200):
-        whole.take(np.column_stack([np.arange(60) * 8.0, np.full(60, 8.0 * k), np.zeros(60)]), None)
+        row = [[8.0 * n, 8.0 * k, 0.0] for n in range(60)]
+        whole.take(np.array(row, np.float64), None)
         whole.put_in()
     assert whole.map.is_full
     assert whole.map.size_bytes <= 200_000
