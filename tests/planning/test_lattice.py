@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.cells.cells import Cells, Layout, place_cells, square_cells
+from planning.cells.cells import Cells, Layout, place_cells, ringed, square_cells
 from planning.cells.lattice import Lattice, bend_at, bend_range, corner, quad_of, straight
 from planning.certificate.around import cells_around
 from planning.certificate.home_ground import home_ground
@@ -20,6 +20,7 @@ from planning.certificate.pyramid import LEAF_PX, cells_pyramid
 from planning.certificate.quads import quad_distance_sq
 from planning.rasters.mapping import source_mapping
 from tests.planning.test_clearance import NORTH, WEST, dsm_of
+from tests.reference import proof
 
 ROWS, COLUMNS = 43, 50
 
@@ -159,3 +160,41 @@ def test_places_are_the_same_whatever_metre_they_are_measured_in(shear_m: float)
     assert part.xy_of(2.0, 3.0) == pytest.approx(layout.xy_of(7.0, 12.0), abs=1e-8)
     apart_m = longer.in_frame(np.array([[WEST, NORTH], [WEST + 10.04, NORTH]]))
     assert np.linalg.norm(apart_m[1] - apart_m[0]) == pytest.approx(10.0)
+
+
+def odd_cells(random: np.random.Generator) -> Cells:
+    """A few cells, often one, with spikes and unknown rims, square, oblong, leaning or bent, of 1 cm or of 90 m."""
+    shape = random.integers(1, 14, 2)
+    elevation_m = random.normal(0.0, 1.0, shape).astype(np.float32)
+    elevation_m[random.random(shape) < 0.1] += 30.0
+    elevation_m[random.random(shape) < 0.05] = np.nan
+    if random.random() < 0.3:
+        elevation_m[0], elevation_m[:, -1] = np.nan, np.nan
+    side_m = random.choice([0.01, 1.0, 10.0, 90.0])
+    lattice = straight(side_m, side_m * random.choice([0.6, 1.0, 1.7]), side_m * random.choice([0.0, 0.5, -1.3]))
+    inner = ringed(elevation_m)
+    if random.random() < 0.5:
+        nodes = (-(-inner.shape[0] // 4) + 1, -(-inner.shape[1] // 4) + 1, 2)
+        lattice = lattice._replace(bend_m=random.uniform(-0.1, 0.1, nodes) * side_m, node_px=4)
+    return Cells(inner, Layout(lattice, (0.0, 0.0), np.eye(2), inner.shape))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_odd_models_are_judged_as_by_brute_force(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    cells = odd_cells(random)
+    lattice, (rows, columns) = cells.layout.lattice, cells.elevation_m.shape
+    pyramid = cells_pyramid(cells)
+    inside = random.uniform([1.02, 1.02], [rows - 1.02, columns - 1.02], (6, 2))
+    on_corner = corner(lattice, 1.0, 1.0)
+    ends = np.array([[*corner(lattice, row, column), random.uniform(-1, 25)] for row, column in inside])
+    ends[0, :2], ends[4, :2] = on_corner, ends[1, :2]  # from a corner of cells, and straight up
+    start_m, end_m = ends[:3], ends[3:]
+    found_m, _ = nearest_distances(pyramid, start_m, end_m)
+    tops = np.where(np.isfinite(cells.elevation_m), cells.elevation_m, np.inf).astype(np.float64)
+    for a, b, distance_m in zip(start_m, end_m, found_m, strict=True):
+        every = [
+            proof.least_sq(a, b, np.array(quad_of(lattice, r, c)).reshape(4, 2), tops[r, c])
+            for r, c in np.ndindex(rows, columns)
+        ]
+        assert distance_m == pytest.approx(np.sqrt(min(every)), abs=1e-8)

@@ -173,7 +173,7 @@ def _column_sq(px, py, pz, quad, top):
 
 
 @njit(cache=True, nogil=True)
-def _least_sq(start, end, quad, top):
+def least_sq(start, end, quad, top):
     """Ternary search: the squared distance to a convex set is convex along a line."""
     low, high = 0.0, 1.0
     for _ in range(70):
@@ -212,5 +212,5 @@ def _leg_distance(tops, corners, start, end, known_least):
             away = math.hypot(x - start[0] - share * d[0], y - start[1] - share * d[1]) - 1.5 * math.sqrt(wide)
             if away >= least[r]:
                 continue  # its middle is farther than that, and more than its own size
-            least[r] = min(least[r], math.sqrt(_least_sq(start, end, quad, top)))
+            least[r] = min(least[r], math.sqrt(least_sq(start, end, quad, top)))
     return least.min()
