@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import rasterio
@@ -29,7 +29,7 @@ from server.tasks import compute_plan, warm_up
 
 SIDE_PX, CELL_M = 11_500, 0.10
 PLACES_M = ((500.0, 500.0), (540.0, 520.0), (560.0, 580.0), (620.0, 600.0))
-LAYOUTS = {
+LAYOUTS: dict[str, dict[str, Any]] = {
     "tiles of 256": {"tiled": True, "blockxsize": 256, "blockysize": 256, "compress": "deflate", "predictor": 3},
     "strips": {"compress": "deflate"},
 }
@@ -41,10 +41,9 @@ def main() -> None:
     warm_up(report=lambda step, share: None)
     plan_mission(small_hill(), _request(small_hill(), ((30.0, 30.0), (90.0, 80.0))))
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+        folder, path = Path(name), Path(name) / "model.tif"
         for layout, options in LAYOUTS.items():
-            path = _write(folder / "model.tif", options)
-            _compare(layout, path)
+            _compare(layout, _write(path, options))
         _move(folder, path)
 
 
@@ -94,7 +93,7 @@ def _pois(model: SurfaceModel, places_m: tuple[tuple[float, float], ...]) -> tup
     return tuple(Poi(lat, lon) for lat, lon in model.lat_lon_from_xy(xy_m).tolist())
 
 
-def _write(path: Path, options: dict[str, object]) -> Path:
+def _write(path: Path, options: dict[str, Any]) -> Path:
     """Hills with some roughness, row block by row block."""
     random = np.random.default_rng(11)
     east_m = np.arange(SIDE_PX, dtype=np.float32) * np.float32(CELL_M)

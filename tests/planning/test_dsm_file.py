@@ -12,6 +12,7 @@ import rasterio
 from affine import Affine
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rasterio.enums import Resampling
 
 from planning.dsm import Dsm
 from planning.errors import NoElevationError, ParameterError, RasterError
@@ -131,6 +132,20 @@ def test_only_the_blocks_of_the_part_are_decoded(files: dict[str, Path]) -> None
         covered[window.row_off : window.row_off + window.height, window.col_off : window.col_off + window.width] += 1
     assert covered[20:50, 40:100].min() == covered.max() == 1
     assert covered.sum() == 30 * 60
+
+
+def test_overviews_are_never_taken(tmp_path: Path) -> None:
+    """Averages lie below what stands up: a mast of one cell is in no overview at its height."""
+    heights = np.full((128, 128), 100.0, dtype=np.float32)
+    heights[70, 75] = 125.0
+    path = write_raster(tmp_path / "model.tif", heights, tiled=True, blockxsize=32, blockysize=32)
+    with rasterio.open(path, "r+") as file:
+        file.build_overviews([2, 4], Resampling.average)
+    model = open_dsm(path)
+    part = model.around(np.array([(500_037.75, 4_169_964.75)]), 3.0)
+    assert model.report is None
+    assert part.elevation_m.max() == 125.0
+    assert_same_part(part, read_dsm(path).around(np.array([(500_037.75, 4_169_964.75)]), 3.0))
 
 
 def test_windows_outside_are_refused(files: dict[str, Path]) -> None:
