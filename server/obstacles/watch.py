@@ -242,7 +242,9 @@ def _filled(status: PerceptionStatus) -> list[MapName]:
     """Maps of a sensor that are not empty, by its own word."""
     flight = status.flight_map
     filled: list[MapName] = [status.sensor] if status.voxels_occupied else []
-    return filled + (["vision_flight"] if flight is not None and flight.voxels_occupied else [])
+    if flight is not None and flight.voxels_occupied:
+        filled.append("vision_flight")
+    return filled
 
 
 def is_in_air(state: VehicleState | None) -> bool:

@@ -17,7 +17,7 @@ from server.obstacles import drawing
 from server.obstacles.drawing import PERIOD_S, MapDrawing
 from server.obstacles.mirror import ChunkKey, MapMirror, Voxels
 from server.scene.sights import MapLook, Sights
-from telemetry.obstacles import MapDelta, MapOrigin, Sensor
+from telemetry.obstacles import MapDelta, MapName, MapOrigin
 from tests.server.obstacle_messages import delta
 from tests.server.test_obstacles_drawing import made
 from tests.server.test_scene_obstacles import placed
@@ -42,11 +42,11 @@ class CountingStage:
 
     def __init__(self, sights: Sights) -> None:
         self._sights = sights
-        self.boxes: dict[tuple[Sensor, ChunkKey], int] = {}
+        self.boxes: dict[tuple[MapName, ChunkKey], int] = {}
         self.chunks_drawn = 0
 
-    def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
-        return self._sights.look(sensor, origin)
+    def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None:
+        return self._sights.look(name, origin)
 
     def draw_cloud(self, source: Any, look: Any) -> None:
         raise AssertionError("maps only")
@@ -54,15 +54,15 @@ class CountingStage:
     def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
         raise AssertionError("maps only")
 
-    def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
+    def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
         for key, voxels in chunks.items():
-            self.boxes[sensor, key] = 0 if voxels is None else len(voxels.keys)
+            self.boxes[name, key] = 0 if voxels is None else len(voxels.keys)
         self.chunks_drawn += len(chunks)
-        return self._sights.draw_chunks(sensor, look, chunks)
+        return self._sights.draw_chunks(name, look, chunks)
 
-    def drop_chunks(self, sensor: Sensor) -> None:
-        self.boxes = {key: count for key, count in self.boxes.items() if key[0] != sensor}
-        self._sights.drop_chunks(sensor)
+    def drop_chunks(self, name: MapName) -> None:
+        self.boxes = {key: count for key, count in self.boxes.items() if key[0] != name}
+        self._sights.drop_chunks(name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def hills(columns: int, *, side: int = 1000) -> I32:
     return np.column_stack([column, row, np.floor(up)]).astype(np.int32)
 
 
-def told(keys: I32, origin: MapOrigin, sensor: Sensor = "radar") -> list[MapDelta]:
+def told(keys: I32, origin: MapOrigin, sensor: MapName = "radar") -> list[MapDelta]:
     """In parts, as nodes tell what is new."""
     parts = np.array_split(keys, max(1, len(keys) // PART_VOXELS))
     random = np.random.default_rng(len(keys))

@@ -13,7 +13,7 @@ from server.obstacles.drawing import Allowance, MapDrawing, fitting_detail
 from server.obstacles.mirror import ChunkKey, MapMirror, Voxels
 from server.obstacles.watch import Watch
 from server.scene.sights import MapLook
-from telemetry.obstacles import MapOrigin, Sensor
+from telemetry.obstacles import MapName, MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta
 from tests.server.test_scene_obstacles import placed
 
@@ -28,7 +28,7 @@ class FakeStage:
         self.view: dict[str, Any] = {"with_ground": True, "visible": True}
         self._drawing = placed()[0]
 
-    def look(self, sensor: Sensor, origin: MapOrigin | None) -> MapLook | None:
+    def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None:
         return None if origin is None else MapLook(self._drawing, origin, **self.view)
 
     def draw_cloud(self, source: Any, look: Any) -> None:
@@ -37,11 +37,11 @@ class FakeStage:
     def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
         raise AssertionError("maps only")
 
-    def draw_chunks(self, sensor: Sensor, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
+    def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
         self.drawn += [(key, 0 if voxels is None else len(voxels.keys)) for key, voxels in chunks.items()]
         return self.cost
 
-    def drop_chunks(self, sensor: Sensor) -> None:
+    def drop_chunks(self, name: MapName) -> None:
         self.dropped += 1
 
 
