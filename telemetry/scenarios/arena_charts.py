@@ -35,13 +35,18 @@ def errors_by_angle(errors: Errors) -> list[tuple[int, float, float, int]]:
 def error_charts(errors: Errors) -> tuple[Chart, ...]:
     """Fig. 8."""
     found = errors_by_angle(errors)
-    off_deg = [low + 2.5 for low, *_ in found]
-    label = "off the nose, deg"
     return (
-        Chart("Range error (fig. 8)", label, "mean error, m", (series("tracks", off_deg, [row[1] for row in found]),)),
-        Chart(
-            "Bearing error (fig. 8)", label, "mean error, deg", (series("tracks", off_deg, [row[2] for row in found]),)
-        ),
+        _error_chart("Range error (fig. 8)", "mean error, m", [(low, range_m) for low, range_m, _, _ in found]),
+        _error_chart("Bearing error (fig. 8)", "mean error, deg", [(low, deg) for low, _, deg, _ in found]),
+    )
+
+
+def _error_chart(title: str, label: str, rows: Sequence[tuple[int, float]]) -> Chart:
+    """From zero on: a trend is one only against its own size."""
+    highest = max((value for _, value in rows), default=1.0)
+    tracks = series("tracks", [low + 2.5 for low, _ in rows], [value for _, value in rows])
+    return Chart(
+        title, "off the nose, deg", label, (tracks,), x_span=(0.0, FAR_DEG[-1] + 5.0), y_span=(0.0, 1.1 * highest)
     )
 
 

@@ -13,6 +13,7 @@ from mapping.errors import ParameterError
 from planning.errors import ParameterError as PlanningError
 from telemetry.flight.aside import Aside
 from telemetry.scenarios import arena, arena_course
+from telemetry.scenarios.arena_charts import error_charts, ways_chart
 from telemetry.scenarios.arena_course import Approach, approaches
 from telemetry.scenarios.arena_flight import Flown, arena_settings, fly
 from telemetry.scenarios.arena_radar import Position2Go
@@ -162,3 +163,19 @@ def test_the_arena_is_in_the_catalogue_and_takes_no_world():
         arena.run(Wanted(world=Path("my.json")))
     with pytest.raises(PlanningError, match="--record"):
         arena.run(Wanted(record=Path("my.mcap")))
+
+
+def test_errors_are_drawn_by_the_distance_from_the_nose_and_from_zero_on():
+    near, far = [(math.radians(2.0), 0.1, 0.01)] * 40, [(math.radians(12.0), 0.3, 0.02)] * 40
+    range_chart, bearing_chart = error_charts([*near, *far, (math.radians(22.0), 9.0, 9.0)])
+    (tracks,) = range_chart.series
+    assert (tracks.x, tracks.y) == ((2.5, 12.5), (0.1, 0.3))
+    assert range_chart.y_span == (0.0, pytest.approx(0.33))
+    assert bearing_chart.series[0].y == pytest.approx((math.degrees(0.01), math.degrees(0.02)), abs=1e-4)
+
+
+def test_ways_are_seen_from_the_pole_that_they_pass():
+    way = Approach(np.array([[0.0, 0.0], [3.0, 3.0]]), np.array([-5.0, 0.0]), np.array([5.0, 0.0]))
+    flown = Flown(path_enu_m=[(-2.0, 0.0), (0.0, -1.0), (2.0, 0.0)])
+    drawn = ways_chart("one", [way], [flown]).series[0]
+    assert list(zip(drawn.x, drawn.y, strict=True)) == [(0.0, -2.0), (1.0, 0.0), (0.0, 2.0)]

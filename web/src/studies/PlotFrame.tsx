@@ -28,7 +28,7 @@ interface Props {
   onPoint?: (x: number | null, y: number | null) => void;
 }
 
-const EDGE = { left: 52, right: 12, top: 8, bottom: 40 };
+const EDGE = { left: 60, right: 12, top: 8, bottom: 40 };
 const LEAST = { width: 160, height: 120 };
 const [PX_PER_X_TICK, PX_PER_Y_TICK] = [56, 40];
 
@@ -74,7 +74,7 @@ function Axes({ area, props }: { area: Area; props: Props }) {
       </text>
       <text
         class="axis-label"
-        transform={`translate(${left - 40} ${top + height / 2}) rotate(-90)`}
+        transform={`translate(${left - 48} ${top + height / 2}) rotate(-90)`}
         text-anchor="middle"
       >
         {props.yLabel}
