@@ -160,9 +160,8 @@ async def scan_over_sockets(page: Station) -> None:
                 await asyncio.sleep(0.02)
             begun_s = time.monotonic() - 6.0
             for k, t_s in enumerate(log.t_s.tolist()):
-                bus.publish(
-                    Topic.VEHICLE, state_of(begun_s + t_s, *log.lat_lon_deg[k].tolist(), float(log.heading_rad[k]))
-                )
+                lat_deg, lon_deg = log.lat_lon_deg[k].tolist()
+                bus.publish(Topic.VEHICLE, state_of(begun_s + t_s, lat_deg, lon_deg, float(log.heading_rad[k])))
                 intensity = log.intensity[k].astype("<f4").tobytes()
                 agent.put(UwbReading(begun_s + t_s, Uwb(0, 0.0, intensity, log.geometry.bin_m)))
                 await asyncio.sleep(0.02)

@@ -21,7 +21,7 @@ METRE_DEG = 1.0 / 111_132.0
 
 def log(count: int = 40) -> UwbScans:
     """Northward at 1 m/s, turning slowly past north."""
-    t_s = 0.1 * np.arange(count)
+    t_s = 0.1 * np.arange(count, dtype=np.float64)
     places = np.column_stack([HERE[0] + 0.1 * METRE_DEG * np.arange(count), np.full(count, HERE[1])])
     heading = np.remainder(np.radians(np.linspace(355.0, 368.0, count)), 2 * math.pi)
     intensity = np.arange(count)[:, None] + np.arange(16)[None, :]

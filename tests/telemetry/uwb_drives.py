@@ -46,7 +46,8 @@ def on_the_bus(log: UwbScans) -> Iterator[VehicleState | UwbScan]:
     for k, t_s in enumerate(log.t_s):
         step = (places[min(k + 1, len(places) - 1)] - places[k]) / 10.0
         turn = (headings[min(k + 1, len(headings) - 1)] - headings[k]) / 10.0
-        yield state_of(T0_MONO_S + t_s, *(places[k] - 3 * step).tolist(), (headings[k] - 3 * turn) % (2 * math.pi))
+        lat_deg, lon_deg = (places[k] - 3 * step).tolist()
+        yield state_of(T0_MONO_S + t_s, lat_deg, lon_deg, (headings[k] - 3 * turn) % (2 * math.pi))
         yield scan_of(k, T0_MONO_S + t_s + OFFSET_S, log.intensity[k])
 
 
