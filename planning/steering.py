@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.reachable import roomiest, shortfall
-from planning.velocity_obstacles import Limits, Obstacles, Proposal, proposal_of, propose
+from planning.velocity_obstacles import Limits, Obstacles, Proposal, approaches, proposal_of, propose
 
 F64 = NDArray[np.float64]
 
@@ -44,29 +44,39 @@ def steer(
 
     It stays near to the present velocity, not to the wanted one: else it would change sides with every frame. None:
     every velocity within the limits leads into something. ``by_room``: where the nearest velocity outside of all cones
-    cannot be reached in time, or there is none, it is the one that leaves the most room on the way to it.
+    cannot be reached in time, or there is none, it is the one that leaves the most room on the way to it; from all
+    obstacles, also where only the nearest one chooses the velocity.
     """
-    straight = propose(obstacles, wanted_enu_m_s, replace(limits, max_turn_rad=math.pi), nearest_only=nearest_only)
+    looked_at = _nearest_ahead(obstacles, wanted_enu_m_s, velocity_enu_m_s) if nearest_only else obstacles
+    straight = propose(looked_at, wanted_enu_m_s, replace(limits, max_turn_rad=math.pi))
     if straight is not None and not straight.evades:
-        return straight
+        passes_all = not (by_room and nearest_only)
+        if passes_all or shortfall(obstacles, velocity_enu_m_s, wanted_enu_m_s[None])[0] <= ENOUGH:
+            return straight
     speed, cruise = math.hypot(*velocity_enu_m_s), math.hypot(*wanted_enu_m_s)
     goes = speed > ONWARD_SHARE * cruise and speed > 0.0
     onward = velocity_enu_m_s * (cruise / speed) if goes else wanted_enu_m_s
-    edge = _on_an_edge(obstacles, onward, limits, nearest_only=nearest_only)
+    edge = _on_an_edge(looked_at, onward, limits)
     if not by_room:
         return edge
-    looked_at = obstacles.nearest() if nearest_only else obstacles
     also = None if edge is None else np.array([edge.velocity_enu_m_s])
-    if also is not None and shortfall(looked_at, velocity_enu_m_s, also)[0] <= ENOUGH:
+    if also is not None and shortfall(obstacles, velocity_enu_m_s, also)[0] <= ENOUGH:
         return edge
-    chosen = roomiest(looked_at, onward, velocity_enu_m_s, limits, also=also)
-    return proposal_of(looked_at, onward, chosen)
+    chosen = roomiest(obstacles, onward, velocity_enu_m_s, limits, also=also)
+    return proposal_of(obstacles, onward, chosen)
 
 
-def _on_an_edge(obstacles: Obstacles, onward: F64, limits: Limits, *, nearest_only: bool) -> Proposal | None:
+def _nearest_ahead(obstacles: Obstacles, *velocities_enu_m_s: F64) -> Obstacles:
+    """What is being left behind is remembered, and would hide what is met next: the paper's vehicle did not see it."""
+    inside = obstacles.range_m < obstacles.radius_m
+    nears = [approaches(obstacles, velocity).after_s > 0.0 for velocity in velocities_enu_m_s]
+    return obstacles.some(np.logical_or.reduce([inside, *nears])).nearest()
+
+
+def _on_an_edge(obstacles: Obstacles, onward: F64, limits: Limits) -> Proposal | None:
     for share in SHARES:
         smaller = replace(obstacles, radius_m=share * obstacles.radius_m)
-        found = propose(smaller, onward, limits, nearest_only=nearest_only)
+        found = propose(smaller, onward, limits)
         if found is not None:
             return found
     return None

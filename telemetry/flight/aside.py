@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from planning.velocity_obstacles import Proposal
 from telemetry.flight.helm import GUIDED, Helm, here_of, moved, stopping_place
-from telemetry.flight.passing import is_wanted, offset_of, scene_of, velocity_of, velocity_past
+from telemetry.flight.passing import Scene, is_last_moment, is_wanted, offset_of, scene_of, velocity_of, velocity_past
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.obstacles import PerceptionSettings
@@ -93,10 +93,11 @@ class Aside:
         if length_m < PASSED_M:
             return False
         wanted = towards * (targets[0].speed_m_s / length_m)
-        found = self._past(state, wanted, targets[0].speed_m_s, now_s)
+        scene = self._scene(state, targets[0].speed_m_s, now_s)
+        found = velocity_past(scene, wanted, velocity_of(state))
         if found is None or is_wanted(found, wanted):
             return False
-        return math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S
+        return math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S or is_last_moment(scene, velocity_of(state))
 
     def _is_new(self) -> bool:
         assert self._tracks is not None
@@ -137,7 +138,7 @@ class Aside:
             return []
         carrot, aside_m = self._carrot(at, self._targets[0].speed_m_s)
         wanted = _with_speed(carrot[:2] - at[:2], self._targets[0].speed_m_s)
-        found = self._past(state, wanted, self._targets[0].speed_m_s, now_s)
+        found = velocity_past(self._scene(state, self._targets[0].speed_m_s, now_s), wanted, velocity_of(state))
         if found is None or math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
             return self._stand(state, "No velocity leads past: it holds. Resume goes on, or return home.", now_s)
         is_free = is_wanted(found, wanted)
@@ -221,10 +222,9 @@ class Aside:
         carrot = a + leg * (ahead_m / length_m)
         return np.array([carrot[0], carrot[1], max(a[2] + leg[2] * along_m / length_m, carrot[2])]), beside_m
 
-    def _past(self, state: VehicleState, wanted: F64, speed_m_s: float, now_s: float) -> Proposal | None:
+    def _scene(self, state: VehicleState, speed_m_s: float, now_s: float) -> Scene:
         assert self._tracks is not None
-        scene = scene_of(state, self._tracks, self.settings, speed_m_s=speed_m_s, now_s=now_s)
-        return velocity_past(scene, wanted, velocity_of(state))
+        return scene_of(state, self._tracks, self.settings, speed_m_s=speed_m_s, now_s=now_s)
 
 
 def _towards(state: VehicleState, target: GuidedTarget) -> F64:

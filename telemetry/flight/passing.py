@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.errors import ParameterError
+from planning.reachable import shortfall
 from planning.steering import steer, with_ground
 from planning.velocity_obstacles import Limits, Obstacles, Proposal
 from telemetry.flight.handover import METRES_PER_DEG
@@ -76,6 +77,11 @@ def velocity_past(scene: Scene, wanted: F64, velocity: F64) -> Proposal | None:
         return steer(everything, wanted, velocity, scene.limits, **choice)
     except ParameterError:
         return None
+
+
+def is_last_moment(scene: Scene, velocity: F64) -> bool:
+    """Whether who stops now comes too near all the same."""
+    return scene.by_room and float(shortfall(scene.obstacles, velocity, np.zeros((1, 2)))[0]) > 0.0
 
 
 def is_wanted(found: Proposal, wanted: F64) -> bool:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from planning.reachable import shortfall
 from planning.steering import SHARES, steer, with_ground
 from planning.velocity_obstacles import Limits, Obstacles, approaches
 
@@ -53,3 +54,26 @@ def test_ground_that_rises_is_an_obstacle_in_its_directions():
     assert clear[1:].all()
     assert with_ground(poles((0.0, 10.0)), (), farthest_m=20.0).range_m.tolist() == [10.0]
     assert with_ground(poles(), (40.0,) * 120, farthest_m=20.0).range_m.tolist() == []
+
+
+def test_the_nearest_is_the_nearest_ahead_not_what_is_being_left_behind():
+    """A pole that was passed is remembered beside the vehicle, nearer than the next one."""
+    passed_and_next = poles((1.6, -0.4), (0.2, 4.0), radius_m=1.0)
+    found = steer(passed_and_next, NORTH, NORTH, LIMITS, nearest_only=True)
+    assert found is not None
+    assert approaches(passed_and_next, found.velocity_enu_m_s).closest_m[1] >= 1.0
+    inside = steer(poles((0.6, -0.4), (0.2, 4.0), radius_m=1.0), NORTH, NORTH, LIMITS, nearest_only=True)
+    assert inside is not None
+    assert np.dot(inside.velocity_enu_m_s, (0.6, -0.4)) < 0.0  # too near: away from it first
+
+
+def test_the_nearest_one_chooses_and_room_is_left_to_all():
+    """Two poles side by side: past the nearer one on the side on which the other one stands."""
+    pair = poles((-0.3, 3.0), (1.4, 3.4), radius_m=1.0)
+    paper = steer(pair, NORTH, NORTH, LIMITS, nearest_only=True)
+    room = steer(pair, NORTH, NORTH, LIMITS, nearest_only=True, by_room=True)
+    assert paper is not None
+    assert room is not None
+    assert approaches(pair, paper.velocity_enu_m_s).closest_m[1] < 0.7
+    worst = shortfall(pair, NORTH, np.array([paper.velocity_enu_m_s, room.velocity_enu_m_s]))
+    assert worst[1] < worst[0]

@@ -7,8 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
+from planning.velocity_obstacles import Limits, Obstacles
+from telemetry.flight.passing import Scene, is_last_moment
 from telemetry.obstacles import PerceptionSettings
 from telemetry.track_settings import VelocitySettings
 from telemetry.tracks import Track, TracksStatus
@@ -213,3 +216,11 @@ def test_a_pause_on_the_way_aside_can_be_ended() -> None:
     it.until(lambda: it.state.mode == "RTL")
     assert it.nearest_m >= STANDS_M * 0.8
     assert it.modes()[-1] == RTL
+
+
+def test_the_last_moment_to_stop_is_told_of_the_choice_with_the_most_room_alone() -> None:
+    pole, north = Obstacles.of([0.0, 0.0], [(0.0, 5.0)], [(0.0, 0.0)], radius_m=2.0), np.array([0.0, 3.0])
+    scene = Scene(pole, Limits(max_speed_m_s=5.0), nearest_only=False, by_room=True, horizon_m=15.0, room_m=ROOM)
+    assert not is_last_moment(scene, 0.9 * north)
+    assert is_last_moment(scene, 1.3 * north)
+    assert not is_last_moment(replace(scene, by_room=False), 1.3 * north)

@@ -115,6 +115,12 @@ def test_a_way_to_the_south_begins_with_the_nose_along_it_and_the_pole_in_view()
     assert way.first_evasion_s < 2.0
 
 
+@pytest.mark.parametrize(("seed", "number"), [(35, 23), (36, 17)])
+def test_by_the_nearest_pole_alone_the_other_one_is_not_run_into(seed, number):
+    """One that was passed hid the next; one was evaded into the other beside it."""
+    assert one_of(seed, number, nearest_only=True).nearest_gap_m > 0.3
+
+
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
     """What shows that the poles are really in the way, and that nothing but the radar's tracks avoids them."""
     monkeypatch.setattr(Position2Go, "frame", lambda self, true, random: np.empty((0, 3)))
