@@ -9,113 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from planning.formats.wpl import read_wpl
-from server import demo, tasks
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotReadyError, StaleRevisionError
-from server.file_tasks import make_demo_terrain
-from server.flying.desk import FlightDesk
-from server.flying.work import FlightWork
 from server.jobs import Lane
-from server.library import Library
-from server.schemas import CheckRow, Computation, FlyState, PlanState, ServerMessage, StartFlight
+from server.schemas import CheckRow, StartFlight
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
-from telemetry.mavlink.storage import as_stored
-from telemetry.mavlink.verify import compare, digest
-from telemetry.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.messages import FlightStatus, LinkStatus
 from telemetry.obstacles import AvoidanceStatus, Eye
-from telemetry.requests import Arm, Download, Operator, ReadParameters, StartAuto, StartGuided, Upload
-from telemetry.vehicle import VehicleState
+from telemetry.requests import Arm, StartAuto, StartGuided
+from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
 
-# On one worker: two would each make the plan and start their processes.
 pytestmark = pytest.mark.xdist_group("flying-desk")
-
-ME = Operator("Anna", 7)
-
-
-class Vehicle:
-    """Behind the link: stores what it gets as ArduPilot does, and remembers what it was told to do."""
-
-    def __init__(self) -> None:
-        self.items: tuple[Any, ...] = ()
-        self.told: list[Any] = []
-        self.swaps_two_items = False
-
-    async def call(self, request: Any) -> Any:
-        if isinstance(request, Upload):
-            self.items = as_stored(request.items, "ardupilot")
-            if self.swaps_two_items:
-                self.items = (self.items[0], self.items[2], self.items[1], *self.items[3:])
-            rounded, differences = compare(request.items, self.items)
-            return UploadReport(not differences, self._onboard(), rounded, differences, 0.1)
-        if isinstance(request, Download):
-            return self._onboard()
-        if isinstance(request, ReadParameters):
-            return {name: 6000.0 if name == "RTL_ALT" else None for name in request.names}
-        self.told.append(request)
-        return None
-
-    def _onboard(self) -> OnboardMission:
-        return OnboardMission(self.items, 0.0, 0.0, 0.0, digest(self.items))
-
-
-QUAD = Candidate("udp/1/1", "udpin:127.0.0.1:14550", "127.0.0.1:9", 1, 1, "ardupilot", 2)
-
-
-class Made:
-    """A library with the demo's surface model and its plan, computed once."""
-
-    def __init__(self, root: Path) -> None:
-        self.library = Library(root)
-        make_demo_terrain(root, demo.TERRAIN_NAME, report=lambda step, share: None)
-        self.library.refresh()
-        terrain = self.library.terrains()[0]
-        plan_id = demo.ensure_plan(self.library, terrain)
-        self.document = self.library.load_plan(plan_id).present
-        directory = self.library.terrain_dir(terrain.id)
-        result, _ = tasks.compute_plan(directory, self.document, report=lambda step, share: None)
-        self.computation = Computation(revision=3, state="ready", result=result)
-
-    def plan(self, **changes: Any) -> PlanState:
-        return PlanState(
-            plan_id="p",
-            revision=3,
-            document=self.document,
-            can_undo=False,
-            can_redo=False,
-            saved_utc="",
-            computation=self.computation.model_copy(update=changes),
-        )
-
-    @property
-    def home(self) -> tuple[float, float]:
-        return self.document.pois[0].lat_deg, self.document.pois[0].lon_deg
-
-    def standing(self, *, east_m: float = 0.0, north_m: float = 0.0) -> VehicleState:
-        """Disarmed and ready, so far from the plan's home."""
-        dsm = self.library.load_terrain(self.library.terrains()[0].id)
-        xy_m = dsm.xy_from_lat_lon(np.array([self.home])) + np.array([[east_m, north_m]])
-        lat_deg, lon_deg = dsm.lat_lon_from_xy(xy_m)[0].tolist()
-        return VehicleState(
-            1,
-            1,
-            autopilot="ardupilot",
-            landed="on_ground",
-            ready_to_arm=True,
-            lat_deg=lat_deg,
-            lon_deg=lon_deg,
-            alt_amsl_m=float(dsm.elevation_at(xy_m)[0]),
-            alt_rel_home_m=0.0,
-            home_lat_deg=lat_deg,
-            home_lon_deg=lon_deg,
-            home_alt_amsl_m=float(dsm.elevation_at(xy_m)[0]),
-            gnss_fix="rtk_fixed",
-            gnss_t_mono_s=0.0,
-            horizontal_accuracy_m=0.02,
-            battery_share=1.0,
-        )
 
 
 @pytest.fixture(scope="module")
@@ -123,42 +29,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
     made = Made(tmp_path_factory.mktemp("data"))
     yield made
     made.library.close()
-
-
-class Bench:
-    def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane]) -> None:
-        self.vehicle, self.plan = Vehicle(), made.plan()
-        self.state: VehicleState | None = made.standing()
-        self.avoidance = AvoidanceStatus()
-        self.told: list[FlyState] = []
-        self.records: list[PlanRecord] = []
-        work = FlightWork(
-            made.library, self.vehicle, present_plan=lambda: self.plan, plan_lane=lanes[0], flight_lane=lanes[1]
-        )
-        self.desk = FlightDesk(
-            self.vehicle,
-            work,
-            file=file,
-            present_document=lambda: self.plan.document,
-            vehicle=lambda: self.state,
-            tell=self._tell,
-            publish_plan=self.records.append,
-            avoidance=lambda: self.avoidance,
-        )
-        self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
-
-    def _tell(self, message: ServerMessage) -> None:
-        assert message.type == "fly"
-        self.told.append(message.fly)
-
-    async def ready(self) -> str:
-        """Uploaded and checked; the digest."""
-        await self.desk.upload(ME, 3)
-        state = await self.desk.check(ME)
-        assert state.preflight is not None
-        assert [row for row in state.preflight.rows if row.state != "good"] == []
-        assert state.onboard.digest is not None
-        return state.onboard.digest
 
 
 @pytest.fixture(scope="module")

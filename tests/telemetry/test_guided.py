@@ -1,26 +1,24 @@
-"""The navigation script: order and timing of targets, loiter, pause, the pilot's say, lost links, a recorded flight."""
+"""The navigation script: order and timing of targets, loiter, pause, the pilot's say, lost links."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
-from pymavlink import mavutil
 
 from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided import GuidedEnd, GuidedScript
 from telemetry.flight.handover import Handover
 from telemetry.flight.orders import Place
 from telemetry.flight.standstill import Standstill
-from telemetry.mavlink.actions import Action, Done, Failed, Progress, Send
-from telemetry.messages import GuidedTarget
+from telemetry.mavlink.actions import Action, Done, Failed, Progress
 from telemetry.reduce import reduce
-from telemetry.requests import Operator, StartGuided
+from telemetry.requests import StartGuided
 from telemetry.vehicle import VehicleState
+from tests.telemetry.guided_requests import LINE, request, target
 from tests.telemetry.guided_vehicle import HOME, LOITER, METRES_PER_DEG, Craft
 from tests.telemetry.lossy import VEHICLE, Faults, Run
 
@@ -28,17 +26,6 @@ READY = VehicleState(
     1, 1, autopilot="ardupilot", mode="STABILIZE", landed="on_ground", alt_amsl_m=HOME[2], alt_rel_home_m=0.0
 )
 HARSH = Faults(loss=0.3, reordering=0.1, duplicates=0.02, corruption=0.01)
-
-
-def target(item: int, north_m: float, up_m: float = 10.0, **more: Any) -> GuidedTarget:
-    return GuidedTarget(item, HOME[0] + north_m / METRES_PER_DEG, HOME[1], up_m, more.pop("speed_m_s", 2.0), **more)
-
-
-LINE = (target(3, 3), target(4, 8), target(5, 13, 12.0), target(7, 18))
-
-
-def request(targets: tuple[GuidedTarget, ...] = LINE, **more: Any) -> StartGuided:
-    return StartGuided(Operator("Ada", 1), targets, 10.0, **more)
 
 
 class Watching:
@@ -354,61 +341,6 @@ def test_without_a_timing_nothing_is_said_about_delay() -> None:
     assert machine.behind_s is None
     status = machine.status(since_utc_s=5.0)
     assert (status.way, status.phase, status.since_utc_s, status.hint) == ("guided", "landed", 5.0, "")
-
-
-def recorded(path: Path) -> list[tuple[float, Any]]:
-    log = mavutil.mavlink_connection(str(path))
-    messages = []
-    try:
-        while (message := log.recv_match(blocking=False)) is not None:
-            messages.append((message._timestamp, message))
-    finally:
-        log.close()
-    return messages
-
-
-def test_on_the_recorded_flight_targets_are_handed_over_when_the_recorded_script_did(shared_data: Path) -> None:
-    """The recorded states drive the script; its targets must come in the recorded order, near the recorded times."""
-    messages = recorded(shared_data / "logs" / "arducopter" / "guided.tlog")
-    theirs = [(t, m) for t, m in messages if m.get_type() == "SET_POSITION_TARGET_GLOBAL_INT"]
-    ready_s = next(t for t, m in messages if m.get_type() == "COMMAND_ACK" and (m.command, m.result) == (400, 0))
-    targets = tuple(
-        GuidedTarget(k, m.lat_int * 1e-7, m.lon_int * 1e-7, m.alt, 3.0) for k, (_, m) in enumerate(theirs, start=2)
-    )
-    asked = replace(request(targets), takeoff_alt_rel_home_m=13.55)
-    ours = replay(messages, asked, from_s=ready_s - 0.01)
-    assert len(ours) == len(theirs) == 30
-    for (_, sent), (_, recorded_one) in zip(ours, theirs, strict=True):
-        assert (sent.lat_int, sent.lon_int) == (recorded_one.lat_int, recorded_one.lon_int)
-        assert sent.alt == pytest.approx(recorded_one.alt, abs=1e-5)
-    apart_s = [our_s - their_s for (our_s, _), (their_s, _) in zip(ours, theirs, strict=True)]
-    assert max(map(abs, apart_s[:2])) < 4.0  # the recorded script stood still for a while after the take-off
-    assert max(map(abs, apart_s[2:])) < 0.5
-
-
-def replay(messages: list[tuple[float, Any]], asked: StartGuided, *, from_s: float) -> list[tuple[float, Any]]:
-    """Targets that the script hands over, each once, when it hears a recorded vehicle."""
-    state: VehicleState | None = None
-    machine: GuidedScript | None = None
-    out: dict[tuple[int, int, float], tuple[float, Any]] = {}
-    for t, message in messages:
-        if message.get_srcSystem() != 1:
-            continue
-        state = reduce(state, message, t_mono_s=t, t_utc_s=t)
-        if state is None or t < from_s:
-            continue
-        actions: list[Action] = []
-        if machine is None:
-            machine = GuidedScript(
-                replace(asked, takeoff_alt_rel_home_m=13.55), state, firmware="ardupilot", target=VEHICLE
-            )
-            actions += machine.start(t)
-        actions += [*machine.on_message(message, t), *machine.on_state(state, t), *machine.on_tick(t)]
-        for action in actions:
-            if isinstance(action, Send) and action.message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
-                place = (action.message.lat_int, action.message.lon_int, action.message.alt)
-                out.setdefault(place, (t, action.message))
-    return list(out.values())
 
 
 def test_an_order_to_hold_that_got_lost_is_given_again_though_the_vehicle_moves() -> None:

@@ -6,46 +6,30 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.parameters import Parameters
 from telemetry.simulator.vehicle import SimulatedVehicle
+from tests.telemetry.autopilot_bench import (
+    ACCEPTED,
+    ARM,
+    BRAKE,
+    DENIED,
+    FAILED,
+    GUIDED,
+    LAND,
+    LAT,
+    LOITER,
+    LON,
+    POSHOLD,
+    RTL,
+    SET_MODE,
+    SPEED,
+    TAKEOFF,
+    YAW,
+    go_to,
+    hovering,
+    landed,
+    ready,
+)
 from tests.telemetry.simulator_bench import HOME, Bench
-
-ARM, SET_MODE, TAKEOFF, START, PAUSE, YAW, SPEED, SET_CURRENT = 400, 176, 22, 300, 193, 115, 178, 224
-STABILIZE, AUTO, GUIDED, LOITER, RTL, LAND, POSHOLD, BRAKE = 0, 3, 4, 5, 6, 9, 16, 17
-ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
-LAT, LON = -371244507, 1756892878
-SHORT_LANDING = {"LAND_SPEED": 150.0, "LAND_ALT_LOW": 200.0, "RTL_LOIT_TIME": 0.0}
-
-
-def ready(**parameters: float) -> Bench:
-    bench = Bench(parameters=Parameters(**SHORT_LANDING, **parameters))
-    bench.until(lambda: bench.vehicle.autopilot.position_ok)
-    return bench
-
-
-def hovering(up_m: float = 10.0, **parameters: float) -> Bench:
-    """In GUIDED, over home."""
-    bench = ready(**parameters)
-    assert bench.command(SET_MODE, 1, GUIDED) == ACCEPTED
-    assert bench.command(ARM, 1) == ACCEPTED
-    assert bench.command(TAKEOFF, 0, 0, 0, 0, 0, 0, up_m) == ACCEPTED
-    bench.until(lambda: bench.vehicle.autopilot.stage == "flight")
-    return bench
-
-
-def go_to(bench: Bench, lat: int, lon: int, up_m: float) -> None:
-    mask = 0b110111111000
-    bench.send(wire.MAVLink_set_position_target_global_int_message(0, 1, 1, 6, mask, lat, lon, up_m, *[0] * 8))
-
-
-def mission(*rows: tuple[int, float, int, int, float]) -> list[tuple[int, int, float, int, int, float]]:
-    """Home, take-off to 10 m and (command, first parameter, lat e7, lon e7, z) rows."""
-    rows = ((TAKEOFF, 0.0, LAT, LON, 10.0), *rows)
-    return [(0, 16, 0.0, LAT, LON, 0.0), *((3, command, first, x, y, z) for command, first, x, y, z in rows)]
-
-
-def landed(bench: Bench) -> bool:
-    return not bench.vehicle.autopilot.armed
 
 
 def test_arming_waits_for_a_position_and_says_so() -> None:
@@ -249,97 +233,6 @@ def test_return_from_above_keeps_the_height() -> None:
     bench.command(SET_MODE, 1, RTL)
     bench.advance(5)
     assert bench.vehicle.truth.p_neu[2] == pytest.approx(25.0, abs=0.2)
-
-
-def test_auto_needs_a_mission_that_begins_with_a_take_off() -> None:
-    bench = ready()
-    assert bench.command(SET_MODE, 1, AUTO) == FAILED
-    bench.upload([(0, 16, 0.0, LAT, LON, 0.0), (3, 16, 0.0, LAT, LON, 10.0)])
-    assert bench.command(SET_MODE, 1, AUTO) == FAILED
-    assert "Auto: Missing Takeoff Cmd" in bench.texts()
-
-
-def test_a_mission_holds_changes_speed_jumps_and_returns() -> None:
-    bench = ready(WPNAV_SPEED=500)
-    rows = mission(
-        (16, 0.0, LAT + 900, LON, 10.0),
-        (16, 3.0, LAT + 900, LON + 900, 12.0),
-        (177, 2.0, 0, 0, 0.0),
-        (195, 0.0, LAT, LON, 0.0),
-        (20, 0.0, 0, 0, 0.0),
-    )
-    assert bench.upload(rows) == 0
-    bench.fly_mission()
-    bench.until(lambda: landed(bench), 300)
-    # A jump whose repeat count was not given (0) is passed over.
-    assert [heard.message.seq for heard in bench.of("MISSION_ITEM_REACHED")] == [1, 2, 3, 6]
-    reached = {heard.message.seq: heard.t_s for heard in bench.of("MISSION_ITEM_REACHED")}
-    assert reached[3] - reached[2] > 3
-    assert bench.last("HEARTBEAT").custom_mode == AUTO
-
-
-def test_a_repeated_jump_flies_its_part_again() -> None:
-    bench = ready(WPNAV_SPEED=800)
-    items = mission(
-        (16, 0.0, LAT + 500, LON, 10.0), (16, 0.0, LAT, LON, 10.0), (177, 2.0, 0, 0, 0.0), (21, 0, LAT, LON, 0)
-    )
-    answers = bench.send(wire.MAVLink_mission_count_message(1, 1, len(items)))
-    for seq, (frame, command, first, x, y, z) in enumerate(items):
-        second = 1.0 if command == 177 else 0.0
-        item = wire.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, first, second, 0, 0, x, y, z)
-        answers = bench.send(item)
-    assert answers[0].type == 0
-    bench.fly_mission()
-    bench.until(lambda: landed(bench), 300)
-    assert [heard.message.seq for heard in bench.of("MISSION_ITEM_REACHED")] == [1, 2, 3, 2, 3, 5]
-
-
-def test_a_paused_mission_stands_still_and_goes_on() -> None:
-    bench = ready(WPNAV_SPEED=500)
-    bench.upload(mission((16, 0.0, LAT + 9000, LON, 10.0), (20, 0.0, 0, 0, 0.0)))
-    bench.fly_mission()
-    bench.until(lambda: bench.vehicle.truth.v_neu[0] > 4, 60)
-    assert bench.command(PAUSE, 0) == ACCEPTED
-    bench.advance(12)
-    assert math.hypot(*bench.vehicle.truth.v_neu) < 0.1
-    bench.stream(42, 5)
-    bench.advance(0.5)
-    assert bench.last("MISSION_CURRENT").mission_state == 4
-    assert bench.command(PAUSE, 1) == ACCEPTED
-    bench.until(lambda: bench.vehicle.truth.v_neu[0] > 4, 60)
-
-
-def test_interrupted_by_loiter_it_goes_on_with_the_same_item() -> None:
-    bench = ready()
-    bench.upload(mission((16, 0.0, LAT + 900, LON, 10.0), (16, 0.0, LAT + 3000, LON, 10.0), (20, 0.0, 0, 0, 0.0)))
-    bench.fly_mission()
-    bench.until(lambda: "Mission: 3 WP" in bench.texts(), 60)
-    bench.advance(1)
-    bench.command(SET_MODE, 1, LOITER)
-    bench.advance(5)
-    bench.command(SET_MODE, 1, AUTO)
-    assert bench.texts()[-1] == "Mission: 3 WP"
-    bench.until(lambda: "Reached command #3" in bench.texts(), 60)
-
-
-def test_the_current_item_can_be_set_in_the_air_and_on_the_ground() -> None:
-    bench = hovering()
-    bench.upload(mission((16, 0.0, LAT + 900, LON, 10.0), (16, 0.0, LAT, LON + 900, 10.0), (20, 0.0, 0, 0, 0.0)))
-    assert bench.command(SET_CURRENT, 9) == DENIED
-    assert bench.command(SET_CURRENT, 3) == ACCEPTED
-    bench.command(SET_MODE, 1, AUTO)
-    assert bench.texts()[-1] == "Mission: 3 WP"
-    assert bench.command(SET_CURRENT, 2) == ACCEPTED
-    assert bench.texts()[-1] == "Mission: 2 WP"
-
-
-def test_after_a_landing_the_mission_begins_anew() -> None:
-    bench = ready()
-    bench.upload(mission((16, 0.0, LAT + 500, LON, 10.0), (20, 0.0, 0, 0, 0.0)))
-    for _ in range(2):
-        bench.fly_mission()
-        bench.until(lambda: landed(bench), 200)
-    assert [heard.message.seq for heard in bench.of("MISSION_ITEM_REACHED")] == [1, 2, 3] * 2
 
 
 def test_a_silent_ground_station_brings_it_home() -> None:
