@@ -116,7 +116,9 @@ def _its_rest_is_planned(page: Page, demo: Station) -> None:
         page.get_by_test_id(f"plan-with-seen-{part}").click()
         expect(page.get_by_test_id("outcome-seen")).to_contain_text(outcome)
         document = demo.state["plan"]["document"]
-        assert [poi["id"] if poi["id"] in points else poi["name"] for poi in document["pois"]] == points
+        planned = [poi["id"] if poi["id"] in points else poi["name"] for poi in document["pois"]]
+        # While the page was slow the vehicle may have come to the last point, where it waits.
+        assert planned == points or (part == "ahead" and planned == points[1:])
         assert document["seen_id"] is not None
     # Of a plan that is not the one on board nothing may be flown before the landing.
     page.get_by_test_id("tab-plan").click()

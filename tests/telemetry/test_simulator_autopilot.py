@@ -189,6 +189,28 @@ def test_guided_flies_velocities_until_they_are_not_told_any_more(
     assert bench.vehicle.truth.p_neu[2] == pytest.approx(15.0, abs=0.1)
 
 
+def test_a_place_with_a_velocity_is_followed_until_it_is_not_told_any_more() -> None:
+    bench = hovering()
+    heard_s = []
+    for step in range(50):
+        north_e7 = round(0.2 * step * 2.0 / 111_195 * 1e7)
+        place = LAT + north_e7, LON, 10.0
+        bench.send(
+            wire.MAVLink_set_position_target_global_int_message(
+                0, 1, 1, 6, 0b110111000000, *place, 2.0, 0.0, 0.0, *[0] * 5
+            )
+        )
+        heard_s.append(bench.now_s)
+        bench.advance(0.2)
+    north, speed = bench.vehicle.truth.p_neu[0], bench.vehicle.truth.v_neu[0]
+    assert speed == pytest.approx(2.0, abs=0.05)
+    assert north == pytest.approx(2.0 * (bench.now_s - heard_s[0]), abs=0.3)
+    bench.advance(12.0)
+    # GUID_TIMEOUT is 3 s from the last one.
+    assert bench.vehicle.truth.p_neu[0] == pytest.approx(2.0 * (heard_s[-1] - heard_s[0] + 3.0), abs=0.3)
+    assert bench.vehicle.truth.v_neu[0] == pytest.approx(0.0, abs=0.05)
+
+
 def test_landing_disarms() -> None:
     bench = hovering(6.0)
     assert bench.command(SET_MODE, 1, LAND) == ACCEPTED
