@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from server.sensor_token import sensor_token
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, drawn, open_demo
 
@@ -78,3 +82,40 @@ def test_a_file_that_is_no_radar_log_is_refused_where_it_was_opened(
     section = page.get_by_test_id("section-traversability")
     expect(section.get_by_test_id("error-box")).to_contain_text("wood.npz")
     expect(page.get_by_test_id("work-out")).to_be_enabled()
+
+
+def test_a_radar_that_scans_now_is_shown_and_its_silence_is_told(station: Station, page: Page, tmp_path: Path) -> None:
+    """Without a vehicle no scan has a place: that is said as well, and none is fused."""
+    open_demo(page, station)
+    page.keyboard.press("7")
+    live = page.get_by_test_id("live-radar")
+    expect(live).to_have_count(0)
+    token = tmp_path / "token.txt"
+    token.write_text(sensor_token(station.data_dir))
+    command = [sys.executable, "-m", "server", "agent", station.origin, "--token-file", str(token), "--name", "rover"]
+    with subprocess.Popen([*command, "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as agent:
+        assert agent.stdin is not None
+        assert agent.stdout is not None
+        for number in range(600):
+            print(json.dumps({"type": "uwb", "intensity": [8.0] * 64}), file=agent.stdin, flush=True)
+            if number == 3:
+                print('{"type": "uwb"}', file=agent.stdin, flush=True)
+            page.wait_for_timeout(50)
+            if live.count() and "left out" in live.inner_text():
+                break
+        expect(live).to_have_attribute("data-state", "live")
+        expect(live).to_contain_text("rover: ")
+        expect(live).to_contain_text("left out: where the vehicle was is not known")
+        page.get_by_test_id("uwb-fusion").locator("summary").first.click()
+        page.get_by_test_id("uwb-rule").select_option("paper")
+        page.get_by_test_id("fuse-live").click()
+        expect(live).to_contain_text("paper")
+        expect(live).to_have_attribute("data-state", "silent")
+        expect(live.get_by_role("alert")).to_contain_text(re.compile(r"sent nothing for \d+ s"))
+        agent.stdin.close()
+        lines = json.loads(agent.stdout.read())["lines"]
+    assert (lines["bad"], lines["reasons"]) == (1, {"a field is missing": 1})
+    page.get_by_test_id("work-out").click()
+    expect(page.get_by_test_id("ground-cells")).to_be_visible()
+    page.get_by_test_id("traversability-away").click()
+    expect(live).to_have_count(0)
