@@ -131,7 +131,8 @@ def test_the_whole_scenario_prints_all_that_the_paper_does(monkeypatch: pytest.M
     monkeypatch.setattr(foliage, "TRIAL_2", {letter: TRIAL_2[letter] for letter in "f"})
     result = foliage.run(Wanted(1))
     text = "\n".join(result.lines())
-    for words in ("Table II", "Stone: P(z|occ) 0.46", "5 layers:", "trial 2 f, 4 layers", "paper: TNR 65.7 %",
+    for words in ("Table II", "P(z|occ) of Stone: 0.461  (paper: 0.4606)", "5 layers:",
+                  "trial 2 f, 4 layers", "paper: TNR 65.7 %",
                   "the paper's rule here: TNR", "our rule: TNR", "TNR of those alone", "Stone ",
 
                   "P_O 0.8, P_C2 0.3: TNR", "route from A to B after clearing", "at 10 Hz"):  # fmt: skip
