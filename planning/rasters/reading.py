@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.errors import RasterError
+from planning.errors import RasterError, RasterFormatError
 from planning.rasters import sandbox
 from planning.rasters.header import RasterHeader
 from planning.rasters.heights import HeightStats
@@ -131,6 +131,8 @@ def file_identity(source: Path) -> tuple[int, int, int]:
     """Changes when the file is written or replaced."""
     try:
         found = os.stat(source)
+    except FileNotFoundError as error:
+        raise RasterFormatError("There is no such file.", where=str(source), advice="Check the path.") from error
     except OSError as error:
         raise RasterError(f"It cannot be read: {error.strerror}.", where=source.name) from error
     return found.st_ino, found.st_size, found.st_mtime_ns

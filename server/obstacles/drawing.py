@@ -28,7 +28,7 @@ from telemetry.tracks import TracksStatus
 log = logging.getLogger("hedgehop.obstacles")
 
 PERIOD_S = 0.1
-BOXES_MAX: Mapping[MapName, int] = {"radar": 130_000, "vision": 60_000, "ranges": 10_000, "vision_flight": 60_000}
+BOXES_MAX: Mapping[MapName, int] = {"radar": 110_000, "vision": 40_000, "ranges": 10_000, "vision_flight": 40_000}
 """200,000 in all, and those of the camera's whole flight where they are shown."""
 FINER_BELOW = 0.6
 """Of the limit: a map that was coarsened gets its detail back only when it fits easily."""

@@ -38,19 +38,23 @@ class Station:
         command = [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
         # Flights of other tests meet no obstacles: a later option wins.
         command.append("--no-demo-world")
-        self._process = subprocess.Popen(
-            [*command, *self._arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=_ENVIRONMENT
-        )
+        # Into a file: a pipe that nobody empties fills up, and the server waits at it for ever.
+        self._told = self.data_dir.with_name(f"{self.data_dir.name}-{port}.log")
+        with self._told.open("w", encoding="utf-8") as told:
+            self._process = subprocess.Popen(
+                [*command, *self._arguments], stdout=told, stderr=subprocess.STDOUT, env=_ENVIRONMENT
+            )
         self.origin = f"http://127.0.0.1:{port}"
         self.link = self._read_link()
         self.http = httpx.Client(base_url=self.origin, headers={"Origin": self.origin}, timeout=PATIENCE_S)
 
     def _read_link(self) -> str:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            if found := re.search(r"http://\S+/login\?token=\S+", line):
+        while True:
+            ended = self._process.poll()
+            if found := re.search(r"http://\S+/login\?token=\S+(?=\s)", self._told.read_text(encoding="utf-8")):
                 return found.group(0)
-        raise AssertionError(f"the server ended with {self._process.wait()} before it printed its sign-in link")
+            assert ended is None, f"the server ended with {ended} before it printed its sign-in link"
+            time.sleep(0.05)
 
     # The operator whose pages the tests open
 
