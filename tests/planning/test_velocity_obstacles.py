@@ -73,7 +73,7 @@ def test_the_closest_approach_is_that_of_ways_stepped_through_time(place, theirs
     assume(coming.after_s[0] < 30.0)
     relative = np.subtract(ours, theirs)
     tried = slow.closest_m(np.array(place), relative, until_s=coming.after_s[0] + 0.1, step_s=0.01)
-    assert tried == pytest.approx(coming.closest_m[0], abs=0.01 * math.hypot(*relative) + 1e-9)
+    assert tried == pytest.approx(coming.closest_m[0], abs=0.01 * math.hypot(*relative) + 1e-8)
 
 
 @settings(max_examples=120)

@@ -21,6 +21,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.targets import guided_plan
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.codec import Packer, Parser
+from telemetry.mavlink.guided_way import OPTIONS, STRAIGHT_LEGS
 from telemetry.mavlink.items import item_message, items_from_mission
 from telemetry.mavlink.line import Line
 from telemetry.mavlink.link import TICK_S, Link
@@ -78,6 +79,10 @@ class RecordedLine:
             row = self._rows(items)[message.seq]
             firmware: Firmware = "ardupilot" if self.has_home_row else "px4"
             return [item_message(row, message.seq, target=station, number=message.seq, firmware=firmware)]
+        if kind == "PARAM_REQUEST_READ" and message.param_id.rstrip("\0") == OPTIONS:
+            # In GUIDED the recorded vehicles were sent places alone.
+            name, number = OPTIONS.encode(), wire.MAV_PARAM_TYPE_INT32
+            return [wire.MAVLink_param_value_message(name, STRAIGHT_LEGS, number, 1, 0)]
         return []
 
     def _rows(self, items: tuple[Item, ...]) -> tuple[Item, ...]:

@@ -1,5 +1,7 @@
 """The two stages beside the slow rule, and their false alarms and detections on a million cells of noise."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +16,8 @@ from tests.mapping.radar.echoes import noise
 from tests.reference import cfar as slow
 
 SET = 1e-3
+SINGLE = 1e-5
+"""More than sums in single precision are wrong by."""
 RANGE = range_stage(Cfar(4, 8, SET), name="rectangular", samples=1000, padding=1, looks=1)
 DOPPLER = doppler_stage(Cfar(2, 4, SET), name="rectangular", chirps=1000, padding=1, looks=1)
 
@@ -26,22 +30,29 @@ def maps(rows: int, cols: int) -> st.SearchStrategy[np.ndarray]:
 @given(maps(3, 40), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
 def test_smallest_of_is_the_slow_rule(power: np.ndarray, guard: int, training: int, stride: int) -> None:
     stage = Stage(guard, training, stride, 2.0)
-    expected = [slow.caso([float(x) for x in row], guard, training, stride, 2.0) for row in power]
-    assert_alike(caso_along_range(power, stage), expected, power)
+
+    def slowly(factor: float) -> np.ndarray:
+        return np.array([slow.caso([float(x) for x in row], guard, training, stride, factor) for row in power])
+
+    assert_alike(caso_along_range(power, stage), slowly)
 
 
 @settings(max_examples=40, deadline=None)
 @given(maps(20, 2), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
 def test_cell_averaging_is_the_slow_rule(power: np.ndarray, guard: int, training: int, stride: int) -> None:
     stage = Stage(guard, training, stride, 2.0)
-    columns = [slow.ca([float(x) for x in column], guard, training, stride, 2.0) for column in power.T]
-    assert_alike(ca_along_doppler(power, stage), np.array(columns).T, power)
+
+    def slowly(factor: float) -> np.ndarray:
+        return np.array([slow.ca([float(x) for x in row], guard, training, stride, factor) for row in power.T]).T
+
+    assert_alike(ca_along_doppler(power, stage), slowly)
 
 
-def assert_alike(ours: np.ndarray, expected: object, power: np.ndarray) -> None:
+def assert_alike(ours: np.ndarray, slowly: Callable[[float], np.ndarray]) -> None:
     """But for cells at the threshold itself, where single and double precision may differ."""
-    wrong = ours != np.array(expected)
-    assert wrong.sum() <= 0.02 * power.size
+    beyond_doubt, perhaps = slowly(2.0 * (1 + SINGLE)), slowly(2.0 * (1 - SINGLE))
+    assert not (beyond_doubt & ~ours).any()
+    assert not (ours & ~perhaps).any()
 
 
 def test_false_alarms_of_each_stage_alone_over_a_million_cells() -> None:
