@@ -29,7 +29,7 @@ FRAME_S, NEARLY_REAL = 0.04, 1.5
 
 @dataclass
 class Watched:
-    """What the tracks node says of a pole on the mission's line, and how near the vehicle truly came to it."""
+    """What the tracks node says of a pole on the mission's line, and how near the vehicle truly came to it on its mission."""
 
     simulator: Simulator
     nearest_m: float = math.inf
@@ -38,7 +38,8 @@ class Watched:
     def look(self) -> TracksStatus:
         north_m, east_m, up_m = self.simulator.vehicle.truth.p_neu
         range_m = math.hypot(POLE_NORTH_M - north_m, POLE_EAST_M - east_m)
-        if up_m > 5.0:
+        # On the way home nothing is stepped around: what sensors see there is climbed over.
+        if up_m > 5.0 and self.simulator.vehicle.autopilot.mode.name != "RTL":
             self.nearest_m = min(self.nearest_m, range_m)
             self.asides_m.append(abs(east_m))
         now_s = time.monotonic()
