@@ -2,7 +2,7 @@ import { duration, metres } from "../format";
 import type { ScenarioFigureDoc, ScenarioPartDoc } from "../messages";
 import { chosenScenario, shownResult } from "../store/scenarios";
 import { Icon } from "../ui/Icon";
-import { limitText, measuredText, withUnit } from "./figures";
+import { limitText, measuredText, textWithUnit } from "./figures";
 import { ScenarioChart } from "./ScenarioChart";
 
 function FigureRow({ figure }: { figure: ScenarioFigureDoc }) {
@@ -12,7 +12,7 @@ function FigureRow({ figure }: { figure: ScenarioFigureDoc }) {
     <tr class={kind} data-testid="scenario-figure" data-verdict={verdict ?? "none"}>
       <th scope="row">{figure.words}</th>
       <td class="value" data-label="Measured">
-        {withUnit(measuredText(figure.value), figure.unit)}
+        {textWithUnit(measuredText(figure.value), figure.unit)}
       </td>
       <td data-label="Paper">{figure.paper}</td>
       <td class="limit" data-label="Held to">

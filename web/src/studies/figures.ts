@@ -8,10 +8,11 @@ export function measuredText(value: number | null): string {
   return number(value, Number.isInteger(value) ? 0 : decimals);
 }
 
-export const withUnit = (text: string, unit: string) => (unit && text !== DASH ? `${text} ${unit}` : text);
+export const textWithUnit = (text: string, unit: string) =>
+  unit && text !== DASH ? `${text} ${unit}` : text;
 
 export function limitText({ least, most, unit }: ScenarioFigureDoc): string {
-  if (least !== null && most !== null && least === most) return withUnit(measuredText(least), unit);
-  if (least !== null) return `≥ ${withUnit(measuredText(least), unit)}`;
-  return most === null ? "" : `≤ ${withUnit(measuredText(most), unit)}`;
+  if (least !== null && most !== null && least === most) return textWithUnit(measuredText(least), unit);
+  if (least !== null) return `≥ ${textWithUnit(measuredText(least), unit)}`;
+  return most === null ? "" : `≤ ${textWithUnit(measuredText(most), unit)}`;
 }
