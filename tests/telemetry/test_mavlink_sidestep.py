@@ -29,7 +29,7 @@ FRAME_S, NEARLY_REAL = 0.04, 1.5
 
 @dataclass
 class Watched:
-    """What the tracks node says of a pole on the mission's line, and how near the vehicle truly came to it on its mission."""
+    """What the tracks node says of a pole on the mission's line, and how near the vehicle truly came on its mission."""
 
     simulator: Simulator
     nearest_m: float = math.inf
