@@ -11,10 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64, I64
 from planning.margins.budget import ClearanceBudget
 from planning.margins.following_error import Firmware, Way
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 from affine import Affine
 
+from mapping.geometry.arrays import F64
+from planning.certificate.clearance import certify
 from planning.certificate.true_metres import SCALE_TOLERANCE
-from planning.dsm import F64, Dsm, SurfaceModel
-from planning.holes import HoleReport, fill_holes
-from planning.model import Certificate, FlownLine
+from planning.formats.commands import has_position
+from planning.missions.flown import flown_line
+from planning.model import Certificate, ClearanceParams, FlownLine, Mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
+from planning.terrain.holes import HoleReport, fill_holes
 
 LARGE_PX = 4_000_000
 """Smaller models are taken whole."""

@@ -12,20 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.certificate.clearance import certify
 from planning.certificate.home_stand import DROP_M
-from planning.certify_part import hole_assumptions
-from planning.clearance import certify
-from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError
-from planning.feasibility import Feasibility, feasibility_of, photos_row
 from planning.flight_time.predict import PredictedTime, predict_duration
-from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
 from planning.formats.safe_text import clean_name
-from planning.holes import HoleReport
-from planning.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.margins.words import uncovered_words
-from planning.mission import BuiltMission, Choice, build_mission, decimation_trade
+from planning.missions.feasibility import Feasibility, feasibility_of, photos_row
+from planning.missions.flown import flown_line
+from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
+from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import (
     BetterHome,
     Certificate,
@@ -38,13 +35,15 @@ from planning.model import (
     Timing,
     VehicleProfile,
 )
-from planning.part import Ground, Grounds, felt_m, least_margin_m, was_enough
-from planning.path import MIN_SEGMENT_M, sampled_path
-from planning.poi import check_pois
+from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, was_enough
 from planning.request import PlanRequest, check_request, check_size, effective_profile
-from planning.surface import FLOOR_SHARE, safe_surface, safe_surface_at
-from planning.survey_coverage import SurveyCoverage, survey_coverage
-from planning.timing import path_timing
+from planning.route.path import MIN_SEGMENT_M, sampled_path
+from planning.route.poi import check_pois
+from planning.route.survey_coverage import SurveyCoverage, survey_coverage
+from planning.route.timing import path_timing
+from planning.safe_surface.surface import FLOOR_SHARE, safe_surface, safe_surface_at
+from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.terrain.holes import HoleReport
 
 Progress = Callable[[str, float | None], None]
 

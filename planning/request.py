@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from planning.dsm import SurfaceModel
 from planning.errors import ParameterError
 from planning.margins.following_error import Way
-from planning.margins.vehicle_terms import budget_of
+from planning.missions.vehicle_profile import path_params
+from planning.missions.vehicle_terms import budget_of
 from planning.model import ClearanceParams, MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
-from planning.survey import SurveyPlan
-from planning.vehicle_profile import path_params
+from planning.route.camera import LOOKS_DOWN_DEG
+from planning.route.survey import SurveyPlan
+from planning.terrain.dsm import SurfaceModel
 
 LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""

@@ -12,10 +12,10 @@ from fastapi import FastAPI
 
 from server.errors import ServerError, StartError
 from server.library import Library
-from server.logs import configure_logging
 from server.settings import Settings
 from server.web import create_app
 from server.wiring import make_workspace, open_flying
+from server.work.logs import configure_logging
 from telemetry.mavlink.address import parse_address
 
 WEBSOCKET_LIMIT_BYTES = 1024**2

@@ -6,24 +6,24 @@ from typing import get_args
 
 import numpy as np
 
-from planning.avoidance import Seen, around, over
-from planning.demo import small_hill
-from planning.dsm import Dsm
+from planning.evading.manoeuvres import Seen, around, over
+from planning.evading.seen import conflicts
 from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
+from planning.ground.demo_hillside import small_hill
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
-from planning.raycast import raycast
 from planning.request import PlanRequest
-from planning.seen import conflicts
-from server import file_tasks, tasks
-from telemetry.perception.kinds import KINDS
+from planning.terrain.dsm import Dsm
+from planning.terrain.raycast import raycast
+from server.plan import file_tasks, tasks
+from telemetry.perception.sensor_kinds import KINDS
 from telemetry.perception.warm_up import warm_up
-from telemetry.sensing import RadarKind, SimTruth
-from telemetry.simulator.demo_world import demo_world
-from telemetry.simulator.scene import World
-from telemetry.simulator.sensors import StereoSensor, radar_sensor
+from telemetry.simulation.simulator.demo_world import demo_world
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors import StereoSensor, radar_sensor
+from telemetry.topics.simulated import RadarKind, SimTruth
 
 
 def main() -> None:

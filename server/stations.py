@@ -10,26 +10,25 @@ import time
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from server.door.hub import Hub
+from server.door.lease import Lease
 from server.errors import reported
-from server.flying.agents import Agents
-from server.flying.channel import Channel
-from server.flying.connections import Connections
-from server.flying.desk import FlightDesk
-from server.flying.nodes import Nodes
+from server.flying.flight_desk import FlightDesk
 from server.flying.plan_followed import PlanFollowed
-from server.flying.present import Present
-from server.flying.recording import RecordingDesk
-from server.flying.relay import Relay
 from server.flying.reviewing import Reviewing
 from server.flying.scenery import Scenery
 from server.flying.simulation import Simulation
 from server.flying.track_so_far import TrackSoFar
 from server.flying.work import FlightWork
-from server.hub import Hub
-from server.jobs import Lane
-from server.lease import Lease
+from server.heard.agents import Agents
+from server.heard.channel import Channel
+from server.heard.connections import Connections
+from server.heard.node_states import Nodes
+from server.heard.present import Present
+from server.heard.recording import RecordingDesk
+from server.heard.relay import Relay
 from server.library import Library
-from server.library.recordings import RecordingShelf
+from server.library.recording_list import RecordingShelf
 from server.obstacles.obstacles import Obstacles
 from server.schemas import (
     ErrorDoc,
@@ -41,13 +40,14 @@ from server.schemas import (
     TransferMessage,
 )
 from server.settings import Settings
-from server.traversability.live import LiveUwb
+from server.traversability.live_uwb import LiveUwb
+from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
-from telemetry.link_client import LinkClient
-from telemetry.messages import FlightStatus, LinkStatus, PlanRecord, RecorderStatus, ServerAlive, Topic
-from telemetry.requests import RecorderRequest, ReplayRequest, StartRecording
-from telemetry.vehicle import VehicleState
+from telemetry.bus.link_client import LinkClient
+from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, RecorderStatus, ServerAlive, Topic
+from telemetry.topics.requests import RecorderRequest, ReplayRequest, StartRecording
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")
 

@@ -19,39 +19,39 @@ from starlette.requests import ClientDisconnect
 from planning import __version__
 from planning.errors import DescribedError
 from server.api import (
-    console,
-    flight,
-    link,
-    obstacles,
-    plan,
-    radar,
-    recordings,
-    scenarios,
-    sensors,
-    session,
-    terrain,
-    traversability,
-    view,
+    console_routes,
+    flight_routes,
+    link_routes,
+    obstacle_routes,
+    plan_routes,
+    proxy,
+    radar_file_routes,
+    recording_routes,
+    scenario_routes,
+    sensor_routes,
+    session_routes,
+    terrain_routes,
+    traversability_routes,
+    view_routes,
 )
 from server.api.access import Parts, answer
-from server.auth import Auth
+from server.door.auth import Auth
+from server.door.guard import Guard
+from server.door.hub import Hub
+from server.door.sensor_token import sensor_token
 from server.errors import error_doc, status_of
-from server.guard import Guard
-from server.hub import Hub
 from server.library import Library
 from server.library.radar_files import RadarShelf
 from server.library.scenario_runs import ScenarioShelf
-from server.scene import proxy
 from server.scene.host import SceneHost
 from server.schemas import NoticeMessage
-from server.sensor_token import sensor_token
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
 from server.studies.scenario_desk import ScenarioDesk
-from server.together import Background
+from server.work.task_group import Background
 
 if TYPE_CHECKING:
-    from server.flying.flying import Flying
+    from server.stations import Flying
     from server.workspace import Workspace
 
 log = logging.getLogger("hedgehop.app")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from server.flying.flying import Flying
-from server.hub import Hub
+from server.door.hub import Hub
 from server.library import Library
 from server.scene.host import SceneHost
 from server.scene.view import SceneView
 from server.settings import Settings
-from server.together import Background
+from server.stations import Flying
+from server.work.task_group import Background
 from server.workspace import Workspace
 
 

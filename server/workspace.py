@@ -9,21 +9,20 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, Protocol
 
-from planning.dsm import Dsm
-from server import file_tasks, tasks
-from server.computing import Computing
+from planning.terrain.dsm import Dsm
 from server.errors import reported
-from server.file_jobs import FileJobs
-from server.job_board import JobBoard, Spawn
-from server.jobs import Lane
 from server.library import Library
-from server.on_show import OnShow
-from server.picture import Picture, View
-from server.plan_desk import PlanDesk
-from server.plan_requests import PlanRequests
-from server.pointing import Pointing
-from server.scene.sights import Sights
-from server.scene.vehicles import Vehicles
+from server.plan import file_tasks, tasks
+from server.plan.computing import Computing
+from server.plan.file_jobs import FileJobs
+from server.plan.on_show import OnShow
+from server.plan.picture import Picture, View
+from server.plan.plan_desk import PlanDesk
+from server.plan.plan_requests import PlanRequests
+from server.plan.pointing import Pointing
+from server.plan.terrain_desk import TerrainDesk
+from server.scene.layers.sights import Sights
+from server.scene.layers.vehicles import Vehicles
 from server.schemas import (
     ErrorDoc,
     LibraryMessage,
@@ -35,8 +34,9 @@ from server.schemas import (
     ServerMessage,
     Snapshot,
 )
-from server.terrain_desk import TerrainDesk
-from server.traversability.desk import TraversabilityDesk
+from server.traversability.traversability_desk import TraversabilityDesk
+from server.work.job_board import JobBoard, Spawn
+from server.work.jobs import Lane
 
 log = logging.getLogger("hedgehop.plan")
 

@@ -1,6 +1,6 @@
 """The documents name what there is."""
 
-import subprocess
+import re
 
 from tests.conftest import ROOT
 

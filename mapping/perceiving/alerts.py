@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.obstacles import Found
+from mapping.geometry.arrays import F64
+from mapping.perceiving.obstacles import Found
 
 Kind = Literal["obstacle", "divergence", "sensor"]
 Phase = Literal["begins", "goes_on", "ends"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.perceiving.model import Settings
+from mapping.geometry.arrays import F64, Bools
+from mapping.perceiving.frame_result import Settings
 from mapping.voxels import VoxelMap
 
 F64 = NDArray[np.float64]

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.alerts import AlertEvent
-from mapping.braking import Braking
-from mapping.obstacles import Found
-from mapping.poses import Pose
-from mapping.radar_targets import Variant
+from mapping.geometry.poses import Pose
+from mapping.perceiving.alerts import AlertEvent
+from mapping.perceiving.braking import Braking
+from mapping.perceiving.obstacles import Found
+from mapping.radar.targets import Variant
 
 Sensor = Literal["radar", "vision", "ranges"]
 State = Literal["waiting", "running", "blind", "frozen", "stale"]

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping import quaternions
-from mapping.alerts import AlertBook
-from mapping.corridor import MissionLine, length_m, tube_points
-from mapping.ground import GroundGrid
-from mapping.obstacles import Found, obstacles, sweep
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose, PoseTrack
+from mapping.perceiving.alerts import AlertBook
+from mapping.perceiving.corridor import MissionLine, length_m, tube_points
 from mapping.perceiving.flight_map import FlightMap
-from mapping.perceiving.model import FrameResult, SearchedRegion, Settings, State
+from mapping.perceiving.frame_result import FrameResult, SearchedRegion, Settings, State
+from mapping.perceiving.ground import GroundGrid
+from mapping.perceiving.obstacles import Found, obstacles, sweep
 from mapping.perceiving.remembered import Field, Remembered, Way
-from mapping.poses import Pose, PoseTrack
-from mapping.roi import search_sector, sector_points, to_enu
+from mapping.perceiving.roi import search_sector, sector_points, to_enu
+from mapping.sensor_frames import SensorFrame
 from mapping.voxels import VoxelMap
 
 F64 = NDArray[np.float64]

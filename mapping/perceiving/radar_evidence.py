@@ -8,10 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.ground import GroundGrid
-from mapping.ground_beams import BeamShape
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose
+from mapping.perceiving.ground import GroundGrid
+from mapping.perceiving.ground_beams import BeamShape
 from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
 from mapping.poses import Pose
 from mapping.radar_targets import Gate, Polar

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, I32, Bools
+from mapping.geometry.poses import Pose
 from mapping.perceiving.radar_moved import Moved, MovedParams
 from mapping.perceiving.radar_near import Column, cells, columns
 from mapping.poses import Pose

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.perceiving.base import Perception
-from mapping.perceiving.model import FrameResult, RadarScan, Settings
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose
+from mapping.perceiving.frame_result import FrameResult, Settings
+from mapping.perceiving.perception import Perception
 from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence, side_lobes
 from mapping.perceiving.radar_passing import Passing
 from mapping.perceiving.remembered import Field

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.frames import heading_rotation
 from mapping.perceiving.base import Perception

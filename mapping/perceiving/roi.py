@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mapping.errors import CapacityError, ParameterError
+from mapping.geometry.arrays import F64, I64
 from mapping.voxels import VoxelMap
 from mapping.voxels.checks import checked_points
 from mapping.voxels.marks import LARGEST_KEY

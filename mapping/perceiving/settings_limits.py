@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from mapping.errors import CapacityError, ParameterError
-from mapping.perceiving.base import LONGEST_CORRIDOR_M, ROI_STEP_M
-from mapping.perceiving.model import Settings
-from mapping.roi import MOST_POINTS, checked_sector
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.perception import LONGEST_CORRIDOR_M, ROI_STEP_M
+from mapping.perceiving.roi import MOST_POINTS, checked_sector
 from mapping.voxels.checks import checked_size
 
 COARSEST_CLOUD = 0.5

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from mapping import quaternions
-from mapping.perceiving.base import Perception
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F32, F64, Bools
+from mapping.geometry.poses import Pose, PoseTrack
 from mapping.perceiving.camera_path import Break, PathWatch
 from mapping.perceiving.flight_map import FlightMap
 from mapping.perceiving.model import CameraPose, Cloud, FrameResult, Settings, State

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import F32, I64, Bools
 from mapping.radar.cfar_factors import ca_factor, caso_factor, weights
 from mapping.radar.fft import Window, noise_correlation
 

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import betainccinv, gammaincc, gammaln
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import F64
 
 F64 = NDArray[np.float64]
 Weights = tuple[float, ...]

@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import C64, F32, F64, Bools
 from mapping.radar import cfar, doa, fft
 from mapping.radar.cfar import Cfar
 from mapping.radar.detections import Detections, between_cells, detections

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import C64, F32, F64, I64, Bools
 from mapping.radar import doa
 from mapping.radar.params import FmcwParams
 

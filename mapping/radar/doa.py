@@ -13,6 +13,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import C64, F64, I64
 from mapping.radar.params import FmcwParams
 
 C64 = NDArray[np.complex64]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, Bools
 from mapping.radar.fft import Window, window
 
 F64 = NDArray[np.float64]

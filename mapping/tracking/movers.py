@@ -6,11 +6,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.ground import GroundGrid
-from mapping.perceiving import FrameResult, RadarPerception, RadarScan, Settings
-from mapping.perceiving.model import State
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose
+from mapping.perceiving import FrameResult, RadarPerception, Settings
+from mapping.perceiving.frame_result import State
+from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.radar_evidence import EvidenceParams
 from mapping.poses import Pose
 from mapping.radar_targets import polar, to_enu

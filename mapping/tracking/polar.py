@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
-from mapping.tracker.cartesian import NEAREST_M, carry
-from mapping.tracker.kalman import FULL_TURN, centred
+from mapping.tracking.cartesian import NEAREST_M, carry
+from mapping.tracking.kalman import FULL_TURN, centred
 
 
 @njit(cache=True, nogil=True)

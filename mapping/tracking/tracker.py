@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
 
 from mapping.errors import ParameterError
 from mapping.tracker import cartesian, polar

@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import F64
 
 F64 = NDArray[np.float64]
 Coordinates = Literal["cartesian", "polar"]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import F32, F64, Bools
 from mapping.traversability import Traversability
 from mapping.uwb.fusion import fuse, view_is_clear
 from mapping.uwb.params import UwbGeometry, UwbParams

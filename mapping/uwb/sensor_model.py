@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.geometry.arrays import F64, I8, I64, Bools
 from mapping.uwb.params import UwbGeometry, UwbParams
 from mapping.uwb.thresholds import Thresholds
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mapping.errors import CapacityError, ParameterError
+from mapping.geometry.arrays import F64, Bools
 from mapping.voxels.marks import LARGEST_KEY, MAX_RANGE_VOXELS
 from mapping.voxels.store import BLOCK_BYTES, MIN_LOG, VOXELS, blocks_that_fit
 from mapping.voxels.update import Model

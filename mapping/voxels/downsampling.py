@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 _REACH = 1 << 20

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.geometry.arrays import F32, F64, I32, I64, Bools
 from mapping.voxels import query, store
-from mapping.voxels.changes import Changes
 from mapping.voxels.checks import (
     checked_model,
     checked_origin,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import U8
 from mapping.voxels.store import (
     HIT,
     IN_BLOCK,

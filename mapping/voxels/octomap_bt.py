@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapping.errors import CapacityError, FormatError
+from mapping.geometry.arrays import I32, I64, U16, Bools
 from mapping.voxels import VoxelMap
 
 FIRST_LINE = b"# Octomap OcTree binary file"

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapping.errors import CapacityError
+from mapping.geometry.arrays import F32, I32, I64, U8, U32
 
 SIDE_BITS = 3
 SIDE = 1 << SIDE_BITS

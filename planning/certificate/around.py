@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from planning.cells.cells import Cells
-from planning.cells.lattice import is_rectangular, quad_of
+from mapping.geometry.arrays import F64
 from planning.certificate.quads import away
 
 F64 = NDArray[np.float64]

@@ -16,11 +16,10 @@ import math
 from dataclasses import asdict, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pyproj import Proj
 
-import planning
-from planning.cells.cells import Layout
+from mapping.geometry.arrays import F64
+from mapping.version import __version__
 from planning.certificate.as_json import certificate_json
 from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
@@ -42,7 +41,6 @@ from planning.certificate.returns import return_altitude
 from planning.certificate.threads import threads_for
 from planning.certificate.true_metres import SCALE_TOLERANCE, true_cells
 from planning.certificate.unjudged import unjudged_reasons
-from planning.dsm import Dsm, SurfaceModel
 from planning.errors import MissionError, ParameterError
 from planning.model import (
     Certificate,
@@ -53,6 +51,8 @@ from planning.model import (
     Reason,
     WorstPoint,
 )
+from planning.terrain.cells.cells import Layout
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 __all__ = ["certificate_json", "certify"]
 

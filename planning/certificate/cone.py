@@ -8,7 +8,6 @@ their own height where that is larger. The lower of the two counts, so that a ce
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 

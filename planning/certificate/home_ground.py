@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 
 from planning.certificate.around import CellsAround, cells_around
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 
 FREE_STEP_M = 1.0
 FREE_SLOPE = math.tan(math.radians(35.0))

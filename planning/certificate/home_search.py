@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32, F64, I64
 from planning.certificate.home_ground import HomeGround, free_step_m, gap_m, home_ground
 from planning.dsm import Dsm, SurfaceModel
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from planning.certificate.home_ground import HomeGround, home_ground
 from planning.certificate.home_search import Standing, ground_around, nearest_standing
-from planning.dsm import SurfaceModel
 from planning.model import SET_DOWN_M, BetterHome, ClearanceParams, FlownLine, HomeStand
+from planning.terrain.dsm import SurfaceModel
 
 DROP_M = 0.3
 """What a better place may drop where the line has no clearance to spare."""

@@ -15,9 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from planning.cells.lattice import bend_range, block_around, is_rectangular, quad_of
+from mapping.geometry.arrays import F64
 from planning.certificate.nearest import STACK, column_distance_sq
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
 from planning.certificate.quads import quad_distance_sq

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.avoiding.line import LineAhead
-from planning.avoiding.model import AvoidanceParams, Manoeuvre, NoWay
-from planning.avoiding.room import Room
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import length_m
+from planning.evading.keep_clear import Room
+from planning.evading.line import LineAhead
+from planning.evading.model import AvoidanceParams, Manoeuvre, NoWay
 
 F64 = NDArray[np.float64]
 HIGHER_M = (0.0, 2.5, 5.0, 10.0)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.avoiding.room import Seen
+from mapping.geometry.arrays import F64
+from planning.evading.keep_clear import Seen
 
 F64 = NDArray[np.float64]
 REACH_UP = math.tan(math.radians(20.0))

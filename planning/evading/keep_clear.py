@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.avoiding.boxes import nearest_box
+from mapping.geometry.arrays import F32, F64, Bools
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import MaxPyramid, max_pyramid
 from planning.certificate.threads import threads_for
+from planning.evading.boxes import nearest_box
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

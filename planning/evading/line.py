@@ -6,9 +6,10 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.avoiding.room import Room
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import Polyline
+from planning.evading.keep_clear import Room
 
 F64 = NDArray[np.float64]
 LOOK_STEP_M = 1.0

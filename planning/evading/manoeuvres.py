@@ -9,14 +9,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from planning.avoiding.around import way_around
-from planning.avoiding.climb import way_up
-from planning.avoiding.line import LineAhead
-from planning.avoiding.model import AvoidanceParams, Kind, Manoeuvre, NoWay
-from planning.avoiding.over import way_over
-from planning.avoiding.room import Room, Seen, Surface
+from planning.evading.around import way_around
+from planning.evading.keep_clear import Room, Seen, Surface
+from planning.evading.line import LineAhead
+from planning.evading.model import AvoidanceParams, Kind, Manoeuvre, NoWay
+from planning.evading.over import way_over, way_up
 
 __all__ = [
     "AvoidanceParams",

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from mapping.geometry.arrays import F64
 
 F64 = NDArray[np.float64]
 Kind = Literal["over", "around", "sidestep"]

@@ -8,13 +8,14 @@ from typing import Protocol
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from planning.avoiding.boxes import half_heights, segment_box_sq
-from planning.avoiding.room import Seen
-from planning.avoiding.standing import REACH_UP, standing
-from planning.cells.cells import Layout
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
+from planning.evading.boxes import half_heights, segment_box_sq
+from planning.evading.columns import REACH_UP, standing
+from planning.evading.keep_clear import Seen
+from planning.terrain.cells.cells import Layout
+from planning.terrain.dsm import Dsm
 
 F64 = NDArray[np.float64]
 TILE_M = 4.0

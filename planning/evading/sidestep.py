@@ -10,11 +10,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from planning.avoiding.line import LineAhead
-from planning.avoiding.model import AvoidanceParams, NoWay
-from planning.avoiding.room import Room, Seen, Surface
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import length_m
+from planning.evading.keep_clear import Room, Seen, Surface
+from planning.evading.line import LineAhead
+from planning.evading.model import AvoidanceParams, NoWay
 
 F64 = NDArray[np.float64]
 AHEAD_M = (4.0, 8.0, 16.0, 32.0)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.reachable import roomiest, shortfall
 from planning.velocity_obstacles import Limits, Obstacles, Proposal, approaches, proposal_of, propose

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, Bools
 from planning.errors import ParameterError
 
 F64 = NDArray[np.float64]

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.geometry.arrays import F64, I64, Bools
 from planning.errors import ParameterError
-from planning.velocity_choice import Forbidden, Limits, within
+from planning.evading.velocity_choice import Forbidden, Limits, within
 
 __all__ = ["Approach", "Cone", "Limits", "Obstacles", "Proposal", "approaches", "cones", "proposal_of", "propose"]
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.flight_time.scurve import Axes
-from planning.model import F64
 
 STRAIGHT_RAD = math.radians(1.0)
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
 from planning.errors import MissionError
 from planning.flight_time.corner_speeds import corner_leg_times
 from planning.flight_time.scurve import Axes, leg, overlap_s
-from planning.model import F64, Home, Mission, MissionItem, VehicleProfile
+from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, MavCmd
+from planning.model import Home, Mission, MissionItem, VehicleProfile
+from planning.terrain.dsm import Dsm
 
 TAKEOFF, WAYPOINT, LAND, RTL, CHANGE_SPEED = 22, 16, 21, 20, 178
 FRAME_AMSL, FRAME_RELATIVE = (0, 5), (3, 6)

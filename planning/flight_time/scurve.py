@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from planning.model import F64
+from mapping.geometry.arrays import F64
 
 INPUT_TIME_CONSTANT_S = 0.15
 """ArduCopter's ATC_INPUT_TC; half its snap is what the S-curves use, so jerk ramps take twice as long."""

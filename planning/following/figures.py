@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, I64, Bools
 from planning.following.lag import lag_s, planned_s
 from planning.following.nearest import Deviations, follow_track
 from planning.following.passing import LOWER_M, REACHED_M, Passing
 from planning.following.reference import Reference
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track, Window, judged_window
-from planning.model import F64
 
 AT_HOME_M = 3.0
 """The way home ends this far from home: there the vehicle comes down to the ground."""

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.following.nearest import Deviation, Deviations
 from planning.following.reference import Reference
-from planning.model import F64
 
 PLACES_M = 0.5
 

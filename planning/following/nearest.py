@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from mapping.geometry.arrays import F64, I64
 from planning.following.reference import Reference
-from planning.model import F64, I64
 
 AHEAD_M, BEHIND_M = 30.0, 10.0
 """How far along the line from the last place the next one is looked for first."""

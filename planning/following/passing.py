@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, Bools
 from planning.following.reference import Reference
-from planning.model import F64
 
 REACHED_M = 3.0
 """Without the vehicle's own word, a waypoint counts as reached within this distance of it."""

@@ -9,14 +9,15 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.certificate.commands import WAYPOINT
+from mapping.geometry.arrays import F64, I64
 from planning.certificate.places import distance_flown
 from planning.certificate.unjudged import unjudged_words
-from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flight_time.predict import WAYPOINT_RADIUS_M, PredictedTime, predict_duration
-from planning.flown import flown_line
-from planning.model import F64, I64, FlownLine, Mission, VehicleProfile
+from planning.mav_cmd import MavCmd
+from planning.missions.flown import flown_line
+from planning.model import FlownLine, Mission, VehicleProfile
+from planning.terrain.dsm import Dsm
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.threads import threads_for
 from planning.certificate.true_metres import true_cells
-from planning.dsm import Dsm
-from planning.holes import fill_holes
-from planning.model import F64
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import SMALL_HOLE_M2, fill_holes
 
 SMALL_HOLE_M2 = 4.0
 """Holes below it take the height of their rim's highest cell, as in planning."""

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, Bools
 from planning.following.nearest import Deviations
 from planning.following.passing import REACHED_M, Flown, Passing, first_approach, passings
 from planning.following.reference import Reference
-from planning.model import F64
 
 BACK_ON_LINE_M = 1.0
 """After an interruption a position counts again once it is this near to the line, beside and above it."""

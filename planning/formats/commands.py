@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from planning.dsm import is_amsl
 from planning.formats.safe_text import clean_name
+from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, MissionItem
+from planning.terrain.dsm import is_amsl
 
 POSITIONED = frozenset({16, 17, 18, 19, 21, 22, 31, 33, 36, 80, 82, 84, 85, 94, 179, 189, 192, 195, 201})
 """MAV_CMDs whose x, y, z are latitude, longitude and altitude."""

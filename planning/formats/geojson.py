@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning import __version__
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
+from mapping.version import __version__
 from planning.errors import FormatError
 from planning.formats.commands import has_position, home_altitude_note
 from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite, load_json
 from planning.model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
+from planning.terrain.dsm import Dsm
 
 F64 = NDArray[np.float64]
 Json = dict[str, Any]

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning import __version__
-from planning.dsm import Dsm, is_amsl
+from mapping.geometry.arrays import F64
+from mapping.version import __version__
 from planning.errors import FormatError
 from planning.formats.commands import home_altitude_note
 from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.safe_text import clean_name, finite
 from planning.model import Home, Mission, Poi, SampledPath
+from planning.terrain.dsm import Dsm, is_amsl
 
 F64 = NDArray[np.float64]
 _STYLES = """<Style id="track"><LineStyle><color>ffdc7a1e</color><width>3</width></LineStyle>\

@@ -6,10 +6,11 @@ import math
 from xml.etree.ElementTree import Element
 
 from planning.errors import FormatError
-from planning.formats.commands import FRAME_AMSL, FRAME_HOME, FRAME_NONE, FRAME_TERRAIN, home_or_first_place
+from planning.formats.commands import home_or_first_place
 from planning.formats.kml import read_kml_track
 from planning.formats.kml_reader import first, read_placemarks, read_xml, tag, text_of
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, finite
+from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, Mission, MissionItem
 
 WAYPOINT, RETURN_TO_LAUNCH, LAND, TAKEOFF, SPLINE = 16, 20, 21, 22, 82

@@ -7,9 +7,9 @@ import re
 
 import numpy as np
 
-from planning.dsm import SurfaceModel
 from planning.formats.safe_text import clean_name
 from planning.model import Mission
+from planning.terrain.dsm import SurfaceModel
 
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _SHOWN = 8

@@ -9,8 +9,8 @@ from typing import Any
 from planning.errors import FormatError, PlanningError
 from planning.formats.safe_text import finite, load_json
 from planning.margins.following_error import WAY_NAMES
+from planning.missions.vehicle_profile import check_profile, profile_from_table
 from planning.model import PlannedFor
-from planning.vehicle_profile import check_profile, profile_from_table
 
 _KEYS = ("profile", "way", "required_clearance_m", "max_height_above_ground_m")
 

@@ -7,12 +7,12 @@ from typing import Any
 
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
+from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import read_planned_for
 from planning.formats.qgc_words import ALTITUDE_MODE, COMPUTED_ABOVE_TERRAIN, FIRMWARE_TYPE
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
 from planning.model import Firmware, Home, Mission, MissionItem, Poi
-from planning.other_surface import surface_digest
 
 Json = dict[str, Any]
 

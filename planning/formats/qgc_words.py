@@ -1,6 +1,6 @@
 """Numbers that the writer and the reader of QGroundControl plans share."""
 
-from planning.formats.commands import FRAME_AMSL, FRAME_HOME, FRAME_TERRAIN
+from planning.mav_cmd import MavFrame
 
 FIRMWARE_TYPE = {"ardupilot": 3, "px4": 12}
 """MAV_AUTOPILOT"""

@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from planning.dsm import SurfaceModel
 from planning.formats.commands import has_position
 from planning.model import Home, MissionItem
+from planning.terrain.dsm import SurfaceModel
 
 NEAR_DEG = 0.5
 """About 50 km: farther than any multicopter mission reaches from home."""

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning import __version__
-from planning.dsm import Dsm, is_amsl
+from mapping.geometry.arrays import F64
+from mapping.version import __version__
 from planning.errors import FormatError
 from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite
 from planning.model import Home, SampledPath, Timing
+from planning.terrain.dsm import Dsm, is_amsl
 
 F64 = NDArray[np.float64]
 COLUMNS = ("lat_deg", "lon_deg", "alt_rel_home_m", "alt_amsl_m", "speed_m_s", "time_to_next_s", "loiter_s")

@@ -9,11 +9,10 @@ import hashlib
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 from scipy import ndimage
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
 from planning.model import Poi
 
 F64 = NDArray[np.float64]

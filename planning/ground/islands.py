@@ -6,9 +6,9 @@ import math
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from mapping.geometry.arrays import F64, I32, Bools
 from mapping.traversability import Traversability
 
 F64 = NDArray[np.float64]

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from mapping.geometry.arrays import F32, F64, Bools
 from mapping.traversability import Traversability
 from planning.errors import ParameterError
 from planning.islands import Islands

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.traversability import MOST_CELLS, Traversability, TraversabilityParams, traversability_map
 from mapping.uwb import Cleared, UwbGeometry, UwbParams, UwbPose, clear
-from planning.dsm import Dsm
 from planning.errors import ParameterError
 from planning.landing_sites import LandingSites, landing_sites
 from planning.surface import block_max

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from planning.model import F64, I64
+from mapping.geometry.arrays import F64, I64
 
 HEIGHT_UNIT_M = 0.01
 """Autopilots keep whole centimetres (measured on ArduCopter, which truncates)."""

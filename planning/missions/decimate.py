@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from planning.corridor import HEIGHT_UNIT_M, SLACK, Bends, Corridor, bends, corridor
+from mapping.geometry.arrays import F64, I64
 from planning.errors import CapacityError, ParameterError
-from planning.model import F64, I64, SampledPath
+from planning.missions.band import HEIGHT_UNIT_M, SLACK, Bends, Corridor, bends, corridor
+from planning.model import SampledPath
 
 WAYPOINT_COST = 1 << 16
 """One waypoint outweighs any sum of height levels, which only break ties downwards."""

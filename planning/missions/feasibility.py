@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from planning.flight_time.predict import CHANGE_SPEED
+from planning.mav_cmd import MavCmd
 from planning.model import Mission, VehicleProfile
 
 RowState = Literal["holds", "fails", "unknown"]

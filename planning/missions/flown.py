@@ -11,21 +11,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.certificate.commands import (
-    BENT,
-    LAND,
-    OTHER_UNJUDGED,
-    RETURN_TO_LAUNCH,
-    STRAIGHT,
-    TAKEOFFS,
-    UNKNOWN,
-    stays,
-)
-from planning.dsm import Dsm, is_amsl
+from mapping.geometry.arrays import F64
+from planning.certificate.commands import BENT, OTHER_UNJUDGED, STRAIGHT, TAKEOFFS, UNKNOWN, stays
 from planning.errors import MissionError
+from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES, MavCmd
 from planning.model import FlownLine, Mission, MissionItem, Unjudged
+from planning.terrain.dsm import Dsm, is_amsl
 
 F64 = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ from pyproj import Geod
 
 from planning.certificate.home_stand import better_home, ground_at
 from planning.certificate.reasons import direction
-from planning.dsm import Dsm, SurfaceModel, is_amsl
 from planning.errors import DatumError, MissionError, PoiError
-from planning.mission_items import FRAME_AMSL, FRAME_RELATIVE, Heights
+from planning.mav_cmd import MavFrame
+from planning.missions.mission_items import Heights
 from planning.model import BetterHome, ClearanceParams, Home, MissionParams, SampledPath
+from planning.terrain.dsm import Dsm, SurfaceModel, is_amsl
 
 START_TOLERANCE_M = 0.5
 HOME_DECIMALS = 9

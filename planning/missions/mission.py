@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.climb import slope_limits
-from planning.decimate import Decimated, decimate_to_fit
-from planning.dsm import Dsm
 from planning.errors import CapacityError
 from planning.flight_time.predict import predict_duration
-from planning.home import check_start, home_from_dsm, item_heights
-from planning.mission_items import (
-    CHANGE_SPEED,
+from planning.mav_cmd import MavCmd
+from planning.missions.decimate import Decimated, decimate_to_fit
+from planning.missions.home import check_start, home_from_dsm, item_heights
+from planning.missions.mission_items import (
     GROUND_SPEED,
     LANDING_ITEMS,
     Heights,
@@ -31,8 +29,10 @@ from planning.mission_items import (
     unset,
     waypoint,
 )
+from planning.missions.vehicle_profile import path_params
 from planning.model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
-from planning.vehicle_profile import path_params
+from planning.route.slopes import slope_limits
+from planning.terrain.dsm import Dsm
 
 __all__ = ["BuiltMission", "Choice", "build_mission", "decimation_trade", "home_from_dsm"]
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
+from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Firmware, Home, MissionItem, MissionParams
+from planning.terrain.dsm import Dsm
 
 WAYPOINT, RTL, LAND, TAKEOFF = 16, 20, 21, 22
 CONDITION_YAW, CHANGE_SPEED = 115, 178

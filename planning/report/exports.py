@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
-from planning.camera import gsd_cm
-from planning.clearance import certificate_json
-from planning.dsm import SurfaceModel
+from planning.certificate.clearance import certificate_json
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
 from planning.plan import Plan, plan_trade
 from planning.report import ReportInput, TradeRow, render_report
+from planning.report.summary import plan_summary
 from planning.request import effective_profile
-from planning.summary import plan_summary
+from planning.route.camera import gsd_cm
+from planning.terrain.dsm import SurfaceModel
 
 FILES = (
     "trajectory.csv",

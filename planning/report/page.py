@@ -12,13 +12,12 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from planning import __version__
-from planning.dsm import Dsm
-from planning.feasibility import Feasibility, verdict_words
+from mapping.version import __version__
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
 from planning.margins.budget import SUM_RULE
 from planning.margins.words import is_by_hand, tube_words
+from planning.missions.feasibility import Feasibility, verdict_words
 from planning.model import (
     Certificate,
     FlownLine,
@@ -32,7 +31,8 @@ from planning.model import (
 from planning.report.figures.curves import altitude_profile, clearance_trend, speed_chart, time_chart
 from planning.report.figures.plan_view import plan_view
 from planning.report.words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up
-from planning.survey_coverage import SurveyCoverage
+from planning.route.survey_coverage import SurveyCoverage
+from planning.terrain.dsm import Dsm
 
 TIGHTEST_LEGS = 8
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from planning.clearance import certificate_json
-from planning.dsm import Dsm, SurfaceModel
-from planning.feasibility import feasibility_json
+from planning.certificate.clearance import certificate_json
+from planning.missions.feasibility import feasibility_json
 from planning.model import Certificate, finite_or_none
 from planning.plan import Plan
-from planning.survey_coverage import SurveyCoverage
+from planning.route.survey_coverage import SurveyCoverage
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 _CERTIFICATE_KEYS = (
     "certified",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from planning.formats.safe_text import clean_name
+from planning.mav_cmd import MavCmd
 
 COMMAND_NAMES = {
     16: "waypoint",

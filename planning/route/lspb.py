@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.model import F64, PathParams
+from planning.model import PathParams
 
 
 @dataclass(frozen=True, slots=True)

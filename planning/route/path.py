@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from planning.climb import limited_heights
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64, I64
 from planning.errors import ParameterError, PoiError
-from planning.model import F64, I64, PathParams, SampledPath
+from planning.model import PathParams, SampledPath
+from planning.route.slopes import limited_heights
+from planning.terrain.dsm import Dsm
 
 SurfaceAt = Callable[[F64], F64]
 MIN_SEGMENT_M = 0.01

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.dsm import Dsm, SurfaceModel
+from mapping.geometry.arrays import F64
 from planning.errors import PoiError
-from planning.model import F64, Poi
-from planning.visiting_order import shortest_order
+from planning.model import Poi
+from planning.route.visiting_order import shortest_order
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 __all__ = ["check_pois", "shortest_order"]
 

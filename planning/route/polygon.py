@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planning.model import F64
+from mapping.geometry.arrays import F64
 
 TOUCHING_M = 1e-6
 """Intervals closer than this are one."""

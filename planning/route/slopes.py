@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.model import F64, PathParams
+from planning.model import PathParams
 
 
 def slope_limits(params: PathParams) -> tuple[float, float]:

@@ -9,11 +9,11 @@ import numba
 import numpy as np
 from skimage.draw import polygon2mask
 
-from planning.camera import footprint_m
-from planning.dsm import F32, Dsm
-from planning.model import F64, I64, Camera, FlownLine, MissionParams
-from planning.request import LOOKS_DOWN_DEG
-from planning.survey import SurveyPlan
+from mapping.geometry.arrays import F32, F64, I64
+from planning.model import Camera, FlownLine, MissionParams
+from planning.route.camera import LOOKS_DOWN_DEG, footprint_m
+from planning.route.survey import SurveyPlan
+from planning.terrain.dsm import Dsm
 
 MOST_CELLS = 200_000
 """Places of the area that are looked at; on a finer model each stands for a block of cells, at its highest one."""

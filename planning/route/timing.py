@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
-from planning.climb import speed_caps
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.lspb import lspb
-from planning.model import F64, PathParams, SampledPath, Timing
+from planning.model import PathParams, SampledPath, Timing
+from planning.route.lspb import lspb
+from planning.route.slopes import speed_caps
 
 
 def path_timing(path: SampledPath, params: PathParams, *, loiter_s: F64 | None = None) -> Timing:

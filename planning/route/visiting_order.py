@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planning.model import F64
+from mapping.geometry.arrays import F64
 
 EXACT_UP_TO = 9
 MIN_GAIN_M = 1e-9

@@ -15,10 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.dilation.kernel import PAIRS, UNKNOWN
-from planning.dsm import F32
+from mapping.geometry.arrays import F32, I64
+from planning.safe_surface.kernel import PAIRS, UNKNOWN
 
 EXCESS = 0.05
 """The fast form stays under eq. 2 with (1.05 R, 1.05 H)."""

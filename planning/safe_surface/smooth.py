@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit, prange
 
-from planning.dsm import F32
+from mapping.geometry.arrays import F32
 
 TRUNCATE_SIGMA = 4.0
 """The kernel ends here; the tails left out weigh 6e-5."""

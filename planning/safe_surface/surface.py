@@ -9,16 +9,17 @@ from typing import Literal
 
 import numpy as np
 from affine import Affine
+from numba import njit, prange
 
-from planning.dilation.element import ball, coarsest_block, finest_block, rounding_lift_m
-from planning.dilation.kernel import dilate_grid
-from planning.dilation.pool import block_max_grid
-from planning.dilation.smooth import gaussian_grid, reach_px
-from planning.dilation.window import Box
-from planning.dsm import F32, F64, Dsm
+from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
-from planning.holes import fill_holes
 from planning.model import SurfaceParams, Surfaces
+from planning.safe_surface.element import ball, coarsest_block, finest_block, rounding_lift_m
+from planning.safe_surface.kernel import dilate_grid
+from planning.safe_surface.smooth import gaussian_grid, reach_px
+from planning.safe_surface.window import Box
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
 
 Method = Literal["exact", "fast"]
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.dsm import F64, Dsm
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
+from planning.terrain.dsm import Dsm
 
 
 @dataclass(frozen=True, slots=True)

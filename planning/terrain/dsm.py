@@ -9,13 +9,13 @@ from functools import lru_cache
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
-from planning.cells.cells import Cells, square_cells
-from planning.cells.squares import squares
+from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
-from planning.vertical_datum import is_above_sea_level
+from planning.terrain.cells.cells import Cells, square_cells
+from planning.terrain.cells.squares import squares
+from planning.terrain.vertical_datum import is_above_sea_level
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

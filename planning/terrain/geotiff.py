@@ -16,17 +16,17 @@ from pyproj import CRS
 from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError, RasterError
-from planning.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
-from planning.rasters import georef, sandbox
-from planning.rasters.assemble import ReadReport, assemble
-from planning.rasters.dsm_file import DsmFile
-from planning.rasters.header import RasterHeader, check_georeference, check_size
-from planning.rasters.limits import RasterLimits
-from planning.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
-from planning.spikes import find_spikes
-from planning.spikes import remove_spikes as without_spikes
+from planning.terrain.dsm import Dsm
+from planning.terrain.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
+from planning.terrain.rasters import georef, sandbox
+from planning.terrain.rasters.assemble import ReadReport, assemble
+from planning.terrain.rasters.dsm_file import DsmFile
+from planning.terrain.rasters.header import RasterHeader, check_georeference, check_size
+from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
+from planning.terrain.spikes import find_spikes
+from planning.terrain.spikes import remove_spikes as without_spikes
 
 __all__ = [
     "DsmFile",

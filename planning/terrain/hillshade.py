@@ -6,7 +6,6 @@ import math
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.dsm import Dsm
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from planning.dsm import F32, Dsm
+from mapping.geometry.arrays import F32, I32, I64
+from planning.terrain.dsm import Dsm
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]

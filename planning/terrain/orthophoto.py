@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS
 
-from planning.cells.squares import Inverse, source_places
+from mapping.geometry.arrays import F64, U8, Bools
 from planning.errors import ParameterError, RasterError, RasterFormatError
-from planning.rasters.header import RasterHeader
-from planning.rasters.mapping import source_mapping
+from planning.terrain.cells.squares import Inverse, source_places
+from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.mapping import source_mapping
 
 U8 = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from planning.dsm import F32, Dsm
+from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
+from planning.terrain.dsm import Dsm
 
 _MISS, _FLOOR, _CELL = 0, 1, 2
 _INSIDE_CELLS = 1e-3

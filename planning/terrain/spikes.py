@@ -12,10 +12,9 @@ from typing import Literal
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F32
 from planning.errors import ParameterError
 
 F32 = NDArray[np.float32]

@@ -10,17 +10,17 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import HTTPConnection
 
-from server.auth import Auth, session_key
+from server.door.auth import Auth, session_key
+from server.door.hub import Hub
 from server.errors import SignInError
-from server.hub import Hub
 from server.library import Library
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc
 from server.settings import Settings
-from telemetry.requests import Operator
+from telemetry.topics.requests import Operator
 
 if TYPE_CHECKING:
-    from server.flying.flying import Flying
+    from server.stations import Flying
     from server.studies.radar_desk import RadarDesk
     from server.studies.scenario_desk import ScenarioDesk
     from server.workspace import Workspace

@@ -7,7 +7,7 @@ from fastapi.responses import Response
 
 from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
 from server.schemas import FlyState, StartFlight, UploadPlan
-from telemetry.requests import Arm, Disarm, Land, Pause, Resume, ReturnHome
+from telemetry.topics.requests import Arm, Disarm, Land, Pause, Resume, ReturnHome
 
 router = APIRouter(prefix="/api/flight", dependencies=[SignedIn], tags=["flight"], responses=ERROR_RESPONSES)
 

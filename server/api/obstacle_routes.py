@@ -20,7 +20,7 @@ from server.schemas import (
     SetAvoidanceBody,
     Source,
 )
-from telemetry.obstacles import MapName
+from telemetry.topics.obstacles import MapName
 
 router = APIRouter(prefix="/api/obstacles", dependencies=[SignedIn], tags=["obstacles"], responses=ERROR_RESPONSES)
 

@@ -20,12 +20,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from server.api.access import parts_of, session_of
-from server.auth import session_key
+from server.door.auth import session_key
+from server.door.hub import Page
 from server.errors import NotFoundError, SignInError
-from server.hub import Page
 from server.scene.filter import MessageFilter
 from server.scene.host import CLIENT_HTML, SUBPROTOCOL, SceneHost
-from server.together import until_first
+from server.work.task_group import until_first
 
 log = logging.getLogger("hedgehop.scene")
 router = APIRouter(include_in_schema=False)

@@ -12,12 +12,12 @@ from fastapi.responses import Response
 from pydantic import RootModel
 
 from server.api.access import ERROR_RESPONSES, SignedIn, answer, parts_of
-from server.api.terrain import RAW_BODY, FileName
+from server.api.terrain_routes import RAW_BODY, FileName
 from server.api.uploads import display_name, stream_to_disk
 from server.errors import BadRequestError, TooLargeError
 from server.library.radar_files import ending_of
 from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading
-from server.schemas.studies import PageName
+from server.schemas.study_docs import PageName
 
 router = APIRouter(prefix="/api/radar", dependencies=[SignedIn], tags=["radar"], responses=ERROR_RESPONSES)
 

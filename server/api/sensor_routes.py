@@ -10,12 +10,12 @@ from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from server.api.access import parts_of
+from server.door.sensor_token import is_token, sensor_token
 from server.errors import BusyError
-from server.flying.agents import Agents
-from server.sensor_token import is_token, sensor_token
-from server.together import until_first
+from server.heard.agents import Agents
+from server.work.task_group import until_first
 from telemetry.agent.intake import Intake
-from telemetry.agent.wire import PATH, SUBPROTOCOL, encode
+from telemetry.agent.link_messages import PATH, SUBPROTOCOL, encode
 from telemetry.errors import SensorLinkError
 
 log = logging.getLogger("hedgehop.sensors")

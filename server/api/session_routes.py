@@ -12,7 +12,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from server.api.access import cookie_name, parts_of, session_of
 from server.api.templates import render
-from server.auth import session_key
+from server.door.auth import session_key
 from server.errors import SignInError, status_of
 from server.schemas import SignIn
 

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from mapping.uwb import UwbParams, of_rule
 from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
-from server.api.terrain import RAW_BODY
+from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
 

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from fastapi import Request
 
 from server.errors import BadRequestError
-from server.library.files import storage_errors
+from server.library.whole_files import storage_errors
 
 _PIECE_BYTES = 4 * 1024**2
 NAME_MAX_CHARS = 80

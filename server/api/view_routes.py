@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter, WebSocket
 
 from server.api.access import parts_of, session_of
-from server.auth import session_key
+from server.door.auth import session_key
+from server.door.hub import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
 from server.errors import BusyError, SignInError
-from server.hub import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
 
 router = APIRouter()
 

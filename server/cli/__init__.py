@@ -10,23 +10,23 @@ import sys
 import typer
 
 from planning import __version__
-from server.cli import examples
-from server.cli.agent import agent
-from server.cli.bench import bench
-from server.cli.certify import certify
-from server.cli.fly import fly
-from server.cli.map import build_map
-from server.cli.plan import plan
-from server.cli.radar import radar
-from server.cli.radar_tracks import tracks
-from server.cli.review import review
-from server.cli.scenario import scenario
-from server.cli.serve import serve
-from server.cli.sim import sim
-from server.cli.survey import survey
-from server.cli.traversability import traversability
-from server.cli.upload import upload
-from server.cli.usage import run_command
+from server.cli.agent_command import agent
+from server.cli.bench_command import bench
+from server.cli.certify_command import certify
+from server.cli.fly_command import fly
+from server.cli.map_command import build_map
+from server.cli.plan_command import plan
+from server.cli.radar_command import radar
+from server.cli.radar_tracks_command import tracks
+from server.cli.review_command import review
+from server.cli.scenario_command import scenario
+from server.cli.serve_command import serve
+from server.cli.shared import examples
+from server.cli.shared.usage import run_command
+from server.cli.sim_command import sim
+from server.cli.survey_command import survey
+from server.cli.traversability_command import traversability
+from server.cli.upload_command import upload
 
 app = typer.Typer(
     name="hedgehop",

@@ -15,11 +15,11 @@ from typing import Annotated, Any
 import typer
 
 from server.cli.agent_source import Source, SourceOptions, source_of
-from server.cli.output import print_json, refusing, say
+from server.cli.shared.output import print_json, refusing, say
 from server.errors import BadRequestError
 from telemetry.agent.client import Agent, AgentCounts, Reading, sensor_url
-from telemetry.agent.wire import REACH_M, Report
-from telemetry.sensors.ti_mmwave.ports import DATA_BAUD
+from telemetry.agent.link_messages import REACH_M, Report
+from telemetry.sensors.ti_mmwave.ti_session import DATA_BAUD
 
 TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
 TELL_EVERY_S = 5.0

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.cli.output import say
+from server.cli.shared.output import say
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading
 from telemetry.agent.driver_lines import DriverLines, LineCounts
@@ -21,9 +21,8 @@ from telemetry.errors import SensorLinkError
 from telemetry.sensors.serial_port import open_port
 from telemetry.sensors.ti_mmwave.config import read_config
 from telemetry.sensors.ti_mmwave.differences import differences
-from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.ports import DATA_BAUD, config_port_beside
-from telemetry.sensors.ti_mmwave.session import TiPorts
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig
+from telemetry.sensors.ti_mmwave.ti_session import DATA_BAUD, TiPorts, config_port_beside
 
 NO_PORT = "none"
 

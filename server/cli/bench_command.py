@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from server.cli.output import FAILED, say
+from server.cli.shared.output import FAILED, say
 
 
 def bench() -> None:

@@ -7,29 +7,28 @@ from typing import Annotated, Any
 
 import typer
 
-from planning.certify_part import certify_part
-from planning.clearance import certificate_json
-from planning.dsm import Dsm, SurfaceModel
+from planning.certificate.clearance import certificate_json
 from planning.errors import MissionError
-from planning.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
 from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.formats.detect import read_flight
+from planning.formats.other_surface import other_surface
+from planning.formats.poi_files import warn_swapped
 from planning.margins.words import uncovered_words
+from planning.missions.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
 from planning.model import Certificate, Mission, VehicleProfile
-from planning.other_surface import other_surface
-from planning.part import Ground
+from planning.part import Ground, certify_part
 from planning.plan import CERTIFICATE_STEP
-from planning.poi_files import warn_swapped
+from planning.report.summary import certificate_summary, dsm_summary
 from planning.request import check_hole_area
-from planning.summary import certificate_summary, dsm_summary
-from server.cli import options as o
-from server.cli.files import read_small
-from server.cli.mission_vehicle import Given, judged_by
-from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
-from server.cli.terrain import ModelOptions, open_model
-from server.cli.verdict import leg_lines, verdict_lines
-from server.stopwatch import StepTimer
+from planning.terrain.dsm import Dsm, SurfaceModel
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import read_small
+from server.cli.shared.mission_vehicle import Given, judged_by
+from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
+from server.cli.shared.terrain_given import ModelOptions, open_model
+from server.cli.shared.verdict import leg_lines, verdict_lines
+from server.work.clocks import StepTimer
 
 
 def certify(

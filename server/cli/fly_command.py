@@ -17,29 +17,29 @@ from typing import Annotated, Literal
 
 import typer
 
-from planning.certify_part import mission_places
-from planning.dsm import Dsm
 from planning.formats.detect import read_mission
+from planning.formats.other_surface import other_surface
 from planning.model import Mission
-from planning.other_surface import other_surface
-from server.cli import options as o
-from server.cli.files import check_directory, read_small
-from server.cli.flight_progress import FlightProgress
-from server.cli.mission_vehicle import Given, judged_by
-from server.cli.nodes import OPERATOR, Station, own_nodes
-from server.cli.output import DONE, FAILED, end_progress, progress, refusing, say
-from server.cli.review import answer, say_below
-from server.cli.terrain import ModelOptions, read_around
+from planning.part import mission_places
+from planning.terrain.dsm import Dsm
+from server.cli.review_command import answer, say_below
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import check_directory, read_small
+from server.cli.shared.flight_progress import FlightProgress
+from server.cli.shared.mission_vehicle import Given, judged_by
+from server.cli.shared.output import DONE, FAILED, end_progress, progress, refusing, say
+from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
+from server.cli.shared.terrain_given import ModelOptions, read_around
 from server.errors import StorageError
-from server.review import recording_of, review
-from server.schemas.review import ReviewDoc
-from server.stopwatch import StepTimer
+from server.flying.review import recording_of, review
+from server.schemas.review_docs import ReviewDoc
+from server.work.clocks import StepTimer
 from telemetry.errors import TelemetryError
 from telemetry.flight.fly import FlyOptions, FlyResult
 from telemetry.flight.fly import fly as conduct
 from telemetry.mavlink.address import parse_address
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.requests import StartRecording, StopRecording
+from telemetry.topics.requests import StartRecording, StopRecording
 
 NODE_TIMEOUT_S = 30.0
 

@@ -11,13 +11,12 @@ import typer
 
 from mapping.errors import ParameterError
 from planning.errors import DescribedError
-from server.cli import options as o
-from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
-from telemetry.perception.export import KINDS as FORMATS
-from telemetry.perception.export import ExportError, Kind, exported
-from telemetry.perception.kinds import KINDS
-from telemetry.perception.limits import check_memory
-from telemetry.perception.rebuild import OtherMap, Rebuilt, rebuild
+from server.cli.shared import options as o
+from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
+from telemetry.perception.sensor_kinds import KINDS, check_memory
+from telemetry.rebuilding.export import KINDS as FORMATS
+from telemetry.rebuilding.export import ExportError, Kind, exported
+from telemetry.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 
 
 class MapFileError(DescribedError):

@@ -10,20 +10,20 @@ from typing import Annotated, Literal
 import numpy as np
 import typer
 
-from planning.dsm import SurfaceModel
 from planning.errors import ParameterError, PoiError
+from planning.formats.poi_files import read_pois, warn_swapped
 from planning.formats.safe_text import clean_name
+from planning.missions.vehicle_profile import path_params
 from planning.model import MissionParams, PathParams, Poi, SurfaceParams
-from planning.poi import check_pois, shortest_order
-from planning.poi_files import read_pois, warn_swapped
 from planning.request import PlanRequest, check_request
-from planning.vehicle_profile import path_params
-from server.cli import options as o
-from server.cli.files import read_small
-from server.cli.output import refusing, say
-from server.cli.places import chosen_heading, parse_place
-from server.cli.planning_run import profile_with, run
-from server.cli.terrain import ModelOptions
+from planning.route.poi import check_pois, shortest_order
+from planning.terrain.dsm import SurfaceModel
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import read_small
+from server.cli.shared.output import refusing, say
+from server.cli.shared.places_given import chosen_heading, parse_place
+from server.cli.shared.planning_run import profile_with, run
+from server.cli.shared.terrain_given import ModelOptions
 
 
 def plan(

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from planning.errors import DescribedError
-from server.cli import examples
-from server.cli import options as o
-from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
+from server.cli.shared import examples
+from server.cli.shared import options as o
+from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
 
 if TYPE_CHECKING:
     from mapping.radar import Detections, Spectra
-    from telemetry.sensors.adc.reading import Reading
+    from telemetry.sensors.adc.read_adc import Reading
 
 SHOWN = 10
 """Detections of the first frame, in the answer for people."""
@@ -95,7 +95,7 @@ radar.command("process", epilog=examples.RADAR_PROCESS)(process)
 
 def _read(file: Path, sensor: Sensor | None, cfg: Path | None, most: int | None, samples_as: SamplesAs) -> Reading:
     """Loaded only now: the help must not wait for compilers."""
-    from telemetry.sensors.adc.reading import HowRead, read_adc
+    from telemetry.sensors.adc.read_adc import HowRead, read_adc
 
     return read_adc(file, HowRead(sensor, samples_as, most), cfg)
 
@@ -125,7 +125,7 @@ def _draw(plots: Path, reading: Reading, chosen: tuple[Spectra, Detections] | No
     if chosen is None:
         what = f"Frame {number} is not in the file, which has {frames}."
         raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
-    from server.cli.radar_plots import write_figures
+    from server.cli.plots.radar_plots import write_figures
 
     write_figures(plots, reading.chain, *chosen, f"{reading.file.name}, frame {number}")
 
@@ -135,13 +135,13 @@ def _run(frames: Iterator[tuple[float, Detections]], out: Path | None, file: Pat
         for _ in frames:
             continue
     else:
-        from telemetry.sensors.targets import write_targets
+        from telemetry.sensors.target_recording import write_targets
 
         write_targets(out, frames, t_utc_s=file.stat().st_mtime, source=sensor)
 
 
 def _parameters(reading: Reading) -> dict[str, Any]:
-    from server.radar_facts import parameters
+    from server.studies.radar_facts import parameters
 
     return parameters(reading.sensor, reading.file)
 
@@ -173,7 +173,7 @@ def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool)
 
 
 def _rows(frame: int, t_s: float, found: Detections) -> list[dict[str, Any]]:
-    from server.radar_facts import detection_rows
+    from server.studies.radar_facts import detection_rows
 
     return [{"frame": frame, "t_s": round(t_s, 6), **row} for row in detection_rows(found)]
 

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from server.cli import options as o
-from server.cli.output import DONE, end_progress, print_json, progress, refusing, say
-from server.cli.radar import RadarOptionsError
+from server.cli.radar_command import RadarOptionsError
+from server.cli.shared import options as o
+from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from mapping.radar import Detections
-    from telemetry.tracking.against_truth import Comparison, Pole
+    from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison
 
 
 def tracks(
@@ -39,14 +39,14 @@ def tracks(
         import numpy as np
 
         from telemetry.sensors.optitrack import read_optitrack
-        from telemetry.tracking.against_truth import compared
+        from telemetry.simulation.scenarios.arena.against_truth import compared
 
         places = np.array([_place(words) for words in pole])
         capture = read_optitrack(optitrack, forward=forward)
         found = compared(_frames(file), capture, places, offset_s=offset_s)
         end_progress()
         if plots is not None:
-            from server.cli.radar_tracks_plot import write_tracks
+            from server.cli.plots.radar_tracks_plot import write_tracks
 
             say(f"Drawn: {write_tracks(plots, found, f'{file.name}, {found.frames} frames')}")
         _answer(file, found, as_json=as_json)

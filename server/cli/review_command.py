@@ -8,19 +8,20 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from planning.certify_part import mission_places
-from planning.dsm import F64, SurfaceModel
+from mapping.geometry.arrays import F64
 from planning.formats.detect import read_mission
 from planning.model import Mission
-from server.cli import options as o
-from server.cli.files import read_small
-from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
-from server.cli.terrain import ModelOptions, read_around
-from server.review import recording_of
-from server.review import review as judge
-from server.review_flight import flown_mission
-from server.schemas.review import ReviewDoc, ReviewFigures
-from server.stopwatch import StepTimer
+from planning.part import mission_places
+from planning.terrain.dsm import SurfaceModel
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import read_small
+from server.cli.shared.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
+from server.cli.shared.terrain_given import ModelOptions, read_around
+from server.flying.review import recording_of
+from server.flying.review import review as judge
+from server.flying.review_flight import flown_mission
+from server.schemas.review_docs import ReviewDoc, ReviewFigures
+from server.work.clocks import StepTimer
 from telemetry.recording.flight_log import FlightLog, read_flight_log
 
 FIRST_KEYS = (

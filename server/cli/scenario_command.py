@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from planning.errors import ParameterError
-from server.cli import options as o
-from server.cli.files import check_directory
-from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import check_directory
+from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
 from server.errors import StorageError
-from telemetry.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
-from telemetry.scenarios.result import ScenarioResult, tally, tally_json
-from telemetry.scenarios.wanted import Wanted
-from telemetry.sensing import RadarKind
+from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
+from telemetry.simulation.scenarios.stage.result import ScenarioResult, tally, tally_json
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.topics.simulated import RadarKind
 
 
 def scenario(
@@ -79,7 +79,7 @@ def scenario(
 
 def _draw(plots: Path, result: ScenarioResult) -> None:
     """Loaded only now: drawing is rarely asked for."""
-    from server.cli.chart_plots import write_charts
+    from server.cli.plots.chart_plots import write_charts
 
     for path in write_charts(plots, result):
         say(f"Drawn: {path}")

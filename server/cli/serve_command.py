@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from server.app import run
-from server.cli.output import refusing
+from server.cli.shared.output import refusing
 from server.settings import load_settings
-from telemetry.sensing import RadarKind
+from telemetry.topics.simulated import RadarKind
 
 
 def serve(

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from server.cli import options as o
-from server.cli.output import refusing, say
+from server.cli.shared import options as o
+from server.cli.shared.output import refusing, say
 from telemetry.nodes.simulator import read_home, read_parameter
-from telemetry.simulator.gnss_script import read_event
-from telemetry.simulator.run import SimOptions, run
+from telemetry.simulation.simulator.airframe.gnss_script import read_event
+from telemetry.simulation.simulator.run import SimOptions, run
 
 
 def sim(

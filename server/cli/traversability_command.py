@@ -9,13 +9,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32
 from mapping.uwb import Cleared, Rule, in_words, of_rule
 from planning.errors import ParameterError
-from planning.geotiff import write_dsm
-from planning.landing_sites import CAUTION, LandingSites
-from planning.traversable import (
+from planning.ground.landing_sites import CAUTION, LandingSites
+from planning.ground.traversable import (
     TraversableGround,
     UwbScans,
     cleared_ground,
@@ -23,12 +22,13 @@ from planning.traversable import (
     sites_near,
     traversable_ground,
 )
-from server.cli import options as o
-from server.cli.files import check_directory, write_files
-from server.cli.output import DONE, FAILED, end_progress, print_json, progress, refusing
-from server.cli.places import parse_place
-from server.cli.terrain import ModelOptions, read_model
-from server.stopwatch import StepTimer
+from planning.terrain.geotiff import write_dsm
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import check_directory, write_files
+from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing
+from server.cli.shared.places_given import parse_place
+from server.cli.shared.terrain_given import ModelOptions, read_model
+from server.work.clocks import StepTimer
 from telemetry.perception.uwb_drive import read_scans
 
 Layers = dict[str, NDArray[np.float32]]

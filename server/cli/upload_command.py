@@ -10,14 +10,14 @@ import typer
 
 from planning.formats.detect import read_mission
 from planning.model import Mission
-from server.cli import options as o
-from server.cli.files import read_small
-from server.cli.nodes import OPERATOR, own_nodes
-from server.cli.output import DONE, FAILED, print_json, refusing, say
-from telemetry.flight.prepare import connect, transfer
+from server.cli.shared import options as o
+from server.cli.shared.files_in_out import read_small
+from server.cli.shared.output import DONE, FAILED, print_json, refusing, say
+from server.cli.shared.own_nodes import OPERATOR, own_nodes
+from telemetry.flight.preflight.prepare import connect, transfer
 from telemetry.flight.watch import watching
 from telemetry.mavlink.address import parse_address
-from telemetry.messages import UploadReport
+from telemetry.topics.messages import UploadReport
 
 
 def upload(mission: o.MissionFile, link: o.Link, as_json: o.AsJson = False) -> None:

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from server.errors import SignInError, TooManyTriesError
-from server.library.files import write_atomically
+from server.library.whole_files import write_atomically
 from server.settings import PasswordHash
 
 SESSIONS_MAX = 1000

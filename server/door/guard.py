@@ -7,6 +7,7 @@ API, open the sockets, or reach them under a name it resolves to 127.0.0.1. Pure
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
 import logging
 import time

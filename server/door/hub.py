@@ -24,7 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server import schemas
 from server.errors import BusyError, error_doc
-from server.together import until_first
+from server.work.task_group import until_first
 
 log = logging.getLogger("hedgehop.hub")
 

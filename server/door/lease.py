@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.errors import NotInChargeError
-from server.library.files import write_atomically
+from server.library.whole_files import write_atomically
 from server.schemas import LeaseDoc
-from telemetry.requests import Operator
+from telemetry.topics.requests import Operator
 
 SERVER_NAME = "Hedgehop"
 """What the server calls itself when it opens the connections it was started with."""

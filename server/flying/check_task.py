@@ -13,27 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapping.braking import Braking
+from mapping.perceiving.braking import Braking
 from planning.certificate.as_json import certificate_json
-from planning.dsm import Dsm
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
-from planning.holes import fill_holes
 from planning.margins.words import rounded_down, rounded_up
+from planning.missions.vehicle_profile import parse_profile
 from planning.model import Certificate, ClearanceParams, Mission
-from planning.vehicle_profile import parse_profile
-from server.clock import utc_now
-from server.documents import demands_from_doc
-from server.jobs import Progress
-from server.library.seen import check_home_stands_on_ground, load_planned_terrain
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
+from server.library.documents import clearance_of, demands_from_doc, seen_in
+from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
-from telemetry.messages import Item, OnboardMission, PlanRecord
-from telemetry.vehicle import VehicleState
+from server.work.clocks import utc_now
+from server.work.jobs import Progress
+from telemetry.topics.messages import Item, OnboardMission, PlanRecord
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from telemetry.flight.preflight import Preflight
-    from telemetry.flight.speeds import Speeds
-    from telemetry.flight.targets import GuidedPlan
+    from telemetry.flight.guided.targets import GuidedPlan
+    from telemetry.flight.preflight.preflight import Preflight
+    from telemetry.flight.preflight.speeds import Speeds
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,8 @@ def check_start(
     report: Progress,
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
-    from telemetry.flight.preflight import check
-    from telemetry.flight.speeds import flown_speeds
+    from telemetry.flight.preflight.preflight import check
+    from telemetry.flight.preflight.speeds import flown_speeds
 
     report("Checking the start", None)
     dsm, planned = load_planned_terrain(directory, seen_in(record)), read_wpl(record.mission_wpl)
@@ -136,7 +136,7 @@ def clearance_of(record: PlanRecord) -> ClearanceParams:
 
 def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
     """The mission as the navigation script hands it over, with the paper's timing. Raises MissionError."""
-    from telemetry.flight.targets import guided_plan, with_timing
+    from telemetry.flight.guided.targets import guided_plan, with_timing
 
     report("Preparing the navigation script", None)
     plan = guided_plan(read_wpl(record.mission_wpl))
@@ -155,8 +155,7 @@ def climb_for_resuming(
     report: Progress,
 ) -> tuple[int, float]:
     """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
-    from telemetry.flight.preflight import SMALL_HOLE_M2
-    from telemetry.flight.resume import plan_resumption
+    from telemetry.flight.preflight.resume import plan_resumption
 
     report("Finding the way back into the mission", None)
     surface, _ = fill_holes(load_planned_terrain(directory, seen_id), max_area_m2=SMALL_HOLE_M2)
@@ -165,8 +164,8 @@ def climb_for_resuming(
 
 
 def _moved(found: Preflight, record: PlanRecord, state: VehicleState, dsm: Dsm) -> Moved | None:
-    from telemetry.flight.preflight import actual_home
-    from telemetry.flight.rereference import rereference
+    from telemetry.flight.preflight.preflight import actual_home
+    from telemetry.flight.preflight.rereference import rereference
     from telemetry.mavlink.items import items_from_mission
 
     home, shift_m = actual_home(state, dsm), found.home_shift_m

@@ -14,20 +14,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from server.errors import CheckNeededError, ConflictError
-from server.flying.asking import Asks
 from server.flying.check_task import Checked
 from server.flying.onboard import Onboard, is_plan, onboard, read_onboard, write_onboard
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
+from server.heard.channel import Asks
 from server.schemas import FlyMessage, FlyState, OnboardDoc, PlanDoc, PreflightDoc, ServerMessage, StartFlight
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
-from telemetry.messages import FlightStatus, Item, LinkStatus, OnboardMission, PlanRecord, UploadReport
-from telemetry.obstacles import AvoidanceStatus
-from telemetry.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, Item, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from telemetry.flight.targets import GuidedPlan
+    from telemetry.flight.guided.targets import GuidedPlan
 
 
 class Works(Protocol):

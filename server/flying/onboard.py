@@ -10,9 +10,9 @@ from pathlib import Path
 
 import msgspec
 
-from server.library.files import write_atomically
+from server.library.whole_files import write_atomically
 from server.schemas import PlanDoc
-from telemetry.messages import PlanRecord, Rounded
+from telemetry.topics.messages import PlanRecord, Rounded
 
 _ROUNDED_KEPT = 200
 """The page lists them; the sentence counts them all."""

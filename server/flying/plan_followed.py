@@ -6,13 +6,13 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 from server.errors import reported
-from server.flying.channel import Channel
-from server.flying.following import Followed, Follower
+from server.heard.channel import Channel
+from server.heard.plan_follower import Followed, Follower
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
-from telemetry.messages import PlanRecord
+from telemetry.topics.messages import PlanRecord
 
 log = logging.getLogger("hedgehop.flying")
 

@@ -6,17 +6,17 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from planning.dsm import Dsm
 from planning.following.below import below_required
 from planning.following.figures import Judged, judge
+from planning.formats.other_surface import other_surface
 from planning.model import Mission
-from planning.other_surface import other_surface
-from server.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
-from server.review_flight import Flight, placed_flight
-from server.schemas.flight import RecordingDoc
-from server.schemas.review import ReviewDoc, ReviewSeries
+from planning.terrain.dsm import Dsm
+from server.flying.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
+from server.flying.review_flight import Flight, placed_flight
+from server.schemas.flight_docs import RecordingDoc
+from server.schemas.review_docs import ReviewDoc, ReviewSeries
 from telemetry.recording.flight_log import FlightLog
-from telemetry.track_settings import unusual
+from telemetry.topics.track_settings import unusual
 
 EMPTY = ReviewSeries(
     t_s=[],

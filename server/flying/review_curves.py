@@ -8,18 +8,17 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, I64
 from planning.following.below import Demanded, below_required
 from planning.following.figures import Judged, TrackFigures
 from planning.following.lag import planned_alt_dsm_m
 from planning.following.reference import Reference
-from planning.model import F64
 from planning.request import clearance_of_planned
-from server.review_flight import Flight
-from server.schemas.review import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
-from telemetry.obstacles import ObstacleAlert
+from server.flying.review_flight import Flight
+from server.schemas.review_docs import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
 from telemetry.recording.flight_log import FlightLog
+from telemetry.topics.obstacles import ObstacleAlert
 
 STRETCHES = 400
 """Parts of a long recording of which each keeps its first position and its peaks."""

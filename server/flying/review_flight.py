@@ -11,19 +11,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import apart_m
 from planning.errors import PlanningError
 from planning.following.reference import Reference, level_model, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.wpl import read_wpl
-from planning.model import F64, Home, Mission, MissionItem, VehicleProfile
-from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, parse_profile
-from telemetry.flight.rest import RETURNS
-from telemetry.obstacles import AvoidanceStatus
+from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, parse_profile
+from planning.model import Home, Mission, MissionItem, VehicleProfile
+from planning.terrain.dsm import Dsm
+from telemetry.flight.guided.remaining_mission import RETURNS
 from telemetry.recording.flight_log import FlightLog
-from telemetry.recording.flight_log import Track as Columns
+from telemetry.recording.flight_log import RecordedTrack as Columns
 from telemetry.recording.frame_facts import SentTarget
+from telemetry.topics.obstacles import AvoidanceStatus
 
 MISSION_MODES = {"auto": ("AUTO", "MISSION"), "guided": ("GUIDED", "OFFBOARD")}
 WAYS_HOME = (*RETURNS, "RETURN", "LAND")

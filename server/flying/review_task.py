@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.following.reference import Reference
 from planning.plan import plan_mission
-from server.documents import request_from_doc
-from server.jobs import Progress
+from planning.terrain.dsm import Dsm
+from server.library.documents import request_from_doc
 from server.library.terrain_of import FlownOver
 from server.library.terrains import load_terrain
-from server.scene.payload import ReviewScene, TerrainScene
-from server.scene.plain import plain_ground
+from server.scene.geometry.payload import ReviewScene, TerrainScene
+from server.scene.geometry.plain import plain_ground
 from server.schemas import PlanDoc, RecordingDoc, ReviewDoc
+from server.work.jobs import Progress
 
 if TYPE_CHECKING:
     from telemetry.recording.flight_log import FlightLog
@@ -71,8 +71,8 @@ def review(
 
     Raises RecordingError, PlanningError.
     """
-    from server.review import review as judged
-    from server.review_flight import placed_flight
+    from server.flying.review import review as judged
+    from server.flying.review_flight import placed_flight
 
     report("Reading the recording", None)
     log = _log(path, path.stat().st_mtime_ns)
@@ -108,7 +108,7 @@ def _name(log: FlightLog, terrain: FlownTerrain | None) -> str:
 
 
 def _drawn(ground: Dsm) -> TerrainScene:
-    from server.scene.terrain_payload import build_terrain_scene
+    from server.scene.geometry.terrain_payload import build_terrain_scene
 
     return build_terrain_scene("", ground, shading="height", orthophoto=None)
 

@@ -14,15 +14,14 @@ from typing import Protocol
 
 from server.errors import NotReadyError
 from server.flying import review_task
-from server.flying.channel import Channel
-from server.flying.following import Followed, Follower
-from server.flying.recording import Run
 from server.flying.review_task import FlownTerrain, Reviewed
-from server.jobs import Lane, Progress
+from server.heard.channel import Channel
+from server.heard.plan_follower import Followed, Follower
+from server.heard.recording import Run
 from server.library import Library
-from server.library.recordings import RecordingShelf
+from server.library.recording_list import RecordingShelf
 from server.library.terrain_of import FlownOver, terrain_of
-from server.scene.payload import ReviewScene
+from server.scene.geometry.payload import ReviewScene
 from server.schemas import (
     OpenReview,
     PlanDoc,
@@ -32,8 +31,9 @@ from server.schemas import (
     ReviewMessage,
     ServerMessage,
 )
-from telemetry.messages import ReplayStatus
-from telemetry.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from server.work.jobs import Lane, Progress
+from telemetry.topics.messages import ReplayStatus
+from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
 
 _SEEK_S = 2.0
 """A jump of the clock beyond what playing explains."""

@@ -7,13 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
-from planning.dsm import Dsm
-from planning.model import F64
-from server.flying.channel import Channel
-from server.placing import Placer
-from server.scene.vehicle import VehiclePose
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.heard.channel import Channel
+from server.heard.vehicle_place import Placer
+from server.scene.layers.vehicle_layers import VehiclePose
 from server.schemas import Source
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 PERIOD_S = 0.1
 _TRACK_EVERY = 5

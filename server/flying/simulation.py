@@ -8,16 +8,16 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Protocol
 
-from server import demo
 from server.errors import NotReadyError
-from server.flying.connections import Connections
-from server.flying.ground_task import Ground, export_ground, write_demo_world
-from server.flying.nodes import Nodes
-from server.jobs import Lane
+from server.heard.connections import Connections
+from server.heard.ground_task import Ground, export_ground, write_demo_world
+from server.heard.node_states import Nodes
 from server.library import Library
+from server.plan import demo
 from server.schemas import PlanDoc
-from telemetry.messages import LinkStatus
-from telemetry.requests import Operator
+from server.work.jobs import Lane
+from telemetry.topics.messages import LinkStatus
+from telemetry.topics.requests import Operator
 
 _OUT, _IN = "udpout:", "udpin:"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError
 from server.flying.check_task import Checked
-from server.placing import metres_apart
 from server.schemas import CheckRow, PreflightDoc, StartFlight
-from telemetry.obstacles import AvoidanceStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.vehicle import VehicleState
 
 FRESH_S = 120.0
 """Long enough to read the check and to hold the button; the vehicle must not have moved meanwhile."""
@@ -33,8 +33,8 @@ class Ready:
 
 def preflight_now(ready: Ready, avoidance: AvoidanceStatus, *, utc_minus_mono_s: float) -> PreflightDoc:
     """The check with what avoidance sees by now: a sensor may have come or gone since."""
-    from telemetry.flight.eyes_check import avoidance_row
-    from telemetry.flight.speeds import Speeds
+    from telemetry.flight.preflight.eyes_check import avoidance_row
+    from telemetry.flight.preflight.speeds import Speeds
 
     checked = ready.checked
     speeds = checked.speeds or Speeds()

@@ -6,11 +6,11 @@ import logging
 from pathlib import Path
 
 from server.errors import reported
-from server.flying.channel import Channel
-from server.flying.recording_task import states_so_far
-from server.jobs import Lane
-from telemetry.messages import RecorderStatus
-from telemetry.vehicle import VehicleState
+from server.heard.channel import Channel
+from server.heard.recording_task import states_so_far
+from server.work.jobs import Lane
+from telemetry.topics.messages import RecorderStatus
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planning.formats import trajectory_csv, wpl
+from planning.missions.vehicle_profile import dump_profile
 from planning.request import effective_profile
-from planning.vehicle_profile import dump_profile
-from server.jobs import Progress
+from server.plan.tasks import last_plan
 from server.schemas import PlanDoc
-from server.tasks import last_plan
-from telemetry.messages import Item, PlanRecord
+from server.work.jobs import Progress
+from telemetry.topics.messages import Item, PlanRecord
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,20 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from server.errors import NotCertifiedError, NotReadyError, StaleRevisionError
-from server.flying.asking import Asks
-from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets, seen_in
+from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets
 from server.flying.upload_task import MadeUpload, make_upload
-from server.jobs import Lane
+from server.heard.channel import Asks
 from server.library import Library
+from server.library.documents import seen_in
 from server.library.terrain_of import FlownOver, terrain_of
 from server.schemas import PlanState, TerrainDoc
-from telemetry.flight.parameters import NAMES
-from telemetry.messages import OnboardMission, PlanRecord
-from telemetry.requests import ReadParameters
-from telemetry.vehicle import VehicleState
+from server.work.jobs import Lane
+from telemetry.flight.preflight.parameters import NAMES
+from telemetry.topics.messages import OnboardMission, PlanRecord
+from telemetry.topics.requests import ReadParameters
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from telemetry.flight.targets import GuidedPlan
+    from telemetry.flight.guided.targets import GuidedPlan
 
 
 class FlightWork:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, UwbScan
 from server.errors import BusyError
 from telemetry.agent.intake import Frame, Intake
-from telemetry.messages import Published, Topic, VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame, UwbScan
+from telemetry.topics.messages import Published, Topic, VehicleText
 
 AGENTS_MAX = 4
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from typing import Any, Protocol
 
-from server.flying.following import Follower
-from server.flying.pace import Pace
-from server.flying.track import Track
+from server.heard.flown_track import Track
+from server.heard.plan_follower import Follower
 from server.schemas import (
     FlightMessage,
     FollowDoc,
@@ -18,8 +18,9 @@ from server.schemas import (
     TrackMessage,
     VehicleMessage,
 )
-from telemetry.messages import FlightStatus, VehicleText
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, VehicleText
+from telemetry.topics.requests import LinkRequest
+from telemetry.topics.vehicle import VehicleState
 
 RATE_HZ, BURST = 20.0, 20.0
 """Of positions: the link sends no more on average, so that in flight none waits; a fast replay sends many more."""

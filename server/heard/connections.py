@@ -6,9 +6,9 @@ import logging
 from collections.abc import Awaitable, Callable
 
 from server.errors import reported
-from server.flying.asking import Asks
-from telemetry.messages import LinkStatus
-from telemetry.requests import Adopt, Connect, Disconnect, Operator, Release
+from server.heard.channel import Asks
+from telemetry.topics.messages import LinkStatus
+from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release
 
 log = logging.getLogger("hedgehop.flying")
 

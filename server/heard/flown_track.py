@@ -6,7 +6,7 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 
 from server.schemas import FollowDoc, ReviewSeries, Source, TrackDoc
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 POINTS_MAX = 3000
 """Then every other one goes: a long flight keeps its shape, and a page that opens late gets it in one message."""

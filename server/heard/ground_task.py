@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.geotiff import write_dsm
-from planning.home import home_from_dsm
-from server.jobs import Progress
+from planning.missions.home import home_from_dsm
+from planning.terrain.geotiff import write_dsm
 from server.library.terrains import load_terrain
+from server.work.jobs import Progress
 
 REACH_CELLS = 2000
 """Around home: farther than a simulated vehicle is flown, and small enough to be read at once."""
@@ -41,7 +41,7 @@ def export_ground(directory: Path, target: Path, home_lat_lon_deg: tuple[float, 
 
 def write_demo_world(target: Path, *, report: Progress) -> None:
     """What stands on the demo's hillside since its surface model was made."""
-    from telemetry.simulator import demo_world
+    from telemetry.simulation.simulator import demo_world
 
     report("Preparing the simulated vehicle's world", None)
     demo_world.write_demo_world(target)

@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from server.flying.ground_task import Ground
+from server.heard.ground_task import Ground
 from server.schemas import NodeDoc, NodesMessage, ServerMessage
-from server.supervisor import NodeState, Supervisor
-from telemetry.node_lock import running_node
-from telemetry.obstacles import SENSORS, Sensor
-from telemetry.sensing import RadarKind
+from server.work.supervisor import NodeState, Supervisor
+from telemetry.bus.node_lock import running_node
+from telemetry.topics.obstacles import SENSORS, Sensor
+from telemetry.topics.simulated import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
 TRACKS = "tracks"

@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
 from planning.following.below import Demanded
 from planning.following.live import Following, follow_on
 from planning.following.reference import Reference, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.formats.wpl import read_wpl
-from planning.model import F64, finite_or_none
-from planning.vehicle_profile import parse_profile
-from server.flying.check_task import clearance_of
-from server.placing import Placer, home_distance_bearing
+from planning.missions.vehicle_profile import parse_profile
+from planning.model import finite_or_none
+from planning.terrain.dsm import Dsm
+from server.heard.vehicle_place import Placer, home_distance_bearing
+from server.library.documents import clearance_of
 from server.schemas import FollowDoc
-from telemetry.messages import FlightStatus, PlanRecord
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, PlanRecord
+from telemetry.topics.vehicle import VehicleState
 
 NO_FLIGHT = FlightStatus()
 _OFF_PLAN = ("returning", "landed", "interrupted")

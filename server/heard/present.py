@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from server.hub import key_of
+from server.door.hub import key_of
 from server.schemas import (
     AlertMessage,
     PerceptionMessage,

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from server.errors import InUseError
-from server.flying import recording_task
-from server.jobs import Lane, Progress
-from server.library.recordings import RecordingShelf
+from server.heard import recording_task
+from server.library.recording_list import RecordingShelf
 from server.schemas import RecorderMessage, RecordingDoc, RecordingsMessage, ServerMessage
-from telemetry.messages import RecorderStatus
-from telemetry.requests import RecorderRequest, StartRecording, StopRecording
+from server.work.jobs import Lane, Progress
+from telemetry.topics.messages import RecorderStatus
+from telemetry.topics.requests import RecorderRequest, StartRecording, StopRecording
 
 T = TypeVar("T")
 Ask = Callable[[RecorderRequest], Awaitable[object]]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from server.file_tasks import named
-from server.flying.track import EVERY_S
-from server.jobs import Progress
+from server.heard.flown_track import EVERY_S
+from server.plan.file_tasks import named
+from server.work.jobs import Progress
 from telemetry.errors import TelemetryError
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 
 def read(upload: Path, filename: str, *, report: Progress) -> None:

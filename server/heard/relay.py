@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from telemetry.bus import Bus
-from telemetry.messages import REPLAY_PREFIX, Topic
+from telemetry.topics.messages import REPLAY_PREFIX, Topic
 
 Handler = Callable[[Any], Awaitable[None] | None]
 

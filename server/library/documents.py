@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 
-from planning.dsm import Dsm
-from planning.model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
-from planning.poi_files import PoiFile
+from planning.formats.poi_files import PoiFile
+from planning.missions.vehicle_profile import path_params
+from planning.model import Camera, ClearanceParams, MissionParams, Poi, SurfaceParams, VehicleProfile
 from planning.request import PlanRequest, survey_request
-from planning.survey import SurveyPlan, survey_lines
-from planning.vehicle_profile import path_params
-from server.edits import new_poi_id
-from server.planned_on import planned_on
+from planning.route.survey import SurveyPlan, survey_lines
+from planning.terrain.dsm import Dsm
+from server.library.edits import new_poi_id
+from server.library.planned_on import planned_on
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
+from telemetry.topics.messages import PlanRecord
 
 
 def profile_from_doc(doc: ProfileDoc) -> VehicleProfile:

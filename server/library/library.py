@@ -6,23 +6,27 @@ orthophotos are written by worker processes (``store_terrain``, ``store_orthopho
 
 from __future__ import annotations
 
+import fcntl
 import os
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
-from planning.dsm import Dsm
-from planning.orthophoto import Orthophoto
+from pydantic import ValidationError
+
+from planning.errors import PlanningError
+from planning.missions.vehicle_profile import load_profile, shipped_profiles
+from planning.terrain.dsm import Dsm
+from planning.terrain.orthophoto import Orthophoto
 from server.errors import DataDirError, StorageError, error_doc
-from server.history import History
 from server.library import orthophotos, plans, terrains
-from server.library.files import clean, new_id, storage_errors, write_atomically
-from server.library.lock import DirectoryLock
+from server.library.documents import doc_from_profile
+from server.library.history import History
 from server.library.orthophotos import OrthophotoManifest
 from server.library.plans import PlanSummary
-from server.library.profiles import read_profiles
 from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
-from server.library.unneeded import remove_unneeded
+from server.library.whole_files import clean, new_id, storage_errors, write_atomically
 from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
 
 _LAST_PLAN = "last-plan"

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 from pyproj import CRS
 
-from planning.orthophoto import Orthophoto
-from server.library.arrays import read_array, write_array
-from server.library.files import new_directory, new_id
+from planning.terrain.orthophoto import Orthophoto
 from server.library.shelf import read_manifest, utc_now, write_manifest
+from server.library.stored_arrays import read_array, write_array
+from server.library.whole_files import new_directory, new_id
 from server.schemas import OrthophotoDoc
 
 FOLDER = "orthophotos"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from planning.dsm import SurfaceModel
+from planning.formats.other_surface import other_surface, surface_digest
 from planning.formats.safe_text import clean_name
 from planning.model import Home, Mission
-from planning.other_surface import other_surface, surface_digest
+from planning.terrain.dsm import SurfaceModel
 from server.schemas import PlanDoc, PlannedOnDoc, TerrainDoc
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from server.history import History
-from server.library.files import new_directory, write_atomically
+from server.library.history import History
 from server.library.shelf import MANIFEST, read_manifest, utc_now, write_manifest
+from server.library.whole_files import new_directory, write_atomically
 
 FOLDER = "plans"
 

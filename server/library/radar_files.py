@@ -11,8 +11,8 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from server.errors import BadRequestError
-from server.library.files import new_directory, new_id, storage_errors, write_atomically, write_durably
 from server.library.shelf import MANIFEST, OnDamage, Shelf, utc_now, write_manifest
+from server.library.whole_files import new_directory, new_id, storage_errors, write_atomically, write_durably
 from server.schemas import RadarFileDoc
 
 FOLDER = "radar"

@@ -13,8 +13,8 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
 from server.errors import BadRequestError, NotFoundError
-from server.library.files import check_id, storage_errors, sync_directory
 from server.library.terrain_of import FlownOver, terrain_of
+from server.library.whole_files import check_id, storage_errors, sync_directory
 from server.schemas import RecordingDoc, TerrainDoc
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from server.library.files import new_directory
 from server.library.shelf import OnDamage, Shelf, write_manifest
+from server.library.whole_files import new_directory
 from server.schemas import ScenarioResultDoc, ScenarioRunDoc
 
 FOLDER = "scenarios"

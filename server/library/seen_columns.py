@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.dsm import F64, Dsm
+from mapping.geometry.arrays import F64
 from planning.errors import PoiError
-from planning.holes import fill_holes
-from planning.seen import Columns, burn
+from planning.evading.seen import Columns, burn
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
 from server.errors import NotReadyError, StorageError
-from server.library.files import check_id, new_id, write_atomically
 from server.library.terrains import load_terrain
+from server.library.whole_files import check_id, new_id, write_atomically
 
 _SAME_M = 0.001
 

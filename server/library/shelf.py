@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from server.errors import NotFoundError, StorageError
-from server.library.files import (
+from server.library.whole_files import (
     TEMPORARY,
     check_id,
     clean,

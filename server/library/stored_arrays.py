@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.errors import StorageError
-from server.library.files import write_durably
+from server.library.whole_files import write_durably
 
 _CHUNK_BYTES = 16 * 1024**2
 

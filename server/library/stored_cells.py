@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from planning.cells.cells import Cells, Layout
-from planning.cells.lattice import Lattice, straight
-from server.library.arrays import read_array, write_array
+from planning.terrain.cells.cells import Cells, Layout
+from planning.terrain.cells.lattice import Lattice, straight
+from server.library.stored_arrays import read_array, write_array
 
 _HEIGHTS, _BEND = "cells.npy", "bend.npy"
 Pair = tuple[float, float]

@@ -11,14 +11,14 @@ from affine import Affine
 from pydantic import BaseModel, ConfigDict
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import NoElevationError
-from server.library.arrays import read_array, write_array
-from server.library.cells import CellsManifest, read_cells, write_cells
-from server.library.files import new_directory, new_id
+from planning.terrain.dsm import Dsm
 from server.library.shelf import read_manifest, utc_now, write_manifest
+from server.library.stored_arrays import read_array, write_array
+from server.library.stored_cells import CellsManifest, read_cells, write_cells
+from server.library.whole_files import new_directory, new_id
 from server.schemas import PlaceDoc, SpikeDoc, TerrainDoc
-from telemetry.obstacles import GroundNotice
+from telemetry.topics.obstacles import GroundNotice
 
 FOLDER = "terrains"
 _ELEVATION = "elevation.npy"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from server.schemas import AlertDoc
-from telemetry.obstacles import ObstacleAlert, Sensor
+from telemetry.topics.obstacles import ObstacleAlert, Sensor
 
 KEPT_MAX = 20
 """The oldest go first, those that are over before those that go on."""

@@ -7,11 +7,11 @@ import logging
 from collections.abc import Awaitable, Callable
 
 from server.errors import reported
-from server.flying.asking import Asks
+from server.heard.channel import Asks
 from server.obstacles.coming_down_task import RestPlanned
-from server.obstacles.manoeuvre_task import Situation
-from server.obstacles.watch import Watch
-from telemetry.requests import FlyRest, Operator
+from server.obstacles.manoeuvre_situation import Situation
+from server.obstacles.obstacle_watch import Watch
+from telemetry.topics.requests import FlyRest, Operator
 
 log = logging.getLogger("hedgehop.obstacles")
 

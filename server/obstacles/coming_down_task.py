@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapping.frames import LocalFrame
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame, apart_m
 from planning.errors import PlanningError
 from server.errors import ServerError
-from server.jobs import Progress
-from server.obstacles.manoeuvre_task import Situation
+from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.rest_of_plan import Underway, rest_of_plan
-from server.placing import metres_apart
 from server.schemas import PlanDoc, PoiDoc
-from telemetry.messages import GuidedTarget
+from server.work.jobs import Progress
+from telemetry.topics.messages import GuidedTarget
 
 if TYPE_CHECKING:
-    from planning.dsm import Dsm
-    from planning.model import F64, Mission
-    from planning.seen import Columns
-    from telemetry.perception.mission_line import Line
+    from planning.evading.seen import Columns
+    from planning.model import Mission
+    from planning.terrain.dsm import Dsm
+    from telemetry.perception.mission_line import FlightLine
 
 SHADOW_M = 25.0
 """Behind what was seen nobody has looked: it is taken to be as deep as this, along the flight, and as high."""
@@ -50,11 +50,10 @@ def plan_rest(situation: Situation, *, report: Progress) -> RestPlanned:
 
 
 def _planned(situation: Situation, report: Progress) -> RestPlanned:
-    from planning.clearance import certify
+    from planning.certificate.clearance import certify
     from planning.plan import plan_mission
-    from server.documents import request_from_doc
-    from server.flying.check_task import clearance_of, seen_in
-    from server.library.seen import load_planned_terrain
+    from server.library.documents import clearance_of, request_from_doc, seen_in
+    from server.library.seen_columns import load_planned_terrain
 
     state, record = situation.state, situation.record
     if not record.plan_json:
@@ -89,7 +88,7 @@ def _apart(pois: list[PoiDoc]) -> list[PoiDoc]:
 
 def burned(dsm: Dsm, situation: Situation) -> Dsm:
     """The model with all that was seen, and its shadow, as columns."""
-    from planning.seen import burn, columns_from_voxels
+    from planning.evading.seen import burn, columns_from_voxels
 
     for voxels in situation.maps:
         origin = voxels.origin
@@ -124,7 +123,7 @@ def _forward(dsm: Dsm, situation: Situation) -> F64:
 
 def _targets(mission: Mission, situation: Situation) -> tuple[GuidedTarget, ...]:
     """From where the vehicle was on, with the numbers that the mission on board has for them."""
-    from telemetry.flight.targets import guided_plan
+    from telemetry.flight.guided.targets import guided_plan
     from telemetry.perception.mission_line import mission_line
 
     line, state = mission_line(situation.record, situation.origin), situation.state

@@ -15,15 +15,15 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from server.errors import reported
-from server.obstacles.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, Voxels, coarser
-from server.obstacles.tracks import TracksWatch
-from server.obstacles.watch import Watch
-from server.scene.regions import Route
-from server.scene.sights import MapLook
+from server.obstacles.moving_objects import TracksWatch
+from server.obstacles.obstacle_watch import Watch
+from server.scene.layers.region_layers import Route
+from server.scene.layers.sights import MapLook
+from server.scene.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, Voxels, coarser
 from server.schemas import MapDrawn, Source
-from telemetry.looks import CloudLook
-from telemetry.obstacles import MAP_NAMES, MapName, MapOrigin, PerceptionStatus, Sensor
-from telemetry.tracks import TracksStatus
+from telemetry.topics.looks import CloudLook
+from telemetry.topics.obstacles import MAP_NAMES, MapName, MapOrigin, PerceptionStatus, Sensor
+from telemetry.topics.tracks import TracksStatus
 
 log = logging.getLogger("hedgehop.obstacles")
 

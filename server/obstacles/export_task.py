@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from server.jobs import Progress
-from server.obstacles.mirror import Voxels
+from server.scene.mirror import Voxels
 from server.schemas import MapFormat
-from telemetry.obstacles import MapDelta, MapName
+from server.work.jobs import Progress
+from telemetry.topics.obstacles import MapDelta, MapName
 
 
 def map_file(voxels: Voxels, name: MapName, kind: MapFormat, *, report: Progress) -> bytes:
     """Raises ExportError for a map that the format cannot hold."""
-    from telemetry.perception import deltas
-    from telemetry.perception.export import exported
+    from telemetry.rebuilding.export import exported
+    from telemetry.topics import deltas
 
     report("Writing the map", None)
     assert voxels.origin is not None

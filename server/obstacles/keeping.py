@@ -9,11 +9,11 @@ import msgspec
 from pydantic import ValidationError
 
 from mapping.errors import MappingError
-from server.library.files import write_atomically
+from server.library.whole_files import write_atomically
 from server.schemas import PerceptionSettingsBody, VelocitySettingsBody
-from telemetry.obstacles import PerceptionSettings
-from telemetry.perception.limits import check_perception
-from telemetry.track_settings import VelocitySettings
+from telemetry.perception.sensor_kinds import check_perception
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import VelocitySettings
 
 FILE = "perception.json"
 WIDEST_M = 100.0

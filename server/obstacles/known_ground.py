@@ -8,8 +8,8 @@ from server.errors import NotFoundError
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
 from server.library.terrains import ground_notice
-from telemetry.messages import PlanRecord
-from telemetry.obstacles import GroundNotice
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.obstacles import GroundNotice
 
 
 class KnownGround:

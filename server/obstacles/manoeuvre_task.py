@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapping.frames import LocalFrame
-from planning.model import F64
-from planning.vehicle_profile import parse_profile
-from server.jobs import Progress
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
+from planning.missions.vehicle_profile import parse_profile
+from server.library.documents import clearance_of
 from server.library.terrains import ground_notice
-from server.obstacles.mirror import Voxels
+from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
+from server.scene.mirror import Voxels
 from server.schemas import ManoeuvreDoc
-from telemetry.messages import FlightStatus, GuidedTarget, PlanRecord
-from telemetry.obstacles import GroundNotice, MapOrigin, ObstacleAlert
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from server.work.jobs import Progress
+from telemetry.topics.messages import GuidedTarget, PlanRecord
+from telemetry.topics.obstacles import GroundNotice, MapOrigin, ObstacleAlert
 
 if TYPE_CHECKING:
-    from mapping.ground import GroundGrid
-    from planning.avoiding.model import Manoeuvre, NoWay
-    from planning.avoiding.room import Seen
-    from telemetry.perception.mission_line import Line
+    from mapping.perceiving.ground import GroundGrid
+    from planning.evading.keep_clear import Seen
+    from planning.evading.model import Manoeuvre, NoWay
+    from telemetry.perception.mission_line import FlightLine
 
 BESIDE_M = 3.0
 """A vehicle farther than this from where its leg begins is on its way to it."""
@@ -98,7 +95,7 @@ class Ahead:
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
-    from planning.avoidance import AvoidanceParams, around, over
+    from planning.evading.manoeuvres import AvoidanceParams, around, over
     from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
@@ -130,8 +127,7 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
 
 def required_m(record: PlanRecord) -> float:
     """That the mission keeps from the ground, or was certified for; else all that its vehicle needs."""
-    from planning.margins.vehicle_terms import budget_of
-    from server.flying.check_task import clearance_of
+    from planning.missions.vehicle_terms import budget_of
 
     if record.plan_json:
         return clearance_of(record).required_clearance_m
@@ -142,8 +138,8 @@ def required_m(record: PlanRecord) -> float:
 
 def _seen(voxels: Voxels, origin: MapOrigin, frame: LocalFrame, position: F64, reach_up: float) -> Seen:
     """What may matter to any way from there; a radar does not tell how high things are."""
-    from planning.avoiding.room import Seen
-    from planning.avoiding.standing import standing
+    from planning.evading.columns import standing
+    from planning.evading.keep_clear import Seen
 
     centres = _centres_enu_m(voxels, origin, frame)
     centres = centres[np.hypot(*(centres[:, :2] - position[:2]).T) <= NEAR_M]
@@ -161,7 +157,7 @@ def _centres_enu_m(voxels: Voxels, origin: MapOrigin, frame: LocalFrame) -> F64:
 
 @lru_cache(maxsize=1)
 def _surface(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
-    from telemetry.perception.ground import ground_around
+    from telemetry.perception.known_ground import ground_around
 
     return ground_around(notice, origin)
 
@@ -181,7 +177,7 @@ def _ahead(line: Line, position: F64, situation: Situation) -> Ahead:
 def _prepared(
     way: Manoeuvre | NoWay, alert: ObstacleAlert, situation: Situation, ahead: Ahead, frame: LocalFrame
 ) -> Prepared:
-    from planning.avoiding.model import NoWay
+    from planning.evading.model import NoWay
 
     if isinstance(way, NoWay):
         return impossible(way, alert)

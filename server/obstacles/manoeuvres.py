@@ -9,15 +9,15 @@ from collections.abc import Awaitable, Callable
 
 import numpy as np
 
+from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
-from server.obstacles.manoeuvre_task import Prepared, Situation
-from server.obstacles.watch import Watch
-from server.placing import metres_apart
-from server.scene.regions import Route
+from server.obstacles.manoeuvre_situation import Prepared, Situation
+from server.obstacles.obstacle_watch import Watch
+from server.scene.layers.region_layers import Route
 from telemetry.errors import NotAllowedError
-from telemetry.obstacles import ObstacleAlert
-from telemetry.requests import FlyManoeuvre, Operator
-from telemetry.vehicle import VehicleState
+from telemetry.topics.obstacles import ObstacleAlert
+from telemetry.topics.requests import FlyManoeuvre, Operator
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 

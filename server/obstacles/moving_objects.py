@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from server.obstacles.watch import DEAD_S, RATE_HZ
+from server.obstacles.obstacle_watch import DEAD_S, RATE_HZ
 from server.schemas import ServerMessage, Source, TracksMessage
-from telemetry.obstacles import ObstacleAlert
-from telemetry.tracks import TracksStatus, VelocityProposal
+from telemetry.topics.obstacles import ObstacleAlert
+from telemetry.topics.tracks import TracksStatus, VelocityProposal
 
 OLD_S = 1.0
 """A velocity that was proposed for a frame measured longer ago is not flown, whenever it arrived."""

@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from planning.errors import PlanningError
-from planning.vehicle_profile import parse_profile
+from planning.missions.vehicle_profile import parse_profile
 from server.errors import NotReadyError, reported
-from server.flying.asking import Asks
-from server.jobs import Lane
+from server.heard.channel import Asks
 from server.obstacles.export_task import map_file
 from server.obstacles.keeping import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
-from server.obstacles.mirror import Voxels
+from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import Underway, rest_of_plan
 from server.obstacles.section import Looking
-from server.obstacles.watch import Watch
+from server.scene.mirror import Voxels
 from server.schemas import (
     AcknowledgeBody,
     MapFormat,
@@ -33,10 +32,11 @@ from server.schemas import (
     SetAvoidanceBody,
     Source,
 )
-from telemetry.messages import LinkStatus, PlanRecord
-from telemetry.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
-from telemetry.perception.limits import check_memory, check_perception
-from telemetry.requests import Operator, SetAvoidance
+from server.work.jobs import Lane
+from telemetry.perception.sensor_kinds import check_memory, check_perception
+from telemetry.topics.messages import LinkStatus, PlanRecord
+from telemetry.topics.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
+from telemetry.topics.requests import Operator, SetAvoidance
 
 log = logging.getLogger("hedgehop.obstacles")
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from server.errors import reported
-from server.obstacles.alerts import LatchedAlerts
-from server.obstacles.mirror import MapMirror
+from server.obstacles.alert_list import LatchedAlerts
+from server.scene.mirror import MapMirror
 from server.schemas import (
     AlertMessage,
     ManoeuvreDoc,
@@ -22,9 +22,9 @@ from server.schemas import (
     ServerMessage,
     Source,
 )
-from telemetry.flight.regions import sees_enough_for
-from telemetry.looks import CloudLook, RadarLook
-from telemetry.obstacles import (
+from telemetry.flight.avoidance.regions import sees_enough_for
+from telemetry.topics.looks import CloudLook, RadarLook
+from telemetry.topics.obstacles import (
     MAP_NAMES,
     SENSORS,
     AvoidanceStatus,
@@ -36,7 +36,7 @@ from telemetry.obstacles import (
     Sensor,
     sensor_of,
 )
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 

@@ -9,32 +9,32 @@ from pathlib import Path
 from typing import Any
 
 from server.errors import reported
-from server.flying.asking import Asks
-from server.flying.channel import Channel
-from server.flying.ground_task import Ground
-from server.flying.nodes import Nodes
-from server.flying.relay import Relay
-from server.jobs import Lane
+from server.heard.channel import Asks, Channel
+from server.heard.ground_task import Ground
+from server.heard.node_states import Nodes
+from server.heard.relay import Relay
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
 from server.obstacles.coming_down import ComingDown
 from server.obstacles.coming_down_task import plan_rest
-from server.obstacles.desk import ObstacleDesk
 from server.obstacles.drawing import MapDrawing
-from server.obstacles.ground import KnownGround
-from server.obstacles.manoeuvre_task import Situation, prepare
+from server.obstacles.known_ground import KnownGround
+from server.obstacles.manoeuvre_situation import Situation
+from server.obstacles.manoeuvre_task import prepare
 from server.obstacles.manoeuvres import Manoeuvres
+from server.obstacles.moving_objects import TracksWatch
+from server.obstacles.obstacle_desk import ObstacleDesk
+from server.obstacles.obstacle_watch import Watch, is_in_air
 from server.obstacles.rest_of_plan import Underway
 from server.obstacles.section import Looking
 from server.obstacles.sensor_nodes import SensorNodes
-from server.obstacles.tracks import TracksWatch
-from server.obstacles.watch import Watch, is_in_air
 from server.schemas import ServerMessage, Source
+from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
-from telemetry.messages import LinkStatus, PlanRecord, Topic
-from telemetry.obstacles import SENSORS, AvoidanceStatus, ObstacleAlert, Sensor
-from telemetry.requests import Operator, WholeMap
+from telemetry.topics.messages import LinkStatus, PlanRecord, Topic
+from telemetry.topics.obstacles import SENSORS, AvoidanceStatus, ObstacleAlert, Sensor
+from telemetry.topics.requests import Operator, WholeMap
 
 log = logging.getLogger("hedgehop.obstacles")
 

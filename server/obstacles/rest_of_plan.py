@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
 
-from mapping.frames import LocalFrame
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame, apart_m
+from mapping.geometry.polyline import Polyline, along_m
 from server.errors import NotReadyError
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc
-from telemetry.messages import FlightStatus, PlanRecord
-from telemetry.obstacles import MapOrigin
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, PlanRecord
+from telemetry.topics.obstacles import MapOrigin
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from planning.model import F64, Mission
-    from telemetry.perception.mission_line import Line
+    from planning.model import Mission
+    from telemetry.perception.mission_line import FlightLine
 
 Part = Literal["ahead", "home"]
 SAME_PLACE_M = 2.0
@@ -61,9 +62,8 @@ def rest_of_plan(part: Part, underway: Underway | None, *, terrain_id: str) -> d
 
 def _survey_fields(flown: PlanDoc, part: Part) -> dict[str, Any]:
     """What a survey brings beside its lines: their height, and on the mission ahead the photos."""
-    from planning.camera import footprint_m, height_from_gsd_m
     from planning.model import Camera
-    from planning.request import LOOKS_DOWN_DEG
+    from planning.route.camera import LOOKS_DOWN_DEG, footprint_m, height_from_gsd_m
 
     if flown.source != "survey" or flown.profile.camera is None:
         return {}

@@ -10,10 +10,11 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from server.obstacles.mirror import Voxels
-from server.obstacles.watch import Watch
+from mapping.geometry.arrays import F64
+from mapping.sensor_frames import rows
+from server.obstacles.obstacle_watch import Watch
+from server.scene.mirror import Voxels
 from server.schemas import RadarTargetsDoc, SectionDoc, SectionMap, Source
 from telemetry.obstacles import MAP_NAMES, MapOrigin, PerceptionStatus
 from telemetry.sensing import rows

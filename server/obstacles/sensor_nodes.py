@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Coroutine
 from typing import Any
 
-from server.flying.nodes import Nodes
+from server.heard.node_states import Nodes
 from telemetry.bus import Bus
-from telemetry.messages import Topic
-from telemetry.obstacles import SENSORS, Sensor
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import SENSORS, Sensor
 
 FRAMES: dict[Sensor, Topic] = {
     "radar": Topic.RADAR_FRAME,

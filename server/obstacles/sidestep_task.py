@@ -7,16 +7,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mapping.frames import LocalFrame
-from planning.avoiding.model import AvoidanceParams, NoWay
-from planning.avoiding.room import Seen, Surface
-from planning.avoiding.sidestep import Mover, Proposed, Sidestep, sidestep
-from planning.model import F64
-from server.obstacles.manoeuvre_task import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
+from planning.evading.keep_clear import Seen, Surface
+from planning.evading.model import AvoidanceParams, NoWay
+from planning.evading.sidestep import Mover, Proposed, Sidestep, sidestep
+from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
 from server.schemas import ManoeuvreDoc
-from telemetry.messages import GuidedTarget
-from telemetry.obstacles import ObstacleAlert
-from telemetry.tracks import Track, TracksStatus
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.obstacles import ObstacleAlert
+from telemetry.topics.tracks import Track, TracksStatus
 
 
 @dataclass(frozen=True, slots=True)

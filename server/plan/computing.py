@@ -9,12 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from server import tasks
-from server.documents import missing
 from server.errors import JobCancelledError, NotFoundError, NotReadyError, reported
-from server.jobs import Lane
-from server.scene.payload import PlanScene
+from server.library.documents import missing
+from server.plan import tasks
+from server.scene.geometry.payload import PlanScene
 from server.schemas import Computation, PlanDoc
+from server.work.jobs import Lane
 
 log = logging.getLogger("hedgehop.plan")
 

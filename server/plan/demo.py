@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import asyncio
 
-from planning.demo import demo_pois, demo_survey_polygon
-from planning.vehicle_profile import load_profile
-from server import file_tasks
-from server.documents import doc_from_profile
-from server.edits import new_poi_id
-from server.history import History
-from server.jobs import Lane, Progress
+from planning.ground.demo_hillside import demo_pois, demo_survey_polygon
+from planning.missions.vehicle_profile import load_profile
 from server.library import Library
+from server.library.documents import doc_from_profile
+from server.library.edits import new_poi_id
+from server.library.history import History
+from server.plan import file_tasks
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SurfaceDoc, SurveyDoc, TerrainDoc
+from server.work.jobs import Lane, Progress
 
 TERRAIN_NAME = "Demo hillside (generated)"
 PLAN_NAME = "Demo flight"

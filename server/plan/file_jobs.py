@@ -7,13 +7,13 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TypeVar
 
-from server import file_tasks
 from server.errors import NotFoundError
-from server.job_board import JobBoard
-from server.jobs import Lane, Progress
 from server.library import Library
 from server.library.terrains import UNKNOWN_ORIGIN, Origin
+from server.plan import file_tasks
 from server.schemas import JobDoc, OrthophotoDoc, PlanDoc, TerrainDoc
+from server.work.job_board import JobBoard
+from server.work.jobs import Lane, Progress
 
 T = TypeVar("T")
 Propose = Callable[[Callable[[PlanDoc], tuple[str, PlanDoc] | None]], Awaitable[object]]

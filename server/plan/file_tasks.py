@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from planning.demo import demo_dsm, small_hill
 from planning.errors import DescribedError, PlanningError
-from planning.geotiff import read_dsm_reported, read_orthophoto
-from planning.spikes import Spike, find_spikes
-from planning.spikes import remove_spikes as without
-from server.jobs import Progress
+from planning.ground.demo_hillside import demo_dsm, small_hill
+from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
+from planning.terrain.spikes import Spike, find_spikes
+from planning.terrain.spikes import remove_spikes as without
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, store_terrain
 from server.schemas import OrthophotoDoc, SpikeDoc, TerrainDoc
+from server.work.jobs import Progress
 
 _STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
 _MAX_SPIKES = 100

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from server.computing import Computing
-from server.picture import Picture
-from server.plan_desk import PlanDesk
-from server.scene.payload import PlanScene, ReviewScene
+from server.plan.computing import Computing
+from server.plan.picture import Picture
+from server.plan.plan_desk import PlanDesk
+from server.scene.geometry.payload import PlanScene, ReviewScene
 from server.schemas import (
     ClientMessage,
     FrameView,

@@ -10,15 +10,15 @@ from typing import Protocol
 
 import numpy as np
 
-from planning.dsm import Dsm
-from server import tasks
+from planning.terrain.dsm import Dsm
 from server.errors import JobCancelledError, NotFoundError, reported
-from server.jobs import Lane
 from server.library import Library
-from server.scene.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
-from server.scene.plain import plain_around, plain_scene
-from server.scene.shots import Target
+from server.plan import tasks
+from server.scene.cameras.shots import Target
+from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
+from server.scene.geometry.plain import plain_around, plain_scene
 from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, Source, ViewDoc
+from server.work.jobs import Lane
 
 log = logging.getLogger("hedgehop.scene")
 

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import Literal
 
 from server.errors import InUseError, StaleRevisionError, reported
-from server.history import History
 from server.library import Library
-from server.planned_on import on_another_model
+from server.library.history import History
+from server.library.planned_on import on_another_model
 from server.schemas import ErrorDoc, NoticeMessage, PlanDoc, PlanEdit
 
 log = logging.getLogger("hedgehop.plan")

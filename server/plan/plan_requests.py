@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import io
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
-from planning.dsm import Dsm
-from planning.poi_files import looks_swapped, read_pois
-from server import ordering
-from server.computing import Computing
-from server.documents import with_points
-from server.errors import NotReadyError
-from server.exporting import exported
-from server.jobs import Lane
+import numpy as np
+
+from planning.errors import PoiError
+from planning.formats.poi_files import looks_swapped, read_pois
+from planning.report.exports import FILES
+from planning.terrain.dsm import Dsm
+from server.errors import ConflictError, NotReadyError
 from server.library import Library
-from server.obstacles.mirror import Voxels
-from server.obstacles.seen_task import keep_seen
-from server.plan_desk import PlanDesk
+from server.library.documents import missing, with_points
+from server.plan import tasks
+from server.plan.computing import Computing
+from server.plan.plan_desk import PlanDesk
+from server.plan.seen_task import keep_seen
+from server.scene.mirror import Voxels
 from server.schemas import Imported, PlanDoc, PlanEdit, PlanState
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from server.edits import clicked, moved
 from server.errors import reported
-from server.plan_desk import PlanDesk, Proposal
+from server.library.edits import clicked, moved
+from server.plan.plan_desk import PlanDesk, Proposal
 from server.schemas import ErrorDoc, NoticeMessage, PlaceDoc, PlanDoc, SelectionDoc
 
 log = logging.getLogger("hedgehop.plan")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, I64
+from mapping.geometry.polyline import along_m
 from planning.plan import Plan
 from server.schemas import Chart
 

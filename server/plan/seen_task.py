@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mapping.frames import LocalFrame
-from planning.seen import columns_from_voxels
+from mapping.geometry.frames import LocalFrame
+from planning.evading.seen import columns_from_voxels
 from server.errors import NotReadyError
-from server.jobs import Progress
-from server.library.seen import SeenColumns, store_seen
+from server.library.seen_columns import SeenColumns, store_seen
 from server.library.terrains import load_terrain
-from server.obstacles.mirror import Voxels
+from server.scene.mirror import Voxels
+from server.work.jobs import Progress
 
 
 def keep_seen(directory: Path, maps: list[Voxels], *, report: Progress) -> str:

@@ -12,28 +12,29 @@ from pathlib import Path
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning import __version__
-from planning.camera import gsd_cm
-from planning.demo import small_hill
-from planning.dsm import Dsm
-from planning.exports import export_file
-from planning.model import F64, Poi, VehicleProfile, finite_or_none
+from planning.ground.demo_hillside import small_hill
+from planning.model import Poi, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
-from planning.poi import shortest_order
+from planning.report.exports import export_file
+from planning.report.summary import plan_summary
 from planning.request import PlanRequest
-from planning.summary import plan_summary
-from server.charts import chart
-from server.documents import request_from_doc
-from server.jobs import Progress
+from planning.route.camera import gsd_cm
+from planning.route.poi import shortest_order
+from planning.terrain.dsm import Dsm
+from server.library.documents import request_from_doc
 from server.library.orthophotos import load_orthophoto
-from server.library.seen import check_home_stands_on_ground, load_planned_terrain, load_seen
+from server.library.planned_on import other_model
+from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import load_terrain
-from server.planned_on import other_model
-from server.scene.payload import PlanScene, TerrainScene
-from server.scene.plan_payload import plan_scene
-from server.scene.terrain_payload import Shading, build_terrain_scene
+from server.plan.profile_chart import chart
+from server.scene.geometry.payload import PlanScene, TerrainScene
+from server.scene.geometry.relief import kept_within, relief
+from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
 from server.schemas import BetterHomeDoc, HomeDoc, PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
-from server.stopwatch import READ_STEP, StepTimer
+from server.work.clocks import READ_STEP, StepTimer
+from server.work.jobs import Progress
 
 PRODUCT_VERSION = __version__
 

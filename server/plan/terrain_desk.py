@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from server import demo
 from server.errors import InUseError, NotFoundError
-from server.job_board import JobBoard
 from server.library import Library
-from server.plan_desk import PlanDesk
+from server.plan import demo
+from server.plan.plan_desk import PlanDesk
 from server.schemas import TerrainDoc
+from server.work.job_board import JobBoard
 
 
 class TerrainDesk:

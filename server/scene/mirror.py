@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from telemetry.obstacles import MapDelta, MapName, MapOrigin, unpack_keys
+from mapping.geometry.arrays import F64, I32, I64, U8, Bools
+from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin, unpack_keys
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]

@@ -12,18 +12,19 @@ from typing import Any
 import numpy as np
 import viser
 
-from planning.dsm import Dsm
-from server.scene.camera import FOV_RAD, nearest_on_path
-from server.scene.cameras import CAMERAS_EVERY_S, Cameras, lens_of, move, planes
-from server.scene.drawing import Drawing
-from server.scene.layers import POIS, Key, layers, unchanged
-from server.scene.marks import cursor_nodes
-from server.scene.nodes import Canvas, Node
-from server.scene.payload import F64, SceneState
-from server.scene.picking import PlaceHit, PoiHit, pick
-from server.scene.shots import Target, shot
-from server.scene.sights import Sights
-from server.scene.vehicles import Vehicles
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.scene.cameras.cameras import CAMERAS_EVERY_S, Cameras, lens_of, move, planes
+from server.scene.cameras.picking import PlaceHit, PoiHit, pick
+from server.scene.cameras.projection import FOV_RAD, nearest_on_path
+from server.scene.cameras.shots import Target, shot
+from server.scene.geometry.canvas import Canvas, Node
+from server.scene.geometry.payload import SceneState
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.layers import POIS, Key, layers, unchanged
+from server.scene.layers.mark_layers import cursor_nodes
+from server.scene.layers.sights import Sights
+from server.scene.layers.vehicles import Vehicles
 from server.schemas import Source
 
 _POINTER_REACH_PX = 24.0

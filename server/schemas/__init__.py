@@ -4,10 +4,6 @@
 Numbers are SI, degrees only for latitude, longitude, heading and gimbal pitch. NaN and infinity become null.
 """
 
-from server.schemas.base import (
-    PROTOCOL_VERSION,
-    Strict,
-)
 from server.schemas.bodies import (
     Imported,
     OpenPlan,
@@ -15,7 +11,7 @@ from server.schemas.bodies import (
     SavePlanAs,
     SignIn,
 )
-from server.schemas.flight import (
+from server.schemas.flight_docs import (
     AdoptVehicle,
     CheckRow,
     ConnectLink,
@@ -35,7 +31,7 @@ from server.schemas.flight import (
     TrackDoc,
     UploadPlan,
 )
-from server.schemas.library import (
+from server.schemas.library_docs import (
     JobDoc,
     LibraryState,
     OrthophotoDoc,
@@ -44,7 +40,7 @@ from server.schemas.library import (
     SpikeDoc,
     TerrainDoc,
 )
-from server.schemas.obstacles import (
+from server.schemas.obstacle_docs import (
     AcknowledgeBody,
     AlertDoc,
     ManoeuvreDoc,
@@ -62,7 +58,7 @@ from server.schemas.obstacles import (
     TrackerSettingsBody,
     VelocitySettingsBody,
 )
-from server.schemas.plan import (
+from server.schemas.plan_docs import (
     CameraDoc,
     ClearanceDoc,
     MissionDoc,
@@ -75,7 +71,7 @@ from server.schemas.plan import (
     SurfaceDoc,
     SurveyDoc,
 )
-from server.schemas.results import (
+from server.schemas.result_docs import (
     BetterHomeDoc,
     Chart,
     Computation,
@@ -88,13 +84,7 @@ from server.schemas.results import (
     TradeRow,
     WorstDoc,
 )
-from server.schemas.review import (
-    Histogram,
-    ReviewDoc,
-    ReviewEvent,
-    ReviewFigures,
-    ReviewSeries,
-)
+from server.schemas.review_docs import Histogram, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries
 from server.schemas.stream import (
     AlertMessage,
     AnsweredMessage,
@@ -134,7 +124,8 @@ from server.schemas.stream import (
     VehicleMessage,
     ViewMessage,
 )
-from server.schemas.studies import (
+from server.schemas.strict_model import PROTOCOL_VERSION, Strict
+from server.schemas.study_docs import (
     ChartDoc,
     RadarDetectionDoc,
     RadarFileDoc,
@@ -151,7 +142,7 @@ from server.schemas.studies import (
     ScenarioRunDoc,
     SeriesDoc,
 )
-from server.schemas.traversability import (
+from server.schemas.traversability_docs import (
     LandingSiteDoc,
     LandingSitesBody,
     LayerName,
@@ -160,10 +151,7 @@ from server.schemas.traversability import (
     UwbLiveDoc,
     UwbRule,
 )
-from server.schemas.view import (
-    SelectionDoc,
-    ViewDoc,
-)
+from server.schemas.view_docs import SelectionDoc, ViewDoc
 
 __all__ = [
     "PROTOCOL_VERSION",

@@ -6,9 +6,9 @@ from typing import Annotated
 
 from pydantic import StringConstraints
 
-from server.schemas.base import Name, Strict
-from server.schemas.plan import PlanDoc
-from server.schemas.results import PlanState
+from server.schemas.plan_docs import PlanDoc
+from server.schemas.result_docs import PlanState
+from server.schemas.strict_model import Name, Strict
 
 
 class PlanEdit(Strict):

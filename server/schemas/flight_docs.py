@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Name, Strict
-from telemetry.messages import Rounded
+from server.schemas.strict_model import Name, Strict
+from telemetry.topics.messages import Rounded
 
 Source = Literal["live", "replay"]
 Address = Annotated[str, Field(min_length=3, max_length=200)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from server.schemas.base import Strict
-from server.schemas.plan import PlaceDoc, ProfileDoc
-from server.schemas.results import ErrorDoc
+from server.schemas.plan_docs import PlaceDoc, ProfileDoc
+from server.schemas.result_docs import ErrorDoc
+from server.schemas.strict_model import Strict
 
 
 class SpikeDoc(Strict):

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from telemetry.obstacles import AvoidanceStatus, MapName, ObstacleAlert, PerceptionSettings
+from server.schemas.strict_model import Strict
+from telemetry.topics.obstacles import AvoidanceStatus, MapName, ObstacleAlert, PerceptionSettings
 
 SensorName = Literal["radar", "vision", "ranges"]
 MapFormat = Literal["ply", "bt", "tif", "geojson"]

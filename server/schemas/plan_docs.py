@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.schemas.base import Latitude, Longitude, Metres, Name, Strict
+from server.schemas.strict_model import Latitude, Longitude, Metres, Name, Strict
 
 
 class PoiDoc(Strict):

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from server.schemas.plan import PlanDoc
+from server.schemas.plan_docs import PlanDoc
+from server.schemas.strict_model import Strict
 
 
 class ErrorDoc(Strict):

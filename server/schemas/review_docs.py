@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from server.schemas.base import Strict
-from server.schemas.flight import RecordingDoc
+from server.schemas.flight_docs import RecordingDoc
+from server.schemas.strict_model import Strict
 
 
 class ReviewFigures(Strict):

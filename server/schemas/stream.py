@@ -6,19 +6,26 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from server.schemas.flight import FlyState, FollowDoc, LeaseDoc, NodeDoc, RecordingDoc, Source, TrackDoc
-from server.schemas.library import JobDoc, LibraryState
-from server.schemas.obstacles import ObstaclesState, SensorName
-from server.schemas.results import ErrorDoc, PlanState
-from server.schemas.review import ReviewDoc
-from server.schemas.studies import RadarFileDoc, ScenarioRunDoc
-from server.schemas.traversability import TraversabilityState
-from server.schemas.view import SelectionDoc, ViewDoc
-from telemetry.messages import FlightStatus, LinkStatus, RecorderStatus, ReplayStatus, TransferStatus, VehicleText
-from telemetry.obstacles import ObstacleAlert, PerceptionStatus
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from server.schemas.flight_docs import FlyState, FollowDoc, LeaseDoc, NodeDoc, RecordingDoc, Source, TrackDoc
+from server.schemas.library_docs import JobDoc, LibraryState
+from server.schemas.obstacle_docs import ObstaclesState, SensorName
+from server.schemas.result_docs import ErrorDoc, PlanState
+from server.schemas.review_docs import ReviewDoc
+from server.schemas.strict_model import Strict
+from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
+from server.schemas.traversability_docs import TraversabilityState
+from server.schemas.view_docs import SelectionDoc, ViewDoc
+from telemetry.topics.messages import (
+    FlightStatus,
+    LinkStatus,
+    RecorderStatus,
+    ReplayStatus,
+    TransferStatus,
+    VehicleText,
+)
+from telemetry.topics.obstacles import ObstacleAlert, PerceptionStatus
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 
 class Snapshot(Strict):

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from server.schemas.results import ErrorDoc
+from server.schemas.result_docs import ErrorDoc
+from server.schemas.strict_model import Strict
 
 RadarSensor = Literal["awr1843", "position2go"]
 SamplesAs = Literal["auto", "twos-complement", "offset-binary"]

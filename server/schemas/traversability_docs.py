@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from server.schemas.results import ErrorDoc
+from server.schemas.result_docs import ErrorDoc
+from server.schemas.strict_model import Strict
 
 LayerName = Literal["before", "cleared", "probability", "time_in_view"]
 

@@ -15,16 +15,16 @@ from pydantic.fields import FieldInfo
 from server import schemas
 from server.schemas import (
     bodies,
-    flight,
-    library,
-    obstacles,
-    plan,
-    results,
-    review,
+    flight_docs,
+    library_docs,
+    obstacle_docs,
+    plan_docs,
+    result_docs,
+    review_docs,
     stream,
-    studies,
-    traversability,
-    view,
+    study_docs,
+    traversability_docs,
+    view_docs,
 )
 
 ANSWERS = (

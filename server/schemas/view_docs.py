@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.base import Strict
-from server.schemas.plan import PlaceDoc
-from server.schemas.traversability import LayerName
+from server.schemas.plan_docs import PlaceDoc
+from server.schemas.strict_model import Strict
+from server.schemas.traversability_docs import LayerName
 
 
 class ViewDoc(Strict):

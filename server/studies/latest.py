@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from server.errors import JobCancelledError
-from server.jobs import Lane
+from server.work.jobs import Lane
 
 SUPERSEDE_AFTER_S = 1.0
 """A newer question ends a call of the same page that has run longer; shorter ones may finish, which is cheaper than

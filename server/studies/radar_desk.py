@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
-from server.jobs import Lane
 from server.library.radar_files import RadarShelf
 from server.schemas import RadarFileDoc, RadarFilesMessage, RadarFrame, RadarOpened, RadarReading, ServerMessage
 from server.studies import radar_task
 from server.studies.latest import Latest
 from server.studies.radar_task import Stored
+from server.work.jobs import Lane
 
 
 class RadarDesk:

@@ -8,7 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mapping.radar import Detections, FmcwParams
-    from telemetry.sensors.adc.model import AdcFile
+    from telemetry.sensors.adc.adc_file import AdcFile
 
 
 def parameters(sensor: str, opened: AdcFile) -> dict[str, Any]:

@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.radar import RadarChain, Spectra
 from planning.errors import DescribedError
 from server.errors import BadRequestError
-from server.jobs import Progress
-from server.radar_facts import detection_rows, parameters
 from server.schemas import (
     RadarDetectionDoc,
     RadarFileDoc,
@@ -30,8 +29,10 @@ from server.schemas import (
     RadarParametersDoc,
     RadarReading,
 )
-from telemetry.sensors.adc.model import AnyFrame
-from telemetry.sensors.adc.reading import HowRead, Reading, read_adc
+from server.studies.radar_facts import detection_rows, parameters
+from server.work.jobs import Progress
+from telemetry.sensors.adc.adc_file import AnyFrame
+from telemetry.sensors.adc.read_adc import HowRead, Reading, read_adc
 
 SHOWN_DB = 60.0
 """Below the strongest cell of a map."""

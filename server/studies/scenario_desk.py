@@ -9,11 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 from server.errors import BusyError, ConflictError, JobCancelledError, NotFoundError, reported
-from server.job_board import Spawn
-from server.jobs import Lane
-from server.library.files import new_id
 from server.library.scenario_runs import ScenarioShelf
 from server.library.shelf import utc_now
+from server.library.whole_files import new_id
 from server.schemas import (
     ErrorDoc,
     RunScenario,
@@ -24,7 +22,9 @@ from server.schemas import (
     ServerMessage,
 )
 from server.studies import scenario_task
-from telemetry.scenarios.catalogue import NAMES, SCENARIOS, scenario_named
+from server.work.job_board import Spawn
+from server.work.jobs import Lane
+from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, scenario_named
 
 log = logging.getLogger("hedgehop.scenarios")
 

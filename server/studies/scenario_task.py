@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from server.jobs import Progress
 from server.schemas import ChartDoc, ScenarioFigureDoc, ScenarioPartDoc, SeriesDoc
-from telemetry.scenarios.catalogue import run_scenario, scenario_named
-from telemetry.scenarios.charts import Chart, ends
-from telemetry.scenarios.result import Figure, FlightResult
-from telemetry.scenarios.wanted import Wanted
+from server.work.jobs import Progress
+from telemetry.simulation.scenarios.catalogue import run_scenario, scenario_named
+from telemetry.simulation.scenarios.stage.curves import Chart, ends
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 
 
 def fly(name: str, seed: int, *, report: Progress) -> tuple[list[ScenarioPartDoc], bool]:

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from planning.landing_sites import LandingSite
-from planning.traversable import site_places, sites_near
-from server.jobs import Progress
+from planning.ground.landing_sites import LandingSite
+from planning.ground.traversable import site_places, sites_near
 from server.schemas import LandingSiteDoc, LandingSitesBody
 from server.traversability.maps import read_maps
+from server.work.jobs import Progress
 
 
 @dataclass(frozen=True, slots=True)

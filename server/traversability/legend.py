@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32, U8, Bools
 from server.schemas import LayerName
 
 F32 = NDArray[np.float32]

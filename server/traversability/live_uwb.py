@@ -10,17 +10,17 @@ from collections import deque
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from mapping.sensor_frames import UwbScan
 from mapping.uwb import UwbParams, in_words
 from planning.errors import DescribedError
 from server.errors import reported
 from server.library import Library
 from server.schemas import UwbLiveDoc
-from server.traversability.desk import TraversabilityDesk
-from telemetry.messages import VehicleText
+from server.traversability.traversability_desk import TraversabilityDesk
 from telemetry.perception.uwb_drive import UwbDrive
-from telemetry.sensing import UwbScan
 from telemetry.sensors.uwb_log import write_uwb_log
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import VehicleText
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.uwb")
 

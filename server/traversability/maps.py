@@ -15,10 +15,10 @@ from pyproj.exceptions import CRSError
 
 from mapping.traversability import Traversability
 from mapping.uwb import Cleared
-from planning.dsm import Dsm
-from planning.traversable import TraversableGround
+from planning.ground.traversable import TraversableGround
+from planning.terrain.dsm import Dsm
 from server.errors import StorageError
-from server.library.files import storage_errors, sync_directory, write_durably
+from server.library.whole_files import storage_errors, sync_directory, write_durably
 
 _KEPT = "traversability.npz"
 

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32, U8
 from mapping.uwb import UwbParams, in_words
-from planning.geotiff import write_dsm
-from planning.traversable import cleared_ground, traversable_ground
+from planning.ground.traversable import cleared_ground, traversable_ground
+from planning.terrain.geotiff import write_dsm
 from server.errors import NotReadyError
-from server.jobs import Progress
 from server.library.terrains import load_terrain
-from server.scene.payload import OverlayScene
+from server.scene.geometry.payload import OverlayScene
 from server.schemas import LayerName
 from server.traversability.legend import chance_classes, classes, legend_of, painted, time_classes
 from server.traversability.maps import Maps, Radar, read_maps, write_maps
+from server.work.jobs import Progress
 from telemetry.perception.uwb_drive import read_scans
 
 DRAWN_CELLS = 1024

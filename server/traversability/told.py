@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.scene.payload import OverlayScene, SiteMark
+from server.scene.geometry.payload import OverlayScene, SiteMark
 from server.schemas import ServerMessage, TraversabilityMessage, TraversabilityState, UwbLiveDoc, ViewDoc
 from server.traversability.legend import legend_of
 from server.traversability.task import Worked

@@ -7,12 +7,10 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from mapping.uwb import UwbParams
-from planning.landing_sites import CAUTION
+from planning.ground.landing_sites import CAUTION
 from server.errors import BusyError, JobCancelledError, NotFoundError, NotReadyError, error_doc
-from server.job_board import JobBoard
-from server.jobs import Lane, Progress
 from server.library import Library
-from server.scene.payload import OverlayScene, SiteMark
+from server.scene.geometry.payload import OverlayScene, SiteMark
 from server.schemas import (
     ErrorDoc,
     JobDoc,
@@ -27,10 +25,12 @@ from server.schemas import (
     ViewDoc,
 )
 from server.traversability import task
+from server.traversability.landing_site_task import find_sites
 from server.traversability.maps import keep, kept_in, settle
-from server.traversability.sites import find_sites
 from server.traversability.task import Worked
 from server.traversability.told import Kept, Told
+from server.work.job_board import JobBoard
+from server.work.jobs import Lane, Progress
 
 _OF_THE_RADAR: tuple[LayerName, ...] = ("probability", "time_in_view")
 _ADVICE = 'Press "Work it out" first.'

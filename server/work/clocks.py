@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from datetime import UTC, datetime
 
 from planning.plan import CERTIFICATE_STEP, PATH_STEP, SURFACE_STEP
-from server.jobs import Progress
+from server.work.jobs import Progress
 
 READ_STEP = "Reading the surface model"
 _KEYS = {READ_STEP: "read", SURFACE_STEP: "surface", PATH_STEP: "path", CERTIFICATE_STEP: "certificate"}

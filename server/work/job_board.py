@@ -9,8 +9,8 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, TypeVar
 
 from server.errors import BusyError, JobCancelledError, NotFoundError, reported
-from server.jobs import Lane, Progress
 from server.schemas import JobDoc, JobMessage, ServerMessage
+from server.work.jobs import Lane, Progress
 
 log = logging.getLogger("hedgehop.jobs")
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from telemetry.node_lock import NodeFacts, running_node
+from telemetry.bus.node_lock import NodeFacts, running_node
 
 LOG_BYTES = 2_000_000
 _LOOK_EVERY_S = 0.1

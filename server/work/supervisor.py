@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from planning import __version__
-from server.node_process import NodeProcess, bound_log
+from server.work.node_process import NodeProcess, bound_log
+from telemetry import nodes
+from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 from telemetry.bus.sockets import private_directory
-from telemetry.node_lock import NodeFacts, running_node, running_nodes
 
 log = logging.getLogger(__name__)
 

@@ -13,16 +13,13 @@ from urllib.parse import urlsplit, urlunsplit
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidStatus, InvalidURI
 from websockets.typing import Origin, Subprotocol
 
-from mapping.thinning import thinned
-from telemetry.agent.bandwidth import Bandwidth
-from telemetry.agent.clock import RemoteClock
-from telemetry.agent.thinning import sendable
-from telemetry.agent.wire import (
+from mapping.geometry.arrays import F32
+from mapping.voxels.downsampling import thinned
+from telemetry.agent.link_messages import (
     NOTICE_LONGEST,
     PATH,
     PROTOCOL_VERSION,
@@ -32,7 +29,7 @@ from telemetry.agent.wire import (
     Notice,
     Ping,
     Pong,
-    Radar,
+    RadarMessage,
     Report,
     Slam,
     Uwb,
@@ -40,7 +37,9 @@ from telemetry.agent.wire import (
     cloud,
     decode_from_server,
     encode,
+    sendable,
 )
+from telemetry.agent.pacing import Bandwidth, RemoteClock
 from telemetry.errors import AddressError, SensorLinkError
 
 _log = logging.getLogger(__name__)

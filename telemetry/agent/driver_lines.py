@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
-from telemetry.agent.wire import BINS_MAX, TARGET_COLUMNS, Slam, Uwb, intensity_of
+from telemetry.agent.link_messages import BINS_MAX, TARGET_COLUMNS, Slam, Uwb, intensity_of
 from telemetry.errors import SensorLinkError
 
 HOPELESS = 20

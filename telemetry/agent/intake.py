@@ -6,7 +6,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from telemetry.agent.wire import (
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, packed
+from telemetry.agent.link_messages import (
     NOTICE_LONGEST,
     PROTOCOL_VERSION,
     Cloud,
@@ -16,7 +17,7 @@ from telemetry.agent.wire import (
     Notice,
     Ping,
     Pong,
-    Radar,
+    RadarMessage,
     Report,
     Slam,
     Uwb,
@@ -27,8 +28,7 @@ from telemetry.agent.wire import (
     targets_of,
 )
 from telemetry.errors import SensorLinkError
-from telemetry.messages import VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, packed
+from telemetry.topics.messages import VehicleText
 
 LATE_S = 0.5
 FUTURE_S = 0.05

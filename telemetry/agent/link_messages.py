@@ -7,13 +7,14 @@ station's monotonic clock; the agent learns it by ``ping`` and ``pong``.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
+from mapping.geometry.arrays import F32
 from mapping.uwb import UwbGeometry
 from telemetry.errors import SensorLinkError
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from telemetry.agent.client import NoticeReading, RadarReading
-from telemetry.agent.wire import TARGETS_MAX
+from telemetry.agent.link_messages import TARGETS_MAX
 from telemetry.errors import SensorError
 
 F32 = NDArray[np.float32]

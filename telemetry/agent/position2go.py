@@ -14,7 +14,7 @@ from mapping.radar.chain import RadarChain
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.live_radar import LiveRadar, LiveStatus, reading_of
 from telemetry.sensors.position2go.answers import CLIPPED
-from telemetry.sensors.position2go.session import Position2GoCounts, Session, Taken
+from telemetry.sensors.position2go.board_session import BoardSession, Position2GoCounts, TakenFrame
 from telemetry.sensors.serial_port import open_port
 
 BAUD = 115_200

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan
 from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
-from telemetry.agent.wire import Slam, Uwb
-from telemetry.messages import Topic
-from telemetry.recording.reader import open_recording
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
+from telemetry.agent.link_messages import Slam, Uwb
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.topics.messages import Topic
 
 _RECORDED = (Topic.RADAR_FRAME, Topic.CLOUD_FRAME, Topic.SLAM_POSE, Topic.UWB_SCAN)
 

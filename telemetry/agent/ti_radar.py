@@ -17,10 +17,10 @@ from telemetry.errors import SensorError
 from telemetry.sensors.serial_port import open_port
 from telemetry.sensors.ti_mmwave.config import LEAST_SNR_DB
 from telemetry.sensors.ti_mmwave.differences import other_configuration
-from telemetry.sensors.ti_mmwave.frame import TiFrame
-from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiCounts, TiStream
-from telemetry.sensors.ti_mmwave.session import TiPorts, configure, empty, frames
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig
+from telemetry.sensors.ti_mmwave.ti_frame import TiFrame
+from telemetry.sensors.ti_mmwave.ti_session import TiPorts, configure, empty, frames
 
 USUAL_PERIOD_S = 0.1
 LONGEST_PAUSE_S = 5.0

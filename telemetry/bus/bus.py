@@ -11,13 +11,13 @@ from typing import Any, Self, TypeVar
 
 import zenoh
 
-from telemetry.bus import wire
+from telemetry.bus import encoding
 from telemetry.bus.calls import Answers, call
-from telemetry.bus.session import open_session
 from telemetry.bus.sockets import remove_socket, socket_directory
 from telemetry.bus.subscription import Subscription
+from telemetry.bus.zenoh_session import open_session
 from telemetry.errors import BusError
-from telemetry.messages import Published
+from telemetry.topics.messages import Published
 
 T = TypeVar("T")
 

@@ -11,8 +11,14 @@ from typing import Any, TypeVar, cast
 import zenoh
 
 from planning.errors import DescribedError
-from telemetry.bus.described import error_info
-from telemetry.bus.wire import decode_answer, decode_request, encode_answer, encode_failure, encode_request
+from telemetry.bus.encoding import (
+    decode_answer,
+    decode_request,
+    encode_answer,
+    encode_failure,
+    encode_request,
+    error_info,
+)
 from telemetry.errors import BusError
 
 _log = logging.getLogger(__name__)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, TypeVar, cast, get_args
 
 import msgspec
 
-from telemetry.bus.described import error_of
+from planning.errors import DescribedError
 from telemetry.errors import BusError
-from telemetry.messages import MESSAGE_TYPES, REPLAY_PREFIX, ErrorInfo, Published, Topic
+from telemetry.topics.messages import MESSAGE_TYPES, REPLAY_PREFIX, ErrorInfo, Published, Topic
 
 T = TypeVar("T")
 

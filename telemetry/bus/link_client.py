@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, overload
 
 from telemetry.bus import Bus
-from telemetry.messages import OnboardMission, UploadReport
-from telemetry.requests import Download, LinkRequest, ReadParameters, StartAuto, StartGuided, Upload
+from telemetry.topics.messages import OnboardMission, UploadReport
+from telemetry.topics.requests import Download, LinkRequest, ReadParameters, StartAuto, StartGuided, Upload
 
 NAME = "link"
 COMMAND_S = 30.0

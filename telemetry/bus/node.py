@@ -12,10 +12,10 @@ from pathlib import Path
 
 from planning.errors import DescribedError
 from telemetry.bus import Bus
+from telemetry.bus.node_lock import NodeLock
 from telemetry.bus.sockets import private_directory
 from telemetry.errors import BusError
-from telemetry.messages import ServerAlive, Topic
-from telemetry.node_lock import NodeLock
+from telemetry.topics.messages import ServerAlive, Topic
 
 _log = logging.getLogger(__name__)
 

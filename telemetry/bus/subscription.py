@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Self
 
-from telemetry.bus.wire import decode_message
+from telemetry.bus.encoding import decode_message
 from telemetry.errors import BusError
-from telemetry.messages import Published
+from telemetry.topics.messages import Published
 
 _log = logging.getLogger(__name__)
 

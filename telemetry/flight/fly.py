@@ -8,17 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from planning.missions.vehicle_profile import dump_profile
 from planning.model import Mission
-from planning.vehicle_profile import dump_profile
 from telemetry.errors import RefusedError, TelemetryError
-from telemetry.flight.preflight import Preflight
-from telemetry.flight.prepare import FlyOptions, Prepared, Report, connect, prepare
+from telemetry.flight.guided.targets import guided_plan
+from telemetry.flight.preflight.preflight import Preflight
+from telemetry.flight.preflight.prepare import FlyOptions, Prepared, Report, connect, prepare
 from telemetry.flight.records import plan_record
-from telemetry.flight.targets import guided_plan
 from telemetry.flight.watch import Asks, Subscribes, Watch, watching
-from telemetry.messages import FlightStatus, PlanRecord, Topic, UploadReport, VehicleText
-from telemetry.requests import ReturnHome, StartAuto, StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, PlanRecord, Topic, UploadReport, VehicleText
+from telemetry.topics.requests import ReturnHome, StartAuto, StartGuided
+from telemetry.topics.vehicle import VehicleState
 
 __all__ = ["FlyOptions", "FlyResult", "Observer", "fly"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import time
 
-from planning.clearance import certificate_json
-from planning.dsm import Dsm
+from planning.certificate.clearance import certificate_json
 from planning.formats.wpl import write_wpl
 from planning.model import Certificate, Mission, finite_or_none
-from telemetry.messages import PlanRecord
+from planning.terrain.dsm import Dsm
+from telemetry.topics.messages import PlanRecord
 
 
 def plan_record(

@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeVar
 
-from telemetry.messages import FlightStatus, LinkStatus, Topic, VehicleText
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, LinkStatus, Topic, VehicleText
+from telemetry.topics.vehicle import VehicleState
 
 T = TypeVar("T")
 

@@ -9,21 +9,21 @@ from typing import Literal, cast
 
 from planning.model import Firmware
 from telemetry.errors import RefusedError, SilentError
+from telemetry.link.exchanges import Exchanges
+from telemetry.link.heartbeat import heartbeat
+from telemetry.link.line import Line
+from telemetry.link.onboard import OnBoard
+from telemetry.link.quality import RoundTripClock, SequenceQuality
+from telemetry.link.streams import StreamRequests
 from telemetry.mavlink.actions import Message
-from telemetry.mavlink.boot_clock import BootClock
 from telemetry.mavlink.commands import CommandRun
-from telemetry.mavlink.exchanges import Exchanges
-from telemetry.mavlink.heartbeat import heartbeat
-from telemetry.mavlink.line import Line
-from telemetry.mavlink.onboard import OnBoard
+from telemetry.mavlink.conversation import BootClock
 from telemetry.mavlink.orders import Order, Orders
 from telemetry.mavlink.parameters import BYTEWISE
-from telemetry.mavlink.quality import RoundTripClock, SequenceQuality
-from telemetry.mavlink.streams import StreamRequests
+from telemetry.mavlink.reduce import reduce
 from telemetry.mavlink.texts import Texts
-from telemetry.messages import Candidate
-from telemetry.reduce import reduce
-from telemetry.vehicle import Autopilot, VehicleState
+from telemetry.topics.messages import Candidate
+from telemetry.topics.vehicle import Autopilot, VehicleState
 
 STALE_S, LOST_S = 1.5, 3.5
 FAST_LINK_BAUD = 400_000

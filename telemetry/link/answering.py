@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from telemetry import requests
 from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.link.link import Link
+from telemetry.link.piloting import Pilot
+from telemetry.topics import requests
 
 if TYPE_CHECKING:
     from telemetry.mavlink.link import Link

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.messages import CommandRecord
+from telemetry.errors import RecordingError, RecordingFullError, TelemetryError
+from telemetry.topics.messages import CommandRecord
+from telemetry.topics.requests import Operator
 
 FIRST = "0" * 64
 """Stands for the line before the first one."""

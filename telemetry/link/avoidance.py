@@ -7,16 +7,16 @@ import time
 from collections.abc import Callable
 
 from telemetry.errors import NotAllowedError, SilentError
-from telemetry.flight.avoiding import Avoiding
-from telemetry.flight.rest import Rest
+from telemetry.flight.avoidance.avoiding import Avoiding
+from telemetry.flight.guided.remaining_mission import RemainingMission
+from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.actions import Action, Message, Send
-from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.modes import commanded_mode
-from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.requests import FlyManoeuvre, FlyRest
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
+from telemetry.topics.requests import FlyManoeuvre, FlyRest
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 WHO_IT_IS_S = 3.0
 """A vehicle that was just adopted is waited for so long to say what it is."""

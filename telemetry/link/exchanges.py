@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 from telemetry.errors import NoVehicleError, TelemetryError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 
 class Machine(Protocol):

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.link.quality import RateMeter
 from telemetry.mavlink.actions import Message
-from telemetry.mavlink.quality import RateMeter
 
 PERIOD_S = 1.0
 HOLD_S = 3.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from telemetry.errors import ConnectionFailedError
+from telemetry.link.peers import Source
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.address import Address
 from telemetry.mavlink.codec import Packer, Parser
 from telemetry.mavlink.connections import Connection, Peer, Receiver, make_connection
-from telemetry.mavlink.peers import Source
-from telemetry.messages import ConnectionStatus, ErrorInfo
+from telemetry.topics.messages import ConnectionStatus, ErrorInfo
 
 MOST_PARSERS = 64
 JUDGE_S = 3.0

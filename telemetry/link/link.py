@@ -11,36 +11,21 @@ import time
 from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
-from telemetry.errors import NotAllowedError, NoVehicleError, TelemetryError
+from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.link.audit import AUTOPILOT, Audit, CommandLog
+from telemetry.link.heartbeat import Grace, Heartbeat
+from telemetry.link.line import Line
+from telemetry.link.peers import Peers, Source
+from telemetry.link.publishing import StatePublisher, StatusTeller
+from telemetry.link.session import Around, Session
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.address import parse_address
-from telemetry.mavlink.adopted import AdoptedVehicle, Telling
-from telemetry.mavlink.answering import Answering
 from telemetry.mavlink.connections import Peer
 from telemetry.mavlink.flight_keeper import FlightKeeper
-from telemetry.mavlink.heartbeat import Grace, Heartbeat
-from telemetry.mavlink.line import Line
-from telemetry.mavlink.operator_right import OperatorRight
-from telemetry.mavlink.peers import Peers, Source
-from telemetry.mavlink.piloting import Pilot
 from telemetry.mavlink.ranges import RangeReader
-from telemetry.mavlink.state_publisher import StatePublisher
-from telemetry.mavlink.status_teller import StatusTeller
-from telemetry.mavlink.trail import Audit, Trail
-from telemetry.mavlink.transferring import Transfers
-from telemetry.messages import (
-    Candidate,
-    FlightStatus,
-    LinkStatus,
-    Published,
-    RawFrame,
-    Topic,
-    VehicleText,
-)
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
-from telemetry.requests import LinkRequest, Operator
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Published, Topic
+from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.topics.tracks import TracksStatus
 
 TICK_S = 0.05
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)

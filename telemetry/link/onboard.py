@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from telemetry.mavlink.actions import Message
-from telemetry.messages import OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import OnboardMission
+from telemetry.topics.vehicle import VehicleState
 
 SETTLE_S = 2.0
 """After a transfer of ours late answers may come, and the vehicle's figures about its mission may be old ones."""

@@ -11,8 +11,8 @@ from typing import Literal
 
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.connections import Peer
-from telemetry.messages import Candidate
-from telemetry.reduce import autopilot_name, is_vehicle_heartbeat
+from telemetry.mavlink.reduce import autopilot_name, is_vehicle_heartbeat
+from telemetry.topics.messages import Candidate
 
 FORGET_S = 10.0
 """A candidate that has been silent for this long is not offered any more."""

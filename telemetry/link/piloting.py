@@ -9,20 +9,16 @@ from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
-from telemetry.flight.guided import GuidedScript
-from telemetry.flight.rest import Rest, rest_from, rest_of_flight
-from telemetry.mavlink.adopted import AdoptedVehicle
-from telemetry.mavlink.avoidance import Avoidance
+from telemetry.flight.guided.guided import GuidedScript
+from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
+from telemetry.link.adopted import AdoptedVehicle
+from telemetry.link.avoidance import Avoidance
+from telemetry.link.missions import JoinMission, ReadMission, check_same_mission, set_speeds, start_mission
+from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, guided_way
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
-from telemetry.mavlink.going_on import ReadMission, check_same_mission, set_speeds
-from telemetry.mavlink.guided_way import guided_way
-from telemetry.mavlink.joining import JoinMission
-from telemetry.mavlink.mission_start import start_mission
-from telemetry.mavlink.mode_change import change_mode
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
-from telemetry.mavlink.procedures import Accepted, Procedures, Spawn
-from telemetry.requests import FlyManoeuvre, StartAuto, StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.topics.requests import FlyManoeuvre, StartAuto, StartGuided
+from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
 IN_THE_AIR = ("taking_off", "in_air", "landing")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import LinkStatus
+from telemetry.topics.vehicle import VehicleState
 
 PERIOD_S = 0.05
 SOONEST_S = 0.04

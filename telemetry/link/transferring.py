@@ -7,13 +7,13 @@ from collections.abc import Callable
 from typing import Literal
 
 from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.actions import Progress
-from telemetry.mavlink.adopted import AdoptedVehicle
 from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.parameters import ParameterRead
 from telemetry.mavlink.upload import MissionUpload
-from telemetry.messages import ErrorInfo, OnboardMission, TransferStatus, UploadReport
-from telemetry.requests import Upload
+from telemetry.topics.messages import ErrorInfo, OnboardMission, TransferStatus, UploadReport
+from telemetry.topics.requests import Upload
 
 TELL_EVERY_S = 0.05
 Phase = Literal["sending", "reading_back", "done", "failed"]

@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from planning.mav_cmd import MavCmd
 from telemetry.errors import RefusedError, SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.command_words import (
-    ACCEPTED,
-    IN_PROGRESS,
-    MISSION_START,
-    TAKEOFF,
-    TEMPORARILY_REJECTED,
-    command_words,
-    result_words,
-)
-from telemetry.mavlink.ends import GROUND_STATION, Ends
-from telemetry.mavlink.vehicle_words import VehicleWords
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
+from telemetry.mavlink.texts import VehicleWords
+from telemetry.topics.vehicle import VehicleState
 
 RESEND_S = 0.7
 LOOK_S = 2.5

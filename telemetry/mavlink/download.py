@@ -7,12 +7,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import RefusedError, SilentError, TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.boot_clock import BootClock
-from telemetry.mavlink.ends import GROUND_STATION, Ends
+from telemetry.mavlink.conversation import GROUND_STATION, BootClock, Endpoints, RoundTrip
 from telemetry.mavlink.items import item_from_message
-from telemetry.mavlink.round_trip import RoundTrip
 from telemetry.mavlink.verify import digest
-from telemetry.messages import Item, OnboardMission
+from telemetry.topics.messages import Item, OnboardMission
 
 LIST_EVERY_S = 0.4
 BEGIN_AGAIN_S = 4.0

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+from planning.mav_cmd import MavCmd
 from telemetry.mavlink.orders import LAND_MODES, MISSION_MODES, RETURN_MODES
-from telemetry.messages import FlightStatus, OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, OnboardMission
+from telemetry.topics.vehicle import VehicleState
 
 Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
 GOING_HOME_COMMANDS = frozenset({20, 21, 189})

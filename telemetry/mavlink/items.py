@@ -10,7 +10,7 @@ from planning.formats.commands import POSITIONED
 from planning.model import Firmware, Home, Mission, MissionItem
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Message
-from telemetry.messages import Item, OnboardMission
+from telemetry.topics.messages import Item, OnboardMission
 
 PLACED = POSITIONED - {206}
 """Commands with latitude, longitude and altitude; 206 sets the distance between photos and has no place."""

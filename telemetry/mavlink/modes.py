@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.vehicle import Autopilot
+from telemetry.topics.vehicle import Autopilot
 
 MULTIROTOR_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35, 43, 45})
 """MAV_TYPE of quad, coaxial, helicopter, hexa, octo, tri, dodeca, deca, generic multirotor and spacecraft frames."""

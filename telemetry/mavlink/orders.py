@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import NotAllowedError
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.modes import mode_numbers
-from telemetry.vehicle import Autopilot, VehicleState
+from telemetry.topics.vehicle import Autopilot, VehicleState
 
 Seen = Callable[[VehicleState], bool]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from telemetry.sensing import RangeFrame
+from mapping.sensor_frames import RangeFrame
 
 _NORTH_ALIGNED = 0
 """MAV_FRAME_GLOBAL: the first sector points north, not ahead."""

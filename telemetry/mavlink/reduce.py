@@ -14,18 +14,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.modes import mode_name
-from telemetry.mavlink.values import (
-    INT16_MAX,
-    INT32_MAX,
-    UINT16_MAX,
-    accuracy,
-    finite,
-    heading,
-    lat_lon,
-    scaled,
-    share,
-)
-from telemetry.vehicle import Autopilot, GnssFix, Landed, VehicleState
+from telemetry.topics.vehicle import Autopilot, GnssFix, Landed, VehicleState
 
 Changes = dict[str, Any]
 Handler = Callable[[VehicleState, Any, float], Changes]

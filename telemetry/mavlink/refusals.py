@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 
 from telemetry.errors import RefusedError, TelemetryError, TransferError
-from telemetry.mavlink.vehicle_words import VehicleWords
-from telemetry.messages import Item
+from telemetry.mavlink.texts import VehicleWords
+from telemetry.topics.messages import Item
 
 (
     ACCEPTED,

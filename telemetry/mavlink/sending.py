@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import SilentError, TelemetryError
 from telemetry.mavlink.actions import Action, Failed, Message, Progress, Send
-from telemetry.mavlink.ends import Ends
+from telemetry.mavlink.conversation import Endpoints, RoundTrip
 from telemetry.mavlink.items import home_message, item_message
 from telemetry.mavlink.refusals import (
     ACCEPTED,
@@ -22,9 +22,8 @@ from telemetry.mavlink.refusals import (
     broken_off,
     refusal_error,
 )
-from telemetry.mavlink.round_trip import RoundTrip
-from telemetry.mavlink.vehicle_words import VehicleWords
-from telemetry.messages import Item
+from telemetry.mavlink.texts import VehicleWords
+from telemetry.topics.messages import Item
 
 COUNT_EVERY_S = 0.5
 GENTLE_RESEND_S = 1.0

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from planning.formats.commands import plain_frame
+from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Firmware
 from telemetry.mavlink.items import PLACED
-from telemetry.messages import Item
+from telemetry.topics.messages import Item
 
 WAYPOINT, LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, RTL, LAND, TAKEOFF, SPLINE = 16, 17, 18, 19, 20, 21, 22, 82
 FRAME_AMSL = 0

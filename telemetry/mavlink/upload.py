@@ -7,13 +7,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send, ended
-from telemetry.mavlink.boot_clock import BootClock
+from telemetry.mavlink.conversation import GROUND_STATION, BootClock, Endpoints
 from telemetry.mavlink.download import MissionDownload
-from telemetry.mavlink.ends import GROUND_STATION, Ends
 from telemetry.mavlink.refusals import CANCELLED
 from telemetry.mavlink.sending import UNKNOWN, MissionSending
 from telemetry.mavlink.verify import compare
-from telemetry.messages import Item, OnboardMission, UploadReport
+from telemetry.topics.messages import Item, OnboardMission, UploadReport
 
 LONGEST_S, LONGEST_PER_ITEM_S = 90.0, 4.0
 

@@ -11,7 +11,7 @@ from planning.formats.commands import plain_frame
 from planning.model import Firmware
 from telemetry.mavlink.items import DEG_E7, PLACED
 from telemetry.mavlink.storage import WHOLE_SECONDS, as_stored, is_flown, kept_params
-from telemetry.messages import Item, Rounded
+from telemetry.topics.messages import Item, Rounded
 
 __all__ = ["as_stored", "compare", "digest"]
 

@@ -7,21 +7,24 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import math
+import contextlib
+import os
 import sys
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
+
 from telemetry.bus import Bus
-from telemetry.mavlink.audit import AuditLog
-from telemetry.mavlink.link import Link, open_link
-from telemetry.mavlink.memory import Memory, Wanted, read_memory, write_memory
-from telemetry.mavlink.operator_right import OperatorRight
-from telemetry.messages import Topic
-from telemetry.node import NodeContext, run_node
-from telemetry.obstacles import PerceptionSettings, PerceptionStatus
-from telemetry.requests import LinkRequest
-from telemetry.tracks import TracksStatus
+from telemetry.bus.node import GIVEN_UP_S, LOOK_EVERY_S, NodeContext, run_node
+from telemetry.link.answering import Answering, OperatorRight
+from telemetry.link.audit import AuditLog
+from telemetry.link.link import Link, open_link
+from telemetry.topics.messages import Candidate, FlightStatus, Topic
+from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus
+from telemetry.topics.requests import LinkRequest
+from telemetry.topics.tracks import TracksStatus
 
 LOOK_EVERY_S = 0.5
 PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)

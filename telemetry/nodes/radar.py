@@ -1,7 +1,5 @@
 """The radar node: ``python -m telemetry.nodes.radar --runtime DIR``. The global map of what the radar has seen."""
 
-from __future__ import annotations
-
 import sys
 
 from telemetry.perception.kinds import RADAR

@@ -1,7 +1,5 @@
 """The ranges node: ``python -m telemetry.nodes.ranges --runtime DIR``. What the vehicle's range finders see."""
 
-from __future__ import annotations
-
 import sys
 
 from telemetry.perception.kinds import RANGES

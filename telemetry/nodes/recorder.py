@@ -14,12 +14,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from telemetry.bus import Bus
+from telemetry.bus.node import NodeContext, run_node
 from telemetry.errors import RecordingError
-from telemetry.messages import RecorderStatus, Topic
-from telemetry.node import NodeContext, run_node
-from telemetry.recording.mend import mend
+from telemetry.recording.mcap_files.mend import mend
 from telemetry.recording.recorder import Recorder
-from telemetry.requests import RecorderRequest, StartRecording
+from telemetry.topics.messages import RecorderStatus, Topic
+from telemetry.topics.requests import RecorderRequest, StartRecording
 
 _log = logging.getLogger(__name__)
 

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from telemetry.bus import Bus
+from telemetry.bus.node import NodeContext, run_node
 from telemetry.errors import RecordingError
-from telemetry.messages import REPLAY_PREFIX, ErrorInfo, Published, ReplayStatus, Topic
-from telemetry.node import NodeContext, run_node
-from telemetry.recording.replay import STATUS_EVERY_S, Due, Player
+from telemetry.recording.player import STATUS_EVERY_S, Due, Player
 from telemetry.recording.replay_sources import ReplaySource, open_source
-from telemetry.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from telemetry.topics.messages import REPLAY_PREFIX, ErrorInfo, Published, ReplayStatus, Topic
+from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
 
 _IDLE_STATUS_EVERY_S = 1.0
 _UNATTENDED_S = 60.0

@@ -20,12 +20,12 @@ from typing import get_args
 import numpy as np
 
 from telemetry.bus import Bus
-from telemetry.messages import Topic
-from telemetry.node import NodeContext, run_node
-from telemetry.sensing import RadarKind, SimTruth
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
-from telemetry.simulator.sensors import SlamDrift, StereoModel, StereoSensor, radar_sensor
+from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors import SlamDrift, StereoModel, StereoSensor, radar_sensor
+from telemetry.topics.messages import Topic
+from telemetry.topics.simulated import RadarKind, SimTruth
 
 _log = logging.getLogger(__name__)
 

@@ -16,11 +16,11 @@ from pathlib import Path
 
 from planning.errors import DescribedError, ParameterError
 from telemetry.bus import Bus
-from telemetry.messages import Topic
-from telemetry.node import EXIT_ENDED, EXIT_REFUSED, NodeContext, run_node
-from telemetry.simulator.gnss import RECEIVERS
-from telemetry.simulator.gnss_script import read_event
-from telemetry.simulator.run import SimOptions, Simulator, flying, run
+from telemetry.bus.node import EXIT_ENDED, EXIT_REFUSED, LOOK_EVERY_S, NodeContext, run_node
+from telemetry.simulation.simulator.airframe.gnss import RECEIVERS
+from telemetry.simulation.simulator.airframe.gnss_script import read_event
+from telemetry.simulation.simulator.run import SimOptions, Simulator, flying, run
+from telemetry.topics.messages import Topic
 
 _log = logging.getLogger(__name__)
 

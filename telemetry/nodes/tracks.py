@@ -1,6 +1,6 @@
 """The tracks node: ``python -m telemetry.nodes.tracks --runtime DIR``. Follows what moves, and says what comes near."""
 
-from __future__ import annotations
+import sys
 
 import argparse
 import sys

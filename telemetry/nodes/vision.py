@@ -1,7 +1,5 @@
 """The vision node: ``python -m telemetry.nodes.vision --runtime DIR``. The local map of what the camera sees."""
 
-from __future__ import annotations
-
 import sys
 
 from telemetry.perception.kinds import VISION

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.corridor import MissionLine
-from planning.avoiding.standing import REACH_UP
-from planning.seen import conflicts
-from telemetry.obstacles import MapDelta, MapOrigin, MissionConflict, ObstacleAlert, Sensor
+from mapping.perceiving.corridor import MissionLine
+from planning.evading.columns import REACH_UP
+from planning.evading.seen import conflicts
 from telemetry.perception.convert import frame_of
 from telemetry.perception.deltas import FoldedMap
 from telemetry.perception.mission_line import Line

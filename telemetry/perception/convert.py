@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from mapping.alerts import AlertEvent
-from mapping.frames import LocalFrame
-from mapping.obstacles import Found
+from mapping.geometry.frames import LocalFrame
 from mapping.perceiving import SearchedRegion
-from telemetry.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Region, Sensor
+from mapping.perceiving.alerts import AlertEvent
+from mapping.perceiving.obstacles import Found
+from telemetry.topics.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Region, Sensor
 
 
 def frame_of(origin: MapOrigin) -> LocalFrame:

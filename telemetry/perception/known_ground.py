@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
-from mapping.frames import LocalFrame
-from mapping.ground import GroundGrid, ground_grid
+from mapping.geometry.arrays import F32, F64
+from mapping.geometry.frames import LocalFrame
+from mapping.perceiving.ground import GroundGrid, ground_grid
 from planning.errors import DescribedError
 from telemetry.errors import TelemetryError
-from telemetry.obstacles import GroundNotice, MapOrigin
+from telemetry.topics.obstacles import GroundNotice, MapOrigin
 
 REACH_M = 1000.0
 """From home, to all four sides."""

@@ -7,11 +7,11 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from telemetry.bus import Bus
-from telemetry.messages import RecorderStatus, Topic
+from telemetry.perception.frame_worker import AVOIDANCE, CAMERA, FLIGHT, NOTICE, PLAN, SETTINGS, STATE
 from telemetry.perception.inbox import Inbox
-from telemetry.perception.kinds import SensorKind
-from telemetry.perception.worker import AVOIDANCE, CAMERA, FLIGHT, NOTICE, PLAN, SETTINGS, STATE
-from telemetry.vehicle import VehicleState
+from telemetry.perception.sensor_kinds import SensorKind
+from telemetry.topics.messages import RecorderStatus, Topic
+from telemetry.topics.vehicle import VehicleState
 
 _MOST_UNREAD = 2000
 _LATEST = {

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import U8
 from mapping.voxels import VoxelMap
-from telemetry.obstacles import MapDelta, MapName, MapOrigin
-from telemetry.perception.deltas import in_parts
+from telemetry.topics.deltas import in_parts
+from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin
 
 _NEVER = -1
 

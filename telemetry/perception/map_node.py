@@ -7,16 +7,17 @@ import logging
 import time
 
 from telemetry.bus import Bus
-from telemetry.messages import Topic
-from telemetry.node import NodeContext
-from telemetry.obstacles import MapDelta, MissionConflict
+from telemetry.bus.node import NodeContext
 from telemetry.perception.ahead import Ahead, Flight
-from telemetry.perception.kinds import SensorKind
-from telemetry.perception.sending import MapSender
-from telemetry.perception.shell import NodeShell
+from telemetry.perception.frame_worker import CONFLICT, WHOLE
+from telemetry.perception.map_sender import MapSender
+from telemetry.perception.map_worker import MapWorker
+from telemetry.perception.sensor_kinds import SensorKind
+from telemetry.perception.sensor_node import SensorNode, run_sensor_node
 from telemetry.perception.warm_up import warm_up
-from telemetry.perception.worker import CONFLICT, WHOLE, Worker
-from telemetry.requests import PerceptionRequest
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import MapDelta, MissionConflict
+from telemetry.topics.requests import PerceptionRequest
 
 _log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from telemetry.obstacles import MapDelta
+from telemetry.topics.obstacles import MapDelta
 
 AT_ONCE = 2
 BETWEEN_S = 0.02

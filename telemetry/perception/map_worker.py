@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable
 from typing import Any
 
-from telemetry.messages import Published, Topic
-from telemetry.obstacles import MapDelta, MapOrigin
+from mapping.sensor_frames import SensorFrame
 from telemetry.perception.ahead import Flight
-from telemetry.perception.changes import ChangeTeller
+from telemetry.perception.frame_worker import (
+    AVOIDANCE,
+    CAMERA,
+    CONFLICT,
+    FLIGHT,
+    TICK_S,
+    WHOLE,
+    FrameWorker,
+    Give,
+)
 from telemetry.perception.inbox import Inbox
-from telemetry.perception.kinds import SensorKind
+from telemetry.perception.map_changes import ChangeTeller
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
+from telemetry.topics.obstacles import MapDelta, MapOrigin, PerceptionStatus
 
 _log = logging.getLogger(__name__)
 

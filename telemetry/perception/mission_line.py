@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS
 
-from mapping.frames import EQUATOR_M
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import EQUATOR_M
 from planning.errors import PlanningError
-from planning.flown import flown_line
 from planning.formats.wpl import read_wpl
 from telemetry.messages import PlanRecord
 from telemetry.obstacles import MapOrigin

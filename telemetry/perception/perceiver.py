@@ -10,17 +10,24 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from mapping.errors import MappingError
-from mapping.ground import GroundGrid
 from mapping.perceiving import FrameResult
+from mapping.perceiving.ground import GroundGrid
+from mapping.sensor_frames import SensorFrame, SlamPose
 from mapping.voxels.checks import checked_size
-from telemetry.messages import PlanRecord
-from telemetry.obstacles import Basis, GroundNotice, MapOrigin, MissionConflict, PerceptionSettings
 from telemetry.perception.flown_line import FlownLine
-from telemetry.perception.kinds import AnyFrame, SensorKind, camera_pose
+from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.status import Outcome, Teller
 from telemetry.perception.whereabouts import Whereabouts, has_fix, is_flying, velocity_enu_m_s
-from telemetry.sensing import SlamPose
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.obstacles import (
+    Basis,
+    GroundNotice,
+    MapOrigin,
+    MissionConflict,
+    PerceptionSettings,
+    PerceptionStatus,
+)
+from telemetry.topics.vehicle import VehicleState
 
 _MOST_BUFFERED = 2000
 BROKEN = "broken frame"

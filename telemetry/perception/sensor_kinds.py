@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
-import numpy as np
+from mapping.errors import CapacityError, MappingError
+from mapping.perceiving import RadarPerception, RangePerception, Settings, VisionPerception
+from mapping.perceiving.braking import Braking
+from mapping.perceiving.settings_limits import check_settings
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import PerceptionSettings, Sensor
 
 from mapping.braking import Braking
 from mapping.perceiving import (

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import logging
 import os
 import time
 from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
 from typing import Any
 
 from planning.errors import DescribedError
 from telemetry.bus import Bus
+from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import BusError
-from telemetry.messages import Published
-from telemetry.node import NodeContext
-from telemetry.perception.ground import ground_around, why_none
+from telemetry.perception.frame_worker import GROUND
 from telemetry.perception.inbox import Inbox
-from telemetry.perception.kinds import SensorKind
+from telemetry.perception.known_ground import ground_around, why_none
 from telemetry.perception.listening import Listening
 from telemetry.perception.perceiver import GroundWanted
-from telemetry.perception.worker import GROUND
+from telemetry.perception.sensor_kinds import SensorKind
+from telemetry.topics.messages import Published
 
 _log = logging.getLogger(__name__)
 

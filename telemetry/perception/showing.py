@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from mapping.perceiving import RadarPerception, RangePerception, VisionPerception
-from telemetry.looks import CloudLook, RadarLook, packed_cm
-from telemetry.obstacles import MapOrigin
-from telemetry.sensing import packed
+from mapping.sensor_frames import packed
+from telemetry.topics.looks import CloudLook, RadarLook, packed_cm
+from telemetry.topics.obstacles import MapOrigin
 
 SHOWN_EVERY_S = 0.5
 MOST_TARGETS = 500

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from statistics import median
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from mapping.alerts import AlertEvent
-from mapping.frames import LocalFrame
+from mapping.geometry.frames import LocalFrame
 from mapping.perceiving import FrameResult
+from mapping.perceiving.alerts import AlertEvent
 from mapping.perceiving.flight_map import FlightMap
-from telemetry.obstacles import Basis, FlightMapStatus, MissionConflict, ObstacleAlert, PerceptionStatus
 from telemetry.perception.convert import alert_of, counts, obstacle_of, region_of
-from telemetry.perception.kinds import SensorKind
+from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.whereabouts import Whereabouts
+from telemetry.topics.obstacles import Basis, FlightMapStatus, MissionConflict, ObstacleAlert, PerceptionStatus
 
 _LATENCIES = 50
 _SAY_BEGUN_S = 10.0

@@ -7,17 +7,16 @@ from collections import deque
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping import quaternions
-from mapping.frames import LocalFrame
-from mapping.poses import Pose, PoseTrack
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F32
+from mapping.geometry.frames import LocalFrame
+from mapping.geometry.poses import Pose, PoseTrack
+from mapping.sensor_frames import UwbScan, rows
 from mapping.uwb import UwbGeometry
-from planning.traversable import UwbScans
+from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic
-from telemetry.recording.reader import open_recording
-from telemetry.sensing import UwbScan, rows
+from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.sensors.uwb_log import MOST_BYTES, read_uwb_log
 from telemetry.vehicle import VehicleState
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 
-from mapping.ground import ground_grid
-from telemetry.perception.changes import ChangeTeller
-from telemetry.perception.kinds import SensorKind
+from mapping.perceiving.ground import ground_grid
+from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SensorFrame, SlamPose, packed
+from telemetry.perception.map_changes import ChangeTeller
 from telemetry.perception.perceiver import Perceiver
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose, packed
-from telemetry.vehicle import VehicleState
+from telemetry.perception.sensor_kinds import SensorKind
+from telemetry.topics.vehicle import VehicleState
 
 
 def warm_up(kind: SensorKind) -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from mapping.frames import LocalFrame
-from telemetry.obstacles import MapOrigin
+from mapping.geometry.frames import LocalFrame, apart_m
 from telemetry.perception.convert import frame_of
-from telemetry.vehicle import VehicleState
+from telemetry.topics.obstacles import MapOrigin
+from telemetry.topics.vehicle import VehicleState
 
 NEW_HOME_M, NEW_HEIGHT_M = 1.0, 0.5
 """Home is another one when it has moved by more than this; less is a receiver's breathing."""

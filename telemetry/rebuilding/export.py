@@ -11,17 +11,18 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from mapping.octomap_bt import write_bt
-from mapping.ply import ply
+from mapping.geometry.arrays import F64
 from mapping.voxels import VoxelMap
-from planning.dsm import Dsm
-from planning.geotiff import write_dsm
+from mapping.voxels.octomap_bt import write_bt
+from mapping.voxels.ply import ply
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import write_dsm
 from telemetry.errors import TelemetryError
-from telemetry.obstacles import MapDelta
 from telemetry.perception.convert import frame_of
-from telemetry.perception.deltas import FoldedMap, Voxels
 from telemetry.perception.mission_line import local_crs
-from telemetry.perception.outlines import clusters, outline
+from telemetry.rebuilding.outlines import clusters, outline
+from telemetry.topics.deltas import FoldedMap, Voxels
+from telemetry.topics.obstacles import MapDelta
 
 Kind = Literal["ply", "bt", "tif", "geojson"]
 KINDS: tuple[Kind, ...] = ("ply", "bt", "tif", "geojson")

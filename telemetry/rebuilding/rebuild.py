@@ -13,26 +13,26 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mapping.ground import GroundGrid
-from mapping.perceiving.limits import COARSEST_CLOUD, check_gate, check_thinning
-from mapping.radar_targets import Variant
+from mapping.perceiving.ground import GroundGrid
+from mapping.perceiving.settings_limits import COARSEST_CLOUD, check_gate, check_thinning
+from mapping.radar.targets import Variant
+from mapping.sensor_frames import SensorFrame, SlamPose
 from mapping.voxels import VoxelMap
 from mapping.voxels.checks import checked_size
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 from telemetry.errors import RecordingError
-from telemetry.messages import FlightStatus, PlanRecord, Published, Topic
-from telemetry.obstacles import Basis, GroundNotice, PerceptionSettings, PerceptionStatus
-from telemetry.perception.changes import ChangeTeller
-from telemetry.perception.deltas import FoldedMap
-from telemetry.perception.ground import GroundError, ground_around, why_none
 from telemetry.perception.inbox import HOLD_S
-from telemetry.perception.kinds import AnyFrame, AnyPerception, SensorKind
+from telemetry.perception.known_ground import GroundError, ground_around, why_none
+from telemetry.perception.map_changes import ChangeTeller
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.sensor_kinds import AnyPerception, SensorKind
 from telemetry.perception.status import full_text
 from telemetry.recording.carried_ground import carried_ground
-from telemetry.recording.reader import Entry, Recording, open_recording
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose
-from telemetry.vehicle import VehicleState
+from telemetry.recording.mcap_files.reader import Entry, Recording, open_recording
+from telemetry.topics.deltas import FoldedMap
+from telemetry.topics.messages import FlightStatus, PlanRecord, Published, Topic
+from telemetry.topics.obstacles import Basis, GroundNotice, PerceptionSettings, PerceptionStatus
+from telemetry.topics.vehicle import VehicleState
 
 _PATIENCE_S = 5.0
 """A frame of which no status has told by then was not worked on."""

@@ -11,10 +11,10 @@ from affine import Affine
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from planning.dsm import Dsm
 from planning.errors import DescribedError
+from planning.terrain.dsm import Dsm
 from telemetry.errors import RecordingError
-from telemetry.recording.reader import Recording
+from telemetry.recording.mcap_files.reader import Recording
 
 NAME, MEDIA_TYPE = "known_ground.npz", "application/x-npz"
 MOST_BYTES = 2_000_000_000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.obstacles import MapDelta
+from telemetry.topics.obstacles import MapDelta
 
 BYTES_PER_S = 500_000
 """On average; some 20 MB a minute on disk. Clouds thinned to 8,000 points five times a second fit in whole."""

@@ -9,14 +9,14 @@ from typing import Literal
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import RecordingError
-from telemetry.recording.files import foreign, is_mcap, opened
+from telemetry.mavlink.reduce import autopilot_name
+from telemetry.recording.file_types import foreign, is_mcap, opened
 from telemetry.recording.frame_facts import decode_frame
-from telemetry.recording.reader import UNFINISHED, own_contents
-from telemetry.recording.scan import glance
+from telemetry.recording.mcap_files.reader import UNFINISHED, own_contents
+from telemetry.recording.mcap_files.scan import glance
+from telemetry.recording.mcap_files.writer import ABOUT, PLAN, VEHICLE
 from telemetry.recording.tlog import Damage, Data, LogFrame, tlog_frames
 from telemetry.recording.tlog_flight import looks_like_tlog
-from telemetry.recording.writer import ABOUT, PLAN, VEHICLE
-from telemetry.reduce import autopilot_name
 
 _AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 _HEAD_BYTES = 256 * 1024

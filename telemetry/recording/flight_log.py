@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from telemetry.recording.files import foreign, is_mcap, opened
-from telemetry.recording.flight import FlightLog, HomePosition, Track
+from telemetry.recording.file_types import foreign, is_mcap, opened
 from telemetry.recording.mcap_flight import read_mcap_flight
+from telemetry.recording.recorded_flight import FlightLog, HomePosition, RecordedTrack
 from telemetry.recording.tlog_flight import looks_like_tlog, read_tlog_flight
 
 __all__ = ["FlightLog", "HomePosition", "Track", "read_flight_log"]

@@ -9,9 +9,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.texts import Texts
-from telemetry.messages import VehicleText
 from telemetry.recording.mission_frames import MissionFrames
 from telemetry.recording.tlog import frame_address
+from telemetry.topics.messages import VehicleText
 
 _NO_POSITION = 0b111
 """Of POSITION_TARGET_TYPEMASK: none of x, y, z is to be used."""

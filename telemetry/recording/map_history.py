@@ -8,9 +8,9 @@ from operator import itemgetter
 
 import numpy as np
 
-from telemetry.obstacles import MapDelta
-from telemetry.perception.deltas import NOTHING, FoldedMap
-from telemetry.recording.reader import Entry, Recording
+from telemetry.recording.mcap_files.reader import Entry, Recording
+from telemetry.topics.deltas import NOTHING, FoldedMap
+from telemetry.topics.obstacles import MapDelta
 
 _KEPT_EVERY_S = 30.0
 _MOST_KEPT = 12

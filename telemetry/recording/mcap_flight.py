@@ -7,21 +7,21 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.dsm import Dsm
 from planning.errors import FormatError
 from planning.formats.wpl import read_wpl
 from planning.model import Mission
+from planning.terrain.dsm import Dsm
 from telemetry.errors import RecordingError
-from telemetry.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
-from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+from telemetry.mavlink.reduce import reduce
 from telemetry.recording.carried_ground import carried_ground
-from telemetry.recording.flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
-from telemetry.recording.reader import Recording
+from telemetry.recording.mcap_files.reader import Recording
+from telemetry.recording.recorded_flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.tlog import Data, frame_address
 from telemetry.recording.tlog_flight import mission_flown
-from telemetry.reduce import reduce
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
+from telemetry.topics.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+from telemetry.topics.vehicle import VehicleState
 
 _READ = (
     Topic.VEHICLE,

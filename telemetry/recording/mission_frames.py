@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
+from planning.mav_cmd import MavCmd
 from planning.model import Firmware, Home, Mission, MissionItem
 
 _MISSION, _ACCEPTED = 0, 0

@@ -9,10 +9,10 @@ from functools import cache
 from typing import Any
 
 from telemetry.errors import RecordingError
-from telemetry.messages import FlightStatus, Published, ReplayStatus, Topic
-from telemetry.recording.reader import Entry
+from telemetry.recording.mcap_files.reader import Entry
+from telemetry.recording.recorded_topics import EVENTS
 from telemetry.recording.replay_sources import ReplaySource
-from telemetry.recording.topics import EVENTS
+from telemetry.topics.messages import FlightStatus, Published, ReplayStatus, Topic
 
 SLOWEST, FASTEST = 0.1, 50.0
 STATUS_EVERY_S = 0.125

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-from telemetry.messages import Published
-from telemetry.recording.topics import LATEST
+from telemetry.recording.recorded_topics import LATEST
+from telemetry.topics.messages import Published
 
 SECONDS = 5.0
 _MOST = 20_000

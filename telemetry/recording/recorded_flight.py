@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
 from planning.model import Mission
-from telemetry.messages import CommandRecord, PlanRecord, VehicleText
-from telemetry.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+from planning.terrain.dsm import Dsm
 from telemetry.recording.frame_facts import SentTarget, TruePosition
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import CommandRecord, PlanRecord, VehicleText
+from telemetry.topics.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
+from telemetry.topics.vehicle import VehicleState
 
 F64 = npt.NDArray[np.float64]
 Stamped = tuple[float, VehicleState]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.messages import MESSAGE_TYPES, Topic
+from telemetry.topics.messages import MESSAGE_TYPES, Topic
 
 MAPS = frozenset({Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, Topic.MAP_RANGES})
 """Told in steps that build on each other: a replay adds them up."""

@@ -14,19 +14,19 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from mapping.sensor_frames import CloudFrame
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.messages import ErrorInfo, PlanRecord, Published, RecorderStatus
-from telemetry.obstacles import MapDelta
 from telemetry.recording.cloud_budget import CloudBudget, LocalMapBudget
 from telemetry.recording.disk_space import Measure, Space, full, running_out, space_at
+from telemetry.recording.mcap_files.sink import Write, describe
+from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.recording.preroll import Preroll, Stamped
-from telemetry.recording.sink import Write, describe
-from telemetry.recording.topics import RECORDED
+from telemetry.recording.recorded_topics import RECORDED
 from telemetry.recording.trigger import Trigger
 from telemetry.recording.waiting import Waiting
-from telemetry.recording.writer import RecordingWriter
-from telemetry.sensing import CloudFrame
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import ErrorInfo, PlanRecord, Published, RecorderStatus
+from telemetry.topics.obstacles import MapDelta
+from telemetry.topics.vehicle import VehicleState
 
 _TRY_AGAIN_S = 3.0
 _MEASURE_EVERY_S = 1.0

@@ -9,15 +9,15 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Protocol
 
-from telemetry.messages import Topic
-from telemetry.recording.files import foreign, is_mcap, opened
+from telemetry.recording.file_types import foreign, is_mcap, opened
 from telemetry.recording.frame_facts import FrameFacts
 from telemetry.recording.map_history import MapHistory
-from telemetry.recording.reader import Entry, Recording
+from telemetry.recording.mcap_files.reader import Entry, Recording
+from telemetry.recording.recorded_topics import LATEST, MAPS, NOT_REPLAYED, RECORDED
 from telemetry.recording.tlog import Data
 from telemetry.recording.tlog_flight import looks_like_tlog, states_of, survey
-from telemetry.recording.topics import LATEST, MAPS, NOT_REPLAYED, RECORDED
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 
 _REPLAYED = RECORDED - NOT_REPLAYED
 _SPACING_S = 0.05

@@ -12,12 +12,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from planning.model import Home, Mission
 from telemetry.errors import RecordingError
-from telemetry.recording.flight import FlightLog, StateHistory, track_of, truth_of
+from telemetry.mavlink.reduce import reduce
 from telemetry.recording.frame_facts import FrameFacts, decode_frame
 from telemetry.recording.mission_frames import mission_of
+from telemetry.recording.recorded_flight import FlightLog, StateHistory, track_of, truth_of
 from telemetry.recording.tlog import Damage, Data, LogFrame, tlog_frames
-from telemetry.reduce import reduce
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 _HEARTBEAT, _GLOBAL_POSITION = 0, 33
 _FIRST_LOOK_BYTES = 1 << 20

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 AFTER_DISARM_S = 7.0
 """Landing and what the vehicle says about it belong to the flight."""

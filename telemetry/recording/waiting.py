@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from telemetry.messages import Published, Topic
-from telemetry.obstacles import MapDelta
+from mapping.sensor_frames import CloudFrame
 from telemetry.recording.preroll import Stamped
-from telemetry.recording.topics import BULKY
-from telemetry.sensing import CloudFrame
+from telemetry.recording.recorded_topics import BULKY
+from telemetry.topics.messages import Published, Topic
+from telemetry.topics.obstacles import MapDelta
 
 M = TypeVar("M")
 

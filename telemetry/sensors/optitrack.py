@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.errors import ParameterError, RadarDataError
+from mapping.geometry.arrays import F64
 
 F64 = NDArray[np.float64]
 Forward = Literal["x", "z", "-x", "-z"]

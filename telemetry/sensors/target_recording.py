@@ -8,11 +8,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mapping.radar.detections import Detections
+from mapping.sensor_frames import RadarFrame
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic
-from telemetry.recording.sink import describe
-from telemetry.recording.writer import RecordingWriter
-from telemetry.sensing import RadarFrame, packed
+from telemetry.recording.mcap_files.sink import describe
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic
 
 
 def radar_frame(found: Detections, *, number: int, t_mono_s: float, t_utc_s: float, source: str) -> RadarFrame:

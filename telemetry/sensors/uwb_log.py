@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.uwb import UwbGeometry
 from planning.errors import FormatError
-from planning.traversable import UwbScans
+from planning.ground.traversable import UwbScans
 
 FORMAT, VERSION = "hedgehop-uwb", 1
 MOST_BYTES = 512 * 1024**2

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from telemetry.obstacles import MapDelta, pack_keys, unpack_keys
+from mapping.geometry.arrays import I32, I64, U8
+from telemetry.topics.obstacles import MapDelta, pack_keys, unpack_keys
 
 MOST_VOXELS = 20_000
 """In one message: some 300 kB."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from telemetry.obstacles import MapOrigin
+from mapping.geometry.arrays import F64
+from telemetry.topics.obstacles import MapOrigin
 
 F64 = NDArray[np.float64]
 REACH_CM = 32_767

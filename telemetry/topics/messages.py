@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
-from telemetry.looks import CloudLook, RadarLook
-from telemetry.obstacles import (
+from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SlamPose, UwbScan
+from telemetry.topics.looks import CloudLook, RadarLook
+from telemetry.topics.obstacles import (
     AvoidanceStatus,
     GroundNotice,
     MapDelta,
@@ -18,9 +19,9 @@ from telemetry.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SimTruth, SlamPose, UwbScan
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.simulated import SimTruth
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 
 class Topic(StrEnum):

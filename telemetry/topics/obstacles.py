@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from telemetry.track_settings import TrackerSettings, VelocitySettings
+from mapping.geometry.arrays import I32
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 
 Sensor = Literal["radar", "vision", "ranges"]
 SENSORS: tuple[Sensor, ...] = ("radar", "vision", "ranges")

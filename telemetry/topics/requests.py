@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.messages import GuidedTarget, Item
-from telemetry.obstacles import AvoidBy
+from telemetry.topics.messages import GuidedTarget, Item
+from telemetry.topics.obstacles import AvoidBy
 
 
 @dataclass(frozen=True, slots=True)

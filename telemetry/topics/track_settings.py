@@ -9,8 +9,8 @@ from typing import Literal, get_args
 
 from mapping.errors import ParameterError
 from mapping.perceiving.radar_evidence import EvidenceParams
-from mapping.tracker import TrackerParams
-from planning.velocity_obstacles import Limits
+from mapping.tracking import TrackerParams
+from planning.evading.velocity_obstacles import Limits
 
 Choice = Literal["room", "edge"]
 MOST_TRACKS = 400

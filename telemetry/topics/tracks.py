@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.obstacles import Count, MapOrigin
+from telemetry.topics.obstacles import Count, MapOrigin
 
 TracksState = Literal["waiting", "running", "frozen", "stale"]
 

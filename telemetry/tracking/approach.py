@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.obstacles import ObstacleAlert
+from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.tracking.followed import UNSEEN_S, Followed, Keep
 
 BEGIN_FRAMES = 3

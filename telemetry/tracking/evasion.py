@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.poses import Pose
-from planning.steering import with_ground
-from planning.velocity_obstacles import Limits, Obstacles, Proposal, cones, propose
+from mapping.geometry.poses import Pose
+from planning.evading.steering import with_ground
+from planning.evading.velocity_obstacles import Limits, Obstacles, Proposal, cones, propose
+from telemetry.topics.tracks import VelocityCone, VelocityProposal
 from telemetry.tracking.followed import Followed, Keep
-from telemetry.tracks import VelocityCone, VelocityProposal
 
 MOST_CONES, MOST_EVADED = 8, 24
 NEAR_RADII = 5.0

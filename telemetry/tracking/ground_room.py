@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from mapping.ground import GroundGrid
+from mapping.geometry.arrays import F64
+from mapping.perceiving.ground import GroundGrid
 
 F64 = NDArray[np.float64]
 DIRECTIONS, FARTHEST_M, STEP_M = 120, 40.0, 0.5

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.perceiving.base import SILENT_S
-from mapping.tracker import Tracker
-from telemetry.messages import PlanRecord
-from telemetry.obstacles import ObstacleAlert, PerceptionSettings
+from mapping.geometry.arrays import F64
+from mapping.perceiving import Settings
+from mapping.perceiving.perception import SILENT_S
+from mapping.sensor_frames import RadarFrame
+from mapping.tracking import Tracker
+from mapping.tracking.movers import Movers
+from planning.errors import DescribedError
+from planning.evading.velocity_obstacles import Limits
+from planning.missions.vehicle_profile import parse_profile
 from telemetry.perception.perceiver import Perceiver
+from telemetry.perception.sensor_kinds import RADAR, SensorKind
 from telemetry.perception.status import Outcome
-from telemetry.sensing import RadarFrame
-from telemetry.track_settings import TrackerSettings
+from telemetry.topics.messages import PlanRecord, Topic
+from telemetry.topics.obstacles import ObstacleAlert, PerceptionSettings, PerceptionStatus
+from telemetry.topics.track_settings import USUAL_MAX_SPEED_M_S, TrackerSettings
+from telemetry.topics.tracks import Track, TracksState, TracksStatus
 from telemetry.tracking.approach import FOLLOWED_AFRESH, LANDED, ApproachBook
 from telemetry.tracking.evasion import Evasion, Rules, evasion
-from telemetry.tracking.followed import UNSEEN_S, Followed, Keep, Memory
+from telemetry.tracking.followed import UNSEEN_S, Followed, Keep, TrackMemory
 from telemetry.tracking.ground_room import GroundRoom
-from telemetry.tracking.kind import tracks_kind
-from telemetry.tracking.limits import USUAL, limits_of
-from telemetry.tracking.movers import Movers
-from telemetry.tracking.remembered import Remembered
-from telemetry.tracks import Track, TracksState, TracksStatus
+from telemetry.tracking.out_of_view import Remembered
 
 F64 = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.poses import Pose
-from mapping.tracker import TrackState
-from planning.velocity_obstacles import Obstacles, approaches
+from mapping.geometry.arrays import F64
+from mapping.geometry.poses import Pose
+from mapping.tracking import TrackState
+from planning.evading.velocity_obstacles import Obstacles, approaches
 from telemetry.tracking.followed import ENOUGH_UPDATES, Followed
 
 F64 = NDArray[np.float64]

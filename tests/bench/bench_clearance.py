@@ -17,13 +17,13 @@ from affine import Affine
 from pyproj import CRS
 from scipy.spatial import KDTree
 
-from planning.cells.squares import squares
+from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.places import places_along
-from planning.clearance import certify
-from planning.dsm import Dsm
-from planning.geotiff import read_dsm
 from planning.model import ClearanceParams, FlownLine
+from planning.terrain.cells.squares import squares
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm
 from tests.planning.geotiff_samples import write_raster
 
 PARAMS = ClearanceParams(3.35, vehicle_radius_m=0.35, position_error_m=2.5, rtl_height_m=60.0)

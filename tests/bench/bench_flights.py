@@ -15,26 +15,27 @@ from typing import Any
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.errors import PlanningError
 from planning.following.figures import TrackFigures, judge
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
-from planning.geotiff import read_dsm
+from planning.missions.vehicle_profile import load_profile, path_params
 from planning.model import Poi, VehicleProfile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import load_profile, path_params
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm
 from telemetry.errors import TelemetryError
 from telemetry.flight.fly import FlyOptions, FlyResult, fly
-from telemetry.flight.prepare import Prepared
-from telemetry.mavlink.link import Link, open_link
-from telemetry.messages import FlightStatus, Topic, VehicleText
-from telemetry.requests import Operator
-from telemetry.simulator.gnss import RECEIVERS
-from telemetry.simulator.run import SimOptions, Simulator, flying
-from telemetry.vehicle import VehicleState
+from telemetry.flight.preflight.prepare import Prepared
+from telemetry.link.answering import Answering, OperatorRight
+from telemetry.link.link import Link, open_link
+from telemetry.simulation.simulator.airframe.gnss import RECEIVERS
+from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
+from telemetry.topics.messages import FlightStatus, Topic, VehicleText
+from telemetry.topics.requests import Operator
+from telemetry.topics.vehicle import VehicleState
 from tests.conftest import ROOT
 from tests.telemetry.small_bus import SmallBus
 

@@ -20,7 +20,7 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 from server.library import Library
 from server.library.terrains import store_terrain
 from server.schemas import PlanDoc, PoiDoc

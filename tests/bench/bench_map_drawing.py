@@ -13,8 +13,8 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from server.obstacles.drawing import BOXES_MAX, BURST_BYTES, PERIOD_S, RATE_BYTES_S
-from server.obstacles.mirror import MapMirror
 from server.scene.host import SUBPROTOCOL
+from server.scene.mirror import MapMirror
 from tests.server.large_maps import Painter, hills, painting, told
 from tests.server.obstacle_messages import delta
 

@@ -28,8 +28,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from server.scene.host import SUBPROTOCOL
-from telemetry.node_lock import running_nodes
-from telemetry.obstacles import Sensor
+from telemetry.bus.node_lock import running_nodes
+from telemetry.topics.obstacles import Sensor
 from tests.server.station import PATIENCE_S, ok
 from tests.server.test_process import free_port
 

@@ -16,12 +16,12 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.demo import demo_dsm, demo_pois
-from planning.dsm import Dsm
-from planning.geotiff import write_dsm
+from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.model import SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import write_dsm
 
 ETNA_SIDE_PX, ETNA_CELL_M = 11_500, 0.0126
 ETNA_LIMIT_S, ETNA_LIMIT_GB = 30.0, 3.0

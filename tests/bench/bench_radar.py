@@ -14,7 +14,7 @@ import numpy as np
 from mapping.radar import AWR1843, POSITION2GO, POSITION2GO_SETTINGS, RadarChain, fft
 from mapping.radar.cfar import Cfar, Stage, ca_along_doppler, caso_along_range, doppler_stage, range_stage
 from mapping.radar.cfar_factors import ca_detection
-from mapping.tracker import Tracker
+from mapping.tracking import Tracker
 from tests.mapping.radar.echoes import Echo, frame, noise
 
 SET = 1e-3

@@ -17,15 +17,15 @@ import rasterio
 from affine import Affine
 from rasterio.windows import Window
 
-from planning.demo import small_hill
-from planning.dsm import SurfaceModel
-from planning.geotiff import open_dsm, read_dsm
+from planning.ground.demo_hillside import small_hill
 from planning.model import Poi, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import SurfaceModel
+from planning.terrain.geotiff import open_dsm, read_dsm
 from server.library.terrains import FOLDER, store_terrain
+from server.plan.tasks import compute_plan, warm_up
 from server.schemas import PlanDoc, PoiDoc, ProfileDoc, SurfaceDoc
-from server.tasks import compute_plan, warm_up
 
 SIDE_PX, CELL_M = 11_500, 0.10
 PLACES_M = ((500.0, 500.0), (540.0, 520.0), (560.0, 580.0), (620.0, 600.0))

@@ -14,8 +14,8 @@ from pyproj import CRS
 from scipy import ndimage
 from skimage import morphology
 
-from planning.dsm import Dsm
-from planning.surface import dilate
+from planning.safe_surface.surface import dilate
+from planning.terrain.dsm import Dsm
 from tests.reference.dilation import ball_structure
 
 SIDE_PX = 2048

@@ -12,9 +12,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mapping.roi import search_sector, sector_points, to_enu
+from mapping.geometry.arrays import F64
+from mapping.perceiving.roi import search_sector, sector_points, to_enu
 from mapping.voxels import VoxelMap
-from tests.mapping.clouds import F64, seen_by_camera
+from tests.mapping.clouds import seen_by_camera
 from tests.reference.octomap import octree
 
 RESOLUTION_M, RANGE_M = 0.5, 40.0

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 
 from server.cli import main
-from server.flying.nodes import SIMULATED_SENSORS
-from server.supervisor import Supervisor
+from server.heard.node_states import SIMULATED_SENSORS
+from server.work.supervisor import Supervisor
 
 _start = Supervisor.start
 

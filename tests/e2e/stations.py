@@ -9,13 +9,13 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import httpx
 
-from telemetry.node_lock import running_nodes
+from telemetry.bus.node_lock import running_nodes
 from tests.server.station import PATIENCE_S, ok
 
 Point = dict[str, Any]

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
 
 from server.schemas import LinkMessage, ObstaclesMessage
-from server.schemas.obstacles import AlertDoc, ObstaclesState
-from telemetry.messages import Candidate, LinkStatus
+from server.schemas.obstacle_docs import AlertDoc, ObstaclesState
+from telemetry.topics.messages import Candidate, LinkStatus
 from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import connect, enter, open_demo, visit
 from tests.server.obstacle_messages import alert, approach, obstacle

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from mapping.radar import AWR1843, POSITION2GO
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, visit
 from tests.server.test_cli_radar import echo

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import start_simulator, visit
+from tests.e2e.steps import start_simulator, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 

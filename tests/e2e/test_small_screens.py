@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import FloatRect, Page, WebSocketRoute, expect
 
 from server.schemas import LinkMessage, ObstaclesMessage, PerceptionMessage
-from server.schemas.obstacles import AlertDoc, ManoeuvreDoc, ObstaclesState
-from telemetry.messages import Candidate, LinkStatus
+from server.schemas.obstacle_docs import AlertDoc, ManoeuvreDoc, ObstaclesState
+from telemetry.topics.messages import Candidate, LinkStatus
 from tests.e2e.stations import Station
 from tests.e2e.steps import visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from server.sensor_token import sensor_token
+from server.door.sensor_token import sensor_token
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, drawn, open_demo
 

@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mapping.frames import attitude_rotation
-from mapping.ground import GroundGrid, ground_grid
-from mapping.perceiving import CameraPose, Cloud, FrameResult, RadarPerception, RadarScan, VisionPerception
-from mapping.perceiving.base import Perception
+from mapping.geometry.frames import attitude_rotation
+from mapping.perceiving import FrameResult, RadarPerception, VisionPerception
+from mapping.perceiving.ground import GroundGrid, ground_grid
+from mapping.perceiving.perception import Perception
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, packed
 
 DOWN_5_M = 5.0
 

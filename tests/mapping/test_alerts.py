@@ -5,8 +5,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.alerts import AlertBook, AlertEvent
-from mapping.obstacles import Found
+from mapping.perceiving.alerts import AlertBook, AlertEvent
+from mapping.perceiving.obstacles import Found
 
 
 def seen_at(east: float, north: float, *, up: float = 0.0, size: float = 1.0) -> Found:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.braking import LEAN_M_S2, Braking, Stopping
+from mapping.perceiving.braking import LEAN_M_S2, Braking, Stopping
 
 MEASURED_M = {3.0: 4.8, 4.0: 6.7, 5.0: 8.8, 6.2: 11.3, 8.0: 15.4}
 """ArduCopter 4.7, default parameters: from BRAKE to standstill."""

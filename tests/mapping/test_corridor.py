@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.braking import Braking
-from mapping.corridor import MissionLine, length_m, tube_points
+from mapping.perceiving.braking import Braking
+from mapping.perceiving.corridor import MissionLine, length_m, tube_points
 
 places = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(0, 20))
 lines = st.lists(places, min_size=2, max_size=6).map(lambda p: np.array(p, np.float64))

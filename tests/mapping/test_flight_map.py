@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from mapping import quaternions
-from mapping.perceiving import CameraPose, Settings, VisionPerception
+from mapping.geometry import quaternions
+from mapping.perceiving import Settings, VisionPerception
 from mapping.perceiving.camera_path import PathWatch
 from mapping.perceiving.flight_map import FlightMap
+from mapping.sensor_frames import SlamPose
 from tests.mapping.flights import Flight
 from tests.mapping.test_vision_perception import floor, flying, pole, slam_of
 

@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Transformer
 
-from mapping.frames import LocalFrame, SphereFrame, attitude_rotation, heading_rotation
+from mapping.geometry.frames import (
+    LocalFrame,
+    SphereFrame,
+    apart_m,
+    attitude_rotation,
+    heading_rotation,
+    moved_deg,
+    offset_m,
+)
 
 latitudes = st.floats(-80, 80)
 longitudes = st.floats(-180, 180)

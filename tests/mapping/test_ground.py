@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.ground import ground_grid
+from mapping.perceiving.ground import ground_grid
 from tests.reference.ground import shell_distance
 
 NORTH_UP = np.array([[0.0, -2.0, 20.0], [2.0, 0.0, 20.0]])

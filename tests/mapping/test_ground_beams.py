@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.frames import attitude_rotation
-from mapping.ground import GroundGrid, ground_grid
-from mapping.ground_beams import BeamShape
+from mapping.geometry.frames import attitude_rotation
+from mapping.perceiving.ground import GroundGrid, ground_grid
+from mapping.perceiving.ground_beams import BeamShape
 from tests.reference.ground import flat_ground_area, flat_ground_gap
 
 SHAPE = BeamShape()

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from mapping.obstacles import MOST_VOXELS, SECTORS, clusters, obstacles, sweep, time_to_contact_s
+from mapping.perceiving.obstacles import MOST_VOXELS, SECTORS, clusters, obstacles, sweep, time_to_contact_s
 
 ORIGIN, STILL = np.zeros(3), np.zeros(3)
 cells = st.lists(st.tuples(*[st.integers(0, 7)] * 3), min_size=1, max_size=60, unique=True)

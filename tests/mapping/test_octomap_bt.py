@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapping.errors import CapacityError, FormatError
-from mapping.octomap_bt import map_from_bt, read_bt, write_bt
 from mapping.voxels import VoxelMap
+from mapping.voxels.octomap_bt import map_from_bt, read_bt, write_bt
 from tests.reference.octomap import octree
 
 FILES = {"octomap/geb079.bt": (532_566, 0.08), "freiburg1/freiburg1_360.bt": (1_547_112, 0.02)}

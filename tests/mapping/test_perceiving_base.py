@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from mapping.braking import Braking
-from mapping.perceiving import RadarPerception, RadarScan, RangePerception, RangeScan, Settings, VisionPerception
-from mapping.perceiving.base import Perception
+from mapping.perceiving import RadarPerception, RangePerception, Settings, VisionPerception
+from mapping.perceiving.braking import Braking
+from mapping.perceiving.perception import Perception
+from mapping.sensor_frames import RadarFrame, RangeFrame
 from tests.mapping.flights import Flight, flat_ground
 
 MAST = np.array([[0.0, 30.0, 0.5]])

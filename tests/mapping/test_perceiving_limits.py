@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from mapping.corridor import tube_points
 from mapping.errors import CapacityError, ParameterError
 from mapping.perceiving import RadarPerception, Settings
-from mapping.perceiving.base import LONGEST_CORRIDOR_M
-from mapping.perceiving.limits import check_settings, corridor_points
+from mapping.perceiving.corridor import tube_points
+from mapping.perceiving.perception import LONGEST_CORRIDOR_M
+from mapping.perceiving.settings_limits import check_settings, corridor_points
 
 LONGEST = np.array([[0.0, 0.0, 0.0], [0.0, LONGEST_CORRIDOR_M, 0.0]])
 

@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from mapping import quaternions
-from mapping.perceiving import RadarPerception, RadarScan, RangePerception, RangeScan, Settings
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose
+from mapping.perceiving import RadarPerception, RangePerception, Settings
 from mapping.perceiving.remembered import LOOKS, MOST_COLUMNS, Field, Remembered, Way
-from mapping.poses import Pose
+from mapping.sensor_frames import RangeFrame
+from tests.mapping.flights import radar_frame
 
 F64 = NDArray[np.float64]
 WAY = Way(depth_m=10.0, half_angle_rad=math.radians(12.0), half_width_m=0.8, height_m=2.0)

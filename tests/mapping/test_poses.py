@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping import quaternions
-from mapping.poses import Pose, PoseTrack, TrackParams
+from mapping.geometry import quaternions
+from mapping.geometry.poses import Pose, PoseTrack, TrackParams
 
 
 def level(heading: float = 0.0) -> np.ndarray:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from mapping import quaternions
-from mapping.frames import attitude_rotation
+from mapping.geometry import quaternions
+from mapping.geometry.frames import attitude_rotation
 
 angles = st.floats(-3.1, 3.1)
 attitudes = st.tuples(angles, st.floats(-1.5, 1.5), angles)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mapping.geometry.poses import Pose
 from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence
-from mapping.poses import Pose
-from mapping.radar_targets import Polar
+from mapping.radar.targets import Polar
 
 SURE = np.array([1.0])
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.perceiving import RadarPerception, RadarScan, Settings
+from mapping.geometry.poses import Pose
+from mapping.perceiving import RadarPerception, Settings
 from mapping.perceiving.radar_passing import Passing, PassingParams
-from mapping.poses import Pose
-from tests.mapping.flights import Flight, flat_ground, snr_db
+from tests.mapping.flights import Flight, flat_ground, radar_frame, snr_db
 
 NONE = (np.empty((0, 3)), np.empty(0, np.bool_))
 

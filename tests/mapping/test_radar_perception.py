@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.ground import GroundGrid, ground_grid
-from mapping.perceiving import RadarPerception, RadarScan, Settings
-from tests.mapping.flights import Flight, flat_ground, snr_db
+from mapping.perceiving import RadarPerception, Settings
+from mapping.perceiving.ground import GroundGrid, ground_grid
+from tests.mapping.flights import Flight, flat_ground, radar_frame, snr_db
 
 AWAY_M = 14.0
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.frames import attitude_rotation, heading_rotation
-from mapping.obstacles import clusters
-from mapping.radar_targets import Gate, Variant, in_gate, polar, to_enu
+from mapping.geometry.frames import attitude_rotation, heading_rotation
+from mapping.perceiving.obstacles import clusters
+from mapping.radar.targets import Gate, Variant, in_gate, polar, to_enu
 
 angles = st.floats(-0.6, 0.6)
 

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mapping.errors import CapacityError, ParameterError
-from mapping.roi import search, search_sector, sector_points, to_enu
+from mapping.perceiving.roi import search, search_sector, sector_points, to_enu
 from mapping.voxels import VoxelMap
 from tests.reference.sector import sector
 

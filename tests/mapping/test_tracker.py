@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.tracker import Tracker, TrackerParams, TrackState
+from mapping.tracking import Tracker, TrackerParams, TrackState
 from tests.mapping.radar_scenes import Frame, Radar, frames, movers
 
 COORDINATES = ("cartesian", "polar")

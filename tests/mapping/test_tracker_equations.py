@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mapping.tracker import TrackerParams, cartesian, polar
-from mapping.tracker.assignment import assign
-from mapping.tracker.kalman import distances, spreads, update, variances
+from mapping.tracking import TrackerParams, cartesian, polar
+from mapping.tracking.kalman import distances, spreads, update, variances
+from mapping.tracking.tracker import assign
 from tests.reference import gnn, kalman
 
 FOREVER = math.inf

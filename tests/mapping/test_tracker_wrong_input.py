@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mapping.errors import ParameterError
-from mapping.tracker import Tracker, TrackerParams
+from mapping.tracking import Tracker, TrackerParams
 
 HERE = {"position_enu_m": (0.0, 0.0), "velocity_enu_m_s": (0.0, 0.0), "heading_rad": 0.0}
 

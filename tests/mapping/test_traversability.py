@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mapping import traversability
 from mapping.errors import CapacityError, ParameterError
 from mapping.traversability import TraversabilityParams, traversability_map
-from planning.geotiff import read_dsm
+from planning.terrain.geotiff import read_dsm
 from tests.reference.traversability import patch_plane
 
 

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping import quaternions
-from mapping.frames import heading_rotation
-from mapping.ground import ground_grid
-from mapping.perceiving import CameraPose, Cloud, Settings, VisionPerception
-from mapping.perceiving.vision import voxel_centres
+from mapping.geometry import quaternions
+from mapping.geometry.frames import heading_rotation
+from mapping.perceiving import Settings, VisionPerception
+from mapping.perceiving.ground import ground_grid
+from mapping.perceiving.vision_perception import voxel_centres
+from mapping.sensor_frames import CloudFrame, SlamPose, packed
 from tests.mapping.flights import Flight, flat_ground
 
 

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from mapping.octomap_bt import read_bt
+from mapping.geometry.arrays import F64
 from mapping.voxels import VoxelMap
-from tests.mapping.clouds import F64, car_clouds, gicp_clouds, seen_by_camera
+from mapping.voxels.octomap_bt import read_bt
+from tests.mapping.clouds import car_clouds, gicp_clouds, seen_by_camera
 from tests.reference.octomap import octree
 
 Keys = set[tuple[int, ...]]

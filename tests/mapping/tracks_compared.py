@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.tracker import Tracker, TrackerParams
+from mapping.geometry.arrays import F64
+from mapping.tracking import Tracker, TrackerParams
 from tests.mapping.radar_scenes import Frame, frames, movers
 from tests.reference.stonesoup_gnn import follow
 

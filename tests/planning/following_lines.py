@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from planning.certificate.places import distance_flown
 from planning.following.reference import Reference
 

@@ -8,8 +8,8 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.model import Home, Mission, MissionItem, Poi, SampledPath, Timing
+from planning.terrain.dsm import Dsm
 
 HOSTILE = "<script>alert(1)</script>&\"'\u202e\x00\x1b]]>, line\nbreak"
 

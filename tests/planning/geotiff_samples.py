@@ -8,6 +8,8 @@ import rasterio
 from affine import Affine
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32
+
 UTM = "EPSG:32633"
 HALF_METRE = Affine(0.5, 0.0, 500_000.0, 0.0, -0.5, 4_170_000.0)
 

@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from planning.demo import demo_dsm
-from planning.dsm import Dsm
+from planning.ground.demo_hillside import demo_dsm
 from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm
 
 QUAD = VehicleProfile("quad", rtl_height_m=60.0, position_error_m=0.5)
 

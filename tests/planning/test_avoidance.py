@@ -9,16 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from planning.avoidance import (
-    AvoidanceParams,
-    Manoeuvre,
-    NoWay,
-    Seen,
-    around,
-    over,
-)
+from mapping.geometry.arrays import F32, F64
+from planning.evading.manoeuvres import AvoidanceParams, Manoeuvre, NoWay, Seen, around, over
 from tests.reference.box_distance import polyline_boxes_m
 
 F64 = NDArray[np.float64]

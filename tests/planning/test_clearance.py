@@ -11,11 +11,11 @@ import pytest
 from affine import Affine
 from pyproj import CRS, Geod
 
-from planning.clearance import certificate_json, certify
-from planning.dsm import Dsm
+from planning.certificate.clearance import certificate_json, certify
 from planning.errors import MissionError, ParameterError
-from planning.margins.vehicle_terms import budget_of
+from planning.missions.vehicle_terms import budget_of
 from planning.model import Certificate, ClearanceParams, FlownLine, Unjudged, VehicleProfile
+from planning.terrain.dsm import Dsm
 
 WEST, NORTH = 500_000.0, 5_000_100.0
 PARAMS = ClearanceParams(3.0, vehicle_radius_m=0.35, position_error_m=1.0, rtl_height_m=40.0)

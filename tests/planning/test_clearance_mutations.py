@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.clearance import certify
-from planning.dsm import Dsm
-from planning.flown import flown_line
+from planning.certificate.clearance import certify
+from planning.missions.flown import flown_line
 from planning.model import ClearanceParams, FlownLine, Home, Mission, MissionItem
+from planning.terrain.dsm import Dsm
 from tests.planning.test_clearance import NORTH, PARAMS, WEST, dsm_of
 from tests.reference import clearance as oracle
 

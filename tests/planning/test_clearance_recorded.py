@@ -13,13 +13,13 @@ from affine import Affine
 from pyproj import CRS, Proj
 from scipy import ndimage
 
+from planning.certificate.clearance import certify
 from planning.certificate.places import places_along
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
-from planning.clearance import certify
-from planning.dsm import Dsm
-from planning.flown import flown_line
+from planning.missions.flown import flown_line
 from planning.model import ClearanceParams, Home, Mission, MissionItem
+from planning.terrain.dsm import Dsm
 from tests.reference import clearance as oracle
 
 DEFAULT_RTL_M = 15.0

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from planning.avoidance import AvoidanceParams, Manoeuvre, NoWay, Seen, climb
-from planning.avoiding.standing import standing
+from mapping.geometry.arrays import F64
+from planning.evading.columns import standing
+from planning.evading.manoeuvres import AvoidanceParams, Manoeuvre, NoWay, Seen, climb
 from tests.reference.box_distance import polyline_boxes_m
 from tests.telemetry.avoiding_bench import Wall, craft, state
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planning.corridor import HEIGHT_UNIT_M, bends, corridor
+from planning.missions.band import HEIGHT_UNIT_M, bends, corridor
 
 S = np.arange(400, dtype=np.float64) * 0.1
 HILLS = 3 * np.sin(S / 4) + 0.4 * np.sin(2 * S)

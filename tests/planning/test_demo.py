@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from planning.demo import demo_dsm, demo_pois, demo_survey_polygon, small_hill
-from planning.dsm import Dsm, is_amsl
-from planning.spikes import find_spikes
+from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polygon, small_hill
+from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.spikes import find_spikes
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import ndimage
 
-from planning.dilation.element import ball, coarsest_block, finest_block, work
-from planning.dilation.kernel import dilate_grid
-from planning.dilation.smooth import gaussian_grid
+from planning.safe_surface.element import ball, coarsest_block, finest_block, work
+from planning.safe_surface.kernel import dilate_grid
+from planning.safe_surface.smooth import gaussian_grid
 from tests.reference.dilation import dilate_slowly
 
 HEIGHTS = st.one_of(st.just(np.nan), st.floats(-400, 4000, width=32))

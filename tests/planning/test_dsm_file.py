@@ -14,14 +14,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rasterio.enums import Resampling
 
-from planning.dsm import Dsm
 from planning.errors import NoElevationError, ParameterError, RasterError
-from planning.geotiff import DsmFile, open_dsm, read_dsm
-from planning.rasters import decode, dsm_file
-from planning.rasters.heights import mask_and_scale
-from planning.rasters.limits import RasterLimits
-from planning.rasters.part_of import needed_pixels, part_of
-from planning.rasters.reading import Declared, Read, all_of, read_surface
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import DsmFile, open_dsm, read_dsm
+from planning.terrain.rasters import decode, dsm_file
+from planning.terrain.rasters.heights import mask_and_scale
+from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.part_of import needed_pixels, part_of
+from planning.terrain.rasters.reading import Declared, Read, all_of, read_surface
 from tests.planning.geotiff_samples import HALF_METRE, write_raster
 
 DEGREES = Affine(2e-6, 0.0, 14.99, 0.0, -1.6e-6, 37.73)

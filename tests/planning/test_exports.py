@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
 
-from planning.dsm import Dsm
-from planning.exports import FILES, export_file, report_input
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
 from planning.model import Camera
 from planning.plan import Plan, plan_mission
+from planning.report.exports import FILES, export_file, report_input
+from planning.terrain.dsm import Dsm
 from tests.planning.format_examples import HOSTILE
 from tests.planning.plan_examples import QUAD, pois_at, request_over, small_dsm
 

@@ -6,7 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from planning.feasibility import commanded_speed_m_s, feasibility_json, feasibility_of, photos_row, verdict_words
+from planning.missions.feasibility import (
+    commanded_speed_m_s,
+    feasibility_json,
+    feasibility_of,
+    photos_row,
+    verdict_words,
+)
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 
 QUAD = VehicleProfile("quad", endurance_s=1000.0, reserve_share=0.25)

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planning.report.figures.chart import Chart, Mark, Series, render_chart
-from planning.report.figures.thin import keep_extremes
+from planning.report.figures.chart import Chart, Mark, Series, keep_extremes, render_chart
 from planning.report.figures.ticks import label, padded, round_step, ticks
-from planning.surface import fit_within
+from planning.safe_surface.surface import fit_within
 from tests.planning.format_examples import HOSTILE, make_dsm
 
 

@@ -9,10 +9,10 @@ from affine import Affine
 from pymavlink import mavutil
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration, usable_endurance_s
 from planning.model import Home, Mission, MissionItem, VehicleProfile
+from planning.terrain.dsm import Dsm
 
 # The parameters that the recorded flight set; the rest were the autopilot's defaults, and so are the profile's.
 RECORDED = VehicleProfile(

@@ -10,10 +10,10 @@ from affine import Affine
 from pyproj import CRS
 
 from planning.certificate.unjudged import unjudged_words
-from planning.dsm import Dsm
 from planning.errors import MissionError
-from planning.flown import flown_line
+from planning.missions.flown import flown_line
 from planning.model import Firmware, FlownLine, Home, Mission, MissionItem
+from planning.terrain.dsm import Dsm
 
 NAN = math.nan
 GROUND_M = 120.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mapping.geometry.arrays import F64
 from planning.following.figures import TrackFigures, judge, track_figures
 from planning.following.track import Track
-from planning.model import F64
 from tests.planning.following_lines import flown, line
 
 ROUTE = line([(0, 0, 12), (40, 0, 12), (80, 0, 12), (80, 40, 12)])

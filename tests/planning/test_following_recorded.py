@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from planning.dsm import Dsm
 from planning.following.figures import track_figures
 from planning.following.nearest import follow
 from planning.following.reference import level_model, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.detect import read_mission
-from planning.geotiff import read_dsm
 from planning.model import Mission, VehicleProfile
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm
 
 RECORDED = VehicleProfile(
     "recorded", mean_speed_m_s=2.0, max_speed_m_s=3.0, max_climb_m_s=2.0, max_descent_m_s=1.5, rtl_height_m=70.0

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Geod
 
-from planning.dsm import Dsm
 from planning.following.figures import judge, track_figures
 from planning.following.lag import late_s, planned_alt_dsm_m, planned_s
 from planning.following.live import Following, follow_on
 from planning.following.nearest import follow
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
+from planning.terrain.dsm import Dsm
 from tests.planning.following_lines import flown, line
 from tests.reference import clearance as clearance_oracle
 from tests.reference import following as oracle

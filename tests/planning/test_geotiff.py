@@ -8,8 +8,6 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.demo import demo_dsm
-from planning.dsm import Dsm
 from planning.errors import (
     MissingCrsError,
     NoElevationError,
@@ -18,7 +16,9 @@ from planning.errors import (
     RasterFormatError,
     RasterTooLargeError,
 )
-from planning.geotiff import RasterLimits, read_dsm, read_dsm_reported, write_dsm
+from planning.ground.demo_hillside import demo_dsm
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import RasterLimits, read_dsm, read_dsm_reported, write_dsm
 from tests.planning.geotiff_samples import HALF_METRE, UTM, hill, write_raster
 
 

@@ -8,7 +8,7 @@ import rasterio
 from pyproj import CRS
 
 from planning.errors import MissingCrsError, NoElevationError, RasterError, RasterFormatError
-from planning.geotiff import read_dsm, read_dsm_reported, read_orthophoto
+from planning.terrain.geotiff import read_dsm, read_dsm_reported, read_orthophoto
 from tests.planning.geotiff_samples import write_raster
 
 AS_THEY_ARE = [

@@ -7,13 +7,13 @@ import pytest
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
-from planning.cells.cells import place_cells
-from planning.cells.squares import square_grid, squares
-from planning.geotiff import read_dsm, read_dsm_reported
-from planning.rasters.mapping import Mapping, extent_of, source_mapping
+from mapping.geometry.arrays import F32
+from planning.terrain.cells.cells import place_cells
+from planning.terrain.cells.squares import square_grid, squares
+from planning.terrain.geotiff import read_dsm, read_dsm_reported
+from planning.terrain.rasters.mapping import Mapping, extent_of, source_mapping
 from tests.planning.geotiff_samples import hill, write_raster
 
 UTM = CRS.from_epsg(32633)

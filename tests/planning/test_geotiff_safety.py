@@ -17,10 +17,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import PlanningError, RasterError, RasterFormatError, RasterTooLargeError
-from planning.geotiff import RasterLimits, read_dsm, read_dsm_reported, read_orthophoto
-from planning.rasters import sandbox
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import RasterLimits, read_dsm, read_dsm_reported, read_orthophoto
+from planning.terrain.rasters import sandbox
 from tests.planning.geotiff_samples import HALF_METRE, UTM, hill, write_raster
 
 BOUNDS = (500_000.0, 4_169_980.0, 500_025.0, 4_170_000.0)

@@ -3,8 +3,8 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
-from planning.hillshade import SUN_ELEVATION_DEG, UNKNOWN_RGB, height_colors, hillshade, scale_rgb
+from planning.terrain.dsm import Dsm
+from planning.terrain.hillshade import SUN_ELEVATION_DEG, UNKNOWN_RGB, height_colors, hillshade, scale_rgb
 
 
 def make(heights) -> Dsm:

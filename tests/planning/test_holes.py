@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from skimage.measure import label
 
-from planning.dsm import Dsm
-from planning.holes import fill_holes
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
 
 UTM = CRS.from_epsg(32633)
 

@@ -7,10 +7,10 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import DatumError, MissionError, PoiError
-from planning.home import home_from_dsm, item_heights
+from planning.missions.home import home_from_dsm, item_heights
 from planning.model import MissionParams
+from planning.terrain.dsm import Dsm
 
 elevation = np.full((50, 50), 321.5, dtype=np.float32)
 elevation[:, 40:] = np.nan

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.home_search import SPARE_M, nearest_standing
-from planning.clearance import certify
-from planning.dsm import Dsm
-from planning.geotiff import read_dsm
 from planning.model import ClearanceParams, FlownLine, Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm
 from tests.planning.test_clearance import NORTH, WEST, codes, dsm_of, line_of
 from tests.reference import home_ground as oracle
 

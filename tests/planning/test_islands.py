@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.traversability import traversability_map
-from planning.geotiff import read_dsm
-from planning.islands import Islands
-from planning.traversable import traversable_ground
+from planning.ground.islands import Islands
+from planning.ground.traversable import traversable_ground
+from planning.terrain.geotiff import read_dsm
 
 CELL_M = 0.5
 MIDDLE = (120, 120)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from planning.clearance import certify
+from planning.certificate.clearance import certify
 from planning.errors import FormatError
-from planning.flown import flown_line
 from planning.formats import read_flight, read_mission, write_kml
 from planning.formats.safe_text import said_once
+from planning.missions.flown import flown_line
 from planning.plan import plan_mission
 from tests.planning.plan_examples import request_over, small_dsm
 

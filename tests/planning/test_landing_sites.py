@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from mapping.traversability import Traversability, traversability_map
 from planning.errors import ParameterError
-from planning.geotiff import read_dsm
-from planning.landing_sites import FARTHEST_OBSTACLE_M, LandingParams, landing_sites
-from planning.traversable import site_places, sites_near, traversable_ground
+from planning.ground.landing_sites import FARTHEST_OBSTACLE_M, LandingParams, landing_sites
+from planning.ground.traversable import site_places, sites_near, traversable_ground
+from planning.terrain.geotiff import read_dsm
 
 CELL_M = 0.5
 

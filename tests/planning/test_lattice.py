@@ -11,16 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.cells.cells import Cells, Layout, place_cells, ringed, square_cells
-from planning.cells.lattice import Lattice, bend_at, bend_range, corner, quad_of, straight
 from planning.certificate.around import cells_around
 from planning.certificate.home_ground import home_ground
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import LEAF_PX, cells_pyramid
 from planning.certificate.quads import quad_distance_sq
-from planning.rasters.mapping import source_mapping
+from planning.terrain.cells.cells import Cells, Layout, place_cells, ringed, square_cells
+from planning.terrain.cells.lattice import Lattice, bend_at, bend_range, corner, quad_of, straight
+from planning.terrain.rasters.mapping import source_mapping
 from tests.planning.test_clearance import NORTH, WEST, dsm_of
 from tests.reference import proof
+from tests.seeds import seeds
 
 ROWS, COLUMNS = 43, 50
 

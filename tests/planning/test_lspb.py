@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.errors import ParameterError
-from planning.lspb import lspb
 from planning.model import PathParams
+from planning.route.lspb import lspb
 from tests.reference.lspb import integrated, printed_law
 
 lengths = st.floats(0.05, 2000)

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import CapacityError, DatumError, MissionError
-from planning.home import home_from_dsm
-from planning.mission import EXCESSES_M, BuiltMission, build_mission, decimation_trade
+from planning.missions.home import home_from_dsm
+from planning.missions.mission import EXCESSES_M, BuiltMission, build_mission, decimation_trade
+from planning.missions.vehicle_profile import load_profile, path_params
 from planning.model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
-from planning.path import sampled_path
-from planning.vehicle_profile import load_profile, path_params
+from planning.route.path import sampled_path
+from planning.terrain.dsm import Dsm
 
 QUAD = load_profile("generic-quad")
 PX4 = load_profile("x500-rtk-px4")

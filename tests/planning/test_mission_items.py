@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import MissionError, ParameterError
-from planning.mission_items import (
+from planning.missions.mission_items import (
     Heights,
     Place,
     aiming,
@@ -24,6 +23,7 @@ from planning.mission_items import (
     waypoint,
 )
 from planning.model import Home, MissionParams
+from planning.terrain.dsm import Dsm
 
 RELATIVE = Heights(3, 100.0)
 HOME = Home(45.15, 15.0, 100.0)

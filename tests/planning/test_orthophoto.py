@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
+from mapping.geometry.arrays import U8
 from planning.errors import MissingCrsError, ParameterError, RasterError, RasterFormatError, RasterTooLargeError
-from planning.geotiff import RasterLimits, read_orthophoto
+from planning.terrain.geotiff import RasterLimits, read_orthophoto
 from tests.planning.geotiff_samples import HALF_METRE, UTM, write_raster
 
 CRS_UTM = CRS.from_user_input(UTM)

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from planning.exports import export_file
 from planning.formats import qgc_plan, wpl
-from planning.other_surface import other_surface
+from planning.formats.other_surface import other_surface
 from planning.plan import plan_mission
+from planning.report.exports import export_file
 from tests.planning.plan_examples import request_over, small_dsm
 
 

@@ -7,11 +7,12 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from mapping.geometry.arrays import F64
 from planning import part, plan
-from planning.dsm import Dsm, SurfaceModel
 from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 
 def hills(size: int = 1400) -> Dsm:

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.climb import slope_limits
-from planning.dsm import Dsm
 from planning.errors import ParameterError, PoiError
 from planning.model import PathParams
-from planning.path import sample_segments, sampled_path
+from planning.route.path import sample_segments, sampled_path
+from planning.route.slopes import slope_limits
+from planning.terrain.dsm import Dsm
 
 coordinate = st.floats(-300, 300).map(lambda v: round(v, 2))
 

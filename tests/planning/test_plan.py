@@ -13,13 +13,13 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import CapacityError, DatumError, MissionError, ParameterError, PoiError
-from planning.flown import flown_line
 from planning.formats import qgc_plan, wpl
+from planning.missions.flown import flown_line
 from planning.model import Mission, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission, plan_trade, read_back
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm
 from tests.planning.plan_examples import QUAD, pois_at, request_over, small_dsm
 from tests.reference import clearance as oracle
 

@@ -10,15 +10,15 @@ import pytest
 from affine import Affine
 
 from planning import part
-from planning.certify_part import certify_part
-from planning.dsm import Dsm, SurfaceModel
 from planning.errors import PoiError
-from planning.exports import export_file
-from planning.geotiff import open_dsm, read_dsm
 from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.part import certify_part
 from planning.plan import Plan, plan_mission
-from planning.rasters import dsm_file
+from planning.report.exports import export_file
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.terrain.geotiff import open_dsm, read_dsm
+from planning.terrain.rasters import dsm_file
 from tests.planning.geotiff_samples import write_raster
 
 KINDS = {

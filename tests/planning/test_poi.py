@@ -5,10 +5,10 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import PoiError
 from planning.model import Poi
-from planning.poi import check_pois
+from planning.route.poi import check_pois
+from planning.terrain.dsm import Dsm
 
 elevation = np.zeros((100, 100), dtype=np.float32)
 elevation[:, 60:70] = np.nan

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from planning.errors import FormatError
 from planning.formats import safe_text, write_geojson, write_kml, write_plan, write_wpl
+from planning.formats.poi_files import looks_swapped, read_pois, warn_swapped, write_pois_csv
 from planning.model import Poi
-from planning.poi_files import looks_swapped, read_pois, warn_swapped, write_pois_csv
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path
 
 TWO = (Poi(47.1, 8.2, "a", 3.0), Poi(47.2, 8.3, "b", 0.0))

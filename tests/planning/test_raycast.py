@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.raycast import raycast
+from planning.terrain.dsm import Dsm
+from planning.terrain.raycast import raycast
 from tests.reference.raycast import first_touch
 
 UTM = CRS.from_epsg(32633)

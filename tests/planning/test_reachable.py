@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planning.reachable import ACCEL_M_S2, HORIZON_S, roomiest, shortfall
-from planning.steering import ENOUGH, steer
-from planning.velocity_obstacles import Limits, Obstacles
+from planning.evading.reachable import ACCEL_M_S2, HORIZON_S, roomiest, shortfall
+from planning.evading.steering import ENOUGH, steer
+from planning.evading.velocity_obstacles import Limits, Obstacles
 
 LIMITS = Limits(max_speed_m_s=3.0)
 NORTH = np.array([0.0, 2.0])

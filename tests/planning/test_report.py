@@ -6,11 +6,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from planning.feasibility import feasibility_of
+from planning.missions.feasibility import feasibility_of
 from planning.model import Certificate, FlownLine, LegClearance, Reason, SurfaceParams, VehicleProfile, WorstPoint
 from planning.report import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
-from planning.survey_coverage import SurveyCoverage
+from planning.route.survey_coverage import SurveyCoverage
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.flight_time.scurve import INPUT_TIME_CONSTANT_S, Axes, Limits, leg, overlap_s, speed_up
+from planning.flight_time.scurve import INPUT_TIME_CONSTANT_S, Axes, LegLimits, leg, overlap_s, speed_up
 
 AXES = Axes(3.0, 2.0, 1.5, 2.5, 1.0, 5.0, 1.0)
 limits = st.builds(Limits, st.floats(0.2, 20), st.floats(0.2, 6), st.floats(0.2, 10))

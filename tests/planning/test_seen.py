@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from mapping.frames import LocalFrame
+from mapping.geometry.frames import LocalFrame
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import max_pyramid
-from planning.dsm import Dsm
-from planning.seen import Columns, Conflict, burn, columns_from_voxels, conflicts
+from planning.evading.seen import Columns, Conflict, burn, columns_from_voxels, conflicts
+from planning.terrain.dsm import Dsm
 from tests.reference.box_distance import polyline_boxes_m
 
 WEST_M, NORTH_M = 500_000.0, 4_100_000.0

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from planning.avoiding.model import NoWay
-from planning.avoiding.room import Seen
-from planning.avoiding.sidestep import AFTER_S, Mover, Proposed, Sidestep, sidestep
+from mapping.geometry.arrays import F64
+from planning.evading.keep_clear import Seen
+from planning.evading.model import NoWay
+from planning.evading.sidestep import AFTER_S, Mover, Proposed, Sidestep, sidestep
 from tests.planning.test_avoidance import slope
 from tests.reference.box_distance import polyline_boxes_m
 

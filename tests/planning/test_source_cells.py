@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
-from numpy.typing import NDArray
 
-from planning.cells.cells import Cells, ringed, square_cells
+from mapping.geometry.arrays import F32, F64
 from planning.certificate.around import cells_around
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.returns import return_altitude
-from planning.dsm import Dsm
-from planning.geotiff import read_dsm, read_dsm_reported
-from planning.holes import fill_holes
-from planning.seen import Columns, burn
+from planning.evading.seen import Columns, burn
+from planning.terrain.cells.cells import Cells, ringed, square_cells
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm, read_dsm_reported
+from planning.terrain.holes import fill_holes
 from server.library.terrains import load_terrain, store_terrain
 from tests.planning.geotiff_samples import hill, write_raster
 

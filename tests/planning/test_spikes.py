@@ -5,12 +5,12 @@ import pytest
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from pyproj import CRS
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F32
 from planning.errors import ParameterError
-from planning.spikes import find_spikes, remove_spikes
+from planning.terrain.dsm import Dsm
+from planning.terrain.spikes import find_spikes, remove_spikes
 
 UTM = CRS.from_epsg(32633)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from planning.avoidance import Manoeuvre, NoWay, Seen, around, over
-from planning.avoiding.boxes import nearest_box
-from planning.avoiding.standing import standing
-from planning.seen import conflicts
+from mapping.geometry.arrays import F64
+from planning.evading.boxes import nearest_box
+from planning.evading.columns import standing
+from planning.evading.manoeuvres import Manoeuvre, NoWay, Seen, around, over
+from planning.evading.seen import conflicts
 from tests.reference.box_distance import polyline_boxes_m
 
 F64 = NDArray[np.float64]

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from planning.reachable import shortfall
-from planning.steering import SHARES, steer, with_ground
-from planning.velocity_obstacles import Limits, Obstacles, approaches
+from planning.evading.reachable import shortfall
+from planning.evading.steering import SHARES, steer, with_ground
+from planning.evading.velocity_obstacles import Limits, Obstacles, approaches
 
 LIMITS = Limits(max_speed_m_s=5.0)
 NORTH = np.array([0.0, 3.0])

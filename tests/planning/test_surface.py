@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from scipy import ndimage
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
 from planning.model import SurfaceParams
-from planning.surface import block_max, dilate, dilate_blocks, safe_surface, safe_surface_at
+from planning.safe_surface.surface import block_max, dilate, dilate_blocks, safe_surface, safe_surface_at
+from planning.terrain.dsm import Dsm
 from tests.reference.dilation import ball_structure
 
 UTM = CRS.from_epsg(32633)

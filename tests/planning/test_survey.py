@@ -8,10 +8,10 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError, PoiError
 from planning.model import Camera
-from planning.survey import SurveyPlan, survey_lines
+from planning.route.survey import SurveyPlan, survey_lines
+from planning.terrain.dsm import Dsm
 
 CAMERA = Camera(6000, 4000, 20.0, 23.5, 15.6)
 CORNER = np.array([500_000.0, 5_000_000.0])

@@ -10,15 +10,15 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.demo import demo_dsm, demo_survey_polygon
-from planning.dsm import Dsm
+from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
+from planning.missions.vehicle_profile import load_profile, path_params
 from planning.model import Camera, FlownLine, MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
+from planning.report.summary import plan_summary
 from planning.request import PlanRequest, survey_request
-from planning.summary import plan_summary
-from planning.survey import SurveyPlan, survey_lines
-from planning.survey_coverage import SurveyCoverage, photo_places, survey_coverage
-from planning.vehicle_profile import load_profile, path_params
+from planning.route.survey import SurveyPlan, survey_lines
+from planning.route.survey_coverage import SurveyCoverage, photo_places, survey_coverage
+from planning.terrain.dsm import Dsm
 from tests.reference.photo_cover import photos_of_each_cell
 
 CAMERA = Camera(6000, 4000, 20.0, 23.5, 15.6)

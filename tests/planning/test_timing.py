@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.errors import ParameterError
-from planning.lspb import lspb
 from planning.model import PathParams, SampledPath
-from planning.timing import path_timing
+from planning.route.lspb import lspb
+from planning.route.timing import path_timing
 
 
 def straight(alt_m: np.ndarray, vertex: list[int], step_m: float = 0.1) -> SampledPath:

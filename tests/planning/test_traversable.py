@@ -14,10 +14,10 @@ from pyproj import CRS
 
 from mapping.errors import CapacityError
 from mapping.uwb import UwbGeometry
-from planning import traversable
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.traversable import UwbScans, cleared_ground, sites_near, traversable_ground
+from planning.ground import traversable
+from planning.ground.traversable import UwbScans, cleared_ground, sites_near, traversable_ground
+from planning.terrain.dsm import Dsm
 
 GEOMETRY = UwbGeometry(bins=40)
 

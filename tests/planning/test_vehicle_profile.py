@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.errors import FormatError, ParameterError
-from planning.model import Camera, VehicleProfile
-from planning.vehicle_profile import (
+from planning.missions.vehicle_profile import (
     check_profile,
     dump_profile,
     load_profile,
@@ -17,6 +16,7 @@ from planning.vehicle_profile import (
     path_params,
     shipped_profiles,
 )
+from planning.model import Camera, VehicleProfile
 
 CAMERA = Camera(6000, 4000, 20.0, 23.5, 15.6)
 

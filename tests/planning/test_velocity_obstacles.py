@@ -11,7 +11,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from planning.errors import ParameterError
-from planning.velocity_obstacles import Limits, Obstacles, approaches, cones, propose
+from planning.evading.velocity_obstacles import STILL_M_S, Limits, Obstacles, approaches, cones, propose
 from tests.reference import velocity_obstacles as slow
 
 ROUNDING_M = 1e-4

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.visiting_order import shortest_order
+from planning.route.visiting_order import shortest_order
 
 points = st.tuples(st.floats(-100, 100), st.floats(-100, 100))
 

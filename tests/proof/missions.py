@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from pyproj import CRS, Transformer
 
-from planning.dsm import Dsm
 from planning.errors import PlanningError
 from planning.formats import wpl
-from planning.geotiff import read_dsm
 from planning.model import Poi, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm
 from tests.proof.models import Model
 from tests.reference import proof
 

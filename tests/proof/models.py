@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import rasterio
 from affine import Affine
-from numpy.typing import NDArray
+
+from mapping.geometry.arrays import F32
 
 FOOT_M = 0.3048
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planning.corridor import HEIGHT_UNIT_M, SLACK, Bends, Corridor
+from planning.missions.band import HEIGHT_UNIT_M, SLACK, Bends, Corridor
 
 
 def line_fits(band: Corridor, i: int, zi: float, j: int, zj: float) -> bool:

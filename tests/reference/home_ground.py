@@ -6,7 +6,8 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mapping.geometry.arrays import F32
 
 
 def nearest_m(row: int, col: int, x: float, y: float, res: float) -> float:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 Measure = Callable[[F64], F64]

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import rasterio
 from numba import njit, prange
-from numpy.typing import NDArray
 from pyproj import CRS, Geod, Transformer
 from scipy import ndimage
 

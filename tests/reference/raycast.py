@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 
 
 def first_touch(

@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.tracker import TrackerParams
+from mapping.geometry.arrays import F64
+from mapping.tracking import TrackerParams
 from tests.mapping.radar_scenes import Frame
 
 F64 = NDArray[np.float64]

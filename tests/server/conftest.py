@@ -4,7 +4,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from server.plan.demo import PLAN_NAME
+from server.schemas import PlanMessage
 from tests.server.running import PASSWORD, Running, running
+from tests.server.station import Station, station
 
 
 @pytest.fixture(scope="module")

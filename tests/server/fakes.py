@@ -8,10 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from server.door.hub import Hub
+from server.door.lease import Lease
 from server.errors import NotReadyError, StaleRevisionError
-from server.flying.agents import Agents
-from server.hub import Hub
-from server.lease import Lease
+from server.heard.agents import Agents
 from server.library import Library
 from server.schemas import (
     ClientMessage,

@@ -9,11 +9,11 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.model import Home, Mission, MissionItem
-from telemetry.messages import VehicleText
-from telemetry.recording.flight import FlightLog, HomePosition, track_of
-from telemetry.vehicle import VehicleState
+from planning.terrain.dsm import Dsm
+from telemetry.recording.recorded_flight import FlightLog, HomePosition, track_of
+from telemetry.topics.messages import VehicleText
+from telemetry.topics.vehicle import VehicleState
 
 START_UTC_S = 1_800_000_000.0
 

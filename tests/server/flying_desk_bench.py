@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from server import demo, tasks
-from server.file_tasks import make_demo_terrain
-from server.flying.desk import FlightDesk
+from server.flying.flight_desk import FlightDesk
 from server.flying.work import FlightWork
-from server.jobs import Lane
 from server.library import Library
+from server.plan import demo, tasks
+from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanState, ServerMessage
+from server.work.jobs import Lane
 from telemetry.mavlink.storage import as_stored
 from telemetry.mavlink.verify import compare, digest
-from telemetry.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
-from telemetry.obstacles import AvoidanceStatus
-from telemetry.requests import Download, Operator, ReadParameters, Upload
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.requests import Download, Operator, ReadParameters, Upload
+from telemetry.topics.vehicle import VehicleState
 
 ME = Operator("Anna", 7)
 

@@ -11,13 +11,13 @@ from unittest.mock import patch
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import I32
 from server.obstacles import drawing
 from server.obstacles.drawing import PERIOD_S, MapDrawing
-from server.obstacles.mirror import ChunkKey, MapMirror, Voxels
-from server.scene.sights import MapLook, Sights
-from telemetry.obstacles import MapDelta, MapName, MapOrigin
+from server.scene.layers.sights import MapLook, Sights
+from server.scene.mirror import ChunkKey, MapMirror, Voxels
+from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin
 from tests.server.obstacle_messages import delta
 from tests.server.test_obstacles_drawing import made
 from tests.server.test_scene_obstacles import placed

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from telemetry.obstacles import (
+from telemetry.topics.obstacles import (
     MapDelta,
     MapOrigin,
     Obstacle,

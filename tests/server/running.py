@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from server.api.access import Parts
 from server.app import bound_socket, server_config
-from server.hub import Hub
+from server.door.hub import Hub
 from server.library import Library
 from server.settings import Settings
 from server.web import MakeWorkspace, OpenFlying, create_app

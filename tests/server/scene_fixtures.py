@@ -8,9 +8,9 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
-from server.scene.payload import PlanScene, Relief, SceneState
-from server.scene.terrain_payload import build_terrain_scene
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.payload import PlanScene, Relief, SceneState
+from server.scene.geometry.terrain_payload import build_terrain_scene
 from server.schemas import PlanDoc, PoiDoc, SelectionDoc, ViewDoc
 
 

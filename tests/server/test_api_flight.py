@@ -21,7 +21,7 @@ from telemetry.errors import (
     TelemetryError,
     TransferError,
 )
-from telemetry.requests import Arm, Land, Operator, Pause, ReturnHome
+from telemetry.topics.requests import Arm, Land, Operator, Pause, ReturnHome
 from tests.server.running import PASSWORD, Running
 
 COMMANDS: list[tuple[str, dict[str, object]]] = [

@@ -7,7 +7,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from server.hub import CLOSE_SIGNED_OUT
+from server.door.hub import CLOSE_SIGNED_OUT
 from tests.server.running import PASSWORD, Running
 
 PRIVATE = [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from server.auth import TRIES_MAX, Auth, session_key
+from server.door.auth import TRIES_MAX, Auth, session_key
 from server.errors import SignInError, TooManyTriesError
 from server.settings import PasswordHash
 

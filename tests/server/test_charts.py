@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planning.demo import demo_dsm, demo_pois
+from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.model import VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
-from server.charts import along, chart, thinned
+from server.plan.profile_chart import chart, thinned
 
 
 def test_few_points_stay_as_they_are() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from telemetry.sensing import rows
+from mapping.sensor_frames import rows
 from tests.server.cli_runs import hedgehop
 from tests.server.running import Running, running
 from tests.server.test_cli_agent_ti import NOWHERE, PATIENCE_S, command, radar_frames, started

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from server.sensor_token import sensor_token
-from telemetry.messages import Topic, VehicleText
-from telemetry.sensing import RadarFrame, rows
+from mapping.sensor_frames import RadarFrame, rows
+from server.door.sensor_token import sensor_token
+from telemetry.topics.messages import Topic, VehicleText
 from tests.server.cli_runs import hedgehop
 from tests.server.running import Running, running
 from tests.telemetry.test_ti_config import GOOD

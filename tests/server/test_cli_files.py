@@ -10,7 +10,7 @@ import pytest
 
 from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES
-from server.cli.files import check_directory, read_small, write_files
+from server.cli.shared.files_in_out import check_directory, read_small, write_files
 from server.errors import StorageError, StorageFullError
 from tests.server.cli_runs import contents
 

@@ -17,17 +17,17 @@ from types import SimpleNamespace
 import pytest
 
 from planning.formats.wpl import write_wpl
-from planning.geotiff import read_dsm, write_dsm
+from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PlannedFor
-from planning.vehicle_profile import load_profile
-from server.cli.fly import keep_recording
-from server.cli.upload import upload_lines
+from planning.terrain.geotiff import read_dsm, write_dsm
+from server.cli.fly_command import keep_recording
+from server.cli.upload_command import upload_lines
 from server.errors import StorageError
-from server.review import recording_of
-from server.review import review as judge
-from server.schemas.review import ReviewDoc
-from telemetry.messages import OnboardMission, Rounded, UploadReport
+from server.flying.review import recording_of
+from server.flying.review import review as judge
+from server.schemas.review_docs import ReviewDoc
 from telemetry.recording.flight_log import read_flight_log
+from telemetry.topics.messages import OnboardMission, Rounded, UploadReport
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from server.cli import app
-from telemetry.messages import Topic
-from telemetry.obstacles import PerceptionSettings
-from telemetry.recording.writer import RecordingWriter
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import PerceptionSettings
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S, write_flight
 

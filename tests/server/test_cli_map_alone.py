@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from telemetry.messages import Published, Topic
-from telemetry.recording.writer import RecordingWriter
-from telemetry.sensing import RadarFrame
+from mapping.sensor_frames import RadarFrame
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Published, Topic
 from tests.server.cli_runs import hedgehop
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S

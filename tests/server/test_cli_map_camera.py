@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.messages import Topic
-from telemetry.recording.writer import RecordingWriter
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic
 from tests.server.test_cli_map import run
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from pymavlink import mavwp
 
-from planning.demo import demo_survey_polygon
-from planning.geotiff import read_dsm, write_dsm
+from planning.ground.demo_hillside import demo_survey_polygon
+from planning.terrain.geotiff import read_dsm, write_dsm
 from tests.server.cli_runs import Run, hedgehop
 
 KEYS = {

@@ -11,7 +11,7 @@ from PIL import Image
 from mapping.radar import AWR1843, POSITION2GO, FmcwParams
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import recorded_readings
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.server.cli_runs import hedgehop
 from tests.telemetry.test_adc_files import dca1000_bytes, oda_line, save
 from tests.telemetry.test_ti_config import GOOD, config

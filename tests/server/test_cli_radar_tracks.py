@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from telemetry.sensing import SimTruth
 from telemetry.sensors.optitrack import read_optitrack
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
-from telemetry.simulator.sensors.iq import IqRadarSensor
-from telemetry.simulator.sensors.iq_model import POSITION2GO_IQ
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
+from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
+from telemetry.topics.simulated import SimTruth
 from tests.server.cli_runs import Run, hedgehop
 from tests.telemetry.test_adc_files import oda_line
 

@@ -10,10 +10,17 @@ import pytest
 from PIL import Image
 
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.scenarios.catalogue import NAMES
-from telemetry.scenarios.charts import Chart, series
-from telemetry.scenarios.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult, measured
-from telemetry.scenarios.wanted import Wanted
+from telemetry.simulation.scenarios.catalogue import NAMES
+from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.scenarios.stage.result import (
+    AlertSeen,
+    Figure,
+    FlightResult,
+    MapFigures,
+    ScenarioResult,
+    measured,
+)
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from tests.server.cli_runs import hedgehop
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from planning.demo import demo_survey_polygon
 from planning.formats.qgc_plan import read_plan
-from planning.geotiff import read_dsm
+from planning.ground.demo_hillside import demo_survey_polygon
+from planning.missions.vehicle_profile import load_profile
 from planning.plan import plan_mission
-from planning.vehicle_profile import load_profile
-from server.documents import doc_from_profile, request_from_doc
+from planning.terrain.geotiff import read_dsm
+from server.library.documents import doc_from_profile, request_from_doc
 from server.schemas import PlaceDoc, PlanDoc, SurveyDoc
 from tests.server.cli_runs import hedgehop, write_demo
 

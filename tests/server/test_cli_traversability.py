@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planning.geotiff import read_dsm
-from telemetry.scenarios import foliage
-from telemetry.scenarios.foliage_drive import lawn_drive
-from telemetry.scenarios.foliage_figures import driven
-from telemetry.scenarios.foliage_trials import trial_site
+from planning.terrain.geotiff import read_dsm
+from telemetry.simulation.scenarios.foliage import foliage
+from telemetry.simulation.scenarios.foliage.foliage_drive import lawn_drive
+from telemetry.simulation.scenarios.foliage.foliage_figures import driven
+from telemetry.simulation.scenarios.foliage.foliage_trials import trial_site
 from tests.server.cli_runs import hedgehop, write_demo
 
 

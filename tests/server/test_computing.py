@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from planning.errors import ParameterError
-from server import tasks
-from server.computing import Computing
 from server.errors import NotFoundError
-from server.jobs import Lane
+from server.plan import tasks
+from server.plan.computing import Computing
 from server.schemas import Chart, Computation, PlanDoc, PoiDoc, ResultDoc, TradeRow
+from server.work.jobs import Lane
 
 POIS = [PoiDoc(id="a", lat_deg=1, lon_deg=2), PoiDoc(id="b", lat_deg=1, lon_deg=2.1)]
 CHART = Chart(**{name: [] for name in Chart.model_fields})

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from server.errors import StartError
-from server.flying.ground_task import Ground
-from server.flying.nodes import SIMULATED_SENSORS, Nodes
+from server.heard.ground_task import Ground
+from server.heard.node_states import SIMULATED_SENSORS, Nodes
 from server.settings import load_settings
-from telemetry.sensing import RadarKind
+from telemetry.topics.simulated import RadarKind
 
 
 @pytest.mark.parametrize("kind", ["model", "iq"])

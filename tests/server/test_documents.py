@@ -6,14 +6,14 @@ from dataclasses import asdict, fields, replace
 
 import pytest
 
-from planning.demo import demo_dsm, demo_pois, demo_survey_polygon
+from planning.formats.poi_files import PoiFile, read_pois
 from planning.formats.wpl import write_wpl
+from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polygon
+from planning.missions.vehicle_profile import load_profile, shipped_profiles
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
-from planning.poi_files import PoiFile, read_pois
-from planning.vehicle_profile import load_profile, shipped_profiles
-from server.documents import doc_from_profile, missing, profile_from_doc, request_from_doc, with_points
-from server.planned_on import on_another_model, other_model
+from server.library.documents import doc_from_profile, missing, profile_from_doc, request_from_doc, with_points
+from server.library.planned_on import on_another_model, other_model
 from server.schemas import (
     CameraDoc,
     MissionDoc,

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from server.edits import clicked, moved, new_poi_id, next_poi_name
+from server.library.edits import clicked, moved, new_poi_id, next_poi_name
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SelectionDoc
 
 

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
-from server.flying.channel import Channel
-from server.flying.present import Present
+from server.heard.channel import Channel
+from server.heard.present import Present
 from server.schemas import FlightMessage, ServerMessage, TextMessage, TrackMessage, VehicleMessage
-from telemetry.messages import FlightStatus, VehicleText
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, VehicleText
+from telemetry.topics.vehicle import VehicleState
 
 STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0, position_t_mono_s=0.0)
 

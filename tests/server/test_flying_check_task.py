@@ -9,10 +9,10 @@ import pytest
 
 from planning.model import Certificate, HomeStand
 from planning.plan import plan_mission
-from server.documents import demands_from_doc
 from server.flying import check_task
+from server.library.documents import demands_from_doc
 from server.schemas import PlanDoc
-from telemetry.messages import PlanRecord
+from telemetry.topics.messages import PlanRecord
 from tests.planning.plan_examples import request_over, small_dsm
 
 PLAN = PlanDoc()

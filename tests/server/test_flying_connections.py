@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from server.flying.connections import Connections
+from server.heard.connections import Connections
 from telemetry.errors import AddressError, ConnectionFailedError
-from telemetry.messages import Candidate, ConnectionStatus, LinkStatus
-from telemetry.requests import Adopt, Connect, Disconnect, Operator, Release
+from telemetry.topics.messages import Candidate, ConnectionStatus, LinkStatus
+from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release
 
 ME, SERVER = Operator("Anna", 5), Operator("Hedgehop", 5)
 UDP, TCP = "udpin:0.0.0.0:14550", "tcp:10.0.0.7:5760"

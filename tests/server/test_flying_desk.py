@@ -13,12 +13,12 @@ import pytest
 
 from planning.formats.wpl import read_wpl
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotReadyError, StaleRevisionError
-from server.jobs import Lane
 from server.schemas import CheckRow, StartFlight
+from server.work.jobs import Lane
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
-from telemetry.messages import FlightStatus, LinkStatus
-from telemetry.obstacles import AvoidanceStatus, Eye
-from telemetry.requests import Arm, StartAuto, StartGuided
+from telemetry.topics.messages import FlightStatus, LinkStatus
+from telemetry.topics.obstacles import AvoidanceStatus, Eye
+from telemetry.topics.requests import Arm, StartAuto, StartGuided
 from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
 
 pytestmark = pytest.mark.xdist_group("flying-desk")

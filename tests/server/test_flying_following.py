@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from planning.following.below import Demanded
 from planning.following.reference import reference_line
-from planning.vehicle_profile import load_profile
-from server.flying.following import Followed, Follower
+from planning.missions.vehicle_profile import load_profile
+from server.heard.plan_follower import Followed, Follower
 from server.schemas import FollowDoc
-from telemetry.messages import FlightStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
 
 FLYING = FlightStatus(phase="flying")

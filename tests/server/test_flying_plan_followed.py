@@ -6,10 +6,10 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
-from planning.demo import small_hill
-from planning.dsm import Dsm
-from server.flying.channel import Channel
+from planning.ground.demo_hillside import small_hill
+from planning.terrain.dsm import Dsm
 from server.flying.plan_followed import PlanFollowed
+from server.heard.channel import Channel
 from server.library import Library
 
 

@@ -17,7 +17,7 @@ import pytest
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from telemetry.node_lock import running_nodes
+from telemetry.bus.node_lock import running_nodes
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
 from tests.server.test_process import command, free_port

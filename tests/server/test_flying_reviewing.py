@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from server.flying.channel import Channel
+from server.flying.review import review
 from server.flying.review_task import Reviewed
 from server.flying.reviewing import Reviewing
-from server.review import review
+from server.heard.channel import Channel
 from server.schemas import OpenReview, PlanDoc
-from telemetry.messages import ReplayStatus
-from telemetry.requests import OpenRecording, ReplayRequest
+from telemetry.topics.messages import ReplayStatus
+from telemetry.topics.requests import OpenRecording, ReplayRequest
 from tests.server.flight_logs import START_UTC_S, log_of, positions
 from tests.server.test_review import RECORDING
 

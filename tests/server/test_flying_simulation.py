@@ -10,12 +10,12 @@ from typing import Any, cast
 
 import pytest
 
-from server.flying.connections import Connections
-from server.flying.ground_task import Ground
 from server.flying.simulation import Simulation, free_udp_port
+from server.heard.connections import Connections
+from server.heard.ground_task import Ground
 from server.schemas import PlanDoc
-from telemetry.messages import ConnectionStatus, LinkStatus
-from telemetry.requests import Connect, Disconnect, Operator
+from telemetry.topics.messages import ConnectionStatus, LinkStatus
+from telemetry.topics.requests import Connect, Disconnect, Operator
 
 ME, SERVER = Operator("Anna", 5), Operator("Hedgehop", 5)
 TYPED = "udpin:0.0.0.0:14550"

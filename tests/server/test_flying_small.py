@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.flying.onboard import rounded_note
-from server.flying.pace import Pace
-from server.flying.track import POINTS_MAX, Track
+from server.heard.channel import Pace
+from server.heard.flown_track import POINTS_MAX, Track
 from server.library.terrain_of import FlownOver, covers, terrain_of
 from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
-from telemetry.messages import Rounded
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Rounded
+from telemetry.topics.vehicle import VehicleState
 
 STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0)
 

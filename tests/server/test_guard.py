@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import socket
 import time
+from collections.abc import Iterator
 
 import httpx
 import pytest
@@ -13,11 +15,11 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from server import guard
+from server.door import guard
+from server.door.guard import Door
 from server.errors import ForbiddenError
-from server.guard import Door
-from server.logs import OneLineFormatter
 from server.settings import Settings
+from server.work.logs import OneLineFormatter
 from tests.server.running import Running
 
 EDIT = {"base_revision": 1, "label": "Test", "document": {}}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.history import History
+from server.library.history import History
 from server.schemas import PlanDoc, PoiDoc
 
 

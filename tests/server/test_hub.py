@@ -10,8 +10,8 @@ from typing import Any, cast
 import pytest
 from starlette.websockets import WebSocket, WebSocketState
 
-from server import hub as hub_module
-from server.hub import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Hub, parse
+from server.door import hub as hub_module
+from server.door.hub import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Hub, parse
 from server.schemas import (
     CursorMessage,
     ErrorDoc,
@@ -29,7 +29,7 @@ from server.schemas import (
     TextMessage,
     VehicleMessage,
 )
-from telemetry.messages import VehicleText
+from telemetry.topics.messages import VehicleText
 from tests.server.fakes import notice, plan_state, snapshot
 
 

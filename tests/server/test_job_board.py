@@ -11,10 +11,10 @@ import pytest
 
 from planning.errors import RasterError
 from server.errors import BusyError, JobCancelledError, NotFoundError
-from server.job_board import WAITING_MAX, JobBoard
-from server.jobs import Lane, Progress
 from server.schemas import JobDoc, JobMessage, ServerMessage
-from server.together import Background
+from server.work.job_board import WAITING_MAX, JobBoard
+from server.work.jobs import Lane, Progress
+from server.work.task_group import Background
 
 
 def _sleep(seconds: float, *, report: Any) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from planning.errors import PoiError
 from server.errors import BusyError, JobCancelledError, WorkerDiedError
-from server.jobs import Lane
+from server.work.jobs import Lane
 
 
 def _double(value, *, report):

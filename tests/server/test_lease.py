@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.door.lease import GONE_S, Lease
 from server.errors import NotInChargeError, status_of
-from server.lease import GONE_S, Lease
 
 ANNA, BEN = "a" * 64, "b" * 64
 

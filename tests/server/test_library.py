@@ -16,12 +16,12 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import NoElevationError
-from planning.orthophoto import Orthophoto
+from planning.terrain.dsm import Dsm
+from planning.terrain.orthophoto import Orthophoto
 from server.errors import DataDirError, NotFoundError, StorageError, StorageFullError
-from server.history import History
 from server.library import Library
+from server.library.history import History
 from server.library.orthophotos import store_orthophoto
 from server.library.terrains import load_terrain, store_terrain
 from server.schemas import PlanDoc, PoiDoc, SpikeDoc

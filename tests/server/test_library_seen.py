@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planning.dsm import Dsm
 from planning.errors import PoiError
+from planning.terrain.dsm import Dsm
 from server.errors import NotFoundError, NotReadyError, StorageError
-from server.library.seen import check_home_stands_on_ground, load_planned_terrain, load_seen
+from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import store_terrain
-from server.obstacles.mirror import MapMirror, Voxels
-from server.obstacles.seen_task import keep_seen
-from telemetry.obstacles import MapOrigin
+from server.plan.seen_task import keep_seen
+from server.scene.mirror import MapMirror, Voxels
+from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import delta
 from tests.server.scene_fixtures import hill
 

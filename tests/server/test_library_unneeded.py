@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planning.seen import Columns
+from planning.evading.seen import Columns
 from server.errors import StorageError
 from server.flying.onboard import onboard, write_onboard
-from server.history import History
-from server.library import Library, unneeded
-from server.library.seen import SeenColumns, load_seen, store_seen
+from server.library import Library
+from server.library import library as whole_library
+from server.library.history import History
+from server.library.seen_columns import SeenColumns, load_seen, store_seen
 from server.library.terrains import store_terrain
 from server.schemas import PlanDoc
-from telemetry.messages import PlanRecord
+from telemetry.topics.messages import PlanRecord
 from tests.server.scene_fixtures import hill
 
 SEEN = SeenColumns((Columns(np.zeros((2, 2)), np.ones(2), 1.0),))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.obstacles.alerts import KEPT_MAX, UNHEARD_S, LatchedAlerts
+from server.obstacles.alert_list import KEPT_MAX, UNHEARD_S, LatchedAlerts
 from tests.server.obstacle_messages import alert, obstacle
 
 

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planning.dsm import Dsm
 from planning.formats.wpl import read_wpl
 from planning.model import VehicleProfile
-from server.documents import doc_from_profile
+from planning.terrain.dsm import Dsm
+from server.library.documents import doc_from_profile
 from server.obstacles import coming_down
 from server.obstacles.coming_down import ComingDown
 from server.obstacles.coming_down_task import SHADOW_M, RestPlanned, burned, plan_rest, with_shadow
-from server.obstacles.manoeuvre_task import Situation
-from server.obstacles.watch import Watch
+from server.obstacles.manoeuvre_situation import Situation
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import PlanDoc, SurfaceDoc
 from telemetry.errors import NotAllowedError
-from telemetry.messages import GuidedTarget, PlanRecord
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings
-from telemetry.requests import FlyRest, Operator
+from telemetry.topics.messages import GuidedTarget, PlanRecord
+from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings
+from telemetry.topics.requests import FlyRest, Operator
 from tests.server.test_obstacles_manoeuvre_task import planned, situation  # noqa: F401
 
 Planned = tuple[Dsm, PlanRecord, Path]
@@ -83,7 +83,7 @@ def test_what_cannot_be_certified_stays_higher_and_says_why(planned: Planned) ->
 
 
 def test_a_shadow_is_as_high_as_what_casts_it_and_lies_ahead() -> None:
-    from planning.seen import Columns
+    from planning.evading.seen import Columns
 
     cast = with_shadow(Columns(np.array([[0.0, 0.0]]), np.array([7.0]), 1.0), np.array([0.0, 1.0]))
     assert cast.xy_m[:, 1].max() == pytest.approx(SHADOW_M)

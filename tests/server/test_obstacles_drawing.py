@@ -10,10 +10,10 @@ import pytest
 
 from server.obstacles import drawing
 from server.obstacles.drawing import Allowance, MapDrawing, fitting_detail
-from server.obstacles.mirror import ChunkKey, MapMirror, Voxels
-from server.obstacles.watch import Watch
-from server.scene.sights import MapLook
-from telemetry.obstacles import MapName, MapOrigin
+from server.obstacles.obstacle_watch import Watch
+from server.scene.layers.sights import MapLook
+from server.scene.mirror import ChunkKey, MapMirror, Voxels
+from telemetry.topics.obstacles import MapName, MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta
 from tests.server.test_scene_obstacles import placed
 

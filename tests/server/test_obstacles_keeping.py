@@ -7,8 +7,8 @@ import pytest
 
 from server.obstacles.keeping import FILE, changed, read_settings, write_settings
 from server.schemas import PerceptionSettingsBody
-from telemetry.obstacles import PerceptionSettings
-from telemetry.track_settings import TrackerSettings, VelocitySettings
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 
 
 def test_what_was_set_is_there_again(tmp_path: Path) -> None:

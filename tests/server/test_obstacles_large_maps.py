@@ -9,7 +9,7 @@ import pytest
 
 from server.obstacles import drawing
 from server.obstacles.drawing import BOXES_MAX, BURST_BYTES, PERIOD_S, RATE_BYTES_S
-from server.obstacles.mirror import MapMirror
+from server.scene.mirror import MapMirror
 from tests.server.large_maps import Clock, Painter, hills, painting, told
 from tests.server.obstacle_messages import ORIGIN, delta
 from tests.server.test_obstacles_drawing import FakeStage, made

@@ -10,22 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planning.dsm import Dsm
 from planning.formats.wpl import write_wpl
-from planning.margins.vehicle_terms import budget_of
+from planning.missions.vehicle_profile import dump_profile
+from planning.missions.vehicle_terms import budget_of
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import dump_profile
+from planning.terrain.dsm import Dsm
 from server.library.terrains import store_terrain
-from server.obstacles.manoeuvre_task import Situation, prepare, required_m
-from server.obstacles.mirror import MapMirror
-from server.schemas.plan import ClearanceDoc, PlanDoc
-from telemetry.messages import FlightStatus, PlanRecord
-from telemetry.obstacles import MapOrigin, Sensor
+from server.obstacles.manoeuvre_situation import Situation
+from server.obstacles.manoeuvre_task import prepare, required_m
+from server.scene.mirror import MapMirror
+from server.schemas.plan_docs import ClearanceDoc, PlanDoc
 from telemetry.perception.mission_line import mission_line
-from telemetry.tracks import VelocityProposal
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, PlanRecord
+from telemetry.topics.obstacles import MapOrigin, Sensor
+from telemetry.topics.tracks import VelocityProposal
+from telemetry.topics.vehicle import VehicleState
 from tests.server.obstacle_messages import alert, approach, delta
 from tests.server.scene_fixtures import hill
 from tests.server.track_messages import track, tracks_status

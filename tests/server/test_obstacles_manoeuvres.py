@@ -10,15 +10,15 @@ import pytest
 
 from server.errors import NotFoundError
 from server.obstacles import manoeuvres
-from server.obstacles.manoeuvre_task import Prepared
+from server.obstacles.manoeuvre_situation import Prepared
 from server.obstacles.manoeuvres import Manoeuvres
-from server.obstacles.watch import Watch
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import ManoeuvreDoc
 from telemetry.errors import NotAllowedError
-from telemetry.messages import GuidedTarget
-from telemetry.obstacles import AvoidanceStatus
-from telemetry.requests import Operator
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.requests import Operator
+from telemetry.topics.vehicle import VehicleState
 from tests.server.obstacle_messages import alert, approach
 
 ANNA = Operator("Anna", 3)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.obstacles.mirror import DETAILS, MapMirror, coarser
+from server.scene.mirror import DETAILS, MapMirror, coarser
 from tests.server.obstacle_messages import ORIGIN, delta
 
 

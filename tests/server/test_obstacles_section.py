@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.obstacles.mirror import MapMirror
+from mapping.sensor_frames import packed
+from server.obstacles.obstacle_watch import Watch
 from server.obstacles.section import MOST_CELLS, Looking, level_axis, placed_status, sliced
-from server.obstacles.watch import Watch
-from telemetry.looks import RadarLook
-from telemetry.obstacles import MapOrigin
-from telemetry.sensing import packed
+from server.scene.mirror import MapMirror
+from telemetry.topics.looks import RadarLook
+from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta, status
 
 NORTH = level_axis(0.0)

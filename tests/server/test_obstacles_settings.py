@@ -10,12 +10,12 @@ import pytest
 
 from mapping.errors import CapacityError
 from server.errors import status_of
-from server.obstacles.desk import ObstacleDesk
 from server.obstacles.keeping import read_settings
-from server.obstacles.watch import Watch
+from server.obstacles.obstacle_desk import ObstacleDesk
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import ObstaclesState, PerceptionSettingsBody
-from telemetry.obstacles import PerceptionSettings
-from telemetry.perception import limits
+from telemetry.perception import sensor_kinds
+from telemetry.topics.obstacles import PerceptionSettings
 
 GB = 1_000_000_000
 

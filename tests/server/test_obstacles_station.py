@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from server.schemas import FlyState, ObstaclesState
-from telemetry.node_lock import running_node, running_nodes
+from telemetry.bus.node_lock import running_node, running_nodes
 from tests.server.running import PASSWORD
 from tests.server.station import PATIENCE_S, Station, ok, station
 

@@ -6,12 +6,12 @@ import asyncio
 from dataclasses import replace
 from typing import Any, cast
 
-from server.flying.nodes import Nodes
-from server.flying.present import Present
-from server.hub import key_of
+from server.door.hub import key_of
+from server.heard.node_states import Nodes
+from server.heard.present import Present
+from server.obstacles.moving_objects import TracksWatch
+from server.obstacles.obstacle_watch import DEAD_S
 from server.obstacles.sensor_nodes import SensorNodes
-from server.obstacles.tracks import TracksWatch
-from server.obstacles.watch import DEAD_S
 from server.schemas import TracksMessage
 from tests.server.track_messages import tracks_status
 

@@ -6,8 +6,8 @@ import asyncio
 from dataclasses import replace
 from typing import Any
 
-from server.obstacles.watch import DEAD_S, Watch
-from telemetry.obstacles import AvoidanceStatus, FlightMapStatus
+from server.obstacles.obstacle_watch import DEAD_S, Watch
+from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
 from tests.server.obstacle_messages import alert, delta, status
 
 

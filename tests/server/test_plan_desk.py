@@ -10,9 +10,9 @@ import pytest
 from pydantic import ValidationError
 
 from server.errors import NotFoundError, StaleRevisionError, StorageFullError
-from server.history import History
 from server.library import Library
-from server.plan_desk import PlanDesk
+from server.library.history import History
+from server.plan.plan_desk import PlanDesk
 from server.schemas import NoticeMessage, PlaceDoc, PlanDoc, PlanEdit
 
 

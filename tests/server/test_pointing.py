@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from typing import cast
 
-from server.plan_desk import PlanDesk, Proposal
-from server.pointing import Pointing
+from server.plan.plan_desk import PlanDesk, Proposal
+from server.plan.pointing import Pointing
 from server.schemas import NoticeMessage, PlaceDoc, PlanDoc, SelectionDoc
 
 

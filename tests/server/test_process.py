@@ -16,7 +16,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from server.demo import PLAN_NAME
+from server.plan.demo import PLAN_NAME
+from tests.server.cli_runs import hedgehop
 from tests.server.station import PATIENCE_S, ok
 
 pytestmark = pytest.mark.xdist_group("process")

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from mapping.radar import AWR1843, POSITION2GO
-from server.guard import UPLOADS
+from server.door.guard import UPLOADS
 from server.schemas import RadarFileDoc, RadarFrame, RadarMap, RadarOpened
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.server.running import Running, running
 from tests.server.station import ok
 from tests.server.test_cli_radar import echo

@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planning.dsm import Dsm
 from planning.formats.commands import has_position
 from planning.formats.wpl import read_wpl, write_wpl
+from planning.missions.vehicle_profile import dump_profile
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import dump_profile
+from planning.terrain.dsm import Dsm
 from server.errors import NotReadyError
 from server.obstacles.rest_of_plan import Part, Underway, rest_of_plan
 from server.schemas import CameraDoc, PlanDoc, PoiDoc, ProfileDoc, SurveyDoc
-from telemetry.messages import FlightStatus, PlanRecord
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, PlanRecord
+from telemetry.topics.vehicle import VehicleState
 from tests.server.scene_fixtures import hill
 
 EAST_M = (8.0, 30.0, 50.0, 72.0)

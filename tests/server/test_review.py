@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from planning.formats.wpl import write_wpl
+from planning.missions.vehicle_profile import dump_profile, load_profile
 from planning.model import Home, PlannedFor
-from planning.vehicle_profile import dump_profile, load_profile
-from server.cli.review import figure_lines, summary
-from server.review import recording_of, review
-from server.review_curves import STRETCHES, thinned
-from server.schemas.flight import RecordingDoc
-from telemetry.messages import CommandRecord, PlanRecord
-from telemetry.obstacles import ObstacleAlert
-from telemetry.recording.flight import FlightLog
+from server.cli.review_command import figure_lines, summary
+from server.flying.review import recording_of, review
+from server.flying.review_curves import STRETCHES, thinned
+from server.schemas.flight_docs import RecordingDoc
 from telemetry.recording.frame_facts import SentTarget
+from telemetry.recording.recorded_flight import FlightLog
+from telemetry.topics.messages import CommandRecord, PlanRecord
+from telemetry.topics.obstacles import ObstacleAlert
 from tests.server.flight_logs import PLAIN, ROUTE, START_UTC_S, degrees, log_of, mission, plain, positions
 
 RECORDING = RecordingDoc(

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from server.cli.review import figure_lines, summary
-from server.review import review
-from server.review_flight import detours_of
-from server.schemas.flight import RecordingDoc
-from server.schemas.review import ReviewDoc
-from telemetry.obstacles import AvoidanceStatus
-from telemetry.recording.flight import FlightLog
+from server.cli.review_command import figure_lines, summary
+from server.flying.review import review
+from server.flying.review_flight import detours_of
+from server.schemas.flight_docs import RecordingDoc
+from server.schemas.review_docs import ReviewDoc
 from telemetry.recording.frame_facts import SentTarget
+from telemetry.recording.recorded_flight import FlightLog
+from telemetry.topics.obstacles import AvoidanceStatus
 from tests.server.flight_logs import PLAIN, ROUTE, START_UTC_S, degrees, log_of, mission, positions
 
 RECORDING = RecordingDoc(

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from planning.formats.detect import read_mission
-from planning.geotiff import read_dsm
-from server.review import recording_of, review
-from server.schemas.review import ReviewDoc
+from planning.terrain.geotiff import read_dsm
+from server.flying.review import recording_of, review
+from server.schemas.review_docs import ReviewDoc
 from telemetry.recording.flight_log import read_flight_log
 
 FIGURES = {

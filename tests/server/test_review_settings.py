@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from server.review import recording_of, review
-from telemetry.messages import Topic
-from telemetry.obstacles import PerceptionSettings
+from server.flying.review import recording_of, review
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.trigger import AFTER_DISARM_S
-from telemetry.track_settings import TrackerSettings, VelocitySettings, unusual, with_figures
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings, unusual, with_figures
 from tests.server.cli_runs import hedgehop
 from tests.telemetry.test_recording_recorder import Station
 

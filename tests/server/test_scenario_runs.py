@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from server.jobs import Progress
 from server.library.scenario_runs import MOST_KEPT, ScenarioShelf
 from server.schemas import ScenarioDoc, ScenarioPartDoc, ScenarioResultDoc, ScenarioRunDoc
 from server.studies.scenario_task import part_doc
-from telemetry.scenarios.catalogue import NAMES
-from telemetry.scenarios.charts import Chart, series
-from telemetry.scenarios.result import Figure, measured
+from server.work.jobs import Progress
+from telemetry.simulation.scenarios.catalogue import NAMES
+from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.scenarios.stage.result import Figure, measured
 from tests.server.running import Running, running
 from tests.server.station import ok
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viser import transforms
 
-from server.scene.camera import FOV_RAD, OBLIQUE, TOP, Lens, fitted, nearest_on_path
+from server.scene.cameras.projection import FOV_RAD, OBLIQUE, TOP, Lens, fitted, nearest_on_path
 
 
 def lens_at(pose, aspect: float) -> Lens:

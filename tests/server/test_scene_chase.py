@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.scene.camera import Pose
-from server.scene.cameras import Cameras
-from server.scene.chase import ABOVE_M, BACK_M, SETTLE_S, Chase
-from server.scene.drawing import Drawing
-from server.scene.flight import flight_nodes
-from server.scene.vehicle import VEHICLE_M, VehiclePose
-from server.scene.vehicles import Vehicles
+from server.scene.cameras.cameras import Cameras
+from server.scene.cameras.chase import ABOVE_M, BACK_M, SETTLE_S, Chase
+from server.scene.cameras.projection import Pose
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.flight_layers import flight_nodes
+from server.scene.layers.vehicle_layers import VEHICLE_M, VehiclePose
+from server.scene.layers.vehicles import Vehicles
 from tests.server.scene_fixtures import hill, state_over
 
 VEHICLE = np.array([10.0, -4.0, 30.0])

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import viser
 
-from server.scene.clouds import cloud_nodes
-from server.scene.drawing import Drawing
-from server.scene.sights import Sights
-from telemetry.looks import CloudLook, packed_cm
-from telemetry.obstacles import MapOrigin
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.sights import Sights
+from server.scene.layers.voxel_layers import cloud_nodes
 from telemetry.perception.showing import MOST_POINTS
+from telemetry.topics.looks import CloudLook, packed_cm
+from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import delta
 from tests.server.test_obstacles_section import watching
 from tests.server.test_scene_obstacles import placed

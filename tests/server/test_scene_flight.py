@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.flight import flight_nodes, path_clearance_m
+from server.scene.geometry import palette
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.flight_layers import flight_nodes, path_clearance_m
 from tests.server.scene_fixtures import hill, plan_over, state_over
 
 DSM = hill()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.scene.frame import LocalFrame
+from server.scene.geometry.scene_frame import LocalFrame
 
 metres = st.floats(-1e5, 1e5)
 

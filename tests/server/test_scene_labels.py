@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from viser import transforms
 
-from server.scene.camera import FOV_RAD, Lens
-from server.scene.labels import Label, Screen, hidden, labels_of
-from server.scene.nodes import Node
-from server.scene.shapes import label_node
+from server.scene.cameras.labels import Label, Screen, hidden, labels_of
+from server.scene.cameras.projection import FOV_RAD, Lens
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.mark_shapes import label_node
 
 FROM_SOUTH = Lens.of(transforms.SO3.from_x_radians(-np.pi / 2).wxyz.astype(np.float64), np.zeros(3), FOV_RAD, 1.5)
 """Looks north: x is right, z is up."""

@@ -12,11 +12,11 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.scene.frame import LocalFrame
-from server.scene.glb import textured_glb
-from server.scene.mesh import drawn_alt_dsm_m, filled, gap_mesh, grid_mesh
-from server.scene.payload import HeightGrid
-from server.scene.unknown import plates
+from server.scene.geometry.glb import textured_glb
+from server.scene.geometry.mesh import drawn_alt_dsm_m, filled, gap_mesh, grid_mesh
+from server.scene.geometry.payload import HeightGrid
+from server.scene.geometry.scene_frame import LocalFrame
+from server.scene.geometry.stage import plates
 
 FRAME = LocalFrame(4.0, -3.0, 0.0, 1.0, 5.0)
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import viser
 
-from server.obstacles.mirror import MapMirror
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.enu import EnuPlacing
-from server.scene.regions import Route, conflict_nodes, region_nodes, route_nodes, sector_corners_enu_m
-from server.scene.shapes import linear_light
-from server.scene.sights import Sights
-from server.scene.voxels import HUES, chunk_nodes, chunk_place, sent_bytes
-from telemetry.obstacles import MapOrigin, MissionConflict, Region
+from server.scene.geometry import palette
+from server.scene.geometry.enu import EnuPlacing
+from server.scene.geometry.mark_shapes import linear_light
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.region_layers import Route, conflict_nodes, region_nodes, route_nodes, sector_corners_enu_m
+from server.scene.layers.sights import Sights
+from server.scene.layers.voxel_layers import HUES, chunk_nodes, chunk_place, sent_bytes
+from server.scene.mirror import MapMirror
+from telemetry.topics.obstacles import MapOrigin, MissionConflict, Region
 from tests.server.obstacle_messages import delta, status
 from tests.server.scene_fixtures import exaggerated, hill, state_over
 

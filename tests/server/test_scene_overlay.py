@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.layers import layers, unchanged
-from server.scene.marks import poi_places
-from server.scene.nodes import Node
-from server.scene.overlay import laid_over
-from server.scene.payload import OverlayScene, SiteMark
-from server.scene.sites import site_nodes
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.payload import OverlayScene, SiteMark
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.ground_layers import laid_over
+from server.scene.layers.layers import layers, unchanged
+from server.scene.layers.mark_layers import poi_places
+from server.scene.layers.site_layer import site_nodes
 from server.schemas import SelectionDoc
 from tests.server.scene_fixtures import exaggerated, hill, state_over
 

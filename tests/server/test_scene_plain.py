@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.following.reference import level_model
 from planning.model import Home, Mission
-from server.picture import Picture
-from server.placing import Placer
-from server.scene.drawing import Drawing
-from server.scene.payload import ReviewScene, SceneState
-from server.scene.plain import plain_ground, plain_scene
-from server.scene.review import review_nodes
+from planning.terrain.dsm import Dsm
+from server.heard.vehicle_place import Placer
+from server.plan.picture import Picture
+from server.scene.geometry.payload import ReviewScene, SceneState
+from server.scene.geometry.plain import plain_ground, plain_scene
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.flight_layers import review_nodes
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 from tests.server.scene_fixtures import hill, plan_over, state_over
 
 LEVEL = level_model(Mission(Home(37.7, 15.0, 812.5), ()))

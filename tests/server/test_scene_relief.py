@@ -9,21 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.demo import demo_dsm, demo_pois
-from planning.dsm import Dsm
-from planning.model import F64, SampledPath, Surfaces
+from mapping.geometry.arrays import F64
+from planning.ground.demo_hillside import demo_dsm, demo_pois
+from planning.missions.vehicle_profile import load_profile
+from planning.model import SampledPath, Surfaces
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
-from planning.surface import safe_surface_at
-from planning.vehicle_profile import load_profile
-from server.scene.drawing import Drawing
-from server.scene.flight import flight_nodes
-from server.scene.ground import surface_nodes
-from server.scene.payload import Relief, SceneState
-from server.scene.plan_payload import plan_scene
-from server.scene.relief import PATH_TOLERANCE_M, relief
-from server.scene.simplified import kept_within
-from server.scene.terrain_payload import build_terrain_scene
+from planning.safe_surface.surface import safe_surface_at
+from planning.terrain.dsm import Dsm
+from server.plan.tasks import plan_scene
+from server.scene.geometry.payload import Relief, SceneState
+from server.scene.geometry.relief import PATH_TOLERANCE_M, kept_within, relief
+from server.scene.geometry.stage import Drawing
+from server.scene.geometry.terrain_payload import build_terrain_scene
+from server.scene.layers.flight_layers import flight_nodes
+from server.scene.layers.ground_layers import surface_nodes
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
 from tests.server.scene_fixtures import hill
 

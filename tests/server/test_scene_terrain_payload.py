@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planning.orthophoto import Orthophoto
-from server.scene.terrain_payload import GRID_CELLS, TEXTURE_PX, build_terrain_scene
+from planning.terrain.orthophoto import Orthophoto
+from server.scene.geometry.terrain_payload import GRID_CELLS, TEXTURE_PX, build_terrain_scene
 from tests.server.scene_fixtures import hill
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from server.scene import palette
-from server.scene.tracks import ARROW_S, MOST, SIGMAS, ellipse_enu_m, track_nodes
+from server.scene.geometry import palette
+from server.scene.layers.track_layer import ARROW_S, MOST, SIGMAS, ellipse_enu_m, track_nodes
 from tests.server.test_scene_obstacles import placed
 from tests.server.track_messages import track, tracks_status
 

@@ -12,10 +12,10 @@ import pytest
 import viser
 from viser import transforms
 
-from server.scene.drawing import Drawing
-from server.scene.payload import ReviewScene
-from server.scene.review import review_nodes
-from server.scene.vehicle import VehiclePose, scene_wxyz, track_nodes, vehicle_nodes
+from server.scene.geometry.payload import ReviewScene
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.flight_layers import review_nodes
+from server.scene.layers.vehicle_layers import VehiclePose, scene_wxyz, track_nodes, vehicle_nodes
 from server.scene.view import SceneView
 from tests.server.scene_fixtures import exaggerated, hill, state_over
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import viser
 
-from planning.dsm import Dsm
-from server.scene.payload import SceneState
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.payload import SceneState
 from server.scene.view import SceneView
 from server.schemas import SelectionDoc
 from tests.server.scene_fixtures import exaggerated, hill, plan_over, state_over

@@ -17,15 +17,16 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from server.api import sensors as sensors_door
-from server.sensor_token import FILE, sensor_token
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
+from server.api import sensor_routes as sensors_door
+from server.door.sensor_token import FILE, sensor_token
 from telemetry.agent.client import Agent, CloudReading, RadarReading, SlamReading, UwbReading
-from telemetry.agent.wire import (
+from telemetry.agent.link_messages import (
     SUBPROTOCOL,
     Hello,
     Ping,
     Pong,
-    Radar,
+    RadarMessage,
     Report,
     Slam,
     Uwb,
@@ -34,8 +35,7 @@ from telemetry.agent.wire import (
     encode,
 )
 from telemetry.errors import SensorLinkError
-from telemetry.messages import Topic, VehicleText
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
+from telemetry.topics.messages import Topic, VehicleText
 from tests.server.running import Running, running
 
 pytestmark = pytest.mark.xdist_group("sensor-link")

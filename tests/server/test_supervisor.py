@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from server.node_process import LOG_BYTES, bound_log
-from server.supervisor import NodeState, Supervisor
+from server.work.node_process import LOG_BYTES, bound_log
+from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
-from telemetry.node_lock import NodeFacts, running_node, running_nodes
+from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 90.0

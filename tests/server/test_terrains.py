@@ -10,7 +10,7 @@ import pytest
 import rasterio
 from affine import Affine
 
-from planning.dsm import Dsm
+from planning.terrain.dsm import Dsm
 from server.library.terrains import load_terrain
 from server.schemas import Computation, PlanDoc, PoiDoc, TerrainDoc
 from tests.server.station import Station, ok, station

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from planning.errors import FormatError
-from planning.landing_sites import CAUTION
+from planning.ground.landing_sites import CAUTION
 from server.errors import JobCancelledError, NotFoundError, NotReadyError, StorageError
-from server.job_board import JobBoard
-from server.jobs import Lane
 from server.schemas import LandingSiteDoc, LandingSitesBody, TraversabilityBody, TraversabilityState, ViewDoc
 from server.traversability import task
-from server.traversability.desk import TraversabilityDesk
-from server.traversability.sites import FoundSites, find_sites
+from server.traversability.landing_site_task import FoundSites, find_sites
+from server.traversability.traversability_desk import TraversabilityDesk
+from server.work.job_board import JobBoard
+from server.work.jobs import Lane
 
 KEPT = "hill/traversability.npz"
 SITE = LandingSiteDoc(

@@ -13,17 +13,17 @@ import pytest
 
 from mapping.uwb import of_rule
 from planning.errors import FormatError
-from planning.geotiff import write_dsm
-from planning.traversable import UwbScans
-from server.flying.flying import RUNTIME_FOLDER
+from planning.ground.traversable import UwbScans
+from planning.terrain.geotiff import write_dsm
+from server.door.sensor_token import sensor_token
 from server.library import Library
 from server.schemas import TraversabilityState, UwbLiveDoc
-from server.sensor_token import sensor_token
-from server.traversability.live import AGAIN_S, SILENT_S, LiveUwb
+from server.stations import RUNTIME_FOLDER
+from server.traversability.live_uwb import AGAIN_S, SILENT_S, LiveUwb
 from telemetry.agent.client import Agent, UwbReading
-from telemetry.agent.wire import Uwb
+from telemetry.agent.link_messages import Uwb
 from telemetry.bus import Bus
-from telemetry.messages import Topic, VehicleText
+from telemetry.topics.messages import Topic, VehicleText
 from tests.server.scene_fixtures import hill
 from tests.server.station import Station, ok, station
 from tests.server.test_traversability_maps import scans

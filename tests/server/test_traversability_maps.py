@@ -11,16 +11,16 @@ import pytest
 from mapping.errors import CapacityError
 from mapping.uwb import Cleared, UwbGeometry, of_rule
 from planning.errors import FormatError
-from planning.geotiff import read_dsm
-from planning.traversable import UwbScans, traversable_ground
+from planning.ground.traversable import UwbScans, traversable_ground
+from planning.terrain.geotiff import read_dsm
 from server.errors import NotReadyError, StorageError
 from server.library.terrains import load_terrain, store_terrain
-from server.scene import palette
+from server.scene.geometry import palette
 from server.schemas import LandingSitesBody, LayerName
 from server.traversability import task
+from server.traversability.landing_site_task import find_sites
 from server.traversability.legend import LEGENDS, chance_classes, classes, legend_of, painted, time_classes
 from server.traversability.maps import Maps, Radar, keep, kept_in, read_maps, settle, write_maps
-from server.traversability.sites import find_sites
 from telemetry.sensors.uwb_log import write_uwb_log
 from tests.server.scene_fixtures import hill
 

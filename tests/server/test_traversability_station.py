@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planning.geotiff import write_dsm
+from planning.terrain.geotiff import write_dsm
 from server.schemas import JobDoc, SetView, TraversabilityState, ViewDoc
 from telemetry.sensors.uwb_log import write_uwb_log
 from tests.server.scene_fixtures import hill

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.typescript import TARGET, _type, generate
+from server.schemas.typescript import TARGET, _type, generate
 
 
 def test_the_console_has_the_present_types() -> None:

@@ -7,25 +7,23 @@ import json
 import threading
 import time
 import zipfile
-from collections.abc import Iterator
 
 import pytest
 
-from planning.demo import demo_pois
-from server.demo import PLAN_NAME, TERRAIN_NAME
+from planning.ground.demo_hillside import demo_pois
+from server.plan.demo import PLAN_NAME, TERRAIN_NAME
 from server.schemas import (
     CursorMessage,
     HoverProfile,
     NoticeMessage,
     PlaceDoc,
     PlanDoc,
-    PlanMessage,
     PoiDoc,
     SelectionDoc,
     SelectionMessage,
     SetSelection,
 )
-from tests.server.station import PATIENCE_S, Station, ok, station
+from tests.server.station import PATIENCE_S, Station, ok
 
 pytestmark = pytest.mark.xdist_group("workspace")
 

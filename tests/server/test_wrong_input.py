@@ -18,10 +18,9 @@ import pytest
 import rasterio
 from affine import Affine
 
-from planning.demo import demo_dsm
-from server.demo import PLAN_NAME
-from server.schemas import JobDoc, PlanDoc, PlanMessage, PoiDoc
-from tests.server.station import Station, ok, station
+from planning.ground.demo_hillside import demo_dsm
+from server.schemas import JobDoc, PlanDoc, PoiDoc
+from tests.server.station import Station, ok
 
 pytestmark = pytest.mark.xdist_group("wrong-input")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from telemetry.tracks import Track, TracksStatus, VelocityCone, VelocityProposal
+from telemetry.topics.tracks import Track, TracksStatus, VelocityCone, VelocityProposal
 from tests.server.obstacle_messages import ORIGIN
 
 

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.parameters import Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from tests.telemetry.simulator_bench import Bench
 
 ARM, SET_MODE, TAKEOFF, START, PAUSE, YAW, SPEED, SET_CURRENT = 400, 176, 22, 300, 193, 115, 178, 224

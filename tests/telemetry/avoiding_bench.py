@@ -7,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from telemetry.flight.avoiding import Avoiding
-from telemetry.flight.rest import Rest, rest_from, rest_of_flight
+from telemetry.flight.avoidance.avoiding import Avoiding
+from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
 from telemetry.mavlink.actions import Send
-from telemetry.messages import GuidedTarget, Item, OnboardMission
-from telemetry.obstacles import Obstacle, PerceptionStatus, Region, Sensor
-from telemetry.reduce import reduce
-from telemetry.requests import Operator
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import reduce
+from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
+from telemetry.topics.obstacles import Obstacle, PerceptionStatus, Region, Sensor
+from telemetry.topics.requests import Operator
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.simulator_bench import HOME, SLICE_S, Bench
 
 NONE = (0.0, 0.0, 0.0, 0.0)

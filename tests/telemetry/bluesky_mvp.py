@@ -10,7 +10,6 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 SCALE = 100.0

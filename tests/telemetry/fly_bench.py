@@ -9,17 +9,10 @@ from typing import Any
 
 from planning.model import ClearanceParams, VehicleProfile
 from telemetry.flight.fly import FlyOptions, FlyResult, fly
-from telemetry.flight.prepare import Prepared
-from telemetry.messages import (
-    Candidate,
-    FlightStatus,
-    LinkStatus,
-    OnboardMission,
-    Topic,
-    UploadReport,
-)
-from telemetry.requests import Connect, Operator, ReadParameters, StartAuto, StartGuided, Upload
-from telemetry.vehicle import VehicleState
+from telemetry.flight.preflight.prepare import Prepared
+from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, Topic, UploadReport
+from telemetry.topics.requests import Connect, Operator, ReadParameters, StartAuto, StartGuided, Upload
+from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, mission
 from tests.telemetry.small_bus import SmallBus
 from tests.telemetry.test_preflight import state_at

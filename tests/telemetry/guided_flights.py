@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from planning.formats.wpl import read_wpl
-from planning.model import F64
-from telemetry.flight.feed import Feed
-from telemetry.flight.guided import GuidedScript
-from telemetry.flight.targets import guided_plan
+from telemetry.flight.guided.feed import Feed
+from telemetry.flight.guided.guided import GuidedScript
+from telemetry.flight.guided.targets import guided_plan
 from telemetry.mavlink.actions import Action, Send
-from telemetry.reduce import reduce
-from telemetry.requests import Operator, StartGuided
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import SimulatedVehicle
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import reduce
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.requests import Operator, StartGuided
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.simulator_bench import SLICE_S, Bench
 
 STREAMS_HZ = {33: 20, 30: 20, 245: 4, 87: 2}

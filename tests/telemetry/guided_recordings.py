@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from planning.model import F64
+from mapping.geometry.arrays import F64
 from telemetry.mavlink.codec import Parser
-from telemetry.messages import RawFrame, Topic
-from telemetry.recording.reader import open_recording
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.messages import RawFrame, Topic
 from tests.telemetry.simulator_bench import SLICE_S, Bench
 
 Order = tuple[float, Any]

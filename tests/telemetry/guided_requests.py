@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from telemetry.messages import GuidedTarget
-from telemetry.requests import Operator, StartGuided
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.requests import Operator, StartGuided
 from tests.telemetry.guided_vehicle import HOME, METRES_PER_DEG
 
 

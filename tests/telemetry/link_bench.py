@@ -8,8 +8,11 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
-from telemetry.mavlink.link import Link, open_link
-from telemetry.messages import (
+from telemetry.link.adopted import AdoptedVehicle
+from telemetry.link.answering import Answering, OperatorRight
+from telemetry.link.link import Link, open_link
+from telemetry.link.piloting import Pilot
+from telemetry.topics.messages import (
     CommandRecord,
     FlightStatus,
     LinkStatus,
@@ -19,8 +22,8 @@ from telemetry.messages import (
     TransferStatus,
     VehicleText,
 )
-from telemetry.requests import Operator
-from telemetry.vehicle import VehicleState
+from telemetry.topics.requests import LinkRequest, Operator
+from telemetry.topics.vehicle import VehicleState
 
 PATIENCE_S = 60.0
 ME = Operator("Ann", 1)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from telemetry.messages import Published
-from telemetry.sensing import RadarFrame, packed
-from telemetry.tracking.following import Following, Told
-from telemetry.tracks import TracksStatus
+from mapping.sensor_frames import RadarFrame, packed
+from telemetry.perception.status import Outcome
+from telemetry.topics.messages import Published
+from telemetry.topics.tracks import TracksStatus
+from telemetry.tracking.object_tracking import ObjectTracking
 from tests.telemetry import perception_flights as flights
 
 T0_MONO_S, T0_UTC_S = 1000.0, 1_700_000_000.0

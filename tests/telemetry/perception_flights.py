@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mapping.frames import LocalFrame
+from mapping.geometry.frames import LocalFrame
+from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SlamPose, packed
 from planning.formats.wpl import write_wpl
 from planning.model import Home, Mission, MissionItem
-from telemetry.messages import PlanRecord
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose, packed
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import PLAN
 
 HOME = (45.0, 10.0, 120.0)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from telemetry.bus import Bus
-from telemetry.messages import ServerAlive, Topic
-from telemetry.obstacles import MapDelta, ObstacleAlert, PerceptionStatus
+from telemetry.topics.messages import ServerAlive, Topic
+from telemetry.topics.obstacles import MapDelta, ObstacleAlert, PerceptionStatus
 from tests.telemetry import perception_flights as flights
 
 PATIENCE_S = 90.0

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import select
 import struct
-import threading
-import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
 
 from mapping.radar import POSITION2GO
-from telemetry.simulator.sensors.iq_synthesis import Returns, sampled
+from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled
 from tests.mapping.radar.echoes import noise
+from tests.telemetry.pseudo_terminals import PseudoTerminals, plugged_in
 
 END = b"\xdb\xe0"
 BITS = 12

@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from planning.formats.wpl import write_wpl
 from planning.model import Home, Mission, MissionItem
-from telemetry.messages import (
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import (
     CommandRecord,
     FlightStatus,
     LinkStatus,
@@ -20,8 +21,7 @@ from telemetry.messages import (
     Topic,
     VehicleText,
 )
-from telemetry.recording.writer import RecordingWriter
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 T0_UTC_S = 1_700_000_000.0
 T0_MONO_S = 500.0

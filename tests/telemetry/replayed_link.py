@@ -18,16 +18,18 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from planning.formats.wpl import read_wpl
 from planning.model import Firmware, Mission
 from telemetry.errors import NotAllowedError
-from telemetry.flight.targets import guided_plan
+from telemetry.flight.guided.targets import guided_plan
+from telemetry.link.answering import Answering, OperatorRight
+from telemetry.link.line import Line
+from telemetry.link.link import TICK_S, Link
+from telemetry.link.peers import Source
+from telemetry.link.procedures import OPTIONS, STRAIGHT_LEGS
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.codec import Packer, Parser
-from telemetry.mavlink.guided_way import OPTIONS, STRAIGHT_LEGS
 from telemetry.mavlink.items import item_message, items_from_mission
-from telemetry.mavlink.line import Line
-from telemetry.mavlink.link import TICK_S, Link
-from telemetry.mavlink.peers import Source
 from telemetry.mavlink.verify import digest
-from telemetry.messages import (
+from telemetry.recording.mcap_files.reader import Entry, open_recording
+from telemetry.topics.messages import (
     CommandRecord,
     ConnectionStatus,
     FlightStatus,
@@ -38,10 +40,9 @@ from telemetry.messages import (
     RawFrame,
     Topic,
 )
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
-from telemetry.recording.reader import Entry, open_recording
-from telemetry.requests import Operator, SetAvoidance, StartAuto, StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.topics.requests import Operator, SetAvoidance, StartAuto, StartGuided
+from telemetry.topics.vehicle import VehicleState
 
 ADDRESS, PEER = "udpin:127.0.0.1:14550", "127.0.0.1:14551"
 ME = Operator("Ann", 1)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from telemetry.sensing import SimTruth
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import SceneTerrain, World
+import numpy as np
 
 FRAME = Frame(37.72902, 14.99262, 1712.0)
 BELOW = -1000.0

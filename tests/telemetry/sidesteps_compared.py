@@ -12,21 +12,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.poses import Pose
-from mapping.tracker import Tracker
-from planning.velocity_obstacles import Obstacles, approaches
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.flight.passing import scene_of, velocity_past
-from telemetry.obstacles import PerceptionSettings
-from telemetry.track_settings import TrackerSettings, VelocitySettings
-from telemetry.tracking.blobs import Blobs
-from telemetry.tracking.followed import Followed, Memory
-from telemetry.tracking.following import keep_of, track_of
-from telemetry.tracking.remembered import Remembered
-from telemetry.tracks import Track, TracksStatus
-from telemetry.vehicle import VehicleState
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import moved_deg
+from mapping.geometry.poses import Pose
+from mapping.tracking import Tracker
+from mapping.tracking.blobs import Blobs
+from planning.evading.velocity_obstacles import Obstacles, approaches
+from telemetry.flight.avoidance.passing import scene_of, velocity_past
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
+from telemetry.topics.tracks import Track, TracksStatus
+from telemetry.topics.vehicle import VehicleState
+from telemetry.tracking.followed import Followed, TrackMemory
+from telemetry.tracking.object_tracking import keep_of, track_of
+from telemetry.tracking.out_of_view import Remembered
 from tests.telemetry.bluesky_mvp import Mvp
 
 F64 = NDArray[np.float64]

@@ -9,10 +9,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.mavlink import Endpoint
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.protocol.mavlink import Endpoint
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from tests.telemetry.tlogs import tlog_messages
 
 HOME = Frame(-37.1244507, 175.6892878, 803.24)

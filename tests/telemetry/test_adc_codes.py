@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import I64, U16
 from mapping.radar import AWR1843, POSITION2GO, RadarChain
 from telemetry.sensors.adc.codes import SampleCode, histogram, told
 from telemetry.sensors.adc.opening import open_adc

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import C64
 from mapping.radar import AWR1843, POSITION2GO, RadarChain
+from telemetry.sensors.adc.adc_file import AdcFile
 from telemetry.sensors.adc.dca1000 import open_dca1000
-from telemetry.sensors.adc.model import AdcFile
 from telemetry.sensors.adc.oda import open_oda
 from telemetry.sensors.adc.opening import open_adc
 from tests.telemetry.test_ti_config import config

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 from telemetry.agent.intake import SCANS_MOST_HZ, Intake, Taken
-from telemetry.agent.wire import (
+from telemetry.agent.link_messages import (
     NOTICE_LONGEST,
     STEP_M,
     Cloud,
@@ -15,7 +16,7 @@ from telemetry.agent.wire import (
     Notice,
     Ping,
     Pong,
-    Radar,
+    RadarMessage,
     Slam,
     Uwb,
     Welcome,
@@ -25,7 +26,6 @@ from telemetry.agent.wire import (
     points_of,
 )
 from telemetry.errors import SensorLinkError
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 
 TARGETS = np.array([[1, 50, 0.5, -3, 20], [2, 60, 1, 0.31, 15]], np.float32)
 

@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.thinning import thinned
-from telemetry.agent.bandwidth import Bandwidth
+from mapping.voxels.downsampling import thinned
 from telemetry.agent.client import sensor_url
-from telemetry.agent.clock import RemoteClock
-from telemetry.agent.thinning import sendable
-from telemetry.agent.wire import REACH_M, cloud, points_of
+from telemetry.agent.link_messages import REACH_M, cloud, points_of, sendable
+from telemetry.agent.pacing import Bandwidth, RemoteClock
 from telemetry.errors import AddressError
 
 

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.mavlink.audit import AuditLog, check_chain, read_entries
-from telemetry.messages import CommandRecord
+from telemetry.link.audit import AuditLog, check_chain, read_entries
+from telemetry.topics.messages import CommandRecord
 
 
 def record(words: str = "arm", *, t_utc_s: float = 1.0) -> CommandRecord:

@@ -23,7 +23,7 @@ from tests.telemetry.avoiding_bench import (
     Wall,
     craft,
     place,
-    rest_at,
+    remaining_at,
     state,
 )
 from tests.telemetry.frames import heard

@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from planning.velocity_obstacles import Limits, Obstacles
-from telemetry.flight.passing import Scene, is_last_moment
-from telemetry.obstacles import PerceptionSettings
-from telemetry.track_settings import VelocitySettings
-from telemetry.tracks import Track, TracksStatus
+from planning.evading.velocity_obstacles import Limits, Obstacles
+from telemetry.flight.avoidance.passing import Scene, is_last_moment
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import VelocitySettings
+from telemetry.topics.tracks import Track, TracksStatus
 from tests.telemetry.avoiding_bench import BRAKE, FLIGHT, HOME, NORTH_PER_DEG, RTL, Craft, Sense, Wall
 
 Place = Callable[[float], tuple[float, float]]

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from telemetry.flight.backing import Trail
-from telemetry.flight.orders import Place
-from telemetry.perception.kinds import RADAR
+from mapping.sensor_frames import RadarFrame, packed
+from telemetry.flight.avoidance.backing import Trail
+from telemetry.flight.guided.orders import Place
 from telemetry.perception.perceiver import Perceiver
-from telemetry.sensing import RadarFrame, packed
-from telemetry.vehicle import VehicleState
+from telemetry.perception.sensor_kinds import RADAR
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.avoiding_bench import BRAKE, Craft, Wall, mission, place
 
 PERIOD_S, LATENCY_S = 0.1, 0.1

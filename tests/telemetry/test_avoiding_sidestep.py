@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from telemetry.requests import FlyManoeuvre
-from tests.telemetry.avoiding_bench import BRAKE, GUIDED, ME, RTL, Wall, craft, rest_at, state, targets
+from telemetry.topics.requests import FlyManoeuvre
+from tests.telemetry.avoiding_bench import BRAKE, GUIDED, ME, RTL, Wall, craft, remaining_at, state, targets
 
 
 def test_it_goes_aside_without_a_stop_and_on_with_the_mission() -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from telemetry.errors import NotAllowedError
-from telemetry.flight.rest import Rest
-from telemetry.requests import FlyManoeuvre
+from telemetry.flight.guided.remaining_mission import RemainingMission
+from telemetry.topics.requests import FlyManoeuvre
 from tests.telemetry.avoiding_bench import (
     AUTO,
     BRAKE,
@@ -19,7 +19,7 @@ from tests.telemetry.avoiding_bench import (
     Sense,
     Wall,
     craft,
-    rest_at,
+    remaining_at,
     state,
     targets,
 )

@@ -11,8 +11,8 @@ import pytest
 
 from telemetry.bus import Bus
 from telemetry.errors import BusError
-from telemetry.messages import PlanRecord, RawFrame, ServerAlive, Topic, VehicleText
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import PlanRecord, RawFrame, ServerAlive, Topic, VehicleText
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run, short_folder
 
 

@@ -10,10 +10,10 @@ import pytest
 
 from planning.errors import CapacityError, DescribedError
 from telemetry.bus import Bus, error_info, error_of
-from telemetry.bus.wire import encode
+from telemetry.bus.encoding import encode
 from telemetry.errors import BusError, MissionUnknownError, RefusedError, SilentError
-from telemetry.messages import ErrorInfo, Item, OnboardMission
-from telemetry.requests import (
+from telemetry.topics.messages import ErrorInfo, Item, OnboardMission
+from telemetry.topics.requests import (
     Arm,
     Connect,
     Download,

@@ -8,7 +8,7 @@ import pytest
 
 from telemetry.bus import Bus
 from telemetry.errors import BusError
-from telemetry.messages import ServerAlive
+from telemetry.topics.messages import ServerAlive
 from tests.telemetry.bus_runs import Participant, run, short_folder
 
 # Publishes a number made of its name again and again, answers calls with it, and prints whom it hears.

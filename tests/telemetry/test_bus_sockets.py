@@ -9,8 +9,8 @@ import pytest
 from telemetry.bus import Bus
 from telemetry.bus.sockets import neighbours, private_directory, socket_directory
 from telemetry.errors import BusError
-from telemetry.messages import Topic
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run, short_folder
 
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
-from telemetry.bus.wire import decode_message, decode_request, encode_message, encode_request
+from telemetry.bus.encoding import decode_message, decode_request, encode_message, encode_request
 from telemetry.errors import BusError
-from telemetry.messages import MESSAGE_TYPES, Published, Topic
-from telemetry.requests import LinkRequest, OpenRecording, Play, ReplayRequest
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import MESSAGE_TYPES, Published, Topic
+from telemetry.topics.requests import LinkRequest, OpenRecording, Play, ReplayRequest
+from telemetry.topics.vehicle import VehicleState
 
 
 def same_after(encode: Callable[[Any], bytes], decode: Callable[[bytes], Any], value: Any) -> bool:

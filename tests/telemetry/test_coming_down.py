@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from telemetry.errors import NotAllowedError
-from telemetry.flight.coming_down import joined
-from telemetry.requests import FlyRest
+from telemetry.flight.avoidance.coming_down import joined
+from telemetry.topics.requests import FlyRest
 from tests.telemetry.avoiding_bench import ME, NORTH_PER_DEG, Craft, Sense, Wall, craft, state, targets
 from tests.telemetry.simulator_bench import HOME
 

@@ -13,7 +13,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import RefusedError, SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Progress, Send
 from telemetry.mavlink.commands import CommandRun
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
+from tests.seeds import seeds
 from tests.telemetry.lossy import STATION, VEHICLE, Faults, Run
 
 ARM, TAKEOFF, MODE, LAND_NOW = 400, 22, 176, 21

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from mapping.braking import Braking
-from telemetry.flight.checks import Row
-from telemetry.flight.eyes_check import avoidance_row
-from telemetry.flight.speeds import Speeds, flown_speeds
-from telemetry.messages import Item, OnboardMission
-from telemetry.obstacles import AvoidanceStatus, Eye
+from mapping.perceiving.braking import Braking
+from telemetry.flight.preflight.checks import Row
+from telemetry.flight.preflight.eyes_check import avoidance_row
+from telemetry.flight.preflight.speeds import Speeds, flown_speeds
+from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.obstacles import AvoidanceStatus, Eye
 
 RADAR = Eye("radar", 100.0, 10.0, 4.1)
 ON = AvoidanceStatus(enabled=True, state="watching", eyes=(RADAR,))

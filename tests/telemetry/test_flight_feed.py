@@ -10,12 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planning.model import F64
-from telemetry.flight.feed import FedLeg, Feed, bounds_of
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.flight.leading import Leading
-from telemetry.flight.orders import Place
-from telemetry.messages import GuidedTarget
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import moved_deg, offset_m
+from telemetry.flight.guided.feed import FedLeg, Feed, bounds_of
+from telemetry.flight.guided.leading import Leading
+from telemetry.flight.guided.orders import Place
+from telemetry.topics.messages import GuidedTarget
 from tests.telemetry.guided_flights import off_line
 
 LAT_DEG, LON_DEG, FEED, STEP_S = 0.0, 10.0, Feed(), 0.1

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.flight.pilot_watch import PilotWatch
-from telemetry.vehicle import VehicleState
+from telemetry.flight.avoidance.pilot_watch import PilotWatch
+from telemetry.topics.vehicle import VehicleState
 
 
 def state(mode: str, *, critical: bool = False) -> VehicleState:

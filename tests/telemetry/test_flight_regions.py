@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from telemetry.flight.regions import CLEAR_FRAMES, Regions, sees_enough_for
-from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
+from telemetry.flight.avoidance.regions import CLEAR_FRAMES, Regions, sees_enough_for
+from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
 from tests.telemetry.avoiding_bench import seen_at
 
 ROI = Region((0.0, 0.0, 0.0), 0.0, 7.0, 0.4, 2.0, occupied=False)

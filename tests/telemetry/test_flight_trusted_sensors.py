@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from telemetry.flight.regions import Regions
-from telemetry.flight.witnesses import Witnesses
-from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
-from telemetry.vehicle import VehicleState
+from telemetry.flight.avoidance.regions import Regions
+from telemetry.flight.avoidance.trusted_sensors import TrustedSensors
+from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Region, Sensor
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.avoiding_bench import Wall, craft, state
 
 OCCUPIED = Region((0.0, 0.0, 0.0), 0.0, 7.0, 0.4, 2.0, occupied=True)

@@ -20,15 +20,8 @@ from telemetry.errors import (
 )
 from telemetry.flight import fly as fly_module
 from telemetry.flight.fly import FlyResult, fly
-from telemetry.messages import (
-    ConnectionStatus,
-    ErrorInfo,
-    FlightStatus,
-    LinkStatus,
-    Topic,
-    VehicleText,
-)
-from telemetry.requests import Connect, ReadParameters, ReturnHome, StartAuto, StartGuided, Upload
+from telemetry.topics.messages import ConnectionStatus, ErrorInfo, FlightStatus, LinkStatus, Topic, VehicleText
+from telemetry.topics.requests import Connect, ReadParameters, ReturnHome, StartAuto, StartGuided, Upload
 from tests.server.flight_logs import PLAIN
 from tests.telemetry.fly_bench import ADDRESS, OPTIONS, PLANNED, VEHICLE, Heard, Pilot, flown
 from tests.telemetry.small_bus import SmallBus

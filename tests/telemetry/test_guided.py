@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from telemetry.errors import NotAllowedError, RefusedError
-from telemetry.flight.guided import GuidedEnd, GuidedScript
-from telemetry.flight.handover import Handover
-from telemetry.flight.orders import Place
-from telemetry.flight.standstill import Standstill
+from telemetry.flight.guided.guided import GuidedEnd, GuidedScript
+from telemetry.flight.guided.handover import Handover
+from telemetry.flight.guided.orders import Place
+from telemetry.flight.guided.standstill import Standstill
 from telemetry.mavlink.actions import Action, Done, Failed, Progress
-from telemetry.reduce import reduce
-from telemetry.requests import StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import reduce
+from telemetry.topics.requests import StartGuided
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.guided_requests import LINE, request, target
 from tests.telemetry.guided_vehicle import HOME, LOITER, METRES_PER_DEG, Craft
 from tests.telemetry.lossy import VEHICLE, Faults, Run

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planning.model import F64
-from telemetry.flight.feed import Feed
+from mapping.geometry.arrays import F64
+from telemetry.flight.guided.feed import Feed
 from tests.telemetry.guided_flights import ScriptedFlight, off_line
 from tests.telemetry.guided_recordings import Replay, Stretch, replayed_stretch
 from tests.telemetry.simulator_bench import SLICE_S

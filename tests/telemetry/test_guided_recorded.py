@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from telemetry.flight.guided import GuidedScript
+from telemetry.flight.guided.guided import GuidedScript
 from telemetry.mavlink.actions import Action, Send
-from telemetry.messages import GuidedTarget
-from telemetry.reduce import reduce
-from telemetry.requests import StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import reduce
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.requests import StartGuided
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.guided_requests import request
 from tests.telemetry.lossy import VEHICLE
 

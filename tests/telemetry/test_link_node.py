@@ -16,14 +16,14 @@ from typing import Any
 import pytest
 
 from telemetry.bus import Bus
+from telemetry.bus.link_client import LinkClient
+from telemetry.bus.node_lock import running_node
 from telemetry.errors import AddressError, MissionUnknownError, NoVehicleError
-from telemetry.link_client import LinkClient
-from telemetry.mavlink.audit import check_chain, read_entries
-from telemetry.messages import FlightStatus, LinkStatus, ServerAlive, Topic
-from telemetry.node_lock import running_node
-from telemetry.requests import Arm, Connect, Operator, ReadParameters, StartAuto, Upload
-from telemetry.simulator.run import SimOptions, flying
-from telemetry.vehicle import VehicleState
+from telemetry.link.audit import check_chain, read_entries
+from telemetry.simulation.simulator.run import SimOptions, flying
+from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic
+from telemetry.topics.requests import Arm, Connect, Operator, ReadParameters, StartAuto, Upload
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import ROOT, run
 from tests.telemetry.link_bench import free_port, until
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, QUICKLY_DOWN, items

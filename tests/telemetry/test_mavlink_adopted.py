@@ -10,11 +10,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import RefusedError, SilentError
+from telemetry.link.adopted import AdoptedVehicle, Telling
+from telemetry.link.line import Line
 from telemetry.mavlink.address import parse_address
-from telemetry.mavlink.adopted import AdoptedVehicle, Telling
-from telemetry.mavlink.line import Line
-from telemetry.messages import Candidate, OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Candidate, OnboardMission
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack
 from tests.telemetry.frames import ARMED, GUIDED, attitude, heard, heartbeat

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import math
 import time
@@ -13,13 +12,13 @@ from typing import Any
 import pytest
 
 from telemetry.errors import NotAllowedError
-from telemetry.messages import FlightStatus, GuidedTarget
-from telemetry.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Region
-from telemetry.requests import FlyManoeuvre, Pause, Resume, ReturnHome, SetAvoidance, StartAuto, StartGuided
-from telemetry.simulator.run import Simulator
+from telemetry.simulation.simulator.run import Simulator
+from telemetry.topics.messages import FlightStatus, GuidedTarget
+from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Region
+from telemetry.topics.requests import FlyManoeuvre, Pause, Resume, ReturnHome, SetAvoidance, StartAuto, StartGuided
 from tests.telemetry.avoiding_bench import Wall, seen_at
 from tests.telemetry.bus_runs import run
-from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.link_bench import ME, Console, again_and_again, until
 from tests.telemetry.test_mavlink_flights import (
     LAT_DEG,
     LON_DEG,

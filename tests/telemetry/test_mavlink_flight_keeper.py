@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
-from telemetry.messages import FlightStatus, Item, OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, Item, OnboardMission
+from telemetry.topics.vehicle import VehicleState
 
 
 def item(command: int) -> Item:

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError
-from telemetry.messages import CommandRecord, FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
-from telemetry.requests import (
+from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
+from telemetry.topics.messages import CommandRecord, FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
+from telemetry.topics.requests import (
     Arm,
     Connect,
     Disarm,
@@ -25,7 +26,6 @@ from telemetry.requests import (
     StartGuided,
     Upload,
 )
-from telemetry.simulator.run import SimOptions, Simulator, flying
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, console, until
 

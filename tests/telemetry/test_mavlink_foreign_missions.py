@@ -9,9 +9,9 @@ import pytest
 from pymavlink import mavutil
 
 from telemetry.errors import MissionUnknownError
-from telemetry.messages import Item, VehicleText
-from telemetry.requests import Resume, ReturnHome, StartAuto
-from telemetry.simulator.run import Simulator
+from telemetry.simulation.simulator.run import Simulator
+from telemetry.topics.messages import Item, VehicleText
+from telemetry.topics.requests import Resume, ReturnHome, StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
 from tests.telemetry.test_mavlink_flights import items, phase, simulated, start, upload

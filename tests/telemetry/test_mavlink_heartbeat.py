@@ -2,7 +2,7 @@
 
 import asyncio
 
-from telemetry.mavlink.heartbeat import HOLD_S, Grace, Heartbeat
+from telemetry.link.heartbeat import HOLD_S, Grace, Heartbeat
 
 GRACE_S = 10.0
 

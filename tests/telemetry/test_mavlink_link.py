@@ -20,8 +20,8 @@ from telemetry.errors import (
     RecordingFullError,
     RefusedError,
 )
-from telemetry.messages import CommandRecord, LinkStatus
-from telemetry.requests import (
+from telemetry.topics.messages import CommandRecord, LinkStatus
+from telemetry.topics.requests import (
     Adopt,
     Arm,
     Connect,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.mavlink.memory import Memory, Wanted, read_memory, write_memory
-from telemetry.messages import Candidate, FlightStatus
+from telemetry.nodes.link import Memory, Wanted, read_memory, write_memory
+from telemetry.topics.messages import Candidate, FlightStatus
 
 FULL = Memory(
     (Wanted("udpin:0.0.0.0:14550", True), Wanted("/dev/ttyACM0:57600", False)),

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from planning.mav_cmd import MavCmd
 from telemetry.errors import SilentError
-from telemetry.mavlink.command_words import MISSION_START
-from telemetry.requests import StartAuto
-from telemetry.simulator.mavlink import Endpoint
+from telemetry.simulation.simulator.protocol.mavlink import Endpoint
+from telemetry.topics.requests import StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, until
 from tests.telemetry.test_mavlink_flights import phase, simulated, upload

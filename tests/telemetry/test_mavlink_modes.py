@@ -3,7 +3,7 @@
 import pytest
 
 from telemetry.mavlink.modes import mode_name, mode_numbers
-from telemetry.vehicle import Autopilot
+from telemetry.topics.vehicle import Autopilot
 
 
 @pytest.mark.parametrize("name", ["STABILIZE", "AUTO", "GUIDED", "LOITER", "RTL", "LAND", "BRAKE", "SMART_RTL"])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.mavlink.onboard import SETTLE_S, OnBoard
-from telemetry.messages import Item, OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.link.onboard import SETTLE_S, OnBoard
+from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.frames import attitude, heard
 
 ITEM = Item(16, 3, (0.0, 0.0, 0.0, 0.0), -37.0, 175.0, 10.0)

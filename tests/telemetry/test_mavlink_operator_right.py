@@ -3,8 +3,8 @@
 import pytest
 
 from telemetry.errors import NotAllowedError
-from telemetry.mavlink.operator_right import OperatorRight
-from telemetry.requests import Operator
+from telemetry.link.answering import OperatorRight
+from telemetry.topics.requests import Operator
 
 
 def test_a_higher_token_takes_over_and_the_lower_one_is_refused() -> None:

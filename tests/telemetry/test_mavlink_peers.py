@@ -1,6 +1,6 @@
 """Who becomes the vehicle, who stays a stranger, and whose messages never mix in."""
 
-from telemetry.mavlink.peers import FORGET_S, MOST_CANDIDATES, Peers, Source
+from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, Peers, Source
 from tests.telemetry.frames import attitude, ground_station_heartbeat, heard, heartbeat
 
 UDP = "udpin:0.0.0.0:14550"

@@ -10,13 +10,13 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, SilentError
-from telemetry.mavlink import mode_change
+from telemetry.link import procedures
+from telemetry.link.missions import check_same_mission, speeds_before
+from telemetry.link.onboard import OnBoard
+from telemetry.link.piloting import Pilot
 from telemetry.mavlink.flight_keeper import FlightKeeper
-from telemetry.mavlink.going_on import check_same_mission, speeds_before
-from telemetry.mavlink.onboard import OnBoard
-from telemetry.mavlink.piloting import Pilot
-from telemetry.messages import Item, OnboardMission
-from telemetry.requests import StartAuto
+from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.requests import StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack
 from tests.telemetry.frames import ARMED, AUTO, GUIDED, RTL, heartbeat

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.mavlink.quality import WINDOW_S, RateMeter, RoundTripClock, SequenceQuality
+from telemetry.link.quality import WINDOW_S, RateMeter, RoundTripClock, SequenceQuality
 from tests.telemetry.frames import heard
 
 

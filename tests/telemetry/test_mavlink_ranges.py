@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from mapping.sensor_frames import RangeFrame
 from telemetry.mavlink.ranges import RangeReader
-from telemetry.messages import Topic
-from telemetry.requests import Connect
-from telemetry.sensing import RangeFrame
+from telemetry.topics.messages import Topic
+from telemetry.topics.requests import Connect
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle, beat
 from tests.telemetry.link_bench import ME, console, free_port, until

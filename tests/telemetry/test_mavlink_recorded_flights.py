@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
+from mapping.geometry.frames import apart_m
 from planning.model import VehicleProfile
-from telemetry.flight import checks
-from telemetry.messages import FlightStatus
+from telemetry.flight.preflight import checks
+from telemetry.topics.messages import FlightStatus
 from tests.telemetry.replayed_link import ReplayedLink, received, replayed
 
 METRES_PER_DEG = 111_195.0

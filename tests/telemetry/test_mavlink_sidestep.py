@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from telemetry.errors import NotAllowedError
-from telemetry.requests import Resume, SetAvoidance, StartAuto
-from telemetry.simulator.run import Simulator
-from telemetry.tracks import Track, TracksStatus
+from telemetry.simulation.simulator.run import Simulator
+from telemetry.topics.requests import Resume, SetAvoidance, StartAuto
+from telemetry.topics.tracks import Track, TracksStatus
 from tests.telemetry.bus_runs import run
-from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.link_bench import ME, Console, again_and_again, until
 from tests.telemetry.test_mavlink_avoidance import HURRIED, avoidance, landed, taken_off
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, simulated, start, upload
 

@@ -3,8 +3,8 @@
 import asyncio
 from dataclasses import replace
 
-from telemetry.mavlink.state_publisher import PERIOD_S, StatePublisher
-from telemetry.vehicle import VehicleState
+from telemetry.link.publishing import PERIOD_S, StatePublisher
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import until
 

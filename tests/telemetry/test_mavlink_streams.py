@@ -5,7 +5,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.mavlink.streams import FAST_HZ, StreamRequests
+from telemetry.link.streams import FAST_HZ, StreamRequests
 from tests.telemetry.frames import attitude, heard
 
 NAMES = {kind.id: kind.msgname for kind in mavlink.mavlink_map.values()}

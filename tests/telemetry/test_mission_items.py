@@ -15,7 +15,7 @@ from telemetry.mavlink.items import (
     items_from_mission,
     mission_from_onboard,
 )
-from telemetry.messages import Item, OnboardMission
+from telemetry.topics.messages import Item, OnboardMission
 
 VEHICLE = (1, 1)
 NAN = math.nan

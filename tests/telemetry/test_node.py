@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from telemetry.bus import Bus
-from telemetry.messages import ServerAlive, Topic
-from telemetry.node_lock import running_node, running_nodes
+from telemetry.bus.node_lock import running_node, running_nodes
+from telemetry.topics.messages import ServerAlive, Topic
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 60.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from telemetry.obstacles import MapDelta, MapOrigin, Sensor, pack_keys
 from telemetry.perception.ahead import Ahead, Flight
-from telemetry.perception.mission_line import Line
+from telemetry.perception.mission_line import FlightLine
+from telemetry.topics.obstacles import MapDelta, MapOrigin, Sensor, pack_keys
 
 ORIGIN = MapOrigin(45.0, 10.0, 100.0)
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.voxels import VoxelMap
-from telemetry.obstacles import MapDelta, MapOrigin
-from telemetry.perception import deltas as d
-from telemetry.perception.changes import ChangeTeller, told_probability
-from telemetry.perception.deltas import FoldedMap, in_parts
+from telemetry.perception.map_changes import ChangeTeller, told_probability
+from telemetry.topics import deltas as d
+from telemetry.topics.deltas import FoldedMap, in_parts
+from telemetry.topics.obstacles import MapDelta, MapOrigin
 
 ORIGIN = MapOrigin(45.0, 10.0, 120.0)
 HEAD = MapDelta("radar", 1.0, 2.0, 3, True, 0, 1, ORIGIN, 0.5, b"", b"", b"")

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapping.frames import LocalFrame
-from mapping.octomap_bt import map_from_bt
-from planning.geotiff import read_dsm
-from telemetry.obstacles import MapDelta, MapOrigin
-from telemetry.perception.deltas import FoldedMap, in_parts
-from telemetry.perception.export import ExportError, exported
-from telemetry.perception.outlines import clusters, outline
+from mapping.geometry.frames import LocalFrame
+from mapping.voxels.octomap_bt import map_from_bt
+from planning.terrain.geotiff import read_dsm
+from telemetry.rebuilding.export import ExportError, exported
+from telemetry.rebuilding.outlines import clusters, outline
+from telemetry.topics.deltas import FoldedMap, in_parts
+from telemetry.topics.obstacles import MapDelta, MapOrigin
 
 ORIGIN = MapOrigin(-37.1244507, 175.6892879, 803.0)
 FRAME = LocalFrame(ORIGIN.lat_deg, ORIGIN.lon_deg, ORIGIN.alt_amsl_m)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from pyproj import CRS, Transformer
 
-from mapping.frames import LocalFrame
-from telemetry.obstacles import GroundNotice, MapOrigin
-from telemetry.perception.ground import GroundError, ground_around
+from mapping.geometry.frames import LocalFrame
+from telemetry.perception.known_ground import GroundError, ground_around
+from telemetry.topics.obstacles import GroundNotice, MapOrigin
 
 UTM = CRS.from_epsg(32633)
 LAT_DEG, LON_DEG = 47.0, 13.5

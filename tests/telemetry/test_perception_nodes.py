@@ -15,13 +15,13 @@ import pytest
 from typer.testing import CliRunner
 
 from server.cli import app
-from telemetry.looks import CloudLook, points_enu_m
-from telemetry.messages import Topic
-from telemetry.obstacles import MapDelta, PerceptionSettings
-from telemetry.perception.deltas import FoldedMap
-from telemetry.perception.kinds import KINDS
-from telemetry.perception.rebuild import rebuild
-from telemetry.requests import StartRecording, StopRecording, WholeMap
+from telemetry.perception.sensor_kinds import KINDS
+from telemetry.rebuilding.rebuild import rebuild
+from telemetry.topics.deltas import FoldedMap
+from telemetry.topics.looks import CloudLook, points_enu_m
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import MapDelta, PerceptionSettings
+from telemetry.topics.requests import StartRecording, StopRecording, WholeMap
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.perception_processes import PATIENCE_S, Processes, Sky, fly
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from telemetry.messages import FlightStatus
-from telemetry.obstacles import AvoidanceStatus, FlightMapStatus, PerceptionSettings
-from telemetry.perception.kinds import KINDS, RADAR, RANGES, VISION
+from mapping.sensor_frames import RadarFrame, packed
 from telemetry.perception.perceiver import BROKEN, Perceiver
+from telemetry.perception.sensor_kinds import KINDS, RADAR, RANGES, VISION
 from telemetry.perception.status import Outcome
-from telemetry.sensing import RadarFrame, packed
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus, PerceptionSettings
 from tests.telemetry import perception_flights as flights
 
 T0_MONO_S, T0_UTC_S = 1000.0, 1_700_000_000.0

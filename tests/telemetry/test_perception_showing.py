@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from mapping.perceiving import RadarPerception, RadarScan, Settings, VisionPerception
-from telemetry.looks import CloudLook, RadarLook, points_enu_m
-from telemetry.obstacles import MapOrigin
+from mapping.perceiving import RadarPerception, Settings, VisionPerception
+from mapping.sensor_frames import rows
 from telemetry.perception.showing import MOST_POINTS, MOST_TARGETS, Showing, look_of
-from telemetry.sensing import rows
-from tests.mapping.flights import Flight
+from telemetry.topics.looks import CloudLook, RadarLook, points_enu_m
+from telemetry.topics.obstacles import MapOrigin
+from tests.mapping.flights import Flight, radar_frame
 
 ORIGIN = MapOrigin(45.0, 10.0, 120.0)
 

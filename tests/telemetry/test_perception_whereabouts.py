@@ -3,7 +3,7 @@
 import pytest
 
 from telemetry.perception.whereabouts import is_flying
-from telemetry.vehicle import Landed, VehicleState
+from telemetry.topics.vehicle import Landed, VehicleState
 
 
 @pytest.mark.parametrize(

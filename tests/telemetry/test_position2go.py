@@ -15,8 +15,8 @@ from mapping.radar import POSITION2GO
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.position2go import Position2Go
 from telemetry.errors import SensorError
-from telemetry.sensors.position2go import answers, session
-from telemetry.sensors.position2go.messages import MessageStream, OutOfStepError, Payload, Status, encode
+from telemetry.sensors.position2go import answers, board_session
+from telemetry.sensors.position2go.board_messages import MessageStream, OutOfStepError, Payload, Status, encode
 from tests.telemetry.position2go_board import Position2GoBoard, frame, payload, plugged, status
 
 

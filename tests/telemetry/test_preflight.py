@@ -10,18 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planning.clearance import certify
-from planning.dsm import Dsm
-from planning.flown import flown_line
+from planning.certificate.clearance import certify
+from planning.missions.flown import flown_line
 from planning.model import ClearanceParams, Home, Mission, MissionItem, VehicleProfile
+from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
-from telemetry.flight.parameters import return_settings
-from telemetry.flight.preflight import Preflight, Row, actual_home, check
-from telemetry.flight.rereference import rereference
-from telemetry.flight.resume import plan_resumption, resume_item
+from telemetry.flight.preflight.parameters import return_settings
+from telemetry.flight.preflight.preflight import Preflight, Row, actual_home, check
+from telemetry.flight.preflight.rereference import rereference
+from telemetry.flight.preflight.resume import plan_resumption, resume_item
 from telemetry.mavlink.items import items_from_mission
-from telemetry.messages import OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import OnboardMission
+from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
 
 PROFILE = VehicleProfile("quad", position_error_m=1.0, rtl_height_m=30.0)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, packed
 from telemetry.errors import RecordingError
-from telemetry.recording.clouds import CloudCodec
-from telemetry.recording.foxglove import Standards, standard_schema
-from telemetry.sensing import CloudFrame, RadarFrame, packed
+from telemetry.recording.mcap_files.cloud_codec import CloudCodec
+from telemetry.recording.mcap_files.foxglove import Standards, standard_schema
 
 POINTS = np.array([[1.0, 10.0, 0.5], [-2.0, 5.0, -1.0]])
 CLOUD = CloudFrame(5.0, 1_700_000_000.25, 7, "camera", packed(POINTS), 0.1)

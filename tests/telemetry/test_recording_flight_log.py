@@ -11,10 +11,10 @@ import pytest
 
 from planning.formats.wpl import read_wpl
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic, VehicleText
-from telemetry.obstacles import AvoidanceStatus
 from telemetry.recording.flight_log import FlightLog, read_flight_log
-from telemetry.recording.writer import RecordingWriter
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic, VehicleText
+from telemetry.topics.obstacles import AvoidanceStatus
 from tests.telemetry.recordings import (
     HOME,
     MISSION,
@@ -136,8 +136,8 @@ def test_hedgehops_own_recording(tmp_path: Path, finish: bool) -> None:
 
 def test_without_a_plan_the_mission_comes_from_the_frames(tmp_path: Path, shared_data: Path) -> None:
     """The real log's frames, recorded as Hedgehop records them."""
-    from telemetry.messages import RawFrame
     from telemetry.recording.tlog import tlog_frames
+    from telemetry.topics.messages import RawFrame
 
     writer = RecordingWriter(tmp_path / "b.mcap", t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S)
     for t_s, topic, message in flight(1.0):

@@ -13,8 +13,13 @@ from hypothesis import strategies as st
 from pyproj import Geod
 from scipy.spatial.transform import Rotation
 
-from telemetry.messages import VehicleText
-from telemetry.recording.foxglove import Standards, east_north_up_m, enu_from_body_quaternion, standard_schema
+from telemetry.recording.mcap_files.foxglove import (
+    Standards,
+    east_north_up_m,
+    enu_from_body_quaternion,
+    standard_schema,
+)
+from telemetry.topics.messages import VehicleText
 from tests.telemetry.recordings import HOME, STATE, state_at
 
 ANGLES = st.floats(-math.pi, math.pi)

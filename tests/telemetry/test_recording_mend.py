@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic
-from telemetry.recording.mend import mend
-from telemetry.recording.reader import open_recording
-from telemetry.recording.sink import being_written
-from telemetry.recording.topics import RECORDED
-from telemetry.recording.writer import RecordingWriter
+from telemetry.recording.mcap_files.mend import mend
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.recording.mcap_files.sink import being_written
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.recorded_topics import RECORDED
+from telemetry.topics.messages import Topic
 from tests.telemetry.recordings import T0_UTC_S, state_at, write_flight
 
 

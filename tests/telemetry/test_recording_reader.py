@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError
-from telemetry.messages import Published, Topic
-from telemetry.recording.reader import Recording, open_recording
-from telemetry.recording.topics import RECORDED
+from telemetry.recording.mcap_files.reader import Recording, open_recording
+from telemetry.recording.recorded_topics import RECORDED
+from telemetry.topics.messages import Published, Topic
 from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S, flight, write_flight
 
 SENT = [(T0_UTC_S + t_s, str(topic), message) for t_s, topic, message in flight()]

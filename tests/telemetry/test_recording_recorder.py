@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from telemetry.errors import RecordingFullError
-from telemetry.messages import RawFrame, RecorderStatus, ReplayStatus, ServerAlive, Topic
 from telemetry.recording.disk_space import Space
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.recording.reader import open_recording
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.recording.recorded_topics import RECORDED
 from telemetry.recording.recorder import Recorder, free_path
-from telemetry.recording.topics import RECORDED
 from telemetry.recording.trigger import AFTER_DISARM_S
+from telemetry.topics.messages import RawFrame, RecorderStatus, ReplayStatus, ServerAlive, Topic
 from tests.telemetry.recordings import PLAN, T0_MONO_S, T0_UTC_S, heartbeat, state_at
 
 MB = 1_000_000

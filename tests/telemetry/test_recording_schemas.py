@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError
-from telemetry.messages import MESSAGE_TYPES, PlanRecord, VehicleText
-from telemetry.recording.schemas import codec_of, json_schema
-from telemetry.vehicle import VehicleState
+from telemetry.recording.mcap_files.schemas import codec_of, json_schema
+from telemetry.topics.messages import MESSAGE_TYPES, PlanRecord, VehicleText
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import PLAN
 
 KINDS = sorted(set(MESSAGE_TYPES.values()), key=lambda kind: kind.__name__)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from telemetry.bus.wire import EACH_ARRIVES
-from telemetry.messages import MESSAGE_TYPES, REPLAY_PREFIX, Topic
-from telemetry.recording.schemas import codec_of
-from telemetry.recording.topics import EVENTS, LATEST, NOT_RECORDED, RECORDED, raw_channel_topic
+from telemetry.bus.encoding import EACH_ARRIVES
+from telemetry.recording.mcap_files.schemas import codec_of
+from telemetry.recording.recorded_topics import EVENTS, LATEST, NOT_RECORDED, RECORDED, raw_channel_topic
+from telemetry.topics.messages import MESSAGE_TYPES, REPLAY_PREFIX, Topic
 
 
 def test_every_topic_is_recorded_or_left_out_on_purpose() -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from telemetry.recording.foxglove import HOME_FRAME, Standards, standard_schema
-from telemetry.tracks import Track, TracksStatus
+from telemetry.recording.mcap_files.foxglove import HOME_FRAME, Standards, standard_schema
+from telemetry.topics.tracks import Track, TracksStatus
 
 TRACK = Track(
     id=7,

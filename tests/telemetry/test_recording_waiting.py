@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from telemetry.messages import Published, Topic, VehicleText
-from telemetry.obstacles import MapDelta, MapOrigin
+from mapping.sensor_frames import CloudFrame
 from telemetry.recording.cloud_budget import BYTES_PER_S, CloudBudget, LocalMapBudget
 from telemetry.recording.preroll import Stamped
 from telemetry.recording.waiting import Waiting
-from telemetry.sensing import CloudFrame
+from telemetry.topics.messages import Published, Topic, VehicleText
+from telemetry.topics.obstacles import MapDelta, MapOrigin
 
 
 def cloud(number: int, size: int = 1_200_000) -> Stamped:

@@ -14,10 +14,10 @@ import pytest
 from mcap.reader import make_reader
 
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.messages import RawFrame, Topic
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.recording.reader import open_recording
-from telemetry.recording.writer import RecordingWriter
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import RawFrame, Topic
 from tests.telemetry.recordings import PLAN, T0_MONO_S, T0_UTC_S, flight, state_at, write_flight
 
 RATE_HZ = 2000

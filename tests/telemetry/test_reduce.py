@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.reduce import is_vehicle_heartbeat, reduce
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import is_vehicle_heartbeat, reduce
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.frames import heard, heartbeat
 from tests.telemetry.tlogs import tlog_messages
 

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError
-from telemetry.messages import FlightStatus, LinkStatus, Topic, VehicleText
-from telemetry.recording.replay import Due, Player
+from telemetry.recording.player import Due, Player
 from telemetry.recording.replay_sources import open_source
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import FlightStatus, LinkStatus, Topic, VehicleText
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import T0_UTC_S, flight, write_flight
 
 NOW_S = 90_000.0

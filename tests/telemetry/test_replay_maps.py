@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from telemetry.messages import REPLAY_PREFIX, Published, Topic
-from telemetry.obstacles import MapDelta, MapOrigin, Obstacle, ObstacleAlert, PerceptionStatus
-from telemetry.perception.deltas import FoldedMap, in_parts
-from telemetry.recording.reader import open_recording
-from telemetry.recording.replay import Due, Player
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.player import Due, Player
 from telemetry.recording.replay_sources import open_source
-from telemetry.recording.writer import RecordingWriter
+from telemetry.topics.deltas import FoldedMap, in_parts
+from telemetry.topics.messages import REPLAY_PREFIX, Published, Topic
+from telemetry.topics.obstacles import MapDelta, MapOrigin, Obstacle, ObstacleAlert, PerceptionStatus
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S, state_at
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from telemetry.bus import Bus
+from telemetry.bus.node import NodeContext
+from telemetry.bus.node_lock import NodeLock
 from telemetry.errors import RecordingError
-from telemetry.messages import REPLAY_PREFIX, Published, ReplayStatus, ServerAlive, Topic
-from telemetry.node import NodeContext
-from telemetry.node_lock import NodeLock
 from telemetry.nodes.replay import Replayer, live
 from telemetry.recording.replay_sources import ReplaySource, open_source
-from telemetry.requests import CloseRecording, OpenRecording, Play, ReplayRequest
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import REPLAY_PREFIX, Published, ReplayStatus, ServerAlive, Topic
+from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import T0_UTC_S, write_flight
 
 PATIENCE_S = 60.0

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.replay_sources import open_source
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import T0_UTC_S, flight, write_flight
 
 

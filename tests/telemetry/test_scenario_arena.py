@@ -11,16 +11,16 @@ import pytest
 
 from mapping.errors import ParameterError
 from planning.errors import ParameterError as PlanningError
-from telemetry.flight.aside import Aside
-from telemetry.scenarios import arena, arena_course
-from telemetry.scenarios.arena_charts import error_charts, ways_chart
-from telemetry.scenarios.arena_course import Approach, approaches
-from telemetry.scenarios.arena_flight import Flown, arena_settings, fly
-from telemetry.scenarios.arena_radar import Position2Go
-from telemetry.scenarios.catalogue import NAMES
-from telemetry.scenarios.wanted import Wanted
-from telemetry.sensing import RadarKind
-from telemetry.track_settings import TrackerSettings
+from telemetry.flight.avoidance.aside import Aside
+from telemetry.simulation.scenarios.arena import arena, arena_course
+from telemetry.simulation.scenarios.arena.arena_charts import error_charts, ways_chart
+from telemetry.simulation.scenarios.arena.arena_course import Approach, approaches
+from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
+from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
+from telemetry.simulation.scenarios.catalogue import NAMES
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.topics.simulated import RadarKind
+from telemetry.topics.track_settings import TrackerSettings
 
 AHEAD = Approach(np.array([[0.0, 0.5], [0.0, 3.0]]), np.array([0.0, -5.0]), np.array([0.0, 5.0]))
 

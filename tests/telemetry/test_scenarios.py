@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.scenarios import scenes
-from telemetry.scenarios.course import Course, Waypoint, course_mission, script_request
-from telemetry.scenarios.figures import clusters_of, level_slice, recall, spread, within
-from telemetry.scenarios.nearness import away_m, level_away_m, objects_of
-from telemetry.scenarios.objects import box, cylinder, reflector, tree, wall, world_document
-from telemetry.scenarios.result import (
+from telemetry.simulation.scenarios.hugging.encounters import away_m, level_away_m, objects_of
+from telemetry.simulation.scenarios.hugging.strewn import strewn
+from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.course import Course, Waypoint, course_mission, script_request
+from telemetry.simulation.scenarios.stage.map_against_world import clusters_of, level_slice, recall, spread, within
+from telemetry.simulation.scenarios.stage.paper_fields import field, known
+from telemetry.simulation.scenarios.stage.result import (
     AlertSeen,
     Figure,
     FlightResult,
@@ -25,13 +26,12 @@ from telemetry.scenarios.result import (
     tally,
     tally_json,
 )
-from telemetry.scenarios.running import flown_of, setup_of
-from telemetry.scenarios.scenes import VALLEY, Scene
-from telemetry.scenarios.strewn import strewn
-from telemetry.scenarios.terrain import field, known
-from telemetry.scenarios.wanted import Wanted
-from telemetry.sensing import SimTruth
-from telemetry.simulator.scene import SceneTerrain, World
+from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.scenes import VALLEY, ScenarioScene
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.world_objects import box, cylinder, reflector, tree, wall, world_document
+from telemetry.simulation.simulator.scene import SceneTerrain, World
+from telemetry.topics.simulated import SimTruth
 
 HOP = Scene(
     world_document("hop", [wall("fence", (-6.0, 14.0), (6.0, 14.0), 5.0, material="stone")]),

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from planning.geotiff import read_dsm
-from telemetry.scenarios import long_flight, terrain_hugging
-from telemetry.scenarios.castle import CASES, fly_case
-from telemetry.scenarios.catalogue import run_scenario
-from telemetry.scenarios.result import Figure, ScenarioResult
-from telemetry.scenarios.wanted import Wanted
+from planning.terrain.geotiff import read_dsm
+from telemetry.simulation.scenarios.castle import CASES, fly_case
+from telemetry.simulation.scenarios.catalogue import run_scenario
+from telemetry.simulation.scenarios.hugging import long_flight, terrain_hugging
+from telemetry.simulation.scenarios.stage.result import Figure, ScenarioResult
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 
 pytestmark = pytest.mark.slow
 

@@ -11,20 +11,35 @@ from PIL import Image
 
 from mapping.uwb import Cleared, UwbParams
 from planning.errors import ParameterError
-from planning.geotiff import read_dsm
-from planning.traversable import cleared_ground, traversable_ground
-from server.cli.chart_plots import write_charts
-from telemetry.scenarios import foliage
-from telemetry.scenarios.charts import MOST_POINTS
-from telemetry.scenarios.foliage_drive import KEEP_M, SCAN_S, SPEED_M_S, drive, lawn_drive, things_on_lawn
-from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, rates, seconds_per_scan
-from telemetry.scenarios.foliage_roc import Roc, curve, echoes_m2, roc_chart
-from telemetry.scenarios.foliage_rural import connected, route
-from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
-from telemetry.scenarios.result import ScenarioResult, measured
-from telemetry.scenarios.wanted import Wanted
+from planning.ground.traversable import cleared_ground, traversable_ground
+from planning.terrain.geotiff import read_dsm
+from server.cli.plots.chart_plots import write_charts
 from telemetry.sensors.uwb_log import read_uwb_log
-from telemetry.simulator.sensors.uwb import UwbModel
+from telemetry.simulation.scenarios.foliage import foliage
+from telemetry.simulation.scenarios.foliage.foliage_drive import (
+    KEEP_M,
+    SCAN_S,
+    SPEED_M_S,
+    drive,
+    lawn_drive,
+    things_on_lawn,
+)
+from telemetry.simulation.scenarios.foliage.foliage_figures import (
+    PAPERS_RULE,
+    Drive,
+    cleared_by,
+    driven,
+    labels,
+    rates,
+    seconds_per_scan,
+)
+from telemetry.simulation.scenarios.foliage.foliage_roc import Roc, curve, echoes_m2, roc_chart
+from telemetry.simulation.scenarios.foliage.foliage_rural import connected, route
+from telemetry.simulation.scenarios.foliage.foliage_trials import TRIAL_1, TRIAL_2, trial_site
+from telemetry.simulation.scenarios.stage.curves import MOST_POINTS
+from telemetry.simulation.scenarios.stage.result import ScenarioResult, measured
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.sensors.uwb import UwbModel
 
 # On one worker: two would each drive for themselves.
 pytestmark = pytest.mark.xdist_group("foliage")

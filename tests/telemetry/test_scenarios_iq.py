@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from planning.errors import ParameterError
-from telemetry.scenarios import iq_reflector
-from telemetry.scenarios.catalogue import NAMES
-from telemetry.scenarios.iq_reflector import SENSORS, measure, resolved
-from telemetry.scenarios.result import ScenarioResult
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.sensors.iq_model import AWR1843_IQ
+from telemetry.simulation.scenarios.catalogue import NAMES
+from telemetry.simulation.scenarios.radar import iq_reflector
+from telemetry.simulation.scenarios.radar.iq_reflector import SENSORS, measure, resolved
+from telemetry.simulation.scenarios.stage.result import ScenarioResult
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ
 
 AWR1843, POSITION2GO = SENSORS
 

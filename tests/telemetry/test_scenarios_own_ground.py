@@ -12,23 +12,29 @@ import numpy as np
 import pytest
 from affine import Affine
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from telemetry.obstacles import PerceptionSettings
+from planning.terrain.dsm import Dsm
 from telemetry.perception.perceiver import Perceiver
-from telemetry.scenarios.course import Course, Waypoint, course_mission
-from telemetry.scenarios.encounters import encounters
-from telemetry.scenarios.flown import Flown
-from telemetry.scenarios.hugging import Hugging, random_route
-from telemetry.scenarios.nearness import objects_of
-from telemetry.scenarios.objects import Object, cylinder, world_document
-from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult, tally, tally_json
-from telemetry.scenarios.scenes import VALLEY
-from telemetry.scenarios.terrain import field
-from telemetry.scenarios.terrain_hugging import etna, run_over, world_of
-from telemetry.scenarios.wanted import Wanted
-from telemetry.sensing import SimTruth
-from telemetry.simulator.scene import World
+from telemetry.simulation.scenarios.hugging.encounters import encounters, objects_of
+from telemetry.simulation.scenarios.hugging.hugging import Hugging, random_route
+from telemetry.simulation.scenarios.hugging.terrain_hugging import etna, run_over, world_of
+from telemetry.simulation.scenarios.stage.course import Course, Waypoint, course_mission
+from telemetry.simulation.scenarios.stage.paper_fields import field
+from telemetry.simulation.scenarios.stage.result import (
+    Figure,
+    FlightResult,
+    MapFigures,
+    ScenarioResult,
+    tally,
+    tally_json,
+)
+from telemetry.simulation.scenarios.stage.scenes import VALLEY
+from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.world_objects import Object, cylinder, world_document
+from telemetry.simulation.simulator.scene import World
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.simulated import SimTruth
 
 LINE = np.array([[0.0, 0.0, 6.0], [0.0, 120.0, 6.0]])
 SHARE = "share of unknown objects alarmed in time"

@@ -12,23 +12,23 @@ from typer.testing import CliRunner
 
 from server.cli import app
 from server.flying import review_task
-from server.review import recording_of
+from server.flying.review import recording_of
 from telemetry.errors import RecordingError
-from telemetry.messages import Topic
-from telemetry.obstacles import MapDelta, PerceptionSettings, Sensor
-from telemetry.perception.changes import ChangeTeller
-from telemetry.perception.deltas import FoldedMap
-from telemetry.perception.kinds import KINDS
-from telemetry.perception.rebuild import OtherMap, rebuild
+from telemetry.perception.map_changes import ChangeTeller
+from telemetry.perception.sensor_kinds import KINDS
+from telemetry.rebuilding.rebuild import OtherMap, rebuild
 from telemetry.recording.carried_ground import carried_ground, packed
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.recording.mend import mend
-from telemetry.recording.reader import open_recording
-from telemetry.scenarios import scenes
-from telemetry.scenarios.flown import Flown
-from telemetry.scenarios.running import flown_of, setup_of
-from telemetry.scenarios.setup import Setup
-from telemetry.scenarios.wanted import Wanted
+from telemetry.recording.mcap_files.mend import mend
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.topics.deltas import FoldedMap
+from telemetry.topics.messages import Topic
+from telemetry.topics.obstacles import MapDelta, PerceptionSettings, Sensor
 
 SETTINGS = PerceptionSettings(radar_resolution_m=0.5)
 """Not the usual ones: they have to be told."""

@@ -13,14 +13,14 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, rows
 from planning.errors import FormatError
 from telemetry.bus import Bus
-from telemetry.messages import Topic
-from telemetry.node import NodeContext
-from telemetry.node_lock import NodeLock
+from telemetry.bus.node import NodeContext
+from telemetry.bus.node_lock import NodeLock
 from telemetry.nodes.sensors import REST_HZ, SensorOptions, main, sense
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose, rows
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.messages import Topic
 from tests.telemetry.scenes import FRAME, truth
 from tests.telemetry.small_bus import SmallBus
 

@@ -12,7 +12,7 @@ from mapping.radar import Detections
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import recorded_readings
 from telemetry.errors import RecordingError
-from telemetry.sensors.targets import write_targets
+from telemetry.sensors.target_recording import write_targets
 
 
 def detections(count: int) -> Detections:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from telemetry.track_settings import VelocitySettings
+from telemetry.topics.track_settings import VelocitySettings
 from tests.telemetry.bluesky_mvp import Mvp, is_installed
 from tests.telemetry.sidesteps_compared import (
     COUNT,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from tests.telemetry.autopilot_bench import (
     ACCEPTED,
     ARM,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from telemetry.simulator.battery import Battery, Pack
+from telemetry.simulation.simulator.airframe.battery import Battery, Pack
 
 
 def drained(thrust_share: float | None, seconds: int) -> Battery:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.simulator.run import SimOptions, Simulator
-from telemetry.simulator.scene import World
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.run import SimOptions, Simulator
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from tests.telemetry.scenes import FRAME, world
 
 ROOF = {"type": "box", "name": "Shed", "at_m": [0, 0], "size_m": [6, 6, 3]}

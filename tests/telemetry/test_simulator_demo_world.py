@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planning.demo import demo_dsm, demo_pois
-from planning.model import F64
+from mapping.geometry.arrays import F64
+from planning.ground.demo_hillside import demo_dsm, demo_pois
+from planning.missions.vehicle_profile import load_profile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import load_profile
-from telemetry.simulator.demo_world import demo_world, write_demo_world
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
+from telemetry.simulation.simulator.demo_world import demo_world, write_demo_world
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
 
 RTL_M = 60.0
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.simulator.dynamics import GRAVITY_M_S2, Airframe, Demand, Multirotor
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, Airframe, Demand, Multirotor
 
 STEP_S = 0.005
 STILL = (0.0, 0.0, 0.0)

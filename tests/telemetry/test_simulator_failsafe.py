@@ -1,7 +1,7 @@
 """When the simulated autopilot takes over."""
 
-from telemetry.simulator.failsafe import BatteryFailsafe, GcsFailsafe
-from telemetry.simulator.parameters import Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.failsafe import BatteryFailsafe, GcsFailsafe
 
 
 def test_a_ground_station_that_was_never_heard_is_not_missed() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from telemetry.simulator.frame import Frame
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 places = st.tuples(st.floats(-84, 84), st.floats(-180, 180), st.floats(-100, 4000))
 metres = st.floats(-3000, 3000)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from telemetry.simulator.gnss import RECEIVERS, Gnss, GnssKind
+from telemetry.simulation.simulator.airframe.gnss import RECEIVERS, Gnss, GnssKind
 
 
 def errors(kind: GnssKind, seed: int, samples: int, every_s: float) -> np.ndarray:

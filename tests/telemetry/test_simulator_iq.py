@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from telemetry.sensing import RadarFrame, SimTruth, rows
-from telemetry.simulator.scene import World
-from telemetry.simulator.scene.shapes import WAVELENGTH_M
-from telemetry.simulator.sensors import RadarSensor, radar_sensor
-from telemetry.simulator.sensors.iq import IqRadarSensor, noise
-from telemetry.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
-from tests.telemetry.scenes import in_the_air, truth, world
+from mapping.sensor_frames import RadarFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.scene.world_shapes import WAVELENGTH_M
+from telemetry.simulation.simulator.sensors import RadarSensor, radar_sensor
+from telemetry.simulation.simulator.sensors.iq import IqRadarSensor, noise
+from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
+from telemetry.topics.simulated import SimTruth
+from tests.telemetry.scenes import in_the_air, polar, truth, world
 
 COARSE_RAD = math.radians(20.0)
 """Between rays, where nothing but corner reflectors is there to be met."""

@@ -9,21 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapping.alerts import AlertEvent
-from mapping.perceiving import RadarPerception, RadarScan, Settings
-from planning.demo import demo_dsm, demo_pois
-from planning.model import F64
+from mapping.geometry.arrays import F64
+from mapping.perceiving import RadarPerception, Settings
+from mapping.perceiving.alerts import AlertEvent
+from planning.ground.demo_hillside import demo_dsm, demo_pois
+from planning.missions.vehicle_profile import load_profile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import load_profile
-from telemetry.obstacles import MapOrigin
-from telemetry.perception.ground import ground_around
-from telemetry.scenarios.terrain import notice
-from telemetry.sensing import RadarFrame, SimTruth, rows
-from telemetry.simulator.demo_world import demo_world
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
-from telemetry.simulator.sensors import radar_sensor
+from telemetry.perception.known_ground import ground_around
+from telemetry.simulation.scenarios.stage.paper_fields import notice
+from telemetry.simulation.simulator.demo_world import demo_world
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors import radar_sensor
+from telemetry.topics.obstacles import MapOrigin
+from telemetry.topics.simulated import SimTruth
 
 SPEED_M_S, RADAR_S = 4.0, 0.1
 FROM_M, TO_M = 4.0, 22.0

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.radar import AWR1843, POSITION2GO, FmcwParams
-from telemetry.simulator.sensors.iq_synthesis import Returns, sampled, strongest
+from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled, strongest
 from tests.reference.iq_samples import Scatterer, samples
 
 SMALL = dataclasses.replace(AWR1843, chirps=9, samples=32, sample_rate_hz=AWR1843.sample_rate_hz / 8)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.flight_time.scurve import Axes, leg
-from telemetry.simulator.frame import Vec3
-from telemetry.simulator.legs import Track, along
+from telemetry.simulation.simulator.autopilot.leg_curves import LegTrack, along
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 STEP_S = 0.01
 AXES = Axes(5.0, 2.5, 1.5, 2.5, 1.0, 5.0, 1.0)

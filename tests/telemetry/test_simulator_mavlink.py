@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.reduce import reduce
-from telemetry.simulator.parameters import SPECS, Parameters
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.reduce import reduce
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Parameters
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.simulator_bench import HOME, Bench
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.mission_items import KINDS, WITHOUT_MOTION, KeptItem, keep
+from telemetry.simulation.simulator.protocol.kept_items import KINDS, WITHOUT_MOTION, KeptItem, keep
 from tests.telemetry.simulator_bench import Bench
 
 LAT, LON = -371244507, 1756892878

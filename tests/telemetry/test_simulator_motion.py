@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.sensing import rows
-from telemetry.simulator.scene import SceneTerrain, World
-from telemetry.simulator.scene.motion import REPEATS, Motion, Repeat
-from telemetry.simulator.sensors import RadarModel, RadarSensor, StereoModel, StereoSensor
-from telemetry.simulator.vehicle import SimulatedVehicle
+from mapping.sensor_frames import rows
+from telemetry.simulation.simulator.scene import SceneTerrain, World
+from telemetry.simulation.simulator.scene.motion import REPEATS, Motion, Repeat
+from telemetry.simulation.simulator.sensors import RadarModel, RadarSensor, StereoModel, StereoSensor
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from tests.telemetry.scenes import FRAME, in_the_air, truth, world
 
 QUIET = RadarModel(false_alarms=0.0, side_lobe_db=-200.0, mount_m=0.0)

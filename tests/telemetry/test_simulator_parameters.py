@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.simulator.parameters import SPECS, Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Parameters
 
 
 @settings(deadline=None)

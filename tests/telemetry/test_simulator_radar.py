@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from telemetry.sensing import RadarFrame, SimTruth, rows
-from telemetry.simulator.scene import World
-from telemetry.simulator.scene.shapes import WAVELENGTH_M
-from telemetry.simulator.sensors import RadarModel, RadarSensor
-from telemetry.simulator.sensors.body import of_truth
-from telemetry.simulator.sensors.radar_cells import Scatterers, detect
-from tests.telemetry.scenes import in_the_air, truth, world
+from mapping.sensor_frames import RadarFrame, rows
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.scene.world_shapes import WAVELENGTH_M
+from telemetry.simulation.simulator.sensors import RadarModel, RadarSensor
+from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.simulation.simulator.sensors.radar_cells import Scatterers, detect
+from telemetry.topics.simulated import SimTruth
+from tests.telemetry.scenes import in_the_air, polar, truth, world
 
 FINE = RadarModel(false_alarms=0.0, side_lobe_db=-200.0, mount_m=0.0)
 """Neither false alarms nor side lobes."""

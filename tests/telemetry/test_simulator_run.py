@@ -14,14 +14,14 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.errors import ParameterError
 from telemetry.bus import Bus
+from telemetry.bus.node import NodeContext
+from telemetry.bus.node_lock import NodeLock
 from telemetry.errors import AddressError, ConnectionFailedError
-from telemetry.messages import Topic
-from telemetry.node import NodeContext
-from telemetry.node_lock import NodeLock
 from telemetry.nodes.simulator import fly_supervised, main, read_home, read_options, read_parameter
-from telemetry.simulator.gnss_script import GnssEvent
-from telemetry.simulator.run import SimOptions, flying
-from telemetry.simulator.transports import parse_where
+from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
+from telemetry.simulation.simulator.protocol.transports import parse_where
+from telemetry.simulation.simulator.run import SimOptions, flying
+from telemetry.topics.messages import Topic
 from tests.telemetry.simulator_process import HOME, PATIENCE_S, child, end, simulated_vehicle
 from tests.telemetry.small_bus import SmallBus
 

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.raycast import raycast
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import SceneTerrain
-from telemetry.simulator.scene.rays import GROUND, NOTHING
+from planning.terrain.dsm import Dsm
+from planning.terrain.raycast import raycast
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import SceneTerrain
+from telemetry.simulation.simulator.scene.ray_bundle import GROUND, NOTHING
 from tests.telemetry.scenes import in_the_air, world
 
 metres = st.floats(-20.0, 20.0)
@@ -125,7 +125,7 @@ def test_the_ground_is_met_where_the_planning_floor_meets_it(seed, origin, direc
 
 
 def test_a_surface_model_lies_in_the_frame_as_its_coordinates_say(shared_data) -> None:
-    from planning.geotiff import read_dsm
+    from planning.terrain.geotiff import read_dsm
 
     dsm = read_dsm(next((shared_data / "dsm" / "coromandel").glob("*.tif")))
     west, south, east, north = dsm.bounds_m

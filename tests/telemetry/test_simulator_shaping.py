@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.flight_time.scurve import Axes
-from telemetry.simulator.shaping import JERK_M_S3, Shaped, approach_speed, stopping_point
+from telemetry.simulation.simulator.autopilot.shaping import JERK_M_S3, Shaped, approach_speed, stopping_point
 
 STEP_S = 0.01
 AXES = Axes(5.0, 2.5, 1.5, 2.5, 1.0, 5.0, 1.0)

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.sensing import SimTruth, SlamPose
-from telemetry.simulator.sensors import SlamDrift
-from telemetry.simulator.sensors.body import of_truth
+from mapping.sensor_frames import SlamPose
+from telemetry.simulation.simulator.sensors import SlamDrift
+from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.topics.simulated import SimTruth
 from tests.telemetry.scenes import truth
 
 

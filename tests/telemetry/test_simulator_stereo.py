@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.sensing import rows
-from telemetry.simulator.sensors import StereoModel, StereoSensor
-from telemetry.simulator.sensors.body import of_truth, quaternion_wxyz, rotation_enu_body
+from mapping.sensor_frames import rows
+from telemetry.simulation.simulator.sensors import StereoModel, StereoSensor
+from telemetry.simulation.simulator.sensors.body import of_truth, quaternion_wxyz, rotation_enu_body
 from tests.telemetry.scenes import in_the_air, truth, world
 
 SMALL = StereoModel(columns=96, rows=54, mount_m=0.0)

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.uwb import Thresholds
-from telemetry.scenarios.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
-from telemetry.simulator.sensors.uwb import UwbModel, UwbRadar, transmission
-from telemetry.simulator.sensors.uwb_scene import Foliage, Target, chords, screen, uwb_scene
+from telemetry.simulation.scenarios.foliage.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
+from telemetry.simulation.simulator.sensors.uwb import UwbModel, UwbRadar, transmission
+from telemetry.simulation.simulator.sensors.uwb_scene import Foliage, Target, chords, screen, uwb_scene
 
 PLAIN = UwbModel(aspects=0)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import STEP_S, SimulatedVehicle
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.simulated_vehicle import STEP_S, SimulatedVehicle
 from tests.telemetry.simulator_bench import HOME
 
 

@@ -5,10 +5,10 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.world import FlatGround, SurfaceGround
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.simulator.ground_below import FlatGround, SurfaceGround
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 CELL_M = 2.0
 HEIGHTS = np.arange(100 * 100, dtype=np.float32).reshape(100, 100) / 100

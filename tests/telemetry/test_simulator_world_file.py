@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.errors import FormatError, ParameterError
-from telemetry.simulator.scene import World
-from telemetry.simulator.scene.motion import Motion
-from telemetry.simulator.scene.shapes import Box, CornerReflector, Cylinder, Tree
-from telemetry.simulator.scene.world_file import parse_world, read_world
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.scene.motion import Motion
+from telemetry.simulation.simulator.scene.world_file import parse_world, read_world
+from telemetry.simulation.simulator.scene.world_shapes import Box, CornerReflector, Cylinder, Tree
 from tests.telemetry.scenes import FRAME
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "worlds.md"

@@ -11,10 +11,10 @@ from mapping.errors import RadarDataError
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import at
 from telemetry.agent.ti_radar import LONGEST_PAUSE_S, TiStatus, captured_readings, frame_reading
-from telemetry.sensors.ti_mmwave.commands import parse_commands
+from telemetry.sensors.ti_mmwave.cfg_commands import parse_commands
 from telemetry.sensors.ti_mmwave.config import config_of
-from telemetry.sensors.ti_mmwave.model import TiConfig
 from telemetry.sensors.ti_mmwave.packets import TiStream
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig
 from tests.telemetry.test_ti_config import GOOD
 from tests.telemetry.ti_packets import POINTS, frame, sdk2, sdk3, with_profile
 

@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 
 from mapping.errors import RadarDataError
 from mapping.radar import AWR1843
-from telemetry.flight.regions import OLD_S
-from telemetry.sensors.ti_mmwave.commands import parse_commands, read_commands
+from telemetry.flight.avoidance.regions import OLD_S
+from telemetry.sensors.ti_mmwave.cfg_commands import parse_commands, read_commands
 from telemetry.sensors.ti_mmwave.config import config_of, read_config
 from telemetry.sensors.ti_mmwave.differences import SILENT_S, differences
-from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig, fmcw_params
 
 GOOD = """% 120 m at 0.5 m, three transmitters
 sensorStop

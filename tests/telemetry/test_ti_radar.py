@@ -20,12 +20,11 @@ from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.ti_radar import TiRadar
 from telemetry.errors import SensorError
 from telemetry.sensors.serial_port import open_port
-from telemetry.sensors.ti_mmwave import session
-from telemetry.sensors.ti_mmwave.commands import parse_commands
+from telemetry.sensors.ti_mmwave import ti_session
+from telemetry.sensors.ti_mmwave.cfg_commands import parse_commands
 from telemetry.sensors.ti_mmwave.config import config_of
 from telemetry.sensors.ti_mmwave.packets import TiStream
-from telemetry.sensors.ti_mmwave.ports import config_port_beside
-from telemetry.sensors.ti_mmwave.session import TiPorts
+from telemetry.sensors.ti_mmwave.ti_session import TiPorts, config_port_beside
 from tests.telemetry.test_ti_config import GOOD
 from tests.telemetry.ti_board import Board, acknowledging, plugged
 from tests.telemetry.ti_packets import frame, sdk3, with_profile

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from telemetry.errors import SensorError
-from telemetry.sensors.ti_mmwave.commands import parse_commands
+from telemetry.sensors.ti_mmwave.cfg_commands import parse_commands
 from telemetry.sensors.ti_mmwave.sender import ANSWER_WITHIN_S, START_WITHIN_S, ConfigSender
 
 TEXT = "% demo\nsensorStop\nflushCfg\nframeCfg 0 2 16 0 100 1 0\nsensorStart\n"

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mapping.poses import Pose
-from mapping.tracker import TrackState
-from telemetry.tracking.blobs import Blobs
-from telemetry.tracking.followed import DRIFT_S, Followed, Memory
+from mapping.geometry.poses import Pose
+from mapping.tracking import TrackState
+from mapping.tracking.blobs import Blobs
+from telemetry.tracking.followed import DRIFT_S, Followed, TrackMemory
 
 HOVERING = np.array([1.0, 0.0, 0.0, 0.0])
 NOTHING = Blobs(np.empty(0), np.empty(0), np.empty(0), np.empty(0, np.bool_))

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mapping.ground import ground_grid
-from planning.vehicle_profile import dump_profile, load_profile
-from telemetry.obstacles import PerceptionSettings
+from mapping.perceiving.ground import ground_grid
+from planning.missions.vehicle_profile import dump_profile, load_profile
+from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.tracking.approach import FOLLOWED_AFRESH, LANDED
-from telemetry.tracking.following import KEEP_S, MOST_TRACKS
+from telemetry.tracking.object_tracking import KEEP_S, MOST_TRACKS
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.moving_flights import T0_MONO_S, Flight, Thing, frame, shows_nothing, straight
 

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.poses import Pose
-from mapping.radar_targets import Polar
-from mapping.tracker import TrackState
-from planning.vehicle_profile import dump_profile, load_profile
-from planning.velocity_obstacles import Limits, Obstacles, approaches
-from telemetry.obstacles import ObstacleAlert
+from mapping.geometry.poses import Pose
+from mapping.radar.targets import Polar
+from mapping.tracking import TrackState
+from mapping.tracking.blobs import MOST_BLOBS, SAME_M, Blobs, blobs
+from planning.evading.velocity_obstacles import Limits, Obstacles, approaches
+from planning.missions.vehicle_profile import dump_profile, load_profile
+from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.tracking.approach import BEGIN_FRAMES, OUT_S, ApproachBook, words
-from telemetry.tracking.blobs import MOST_BLOBS, SAME_M, Blobs, blobs
 from telemetry.tracking.evasion import MOST_CONES, Rules, evasion
-from telemetry.tracking.followed import ENOUGH_UPDATES, Followed, Keep, Memory
-from telemetry.tracking.limits import USUAL, limits_of
+from telemetry.tracking.followed import ENOUGH_UPDATES, Followed, Keep, TrackMemory
+from telemetry.tracking.object_tracking import USUAL, limits_of
 from tests.telemetry import perception_flights as flights
 
 NORTHWARDS = Pose(100.0, np.array([0.0, 0.0, 10.0]), np.array([0.0, 3.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))

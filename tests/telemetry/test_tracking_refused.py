@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from telemetry.tracking.following import KEEP_S
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
+from telemetry.tracking.object_tracking import KEEP_S
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.moving_flights import T0_MONO_S, T0_UTC_S, Flight, frame, shows_nothing, straight
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapping.ground import ground_grid
-from mapping.poses import Pose
-from mapping.tracker import TrackState
-from telemetry.obstacles import PerceptionSettings
-from telemetry.track_settings import TrackerSettings, VelocitySettings
+from mapping.geometry.poses import Pose
+from mapping.perceiving.ground import ground_grid
+from mapping.tracking import TrackState
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 from telemetry.tracking.followed import Followed
 from telemetry.tracking.ground_room import DIRECTIONS, FARTHEST_M, GroundRoom
-from telemetry.tracking.remembered import GONE_S, LONGEST_MOVING_S, LONGEST_S, Remembered
+from telemetry.tracking.out_of_view import GONE_S, LONGEST_MOVING_S, LONGEST_S, Remembered
 from tests.telemetry.moving_flights import Flight, straight
 
 NORTHWARDS = np.array([1.0, 0.0, 0.0, 0.0])

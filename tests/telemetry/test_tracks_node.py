@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from telemetry.bus import Bus
-from telemetry.messages import ServerAlive, Topic
-from telemetry.obstacles import ObstacleAlert, PerceptionStatus
-from telemetry.recording.reader import open_recording
-from telemetry.requests import StartRecording, StopRecording
-from telemetry.tracks import TracksStatus
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.topics.messages import ServerAlive, Topic
+from telemetry.topics.obstacles import ObstacleAlert, PerceptionStatus
+from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.tracks import TracksStatus
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.moving_flights import frame, straight
 from tests.telemetry.perception_processes import PATIENCE_S, Flight, Processes, flown

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapping.uwb import UwbGeometry
-from planning.traversable import UwbScans
+from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.perception.uwb_drive import UwbDrive, read_scans, recorded_scans
 from tests.telemetry.recordings import write_flight

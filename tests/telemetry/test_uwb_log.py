@@ -13,7 +13,7 @@ import pytest
 
 from mapping.uwb import UwbGeometry
 from planning.errors import FormatError
-from planning.traversable import UwbScans
+from planning.ground.traversable import UwbScans
 from telemetry.sensors import uwb_log
 from telemetry.sensors.uwb_log import read_uwb_log, write_uwb_log
 

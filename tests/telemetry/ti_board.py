@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import select
-import threading
-import tty
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
+
+from tests.telemetry.pseudo_terminals import PseudoTerminals, plugged_in
 
 Answer = Callable[[bytes], bytes]
 

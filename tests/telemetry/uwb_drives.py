@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.traversable import UwbScans
-from telemetry.messages import Topic
-from telemetry.recording.writer import RecordingWriter
-from telemetry.sensing import UwbScan, packed
-from telemetry.vehicle import VehicleState
+from mapping.sensor_frames import UwbScan, packed
+from planning.ground.traversable import UwbScans
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 
 T0_MONO_S, T0_UTC_S = 500.0, 1_700_000_000.0
 OFFSET_S = 0.03

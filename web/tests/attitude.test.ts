@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { HALF_HEIGHT, PER_DEG, horizon, ladder, tape } from "../src/fly/attitude";
+import { HALF_HEIGHT, PER_DEG, horizon, ladder, tape } from "../src/vehicle/attitude";
 
 const RAD = Math.PI / 180;
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { againstFlown, followsPlan, markerShare, tolerance_m, verdictOf } from "../src/fly/deviation";
+import { againstFlown, followsPlan, markerShare, tolerance_m, verdictOf } from "../src/vehicle/deviation";
 
 describe("a plan", () => {
   const state = (armed: boolean, landed: "on_ground" | "in_air" | "landing" | null, mode: string) => ({

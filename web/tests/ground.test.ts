@@ -12,7 +12,14 @@ import {
   traversability,
 } from "../src/store/traversability";
 import { isRadarLog, ruleQuery } from "../src/store/files";
-import { figures, leftOut, legendOf, liveWords, reasonsOf, shownLayer } from "../src/traversability/words";
+import {
+  figures,
+  leftOut,
+  legendOf,
+  liveWords,
+  reasonsOf,
+  shownLayer,
+} from "../src/traversability/ground_words";
 import { ground } from "./track_samples";
 
 const plain = (text: string) => text.replace(/\u00a0/g, " ").replace(/\u202f/g, "");

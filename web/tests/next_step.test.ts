@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { nextStep, uploadObstacle, type Facts } from "../src/fly/next_step";
+import { nextStep, type Facts } from "../src/fly/next_step";
+import { uploadObstacle } from "../src/vehicle/orders";
 import type { CheckRow, FlightStatus, OnboardDoc, PreflightDoc, TransferStatus } from "../src/messages";
 import { flyState, linkStatus, vehicleState } from "./flight_samples";
 

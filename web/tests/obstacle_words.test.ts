@@ -10,7 +10,7 @@ import {
   signedHeight,
   spoken,
   timeTo,
-} from "../src/obstacles/words";
+} from "../src/obstacles/obstacle_words";
 import { withStatus } from "../src/store/sensing";
 import { alert, alertDoc, obstacle, perception, perceptionMessage } from "./obstacle_samples";
 

@@ -1,5 +1,5 @@
 import { beforeEach, describe, expect, it } from "vitest";
-import { accept, accepted } from "../src/fly/commands";
+import { accept, accepted } from "../src/vehicle/orders";
 import { fly } from "../src/store/flying";
 import type { PreflightDoc } from "../src/messages";
 import { flyState } from "./flight_samples";

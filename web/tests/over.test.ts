@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { BANNER_MS, endingsOf, parted } from "../src/obstacles/over";
+import { BANNER_MS, endingsOf, parted } from "../src/store/alerts";
 import { alertDoc, alert } from "./obstacle_samples";
 
 const doc = (id: string, over: boolean) => alertDoc(id, { alert: alert(id), over });

@@ -1,9 +1,9 @@
 import { describe, expect, it } from "vitest";
 import type { ReplayStatus, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries } from "../src/messages";
 import { playhead, replay, review, seeking, takeReviewing } from "../src/store/review";
-import { flownLevel } from "../src/review/level";
-import { higherWords } from "../src/review/words";
-import { alertTimes, axisTime, columns, eventAt, momentAt, reachOf, roundStep } from "../src/review/time";
+import { flownLevel, higherWords } from "../src/review/judged";
+import { alertTimes, axisTime, columns, eventAt, momentAt, reachOf } from "../src/review/time";
+import { roundStep } from "../src/chart/axes";
 
 const status = (fields: Partial<ReplayStatus> = {}): ReplayStatus => ({
   t_mono_s: 0,

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { slowestOf } from "../src/obstacles/sees_enough";
+import { slowestOf } from "../src/plan/SeesEnough";
 import { obstacles } from "../src/store/obstacles";
 
 const known = { ...obstacles.live.value, sees_enough: { radar: 4.17, vision: 2.94, ranges: 3.1 } };

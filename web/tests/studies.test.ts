@@ -1,10 +1,9 @@
 import { describe, expect, it } from "vitest";
 import type { RadarMap } from "../src/messages";
-import { studyIn } from "../src/review/study";
-import { ticks } from "../src/studies/axes";
-import { LEVELS } from "../src/studies/colours";
-import { fan, powerAt, spanOfColumns, spanOfRows, upright } from "../src/studies/maps";
-import { limitText, measuredText } from "../src/studies/figures";
+import { addressOf, studyIn, viewIn } from "../src/store/address";
+import { ticks } from "../src/chart/axes";
+import { LEVELS, fan, powerAt, spanOfColumns, spanOfRows, upright } from "../src/studies/maps";
+import { limitText, measuredText } from "../src/studies/scenarios";
 import { Newest } from "../src/studies/newest";
 
 const base64 = (cells: number[]) => btoa(String.fromCharCode(...cells));

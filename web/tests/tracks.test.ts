@@ -2,7 +2,14 @@ import { beforeEach, describe, expect, it } from "vitest";
 import { receive } from "../src/store/reduce";
 import { forgetMoving, hasTracks, isEndangered, moving, movingWatch } from "../src/store/moving";
 import { now_ms } from "../src/store/clock";
-import { closestWords, displayWords, headline, offNoseOf, trackSpeed, trackWords } from "../src/tracks/words";
+import {
+  closestWords,
+  displayWords,
+  headline,
+  offNoseOf,
+  trackSpeed,
+  trackWords,
+} from "../src/tracks/track_words";
 import { cone, track, tracksMessage, tracksStatus } from "./track_samples";
 
 const plain = (text: string) => text.replace(/\u00a0/g, " ");

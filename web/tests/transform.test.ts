@@ -8,9 +8,9 @@ import {
   levelOf,
   levelSpans,
   profileRange,
-  tickDecimals,
   valueAt,
 } from "../src/chart/transform";
+import { tickDecimals } from "../src/chart/axes";
 
 describe("clearance colours", () => {
   it("are red at zero and below, orange below the requirement, green from it on", () => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { batteryLevel, batteryWord, fixLevel, linkWords, modeWord } from "../src/fly/words";
+import { batteryLevel, batteryWord, fixLevel, linkWords, modeWord } from "../src/vehicle/vehicle_words";
 import { linkStatus, vehicleState } from "./flight_samples";
 
 describe("the status bar", () => {

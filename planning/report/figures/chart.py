@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.report.figures.thin import keep_extremes
+from mapping.geometry.arrays import F64, I64
 from planning.report.figures.ticks import label, padded, round_step, ticks
 
 F64 = NDArray[np.float64]

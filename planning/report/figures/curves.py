@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import along_m
 from planning.formats.safe_text import clean_name
 from planning.margins.words import rounded_up
 from planning.model import Certificate, FlownLine, Poi, SampledPath, Timing

@@ -8,16 +8,16 @@ from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
-from planning.dsm import Dsm
-from planning.hillshade import height_colors, hillshade, scale_rgb
+from mapping.geometry.arrays import F64, U8
 from planning.model import Certificate, FlownLine, Poi
 from planning.report.figures.curves import BAD, PATH, short_name
 from planning.report.figures.ticks import label, round_step
 from planning.report.words import metres
-from planning.surface import fit_within
+from planning.safe_surface.surface import fit_within
+from planning.terrain.dsm import Dsm
+from planning.terrain.hillshade import height_colors, hillshade, scale_rgb
 
 F64 = NDArray[np.float64]
 MAX_IMAGE_PX = 1000

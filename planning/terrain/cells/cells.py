@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.cells.lattice import Lattice, corner, places_of, straight
+from mapping.geometry.arrays import F32, F64
 from planning.errors import RasterFormatError
+from planning.terrain.cells.lattice import Lattice, corner, places_of, straight
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

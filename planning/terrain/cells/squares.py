@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from affine import Affine
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from planning.cells.cells import Cells, Layout
+from mapping.geometry.arrays import F32, F64
+from planning.terrain.cells.cells import Cells, Layout
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
-from planning.cells.squares import squares
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F32
 from planning.errors import NoElevationError
 from planning.rasters.heights import HeightStats, doubts, false_sentinels, mask_and_scale
 from planning.rasters.surface_plan import SurfacePlan

@@ -12,13 +12,13 @@ from typing import Any, BinaryIO
 import numpy as np
 import rasterio
 from affine import Affine
-from numpy.typing import NDArray
 from rasterio.enums import Interleaving, Resampling
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.windows import Window
 
-from planning.rasters.header import RasterHeader
-from planning.rasters.heights import HeightStats
+from mapping.geometry.arrays import F32
+from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.heights import HeightStats
 
 Json = dict[str, Any]
 Send = Callable[..., None]

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.dsm import F64, Dsm, SurfaceModel
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError, RasterError
-from planning.part import LARGE_PX
-from planning.rasters.assemble import ReadReport, assemble
-from planning.rasters.header import RasterHeader
-from planning.rasters.heights import doubts, mask_and_scale
-from planning.rasters.part_of import model_grid, needed_pixels, part_of
-from planning.rasters.reading import Declared, Pixels, Progress, Read, all_of, file_identity, read_surface
+from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
+from planning.terrain.rasters.assemble import ReadReport, assemble
+from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.heights import doubts, mask_and_scale
+from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
+from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, file_identity, read_surface
 
 AHEAD_PX = 256
 """Decoded around what is asked for: the next question is mostly about a little more."""

@@ -10,7 +10,7 @@ from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from planning.errors import MissingCrsError, RasterFormatError
-from planning.rasters.header import RasterHeader
+from planning.terrain.rasters.header import RasterHeader
 
 _MOST_DISTORTION = 0.02
 """Of a projection's metres against metres on the ground; national grids and UTM stay below 0.002."""

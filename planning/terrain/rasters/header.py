@@ -8,7 +8,7 @@ from typing import Any
 from affine import Affine
 
 from planning.errors import RasterFormatError, RasterTooLargeError
-from planning.rasters.limits import RasterLimits
+from planning.terrain.rasters.limits import RasterLimits
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 from pyproj import CRS, Transformer
 
 F64 = NDArray[np.float64]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
-from planning.cells.cells import Cells, Placing, cut_out
-from planning.cells.squares import squares_of_part
-from planning.dsm import Dsm
-from planning.rasters.assemble import north_up_grid
-from planning.rasters.reading import Pixels
-from planning.rasters.surface_plan import SurfacePlan
+from mapping.geometry.arrays import F32
+from planning.terrain.cells.cells import Cells, Placing, cut_out
+from planning.terrain.cells.squares import squares_of_part
+from planning.terrain.dsm import Dsm
+from planning.terrain.rasters.assemble import north_up_grid
+from planning.terrain.rasters.reading import Pixels
+from planning.terrain.rasters.surface_plan import SurfacePlan
 
 F32 = NDArray[np.float32]
 Part = tuple[slice, slice]

@@ -10,15 +10,15 @@ from secrets import token_hex
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32
 from planning.errors import RasterError, RasterFormatError
-from planning.rasters import sandbox
-from planning.rasters.header import RasterHeader
-from planning.rasters.heights import HeightStats
-from planning.rasters.limits import RasterLimits
-from planning.rasters.magic import driver_of
-from planning.rasters.surface_plan import SurfacePlan, plan_surface
+from planning.terrain.rasters import sandbox
+from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.heights import HeightStats
+from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.magic import driver_of
+from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 
 F32 = NDArray[np.float32]
 Progress = Callable[[str, float], None]

@@ -8,13 +8,13 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.cells.cells import Placing, place_cells
-from planning.cells.squares import square_grid
 from planning.errors import RasterTooLargeError
-from planning.rasters import georef
-from planning.rasters.header import RasterHeader, check_georeference, check_size, check_surface_bands
-from planning.rasters.limits import RasterLimits
-from planning.rasters.mapping import extent_of, source_mapping
+from planning.terrain.cells.cells import Placing, place_cells
+from planning.terrain.cells.squares import square_grid
+from planning.terrain.rasters import georef
+from planning.terrain.rasters.header import RasterHeader, check_georeference, check_size, check_surface_bands
+from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.mapping import extent_of, source_mapping
 
 _MOST_DRIFT_PX = 0.1
 """Oblong cells that are nowhere farther from squares than this stay in their places in the grid of squares."""

@@ -27,7 +27,7 @@ def main() -> None:
     job = _receive()
     _confine(job)
     try:
-        from planning.rasters import decode  # after the limits: GDAL registers its drivers on import
+        from planning.terrain.rasters import decode  # after the limits: GDAL registers its drivers on import
 
         decode.JOBS[job["job"]](job, send, partial(_ask, send))
     except Exception as error:

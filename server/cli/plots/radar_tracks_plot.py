@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from telemetry.scenarios.arena_radar import Position2Go
-from telemetry.tracking.against_truth import Comparison
+from telemetry.simulation.scenarios.arena.against_truth import TruthComparison
+from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
 
 NAME = "tracks.png"
 _TRUE, _FOLLOWED = ("#e4a13a", "#6ab4d8", "#8cc084"), ("#c0392b", "#1f3f8b", "#2e6b34")

@@ -6,11 +6,11 @@ import time
 
 from planning.following.live import Following, Progress, follow_on
 from planning.following.reference import Reference, reference_line
-from server.cli.output import end_progress, progress, say
-from server.placing import Placer
-from telemetry.flight.prepare import FlyOptions, Prepared
-from telemetry.messages import FlightStatus
-from telemetry.vehicle import VehicleState
+from server.cli.shared.output import end_progress, progress, say
+from server.heard.vehicle_place import Placer
+from telemetry.flight.preflight.prepare import FlyOptions, Prepared
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.vehicle import VehicleState
 
 FLYING = ("arming", "taking_off", "flying", "paused", "returning")
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from planning.feasibility import commanded_speed_m_s
 from planning.margins.following_error import WAY_NAMES, Way
+from planning.missions.feasibility import commanded_speed_m_s
+from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
 from planning.model import Mission, PathParams, PlannedFor, VehicleProfile
 from planning.request import PlanRequest, check_demands
-from planning.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
-from server.cli.output import harmless, say
+from server.cli.shared.output import harmless, say
 
 
 @dataclass(frozen=True, slots=True)

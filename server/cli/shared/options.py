@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from planning.errors import FormatError
-from planning.vehicle_profile import shipped_profiles
+from planning.missions.vehicle_profile import shipped_profiles
 
 _MODEL, _SURFACE, _PATH = "Surface model", "Surface to fly on", "Path and speeds"
 _VEHICLE, _CLEARANCE, _MISSION = "Vehicle", "Clearance", "Mission"

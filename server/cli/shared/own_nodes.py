@@ -12,11 +12,11 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.supervisor import Supervisor
+from server.work.supervisor import Supervisor
 from telemetry.bus import Bus
-from telemetry.link_client import LinkClient
-from telemetry.messages import ServerAlive, Topic
-from telemetry.requests import Operator
+from telemetry.bus.link_client import LinkClient
+from telemetry.topics.messages import ServerAlive, Topic
+from telemetry.topics.requests import Operator
 
 ALIVE_EVERY_S = 1.0
 OPERATOR = Operator("command line", 1)

@@ -8,20 +8,19 @@ from pathlib import Path
 
 import typer
 
-from planning.dsm import SurfaceModel
-from planning.exports import FILES, export_file
+from planning.missions.vehicle_profile import load_profile
 from planning.model import VehicleProfile
 from planning.plan import Plan, plan_mission
+from planning.report.exports import FILES, export_file
+from planning.report.summary import plan_summary
 from planning.report.words import duration, metres
 from planning.request import PlanRequest
-from planning.summary import plan_summary
-from planning.vehicle_profile import load_profile
-from server.cli.files import check_directory, write_files
-from server.cli.output import DONE, FAILED, end_progress, harmless, print_json, progress, say
-from server.cli.terrain import ModelOptions, open_model
-from server.cli.verdict import verdict_lines
-from server.clock import utc_now
-from server.stopwatch import StepTimer
+from planning.terrain.dsm import SurfaceModel
+from server.cli.shared.files_in_out import check_directory, write_files
+from server.cli.shared.output import DONE, FAILED, end_progress, harmless, print_json, progress, say
+from server.cli.shared.terrain_given import ModelOptions, open_model
+from server.cli.shared.verdict import verdict_lines
+from server.work.clocks import StepTimer, utc_now
 
 
 def profile_with(name: str, **overrides: float | int | None) -> VehicleProfile:

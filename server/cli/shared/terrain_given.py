@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from planning.dsm import F64, Dsm, SurfaceModel
+from mapping.geometry.arrays import F64
 from planning.errors import RasterFormatError
-from planning.geotiff import open_dsm, read_dsm_reported
 from planning.part import FLIGHT_MARGIN_M, needed_part
-from planning.spikes import Spike, find_spikes
-from server.cli.output import end_progress, say
-from server.stopwatch import READ_STEP, StepTimer
+from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.terrain.geotiff import open_dsm, read_dsm_reported
+from planning.terrain.spikes import Spike, find_spikes
+from server.cli.shared.output import end_progress, say
+from server.work.clocks import READ_STEP, StepTimer
 
 
 @dataclass(frozen=True, slots=True)

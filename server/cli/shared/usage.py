@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 from typer.exceptions import Abort, TyperException
 
-from server.cli.output import FAILED, WRONG_INPUT, print_json, say
+from server.cli.shared.output import FAILED, WRONG_INPUT, print_json, say
 
 
 def run_command(app: typer.Typer, arguments: Sequence[str] | None = None) -> int:

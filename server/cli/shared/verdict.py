@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from planning.feasibility import verdict_words
+from planning.missions.feasibility import verdict_words
 from planning.report.words import metres, metres_up
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import viser
 from viser import _messages
 
-from server.scene.camera import Lens, Pose
-from server.scene.chase import Chase
-from server.scene.drawing import Drawing
-from server.scene.labels import Screen, hidden, labels_of
-from server.scene.nodes import Node
-from server.scene.vehicles import Vehicles
+from server.scene.cameras.chase import Chase
+from server.scene.cameras.labels import Screen, hidden, labels_of
+from server.scene.cameras.projection import Lens, Pose
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.vehicles import Vehicles
 from server.schemas import Source
 
 CAMERAS_EVERY_S = 0.1

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from server.scene.camera import Pose
-from server.scene.payload import F64
+from mapping.geometry.arrays import F64
+from server.scene.cameras.projection import Pose
 
 BACK_M, ABOVE_M, AHEAD_M = 17.0, 9.0, 5.0
 """Of the camera from the vehicle, and of where it looks: a region of 10 m fills the middle of the picture."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from server.scene.camera import Lens
-from server.scene.nodes import Node
-from server.scene.payload import F64
+from mapping.geometry.arrays import F64
+from server.scene.cameras.projection import Lens
+from server.scene.geometry.canvas import Node
 
 LETTER_PX, LINE_PX = 8.2, 22.0
 """Of a label of size 1, margins included."""

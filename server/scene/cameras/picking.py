@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planning.raycast import TerrainHit, raycast
-from server.scene.camera import SCREEN_HEIGHT_PX
-from server.scene.drawing import Drawing
-from server.scene.marks import poi_places
-from server.scene.payload import F64
-from server.scene.unknown import as_model
+from mapping.geometry.arrays import F64
+from planning.terrain.raycast import TerrainHit, raycast
+from server.scene.cameras.projection import SCREEN_HEIGHT_PX
+from server.scene.geometry.stage import Drawing, as_model
+from server.scene.layers.mark_layers import poi_places
 
 _POI_REACH_PX = 18.0
 

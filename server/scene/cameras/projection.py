@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from viser import transforms
 
-from server.scene.payload import F64
+from mapping.geometry.arrays import F64
 
 FOV_RAD = math.radians(45.0)
 OBLIQUE = np.array([0.0, math.cos(math.radians(38.0)), -math.sin(math.radians(38.0))])

@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from server.scene.camera import OBLIQUE, TOP, Pose, fitted
-from server.scene.drawing import Drawing
-from server.scene.payload import F64
+from mapping.geometry.arrays import F64
+from server.scene.cameras.projection import OBLIQUE, TOP, Pose, fitted
+from server.scene.geometry.stage import Drawing
 
 Target = Literal["terrain", "plan", "top", "worst", "poi", "chase"]
 

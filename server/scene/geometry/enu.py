@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.frames import LocalFrame
-from planning.dsm import Dsm
-from server.scene.payload import F64
-from telemetry.obstacles import MapOrigin
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
+from planning.terrain.dsm import Dsm
+from telemetry.topics.obstacles import MapOrigin
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from server.scene.mesh import Mesh
-from server.scene.payload import U8
+from mapping.geometry.arrays import U8
+from server.scene.geometry.mesh import Mesh
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT = 5126, 5125

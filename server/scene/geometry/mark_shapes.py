@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from server.scene.mesh import U32
-from server.scene.nodes import Node
-from server.scene.payload import F32, F64, U8
+from mapping.geometry.arrays import F32, F64, U8, U32
+from server.scene.geometry.canvas import Node
 
 Rgb = tuple[int, int, int]
 _UNSHADED = {"cast_shadow": False, "receive_shadow": False}

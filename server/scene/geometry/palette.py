@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from server.scene.payload import F64, U8
+from mapping.geometry.arrays import F64, U8
 
 SAFE = (0, 190, 70)
 CLOSE = (255, 145, 0)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F32, F64, U8, U32
+from planning.terrain.dsm import Dsm
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
 
 F32 = NDArray[np.float32]

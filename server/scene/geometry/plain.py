@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from affine import Affine
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64, U8
 from planning.following.reference import level_model
 from planning.model import Home, Mission
-from server.scene.payload import F64, U8, HeightGrid, TerrainScene
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.payload import HeightGrid, TerrainScene
 
 _MARGIN_M, _REACH_M = 60.0, 400.0
 _CELLS, _TEXTURE_PX, _LINES_MAX = 60, 1600, 80

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import Delaunay, KDTree
 
-from planning.dsm import Dsm
-from planning.model import F64, SampledPath, Surfaces
-from planning.surface import safe_surface_at
-from server.scene.payload import Relief
-from server.scene.simplified import kept_within
+from mapping.geometry.arrays import F64, I64, Bools
+from planning.model import SampledPath, Surfaces
+from planning.safe_surface.surface import safe_surface_at
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.payload import Relief
 
 PATH_TOLERANCE_M = 0.03
 """Between mesh and surface at every sample of the path."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.dsm import Dsm
-from server.scene.payload import F64, HeightGrid
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.payload import HeightGrid
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from affine import Affine
+from scipy import ndimage
+from skimage import measure
 
-from planning.dsm import Dsm
-from server.scene.frame import LocalFrame
-from server.scene.mesh import drawn_alt_dsm_m, filled
-from server.scene.payload import F64, HeightGrid, SceneState, TerrainScene
-from server.scene.unknown import plates
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.mesh import drawn_alt_dsm_m, filled
+from server.scene.geometry.payload import HeightGrid, SceneState, TerrainScene
+from server.scene.geometry.scene_frame import LocalFrame
 
 _LARGEST_BODY_M = 0.9
 

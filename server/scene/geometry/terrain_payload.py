@@ -8,11 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from planning.dsm import Dsm
-from planning.hillshade import height_colors, hillshade
-from planning.orthophoto import Orthophoto
-from planning.surface import block_max
-from server.scene.payload import U8, HeightGrid, TerrainScene
+from mapping.geometry.arrays import U8
+from planning.safe_surface.surface import block_max
+from planning.terrain.dsm import Dsm
+from planning.terrain.hillshade import height_colors, hillshade
+from planning.terrain.orthophoto import Orthophoto
+from server.scene.geometry.payload import HeightGrid, TerrainScene
 
 Shading = Literal["height", "hillshade", "orthophoto"]
 Progress = Callable[[str, float | None], None]

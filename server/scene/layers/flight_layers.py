@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
+from mapping.geometry.arrays import F64, U8
+from mapping.geometry.polyline import along_m
 from planning.report.words import metres
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.nodes import Node
-from server.scene.payload import F64, U8, PlanScene
-from server.scene.shapes import GEM, dots_node, label_node, line_node, raised, shape_node
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.mark_shapes import GEM, dots_node, label_node, line_node, raised, shape_node
+from server.scene.geometry.payload import PlanScene
+from server.scene.geometry.stage import Drawing
 
 _MOST_WAYPOINT_MARKS = 1500
 _WAYPOINT_PX, _WORST_PX = 6.0, 13.0

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.glb import textured_glb
-from server.scene.mesh import gap_mesh, grid_mesh
-from server.scene.nodes import Node
-from server.scene.overlay import laid_over
-from server.scene.payload import F32, U8, HeightGrid, Relief
+from mapping.geometry.arrays import F32, U8
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.glb import textured_glb
+from server.scene.geometry.mesh import gap_mesh, grid_mesh
+from server.scene.geometry.payload import HeightGrid, OverlayScene, Relief, TerrainScene
+from server.scene.geometry.stage import Drawing
 
 _SURFACE_OPACITY = 0.26
 SURFACE_BELOW_M = 0.04

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from server.scene.drawing import Drawing
-from server.scene.flight import flight_nodes
-from server.scene.ground import surface_nodes, terrain_nodes, unknown_nodes
-from server.scene.marks import is_first_home, place_nodes, poi_nodes
-from server.scene.nodes import Node, Ready
-from server.scene.payload import OverlayScene, PlanScene, ReviewScene, TerrainScene
-from server.scene.review import review_nodes
-from server.scene.sites import site_nodes
+from server.scene.geometry.canvas import Node, Ready
+from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, TerrainScene
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.flight_layers import flight_nodes, review_nodes
+from server.scene.layers.ground_layers import surface_nodes, terrain_nodes, unknown_nodes
+from server.scene.layers.mark_layers import is_first_home, place_nodes, poi_nodes
+from server.scene.layers.site_layer import site_nodes
 
 POIS = "pois"
 Key = tuple[Any, ...]

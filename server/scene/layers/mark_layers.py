@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.nodes import Node, Ready
-from server.scene.payload import F64
-from server.scene.shapes import BALL, CONE, Rgb, dots_node, label_node, line_node, many_node, shape_node
+from mapping.geometry.arrays import F64
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node, Ready
+from server.scene.geometry.mark_shapes import BALL, CONE, Rgb, dots_node, label_node, line_node, many_node, shape_node
+from server.scene.geometry.stage import Drawing
 
 GIZMO = "/gizmo"
 """The selected point of interest hangs below it, so that browsers move it with the pointer themselves."""

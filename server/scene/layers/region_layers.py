@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.enu import EnuPlacing
-from server.scene.nodes import Node
-from server.scene.payload import F64
-from server.scene.shapes import GEM, label_node, line_node, raised, shape_node
-from server.scene.voxels import HUES
-from telemetry.obstacles import MissionConflict, PerceptionStatus, Region, Sensor
+from mapping.geometry.arrays import F64
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.enu import EnuPlacing
+from server.scene.geometry.mark_shapes import GEM, label_node, line_node, raised, shape_node
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.voxel_layers import HUES
+from telemetry.topics.obstacles import MissionConflict, PerceptionStatus, Region, Sensor
 
 _ARC_PIECES = 12
 _FREE_PX, _OCCUPIED_PX = 2.0, 5.0

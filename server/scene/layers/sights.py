@@ -11,20 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from planning.dsm import Dsm
-from server.obstacles.mirror import ChunkKey, Voxels
-from server.scene.clouds import cloud_nodes
-from server.scene.drawing import Drawing
-from server.scene.enu import EnuPlacing
-from server.scene.nodes import Canvas, Node
-from server.scene.payload import F64
-from server.scene.regions import Route, conflict_nodes, region_nodes, route_nodes
-from server.scene.tracks import track_nodes
-from server.scene.voxels import chunk_nodes, chunk_place, sent_bytes
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.canvas import Canvas, Node
+from server.scene.geometry.enu import EnuPlacing
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.region_layers import Route, conflict_nodes, region_nodes, route_nodes
+from server.scene.layers.track_layer import track_nodes
+from server.scene.layers.voxel_layers import chunk_nodes, chunk_place, cloud_nodes, sent_bytes
+from server.scene.mirror import ChunkKey, Voxels
 from server.schemas import Source
-from telemetry.looks import CloudLook
-from telemetry.obstacles import MapName, MapOrigin, PerceptionStatus, Sensor
-from telemetry.tracks import TracksStatus
+from telemetry.topics.looks import CloudLook
+from telemetry.topics.obstacles import MapName, MapOrigin, PerceptionStatus, Sensor
+from telemetry.topics.tracks import TracksStatus
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.marks import poi_places
-from server.scene.nodes import Node
-from server.scene.payload import F64, SiteMark
-from server.scene.shapes import BALL, label_node, line_node, raised, shape_node
+from mapping.geometry.arrays import F64
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.mark_shapes import BALL, label_node, line_node, raised, shape_node
+from server.scene.geometry.payload import SiteMark
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.mark_layers import poi_places
 
 _POLE = 5.0
 _APART = 7.0

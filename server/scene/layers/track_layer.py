@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from mapping.frames import LocalFrame
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.enu import EnuPlacing
-from server.scene.nodes import Node
-from server.scene.payload import F64
-from server.scene.shapes import GEM, label_node, line_node, many_node, raised, shape_node
-from telemetry.tracks import Track, TracksStatus
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.enu import EnuPlacing
+from server.scene.geometry.mark_shapes import GEM, label_node, line_node, many_node, raised, shape_node
+from server.scene.geometry.stage import Drawing
+from telemetry.topics.tracks import Track, TracksStatus
 
 ARROW_S = 3.0
 """An arrow ends where its object will be then."""

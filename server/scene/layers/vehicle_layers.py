@@ -13,11 +13,11 @@ import numpy as np
 import trimesh
 from viser import transforms
 
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.nodes import Node
-from server.scene.payload import F64
-from server.scene.shapes import CONE, Rgb, dots_node, label_node, line_node, shape_node
+from mapping.geometry.arrays import F64
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.mark_shapes import CONE, Rgb, dots_node, label_node, line_node, shape_node
+from server.scene.geometry.stage import Drawing
 from server.schemas import Source
 
 VEHICLE_M = 1.6

@@ -7,11 +7,11 @@ from typing import get_args
 
 import numpy as np
 
-from planning.dsm import Dsm
-from server.scene.drawing import Drawing
-from server.scene.nodes import Node
-from server.scene.payload import F64
-from server.scene.vehicle import VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
+from mapping.geometry.arrays import F64
+from planning.terrain.dsm import Dsm
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.stage import Drawing
+from server.scene.layers.vehicle_layers import VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
 from server.schemas import Source
 
 _SOURCES: tuple[Source, ...] = get_args(Source)

@@ -15,14 +15,16 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from server.obstacles.mirror import CHUNK_M, ChunkKey, Voxels
-from server.scene import palette
-from server.scene.drawing import Drawing
-from server.scene.enu import EnuPlacing
-from server.scene.nodes import Node
-from server.scene.payload import F64, U8
-from server.scene.shapes import linear_light
-from telemetry.obstacles import MapName
+from mapping.geometry.arrays import F64, U8
+from server.scene.geometry import palette
+from server.scene.geometry.canvas import Node
+from server.scene.geometry.enu import EnuPlacing
+from server.scene.geometry.mark_shapes import linear_light
+from server.scene.geometry.stage import Drawing
+from server.scene.mirror import CHUNK_M, ChunkKey, Voxels
+from telemetry.perception.showing import MOST_POINTS
+from telemetry.topics.looks import CloudLook, points_enu_m
+from telemetry.topics.obstacles import MapName
 
 HUES: Mapping[MapName, tuple[int, int, int]] = {
     "radar": palette.RADAR,

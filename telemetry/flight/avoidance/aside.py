@@ -11,11 +11,19 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.velocity_obstacles import Proposal
-from telemetry.flight.helm import GUIDED, Helm, here_of, moved, stopping_place
-from telemetry.flight.passing import Scene, is_last_moment, is_wanted, offset_of, scene_of, velocity_of, velocity_past
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import offset_m
+from planning.evading.velocity_obstacles import Proposal
+from telemetry.flight.avoidance.passing import (
+    Scene,
+    is_last_moment,
+    is_wanted,
+    scene_of,
+    velocity_of,
+    velocity_past,
+)
+from telemetry.flight.guided.helm import GUIDED, Helm, here_of, moved
 from telemetry.mavlink.actions import Action
 from telemetry.messages import GuidedTarget
 from telemetry.obstacles import PerceptionSettings

@@ -11,21 +11,21 @@ import math
 from collections.abc import Callable
 
 from telemetry.errors import NotAllowedError
-from telemetry.flight.avoiding_words import status_of
-from telemetry.flight.coming_down import joined
-from telemetry.flight.detour import Detour, DetourParams
-from telemetry.flight.helm import GUIDED, STOP_MODES, Helm
-from telemetry.flight.pilot_watch import PilotWatch
-from telemetry.flight.regions import Regions, Sight, largest_speed
-from telemetry.flight.rest import RETURNS, Rest
-from telemetry.flight.slowing import Slowing
+from telemetry.flight.avoidance.avoiding_words import Now, status_of
+from telemetry.flight.avoidance.coming_down import joined
+from telemetry.flight.avoidance.detour import Detour, DetourParams
+from telemetry.flight.avoidance.pilot_watch import PilotWatch
+from telemetry.flight.avoidance.regions import Regions, Sight, largest_speed
+from telemetry.flight.avoidance.slowing import Slowing
+from telemetry.flight.guided.helm import GUIDED, STOP_MODES, Helm
+from telemetry.flight.guided.remaining_mission import RETURNS, RemainingMission
 from telemetry.mavlink.actions import Action, Message
-from telemetry.mavlink.ends import GROUND_STATION
-from telemetry.messages import FlightStatus, GuidedTarget
-from telemetry.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.requests import FlyManoeuvre, FlyRest
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import GROUND_STATION
+from telemetry.topics.messages import FlightStatus, GuidedTarget
+from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
+from telemetry.topics.requests import FlyManoeuvre, FlyRest
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 LOW_M = 1.0
 SHORT_M = 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from telemetry.flight.regions import FASTER_M_S
 from telemetry.obstacles import AvoidanceStatus, Eye

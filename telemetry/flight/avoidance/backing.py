@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from telemetry.flight.handover import METRES_PER_DEG, away_m
-from telemetry.flight.helm import Helm, here_of
-from telemetry.flight.orders import Place
+from mapping.geometry.frames import apart_m
+from telemetry.flight.guided.handover import away_m
+from telemetry.flight.guided.helm import Helm, here_of
+from telemetry.flight.guided.orders import Place
 from telemetry.mavlink.actions import Action
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 SPACED_M, KEPT = 0.25, 200
 SPEED_M_S = 1.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from telemetry.flight.helm import Helm, here_of
-from telemetry.flight.orders import CLIMB_SPEED
+from telemetry.flight.guided.helm import Helm, here_of
+from telemetry.flight.guided.orders import CLIMB_SPEED
 from telemetry.mavlink.actions import Action
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 AHEAD_M, AHEAD_AGAIN_M = 6.0, 4.0
 """The climb's target is never farther above the vehicle: without a link it climbs no farther than that."""

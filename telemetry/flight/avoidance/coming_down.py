@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
-from mapping.braking import Braking
+from mapping.geometry.frames import offset_m
+from mapping.perceiving.braking import Braking
 from telemetry.errors import NotAllowedError
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.messages import GuidedTarget
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.vehicle import VehicleState
 
 BESIDE_M = 3.0
 """Farther from the line than this it is another flight's."""

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import offset_m
 from planning.errors import ParameterError
 from planning.reachable import shortfall
 from planning.steering import steer, with_ground

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from telemetry.mavlink.actions import Message
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 ASKED_S = 15.0
 """A mode that was asked for longer ago than this and shows only now was chosen by somebody else."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from mapping.braking import Braking, Stopping
-from telemetry.obstacles import PerceptionSettings, PerceptionStatus, Sensor
+from mapping.perceiving.braking import Braking, Stopping
+from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Sensor
 
 OLD_S = 0.5
 """A frame or pose older than this says nothing about what is ahead now."""

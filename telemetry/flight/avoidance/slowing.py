@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from telemetry.flight.helm import Helm
-from telemetry.flight.regions import FASTER_M_S, largest_speed
+from telemetry.flight.avoidance.regions import FASTER_M_S, largest_speed
+from telemetry.flight.guided.helm import Helm
 from telemetry.mavlink.actions import Action
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 AGAIN_S = 2.0
 """A vehicle that is still too fast, or again because its mission says so, is told once more."""

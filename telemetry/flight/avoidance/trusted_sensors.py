@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from telemetry.flight.avoiding_words import SENSOR_WORDS
-from telemetry.flight.regions import OLD_S, Regions, Sight
-from telemetry.obstacles import Sensor
-from telemetry.vehicle import VehicleState
+from telemetry.flight.avoidance.regions import OLD_S, SENSOR_WORDS, Regions, Sight
+from telemetry.topics.obstacles import Sensor
+from telemetry.topics.vehicle import VehicleState
 
 SEEN_FROM_M = 1.5
 """Beyond what is too near to be seen: voxels are a metre wide, and the vehicle drifts."""

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.flight.orders import Place
-from telemetry.messages import GuidedTarget
+from mapping.geometry.frames import offset_m
+from telemetry.flight.guided.orders import Place
+from telemetry.topics.messages import GuidedTarget
 
 Vec3 = tuple[float, float, float]
 SHORTEST_M = 0.05

@@ -13,20 +13,20 @@ from typing import Literal
 
 from planning.model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
-from telemetry.flight.errand import Errand, Then
-from telemetry.flight.feed import Feed
-from telemetry.flight.handover import Handover, away_m, is_fresh
-from telemetry.flight.leading import Leading
-from telemetry.flight.mode_watch import ModeWatch
-from telemetry.flight.orders import Orders, Place
-from telemetry.flight.punctuality import Punctuality
-from telemetry.flight.standstill import Standstill
-from telemetry.flight.targets import bearing_rad
+from telemetry.flight.guided.feed import Feed
+from telemetry.flight.guided.handover import Handover, away_m, is_fresh
+from telemetry.flight.guided.leading import Leading
+from telemetry.flight.guided.mode_watch import ModeWatch
+from telemetry.flight.guided.orders import GuidedOrders, Place
+from telemetry.flight.guided.pending_command import PendingCommand, Then
+from telemetry.flight.guided.punctuality import Punctuality
+from telemetry.flight.guided.standstill import Standstill
+from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.ends import GROUND_STATION, Ends
-from telemetry.messages import FlightStatus, GuidedTarget
-from telemetry.requests import StartGuided
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
+from telemetry.topics.messages import FlightStatus, GuidedTarget
+from telemetry.topics.requests import StartGuided
+from telemetry.topics.vehicle import VehicleState
 
 Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
 TAKEOFF_TOLERANCE_M = 0.3

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from telemetry.flight.orders import Place
+from mapping.geometry.frames import apart_m
+from telemetry.flight.guided.orders import Place
 from telemetry.mavlink.actions import Message
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 METRES_PER_DEG = 111_195.0
 SAME_PLACE_M = 1.0

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
+from mapping.geometry.frames import moved_deg
 from telemetry.errors import RefusedError, TelemetryError
-from telemetry.flight.errand import Errand, Then
-from telemetry.flight.handover import METRES_PER_DEG, Handover, is_fresh
-from telemetry.flight.orders import GROUND_SPEED, Orders, Place
+from telemetry.flight.guided.handover import Handover, is_fresh
+from telemetry.flight.guided.orders import GROUND_SPEED, GuidedOrders, Place
+from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.mavlink.actions import Action, Message, Send
-from telemetry.mavlink.ends import GROUND_STATION, Ends
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
+from telemetry.topics.vehicle import VehicleState
 
 STOP_MODES = ("BRAKE", "GUIDED")
 """In order of preference; a change to GUIDED stops the vehicle too, unless it is in GUIDED already."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from telemetry.flight.feed import FedLeg, Feed, SetPoint, bounds_of
-from telemetry.flight.orders import Place
-from telemetry.messages import GuidedTarget
+from telemetry.flight.guided.feed import FedLeg, Feed, SetPoint, bounds_of
+from telemetry.flight.guided.orders import Place
+from telemetry.topics.messages import GuidedTarget
 
 PASSING_S = 0.5
 """A corner that is not stood at may be passed so much earlier than at its radius: the vehicle follows a little late."""

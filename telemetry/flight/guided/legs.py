@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from telemetry.flight.handover import is_fresh
-from telemetry.flight.helm import Helm, here_of
-from telemetry.flight.orders import Place
-from telemetry.flight.targets import bearing_rad
+from telemetry.flight.guided.handover import is_fresh
+from telemetry.flight.guided.helm import Helm, here_of
+from telemetry.flight.guided.orders import Place
+from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action
-from telemetry.messages import GuidedTarget
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.vehicle import VehicleState
 
 RADIUS_M = 0.7
 """Corners are cut by less than this."""

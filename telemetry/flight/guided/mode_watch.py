@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.vehicle import VehicleState
+from telemetry.topics.vehicle import VehicleState
 
 
 class ModeWatch:

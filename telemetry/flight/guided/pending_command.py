@@ -7,8 +7,8 @@ from collections.abc import Callable
 from telemetry.errors import TelemetryError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Send
 from telemetry.mavlink.commands import CommandRun
-from telemetry.mavlink.ends import Ends
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import Endpoints
+from telemetry.topics.vehicle import VehicleState
 
 Then = Callable[[float], list[Action]]
 OnFailed = Callable[[TelemetryError, float], list[Action]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.messages import GuidedTarget
+from telemetry.topics.messages import GuidedTarget
 
 
 class Punctuality:

@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from planning.certificate.commands import LAND, RETURN_TO_LAUNCH, TAKEOFFS
+from mapping.geometry.frames import apart_m
+from planning.certificate.commands import TAKEOFFS
 from planning.errors import MissionError
+from planning.mav_cmd import MavCmd
 from planning.model import Home, Mission, MissionItem
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.flight.targets import guided_plan
+from telemetry.flight.guided.targets import guided_plan
 from telemetry.mavlink.flight_keeper import item_of
-from telemetry.messages import GuidedTarget, Item, OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
+from telemetry.topics.vehicle import VehicleState
 
 LANDS_M = 20.0
 """From home; nearer than that the way home is a descent, where whatever stands around is not in the way."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from telemetry.flight.handover import away_m
-from telemetry.flight.orders import Place
-from telemetry.vehicle import VehicleState
+from telemetry.flight.guided.handover import away_m
+from telemetry.flight.guided.orders import Place
+from telemetry.topics.vehicle import VehicleState
 
 PATIENCE_S = 10.0
 NEARER_M = 0.5

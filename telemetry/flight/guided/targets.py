@@ -9,13 +9,16 @@ from typing import Literal
 
 import numpy as np
 
-from planning.certificate.commands import BENT, LAND, OTHER_UNJUDGED, RETURN_TO_LAUNCH, TAKEOFFS
-from planning.dsm import is_amsl
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import offset_m
+from planning.certificate.commands import BENT, OTHER_UNJUDGED, TAKEOFFS
 from planning.errors import MissionError
 from planning.formats.commands import plain_frame
 from planning.formats.trajectory_csv import Trajectory
-from planning.model import F64, Mission, MissionItem
-from telemetry.messages import GuidedTarget
+from planning.mav_cmd import MavCmd, MavFrame
+from planning.model import Mission, MissionItem
+from planning.terrain.dsm import is_amsl
+from telemetry.topics.messages import GuidedTarget
 
 WAYPOINT, LOITER_UNLIMITED, LOITER_TIME = 16, 17, 19
 CONDITION_YAW, CHANGE_SPEED = 115, 178

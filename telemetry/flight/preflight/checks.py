@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from planning.dsm import is_amsl
-from planning.flown import AMSL_FRAMES
 from planning.formats.commands import has_position
 from planning.margins.words import rounded_down, rounded_up
+from planning.missions.flown import AMSL_FRAMES
 from planning.model import Certificate, ClearanceParams, Home, HomeStand, Mission, VehicleProfile
-from telemetry.flight.parameters import ReturnSettings
-from telemetry.messages import OnboardMission
-from telemetry.vehicle import GnssFix, VehicleState
+from planning.terrain.dsm import is_amsl
+from telemetry.flight.preflight.parameters import ReturnSettings
+from telemetry.topics.messages import OnboardMission
+from telemetry.topics.vehicle import GnssFix, VehicleState
 
 Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance"]
 State = Literal["good", "accept", "bad", "unknown"]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 
-from mapping.braking import Braking
-from telemetry.flight.avoiding_words import SENSOR_WORDS
-from telemetry.flight.checks import Row
-from telemetry.flight.regions import largest_speed
-from telemetry.flight.speeds import Speeds
-from telemetry.obstacles import AvoidanceStatus, Eye
+from mapping.perceiving.braking import Braking
+from telemetry.flight.avoidance.regions import SENSOR_WORDS, largest_speed
+from telemetry.flight.preflight.checks import Row
+from telemetry.flight.preflight.speeds import Speeds
+from telemetry.topics.obstacles import AvoidanceStatus, Eye
 
 BLIND = "Avoidance is on, but no sensor sees ahead: nothing would brake."
 SLOWER = 0.05

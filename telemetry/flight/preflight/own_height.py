@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 from planning.certificate.home_ground import HomeGround
-from planning.dsm import is_amsl
-from telemetry.vehicle import VehicleState
+from planning.terrain.dsm import is_amsl
+from telemetry.topics.vehicle import VehicleState
 
 ANTENNA_M = 0.5
 """The antenna sits at most so high above the ground that the vehicle stands on."""

@@ -8,22 +8,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.certificate.clearance import certify
 from planning.certificate.home_stand import ground_at
-from planning.clearance import certify
-from planning.dsm import Dsm
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration
-from planning.flown import AMSL_FRAMES, flown_line
 from planning.formats.commands import has_position
-from planning.holes import fill_holes
+from planning.missions.flown import AMSL_FRAMES, flown_line
 from planning.model import Certificate, ClearanceParams, Firmware, Home, Mission, VehicleProfile
-from telemetry.flight import checks
-from telemetry.flight.checks import Row
-from telemetry.flight.own_height import narrowed, own_ground
-from telemetry.flight.parameters import return_settings
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
+from telemetry.flight.preflight import checks
+from telemetry.flight.preflight.checks import Row
+from telemetry.flight.preflight.own_height import narrowed, own_ground
+from telemetry.flight.preflight.parameters import return_settings
 from telemetry.mavlink.items import mission_from_onboard
-from telemetry.messages import OnboardMission
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import OnboardMission
+from telemetry.topics.vehicle import VehicleState
 
 __all__ = ["LARGEST_SHIFT_M", "Preflight", "Row", "actual_home", "check"]
 

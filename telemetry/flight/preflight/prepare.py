@@ -7,22 +7,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from planning.dsm import Dsm
-from planning.flown import flown_line
-from planning.holes import fill_holes
+from planning.missions.flown import flown_line
 from planning.model import ClearanceParams, Home, Mission, VehicleProfile
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
 from telemetry.errors import ConnectionFailedError, NotAllowedError, NoVehicleError, TransferError
-from telemetry.flight import checks
-from telemetry.flight.parameters import NAMES
-from telemetry.flight.preflight import SMALL_HOLE_M2, Preflight, actual_home, check
-from telemetry.flight.rereference import rereference
-from telemetry.flight.resume import Resumption, plan_resumption
+from telemetry.flight.preflight import checks
+from telemetry.flight.preflight.parameters import NAMES
+from telemetry.flight.preflight.preflight import Preflight, actual_home, check
+from telemetry.flight.preflight.rereference import rereference
+from telemetry.flight.preflight.resume import Resumption, plan_resumption
 from telemetry.flight.watch import Asks, Watch
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.items import items_from_mission
-from telemetry.messages import ErrorInfo, UploadReport
-from telemetry.requests import Connect, Operator, ReadParameters, Upload
-from telemetry.vehicle import VehicleState
+from telemetry.topics.messages import ErrorInfo, UploadReport
+from telemetry.topics.requests import Connect, Operator, ReadParameters, Upload
+from telemetry.topics.vehicle import VehicleState
 
 Report = Callable[[str], None]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from planning.certificate.commands import LAND, TAKEOFFS
-from planning.flown import HOME_FRAMES
+from planning.certificate.commands import TAKEOFFS
 from planning.formats.commands import has_position
-from planning.mission_items import MIN_TAKEOFF_M, TRUNCATION_GUARD_M
+from planning.mav_cmd import MavCmd
+from planning.missions.flown import HOME_FRAMES
+from planning.missions.mission_items import MIN_TAKEOFF_M, TRUNCATION_GUARD_M
 from planning.model import Home, Mission, MissionItem
 
 

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planning.certificate.commands import STRAIGHT
+from planning.mav_cmd import MavCmd
 from planning.model import Firmware
-from telemetry.flight.targets import CHANGE_SPEED, GROUND_SPEEDS
-from telemetry.messages import OnboardMission
+from telemetry.flight.guided.targets import GROUND_SPEEDS
+from telemetry.topics.messages import OnboardMission
 
 CRUISE, HOME, JERK = ("WP_SPD", "WPNAV_SPEED"), ("RTL_SPEED_MS", "RTL_SPEED"), ("PSC_JERK_NE", "PSC_JERK_XY")
 """ArduPilot's names, those of 4.7 and newer first."""

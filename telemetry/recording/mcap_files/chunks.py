@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import zstandard
 from mcap.opcode import Opcode
 
-from telemetry.recording.closing import ChunkPlace
-from telemetry.recording.records import Record, record_at, records
+from telemetry.recording.mcap_files.closing import ChunkPlace
+from telemetry.recording.mcap_files.mcap_records import Record, record_at, records
 from telemetry.recording.tlog import Data
 
 _CHUNK = struct.Struct("<QQQI")

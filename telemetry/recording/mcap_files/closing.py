@@ -20,7 +20,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from telemetry.recording.files import MCAP_MAGIC
+from telemetry.recording.file_types import MCAP_MAGIC
 
 _FOOTER_BYTES = 8 + 8 + 4
 

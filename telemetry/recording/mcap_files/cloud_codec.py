@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
+from mapping.sensor_frames import CloudFrame, RadarFrame
 from telemetry.errors import RecordingError
-from telemetry.sensing import CloudFrame, RadarFrame
 
 SCHEMA_NAME = "foxglove.PointCloud"
 _FLOAT32 = 7

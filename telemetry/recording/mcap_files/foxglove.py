@@ -10,11 +10,12 @@ from typing import Any
 
 import msgspec
 
-from telemetry.messages import Published, VehicleText
-from telemetry.recording import clouds, track_scene
-from telemetry.sensing import RadarFrame
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
+from mapping.geometry.frames import offset_m
+from mapping.sensor_frames import RadarFrame
+from telemetry.recording.mcap_files import cloud_codec, track_scene
+from telemetry.topics.messages import Published, VehicleText
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 HOME_FRAME, VEHICLE_FRAME = "home", "vehicle"
 """East, north, up of home; forward, left, up of the vehicle."""

@@ -9,13 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from telemetry.errors import RecordingError
-from telemetry.recording.chunks import chunk_content, messages
-from telemetry.recording.closing import ChunkPlace, Closing
-from telemetry.recording.files import is_mcap, opened
-from telemetry.recording.message_index import message_index
-from telemetry.recording.records import BROKEN
-from telemetry.recording.scan import Contents, read_contents
-from telemetry.recording.sink import describe
+from telemetry.recording.file_types import is_mcap, opened
+from telemetry.recording.mcap_files.chunks import chunk_content, message_index, messages
+from telemetry.recording.mcap_files.closing import ChunkPlace, Closing
+from telemetry.recording.mcap_files.mcap_records import BROKEN
+from telemetry.recording.mcap_files.scan import Contents, read_contents
+from telemetry.recording.mcap_files.sink import describe
 from telemetry.recording.tlog import Data
 
 

@@ -11,16 +11,16 @@ from typing import NamedTuple
 from mcap.records import Attachment, Channel
 
 from telemetry.errors import RecordingError
-from telemetry.messages import MESSAGE_TYPES, Published, RawFrame, Topic
-from telemetry.recording.chunks import chunk_content, messages
-from telemetry.recording.closing import ChunkPlace
-from telemetry.recording.files import foreign, is_mcap, opened
-from telemetry.recording.records import BROKEN, record_at, stream_of
-from telemetry.recording.scan import Contents, read_contents
-from telemetry.recording.schemas import codec_of
+from telemetry.recording.file_types import foreign, is_mcap, opened
+from telemetry.recording.mcap_files.chunks import chunk_content, messages
+from telemetry.recording.mcap_files.closing import ChunkPlace
+from telemetry.recording.mcap_files.mcap_records import BROKEN, record_at, stream_of
+from telemetry.recording.mcap_files.scan import Contents, read_contents
+from telemetry.recording.mcap_files.schemas import codec_of
+from telemetry.recording.mcap_files.writer import ABOUT
+from telemetry.recording.recorded_topics import RAW_ENCODING, raw_channel_topic
 from telemetry.recording.tlog import Data
-from telemetry.recording.topics import RAW_ENCODING, raw_channel_topic
-from telemetry.recording.writer import ABOUT
+from telemetry.topics.messages import MESSAGE_TYPES, Published, RawFrame, Topic
 
 UNFINISHED = "The recording was not finished: its recorder was killed, or is still recording."
 _RAW_TOPICS = {raw_channel_topic(sent): sent for sent in (True, False)}

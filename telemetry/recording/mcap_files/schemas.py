@@ -14,9 +14,9 @@ from typing import Any
 
 import msgspec
 
+from mapping.sensor_frames import CloudFrame
 from telemetry.errors import RecordingError
-from telemetry.recording.clouds import CloudCodec
-from telemetry.sensing import CloudFrame
+from telemetry.recording.mcap_files.cloud_codec import CloudCodec
 
 _PLAIN: dict[object, dict[str, str]] = {
     float: {"type": "number"},

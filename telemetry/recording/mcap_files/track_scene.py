@@ -6,7 +6,7 @@ import json
 import math
 from typing import Any
 
-from telemetry.tracks import Track, TracksStatus
+from telemetry.topics.tracks import Track, TracksStatus
 
 SCHEMA_NAME = "foxglove.SceneUpdate"
 _SHOWN_S = 1.5

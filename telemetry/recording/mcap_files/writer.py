@@ -19,16 +19,16 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 
 from planning import __version__
-from telemetry.messages import MESSAGE_TYPES, PlanRecord, Published, RawFrame
-from telemetry.recording.closing import ChunkPlace, Closing
-from telemetry.recording.files import MCAP_MAGIC
-from telemetry.recording.foxglove import Standards, standard_schema
-from telemetry.recording.message_index import message_index
-from telemetry.recording.scan import attachment_index
-from telemetry.recording.schemas import codec_of
-from telemetry.recording.sink import Sink, Write
-from telemetry.recording.topics import RAW_ENCODING, raw_channel_topic
-from telemetry.vehicle import VehicleState
+from telemetry.recording.file_types import MCAP_MAGIC
+from telemetry.recording.mcap_files.chunks import message_index
+from telemetry.recording.mcap_files.closing import ChunkPlace, Closing
+from telemetry.recording.mcap_files.foxglove import Standards, standard_schema
+from telemetry.recording.mcap_files.scan import attachment_index
+from telemetry.recording.mcap_files.schemas import codec_of
+from telemetry.recording.mcap_files.sink import Sink, Write
+from telemetry.recording.recorded_topics import RAW_ENCODING, raw_channel_topic
+from telemetry.topics.messages import MESSAGE_TYPES, PlanRecord, Published, RawFrame
+from telemetry.topics.vehicle import VehicleState
 
 LIBRARY = f"hedgehop {__version__}"
 ABOUT, PLAN, VEHICLE = "hedgehop", "plan", "vehicle"

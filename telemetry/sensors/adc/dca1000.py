@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import C64, I64
+from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
 from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
-from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig, fmcw_params
 
 SAMPLE_BYTES = 4
 """I and Q."""

@@ -11,9 +11,10 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import C64, I64
 from mapping.radar.params import FmcwParams
+from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, dimensions, refuse_clipped, refuse_empty
 from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
-from telemetry.sensors.adc.model import C64, AdcFile, AdcFrame, AnyFrame, dimensions, refuse_clipped, refuse_empty
 
 USUAL_PERIOD_S = 0.1
 """Arrays do not tell it."""

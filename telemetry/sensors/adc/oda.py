@@ -15,7 +15,7 @@ import numpy as np
 
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
-from telemetry.sensors.adc.model import AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
+from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
 
 RATE_HZ = 15.7
 _BLOCKS = 4

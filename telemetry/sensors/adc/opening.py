@@ -6,13 +6,12 @@ from pathlib import Path
 
 from mapping.errors import RadarDataError
 from mapping.radar.params import FmcwParams
+from telemetry.sensors.adc.adc_file import AdcFile
 from telemetry.sensors.adc.codes import SampleCode
 from telemetry.sensors.adc.dca1000 import open_dca1000
-from telemetry.sensors.adc.model import AdcFile
 from telemetry.sensors.adc.npy import open_npy
 from telemetry.sensors.adc.oda import open_oda
-from telemetry.sensors.ti_mmwave.model import TiConfig
-from telemetry.sensors.ti_mmwave.waveform import fmcw_params
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig, fmcw_params
 
 ENDINGS = (".npy", ".bin", ".csv")
 

@@ -16,8 +16,8 @@ from mapping.radar import (
     RadarChain,
     Spectra,
 )
+from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame
 from telemetry.sensors.adc.codes import SampleCode
-from telemetry.sensors.adc.model import AdcFile, AdcFrame
 from telemetry.sensors.adc.opening import open_adc
 from telemetry.sensors.ti_mmwave.config import read_config
 from telemetry.sensors.ti_mmwave.differences import differences

@@ -10,8 +10,8 @@ import struct
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import C64, U32
 from mapping.radar import POSITION2GO, FmcwParams
 from telemetry.errors import SensorError
 

@@ -12,7 +12,7 @@ from mapping.radar import FmcwParams
 from telemetry.errors import SensorError
 from telemetry.sensors.position2go import answers
 from telemetry.sensors.position2go.answers import Frame, WrongAnswerError, frame_of, params_of
-from telemetry.sensors.position2go.messages import Message, MessageStream, OutOfStepError, Payload, Status, encode
+from telemetry.sensors.position2go.board_messages import Message, MessageStream, OutOfStepError, Payload, Status, encode
 from telemetry.sensors.serial_port import failing_as_sensor
 
 EVERY_S = 1 / 15

@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 
 from mapping.errors import RadarDataError
-from telemetry.sensors.ti_mmwave.commands import Command, read_commands
-from telemetry.sensors.ti_mmwave.model import TiConfig
+from telemetry.sensors.ti_mmwave.cfg_commands import Command, read_commands
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig
 
 LEAST_SNR_DB = 15.0
 """Of a detection where the configuration names no threshold in decibels: the demo's default."""

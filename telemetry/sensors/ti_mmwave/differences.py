@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from telemetry.sensors.ti_mmwave.commands import Command
-from telemetry.sensors.ti_mmwave.frame import TiFrame
-from telemetry.sensors.ti_mmwave.model import TiConfig
+from telemetry.sensors.ti_mmwave.cfg_commands import Command
+from telemetry.sensors.ti_mmwave.ti_config import TiConfig
+from telemetry.sensors.ti_mmwave.ti_frame import TiFrame
 
 ENOUGH = 1.2
 """Differences smaller than this factor are not worth a word."""

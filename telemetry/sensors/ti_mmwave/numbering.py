@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from telemetry.sensors.ti_mmwave.frame import TiFrame
+from telemetry.sensors.ti_mmwave.ti_frame import TiFrame
 
 MOST_SKIPPED = 20
 """Numbers that go on farther than this, or backwards, are in doubt: one flipped bit does as much."""

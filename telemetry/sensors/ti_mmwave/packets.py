@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from telemetry.sensors.ti_mmwave.frame import MAGIC, DamagedPacketError, TiFrame, decode_packet, packet_bytes
 from telemetry.sensors.ti_mmwave.numbering import Numbering
+from telemetry.sensors.ti_mmwave.ti_frame import MAGIC, DamagedPacketError, TiFrame, decode_packet, packet_bytes
 
 _START_BYTES = 16
 """Magic word, version and total length."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from telemetry.errors import SensorError
-from telemetry.sensors.ti_mmwave.commands import Command
+from telemetry.sensors.ti_mmwave.cfg_commands import Command
 
 ANSWER_WITHIN_S, START_WITHIN_S = 3.0, 10.0
 """``sensorStart`` calibrates first."""

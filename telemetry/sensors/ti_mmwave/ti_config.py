@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from telemetry.sensors.ti_mmwave.commands import Command
+from mapping.errors import RadarDataError
+from mapping.radar.params import FmcwParams
+from telemetry.sensors.ti_mmwave.cfg_commands import Command
 
 C_M_S = 299_792_458.0
 USABLE_RANGE = 0.8

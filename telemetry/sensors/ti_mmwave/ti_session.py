@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import serial
 
 from telemetry.errors import SensorError
 from telemetry.sensors.serial_port import failing_as_sensor, open_port
-from telemetry.sensors.ti_mmwave.commands import Command
-from telemetry.sensors.ti_mmwave.frame import TiFrame
+from telemetry.sensors.ti_mmwave.cfg_commands import Command
 from telemetry.sensors.ti_mmwave.packets import TiStream
-from telemetry.sensors.ti_mmwave.ports import CONFIG_BAUD, DATA_BAUD
 from telemetry.sensors.ti_mmwave.sender import ConfigSender
+from telemetry.sensors.ti_mmwave.ti_frame import TiFrame
 
 GARBLED_S, GARBLED_BYTES = 3.0, 200
 """So long and so much without a frame: what comes is no stream of frames."""

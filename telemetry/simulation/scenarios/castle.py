@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from telemetry.obstacles import Sensor
-from telemetry.scenarios import scenes
-from telemetry.scenarios.charts import Chart, series
-from telemetry.scenarios.flown import Flown
-from telemetry.scenarios.map_figures import radar_figures, vision_figures
-from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult
-from telemetry.scenarios.running import flown_of, setup_of
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.gnss_script import GnssEvent
+from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult
+from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
+from telemetry.topics.obstacles import Sensor
 
 NAME = "castle-building"
 LATEST_ALERT_S = 0.2

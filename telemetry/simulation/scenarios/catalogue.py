@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 
-from telemetry.scenarios.result import ScenarioResult
-from telemetry.scenarios.wanted import Wanted
+from telemetry.simulation.scenarios.stage.result import ScenarioResult
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,9 @@ import json
 import math
 from pathlib import Path
 
-from planning.demo import demo_pois
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene.world_file import FORMAT, VERSION
+from planning.ground.demo_hillside import demo_pois
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene.world_file import FORMAT, VERSION
 
 NAME = "Demo hillside, some years later"
 _BUILDING_ALONG_M = 33.0

@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Frame, Vec3
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
 
 class Ground(Protocol):

@@ -13,16 +13,16 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.errors import ParameterError
-from telemetry.simulator.battery import Pack
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.gnss import GnssKind
-from telemetry.simulator.gnss_script import GnssEvent
-from telemetry.simulator.mavlink import Endpoint
-from telemetry.simulator.mission_protocol import Reply
-from telemetry.simulator.parameters import SPECS, Parameters
-from telemetry.simulator.transports import Transport, open_transport, parse_where
-from telemetry.simulator.vehicle import SimulatedVehicle
-from telemetry.simulator.world import Ground, Obstacles, SurfaceGround
+from telemetry.simulation.simulator.airframe.battery import Pack
+from telemetry.simulation.simulator.airframe.gnss import GnssKind
+from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Parameters
+from telemetry.simulation.simulator.ground_below import Ground, Obstacles, SurfaceGround
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.protocol.mavlink import Endpoint
+from telemetry.simulation.simulator.protocol.mission_protocol import Reply
+from telemetry.simulation.simulator.protocol.transports import Transport, open_transport, parse_where
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 SLICE_S = 0.02
 """Simulated time between looks at the streams."""
@@ -215,12 +215,12 @@ def _surroundings(options: SimOptions, frame: Frame) -> tuple[Ground | None, Obs
     # What reads rasters and casts rays takes a second to load; level ground starts without it.
     if options.dsm is None and options.world is None:
         return None, None
-    from planning.geotiff import read_dsm
+    from planning.terrain.geotiff import read_dsm
 
     dsm = read_dsm(options.dsm) if options.dsm else None
     if options.world is None:
         return SurfaceGround(dsm, frame) if dsm else None, None
-    from telemetry.simulator.scene import World
+    from telemetry.simulation.simulator.scene import World
 
     world = World.load(options.world, frame=frame, dsm=dsm)
     return world.ground, world

@@ -6,18 +6,17 @@ import math
 
 import numpy as np
 
-from telemetry.sensing import SimTruth
-from telemetry.simulator.attitude import AttitudeError
-from telemetry.simulator.autopilot import Autopilot
-from telemetry.simulator.battery import Battery, Pack
-from telemetry.simulator.dynamics import GRAVITY_M_S2, Airframe, Multirotor
-from telemetry.simulator.frame import Frame, Vec3
-from telemetry.simulator.gnss import Gnss, GnssKind
-from telemetry.simulator.gnss_script import GnssEvent, has_fix, offset_neu
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.pilot import AS_REAL_BOOT_S, Sensed
-from telemetry.simulator.wind import Wind
-from telemetry.simulator.world import FlatGround, Ground, Obstacles
+from telemetry.simulation.simulator.airframe.battery import Battery, Pack
+from telemetry.simulation.simulator.airframe.disturbances import AttitudeError, Wind
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, Airframe, Multirotor
+from telemetry.simulation.simulator.airframe.gnss import Gnss, GnssKind
+from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent, has_fix, offset_neu
+from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S, Sensed
+from telemetry.simulation.simulator.ground_below import FlatGround, Ground, Obstacles
+from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
+from telemetry.topics.simulated import SimTruth
 
 STEP_S = 0.005
 STEPS_PER_LOOK = 4

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import C64, C128
 from mapping.radar import AWR1843, FmcwParams
 from mapping.radar.params import LIGHT_M_S
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mapping.radar import Detections
 from mapping.radar.detections import between_cells
-from mapping.radar_targets import polar
+from mapping.radar.targets import polar
 
 
 @given(st.floats(-0.45, 0.45), st.floats(-0.45, 0.45), st.integers(0, 15), st.integers(2, 20))

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import C128
 from mapping.radar import AWR1843, ChainSettings, Detections, RadarChain, Spectra, doa
 
 NAMES = ["simple_frame_1", "doppler_example", "doppler_example_1"]

@@ -3,9 +3,13 @@ import type uPlot from "uplot";
 import { metres } from "../format";
 import { isStale } from "../store/ages";
 import { now_ms } from "../store/clock";
-import { heard, trackVersion, tracks } from "../store/flying";
+import { heard, tracks, trackVersion } from "../store/flying";
 import { theme } from "../store/prefs";
-import { ConflictMark } from "./ConflictMark";
+import { aheadOf } from "../obstacles/ahead";
+import { conflictWhere } from "../obstacles/obstacle_words";
+import { watching } from "../store/obstacles";
+import { Icon } from "../ui/Icon";
+import { VerticalLine } from "./ChartBox";
 
 const REDRAW_MS = 200;
 

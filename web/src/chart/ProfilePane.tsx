@@ -1,14 +1,15 @@
 import { signal } from "@preact/signals";
-import { count } from "../format";
+import { count, latLon, metres } from "../format";
 import { Segmented } from "../ui/Button";
-import { throttled } from "../scene/frame_events";
+import { throttled } from "../ui/throttle";
 import { chartHeight_px } from "../store/prefs";
 import { computation, cursor, isFresh, result } from "../store/state";
 import { send } from "../store/stream";
-import { activeView } from "../shell/views";
-import { CursorValues } from "./CursorValues";
+import { viewId } from "../store/view";
 import { Plot, type ChartKind } from "./Plot";
 import { ResizeHandle } from "./ResizeHandle";
+import type { CursorMessage, ResultDoc } from "../messages";
+import { levelOf, valueAt } from "./transform";
 
 const kind = signal<ChartKind>("altitude");
 const tellServer = throttled<number | null>(1000 / 30, (s_m) => send({ type: "hover_profile", s_m }));

@@ -1,7 +1,8 @@
 import uPlot from "uplot";
 import { number } from "../format";
 import { CHART_FONT, type Palette } from "./palette";
-import { tickDecimals, type Span } from "./transform";
+import { tickDecimals } from "./axes";
+import type { Span } from "./transform";
 
 /** What both charts have in common: axes with units, no zoom, no legend of uPlot's own. */
 interface Frame {

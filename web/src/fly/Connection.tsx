@@ -4,11 +4,11 @@ import { count, number } from "../format";
 import { adopted, isInAir, lease, linkStatus, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { Button } from "../ui/Button";
-import { ErrorPanel } from "../ui/ErrorBox";
+import { ErrorPanel } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
 import { Section } from "../ui/Section";
-import { adopt, connectTo, disconnect, giveControl, release, startSimulator } from "./commands";
-import { linkWords } from "./words";
+import { adopt, connectTo, disconnect, giveControl, release, startSimulator } from "../vehicle/orders";
+import { linkWords } from "../vehicle/vehicle_words";
 
 const PLACE = "connection";
 

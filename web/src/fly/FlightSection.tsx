@@ -2,12 +2,11 @@ import { bytes, duration } from "../format";
 import { adopted, flight, isInAir, lease, recorded_s, recorder, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { Button } from "../ui/Button";
-import { ErrorPanel } from "../ui/ErrorBox";
+import { Done, ErrorPanel, Outcome } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
-import { Done, Outcome } from "../ui/Outcome";
 import { Section } from "../ui/Section";
-import { arm, disarm, land, startRecording, stopRecording } from "./commands";
-import { armedWord } from "./words";
+import { arm, disarm, land, startRecording, stopRecording } from "../vehicle/orders";
+import { armedWord } from "../vehicle/vehicle_words";
 
 const PLACE = "flight";
 

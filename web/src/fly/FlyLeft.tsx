@@ -1,8 +1,7 @@
 import { adopted, isInAir, linkStatus } from "../store/flying";
-import { closeReview } from "../review/commands";
-import { isReplaying, review } from "../store/review";
+import { closeReview, isReplaying, review } from "../store/review";
 import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
-import { ObstaclesSection } from "../obstacles/ObstaclesSection";
+import { ObstaclesSection } from "./ObstaclesSection";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { ConnectionSection } from "./Connection";

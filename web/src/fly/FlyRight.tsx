@@ -6,7 +6,7 @@ import { hasRoom } from "../tracks/Displays";
 import { ROWS, TrackList } from "../tracks/TrackList";
 import { adopted, heard, texts } from "../store/flying";
 import { hasSensors } from "../store/obstacles";
-import { Instruments } from "./Instruments";
+import { Instruments } from "../vehicle/Instruments";
 import { VehicleMessages } from "./VehicleMessages";
 
 function Teaching() {

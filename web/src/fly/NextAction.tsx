@@ -1,18 +1,16 @@
-import { count } from "../format";
-import { openReview } from "../review/commands";
-import { goTo } from "../shell/views";
-import { fly, flight, isInAir, lease, linkStatus, recorder, transfer } from "../store/flying";
+import { openReview, recordings } from "../store/review";
+import { goTo } from "../store/view";
+import { flight, fly, isInAir, lease, linkStatus, recorder, transfer, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
-import { recordings } from "../store/review";
-import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { Outcome } from "../ui/Outcome";
 import {
-  LEASE,
-  NEXT,
+  accepted,
   adopt,
   checkStart,
+  LEASE,
+  NEXT,
   pauseFlight,
   resumeFlight,
   resumeFrom,

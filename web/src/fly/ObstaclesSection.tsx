@@ -1,17 +1,17 @@
 import { metres } from "../format";
-import type { PerceptionSettings, PerceptionSettingsBody } from "../messages";
+import { LIMITS, type PerceptionSettings, type PerceptionSettingsBody } from "../messages";
 import { lease } from "../store/flying";
 import { hasSensors, obstacles } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { Done } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
-import { NumberField } from "../ui/NumberField";
+import { NumberFields, type NumberSpec } from "../ui/NumberField";
 import { Section } from "../ui/Section";
 import { Check, SelectField } from "../ui/fields";
 import { TrackSettings } from "../tracks/TrackSettings";
-import { MapExports } from "./MapExports";
-import { MapSettings } from "./MapSettings";
-import { MAPS, clearMaps, setPerception } from "./commands";
+import { MapExports } from "../obstacles/MapExports";
+import { MapSettings } from "../obstacles/MapSettings";
+import { MAPS, clearMaps, setPerception } from "../obstacles/obstacle_orders";
 
 const FIELDS = [
   { key: "radar_depth_m", label: "Radar looks ahead", unit: "m", min: 2, max: 120, step: 1 },

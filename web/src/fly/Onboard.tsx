@@ -6,8 +6,7 @@ import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { Section } from "../ui/Section";
-import { NEXT, checkStart, uploadPlan } from "./commands";
-import { obstacle } from "./facts";
+import { NEXT, checkStart, uploadPlan, uploadRefusal } from "../vehicle/orders";
 
 const SUMMARIES = { unknown: "not known", none: "none", verified: "verified" } as const;
 const MOST_ROWS = 40;

@@ -16,7 +16,7 @@ import {
   resumes,
   way,
   wayToFly,
-} from "./commands";
+} from "../vehicle/orders";
 import { openChecks, unaccepted } from "./next_step";
 
 const MARKS: Record<CheckRow["state"], { icon: IconName; word: string }> = {

@@ -1,6 +1,5 @@
 import type { CheckRow, FlightStatus, FlyState, LinkStatus, TransferStatus, VehicleState } from "../messages";
-import type { VerdictKind } from "../store/results";
-import { isAcceptable, type Accepted } from "./commands";
+import { isAcceptable, type Accepted } from "../vehicle/orders";
 
 /** What the page knows when it says what comes next. */
 export interface Facts {

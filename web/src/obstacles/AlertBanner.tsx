@@ -1,20 +1,19 @@
 import { useRef, useState } from "preact/hooks";
 import type { AlertDoc } from "../messages";
+import { endingsOf, parted, type Endings } from "../store/alerts";
 import { now_ms } from "../store/clock";
 import { alerts } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { isReplaying } from "../store/review";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
-import { ErrorBox } from "../ui/ErrorBox";
-import { activeView, goTo } from "../shell/views";
+import { ErrorBox } from "../ui/Outcome";
+import { goTo, viewId } from "../store/view";
 import { Figures, Place, State } from "./AlertFigures";
-import { Announcer } from "./Announcer";
 import { SensorMark } from "./SensorMark";
-import { ALERTS, acknowledge } from "./commands";
+import { ALERTS, acknowledge } from "./obstacle_orders";
 import { hasWays } from "./manoeuvres";
-import { endingsOf, parted, type Endings } from "./over";
-import { alertTitle, bearingWord, distance, heightDifference } from "./words";
+import { alertTitle, bearingWord, distance, heightDifference, spoken } from "./obstacle_words";
 
 /** Further alerts, one line each. */
 const MOST_LINES = 2;

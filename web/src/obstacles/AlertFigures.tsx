@@ -3,7 +3,7 @@ import { clock, latLon, metres } from "../format";
 import type { AlertDoc, Obstacle } from "../messages";
 import { notifyText } from "../store/state";
 import { Icon } from "../ui/Icon";
-import { bearingWord, distance, heightDifference, timeTo } from "./words";
+import { bearingWord, distance, heightDifference, timeTo } from "./obstacle_words";
 
 /** Where it is; before the first position of the vehicle nobody knows. */
 export function Place({ obstacle: { lat_deg, lon_deg, alt_amsl_m } }: { obstacle: Obstacle }) {

@@ -9,8 +9,8 @@ import { Check } from "../ui/fields";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
-import { AVOIDANCE, setPerception, switchAvoidance, wantsConsent } from "./commands";
-import { avoidanceWords, isTooFast } from "./words";
+import { AVOIDANCE, setPerception, switchAvoidance, wantsConsent } from "./obstacle_orders";
+import { avoidanceWords, isTooFast } from "./obstacle_words";
 
 const isSimulated = () => nodes.value.some((node) => node.name === "simulator" && node.state === "running");
 

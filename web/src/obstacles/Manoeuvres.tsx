@@ -7,7 +7,7 @@ import { HoldButton } from "../ui/HoldButton";
 import { Icon, type IconName } from "../ui/Icon";
 import { matching } from "../ui/media";
 import { Outcome } from "../ui/Outcome";
-import { MANOEUVRE, flyManoeuvre } from "./commands";
+import { MANOEUVRE, flyManoeuvre } from "./obstacle_orders";
 import { cardsFor, sidestepWords, type Card, type Kind } from "./manoeuvres";
 
 interface Words {

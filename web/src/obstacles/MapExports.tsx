@@ -3,7 +3,7 @@ import type { Source } from "../store/flying";
 import { SENSORS, sensed, type MapName, type SensorName } from "../store/obstacles";
 import { Icon } from "../ui/Icon";
 import { SensorMark } from "./SensorMark";
-import { SENSOR_WORDS } from "./words";
+import { SENSOR_WORDS } from "./obstacle_words";
 
 const FILES = [
   { format: "ply", note: "points, for any 3D program" },

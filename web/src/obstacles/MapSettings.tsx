@@ -1,13 +1,13 @@
 import { useState } from "preact/hooks";
-import type { PerceptionSettings, PerceptionSettingsBody } from "../messages";
+import { LIMITS, type PerceptionSettings, type PerceptionSettingsBody } from "../messages";
 import { lease } from "../store/flying";
 import { setError } from "../store/state";
 import { Button } from "../ui/Button";
-import { ErrorBox } from "../ui/ErrorBox";
+import { ErrorBox } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
-import { NumberField } from "../ui/NumberField";
+import { NumberField, NumberFields } from "../ui/NumberField";
 import { type AnotherMap, BYTES_PER_MB, beginsAnew, differing } from "./another_map";
-import { MAP_SETTINGS, setPerception } from "./commands";
+import { MAP_SETTINGS, setPerception } from "./obstacle_orders";
 
 const AT_ONCE = [
   { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", min: 0.1, max: 5, step: 0.1 },

@@ -1,7 +1,7 @@
 import { latLon, metres, number } from "../format";
-import { CopyPlace } from "../plan/CopyPlace";
+import { CopyPlace } from "../ui/CopyPlace";
 import { isInAir, lease, type Source } from "../store/flying";
-import { goTo } from "../shell/views";
+import { goTo } from "../store/view";
 import { hasSensors, watching } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { document_, link } from "../store/state";
@@ -10,8 +10,8 @@ import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
 import { SensorMark } from "./SensorMark";
 import { aheadOf, type Ahead } from "./ahead";
-import { SEEN, planWithSeen, type SeenPart } from "./commands";
-import { SENSOR_WORDS, conflictWhere } from "./words";
+import { SEEN, planWithSeen, type SeenPart } from "./obstacle_orders";
+import { SENSOR_WORDS, conflictWhere } from "./obstacle_words";
 
 function ConflictLine({ conflict }: { conflict: NonNullable<Ahead["conflict"]> }) {
   return (

@@ -20,7 +20,7 @@ import {
 } from "./PolarLayers";
 import { SensorMark } from "./SensorMark";
 import { nearestOf, nextRange } from "./polar";
-import { SENSOR_WORDS, distance, offNose } from "./words";
+import { SENSOR_WORDS, distance, offNose } from "./obstacle_words";
 
 function words(all: readonly Shown[]): string {
   const watching = all.filter((shown) => shown.isWatching);

@@ -1,10 +1,9 @@
-import { metres, number } from "../format";
-import { degreesOf } from "../fly/attitude";
+import { degreesOf, metres, number } from "../format";
 import type { SensorName } from "../store/obstacles";
 import type { Sensed } from "../store/sensing";
 import { SHAPES } from "./SensorMark";
 import { RADIUS, blips, labelled, place, rings, sector, sweepArcs } from "./polar";
-import { signedHeight } from "./words";
+import { signedHeight } from "./obstacle_words";
 
 /** What the polar display draws, from below to above. */
 

@@ -4,7 +4,7 @@ import type { SectionDoc } from "../messages";
 import type { Source } from "../store/flying";
 import type { MapName } from "../store/obstacles";
 import { Segmented } from "../ui/Button";
-import { NumberField } from "../ui/NumberField";
+import { NumberFields } from "../ui/NumberField";
 import { axes, Drawn, type Pen } from "./Drawn";
 import { px, sectionFrame, ticks, type Frame } from "./looking";
 import { usePolled } from "./polled";

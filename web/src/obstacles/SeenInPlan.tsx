@@ -5,7 +5,7 @@ import { document_, result } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
-import { SEEN, planWithSeen } from "./commands";
+import { SEEN, planWithSeen } from "./obstacle_orders";
 
 /** In Plan: the surface model is not as it was read, and the way out of it. */
 export function SeenInPlan() {

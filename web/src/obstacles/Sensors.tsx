@@ -5,7 +5,7 @@ import { SENSORS, drawnOf, sensed, type SensorName } from "../store/obstacles";
 import { silence_s, watchOf, type Sensed } from "../store/sensing";
 import { Icon } from "../ui/Icon";
 import { SensorMark } from "./SensorMark";
-import { SENSOR_WORDS, WATCH_WORDS, sensorRow } from "./words";
+import { SENSOR_WORDS, WATCH_WORDS, sensorRow } from "./obstacle_words";
 
 /** The camera's own path may part from the satellites' by so much before it matters. */
 const DIVERGENCE_M = 2;

@@ -2,9 +2,9 @@ import { clearance, demanded, latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
-import { drawer } from "../shell/ui_state";
+import { drawer } from "../store/view";
 import { frame } from "../store/stream";
-import { CopyPlace } from "./CopyPlace";
+import { CopyPlace } from "../ui/CopyPlace";
 
 type Level = "good" | "near" | "bad" | "neutral";
 

@@ -1,11 +1,9 @@
-import { NEXT, uploadPlan } from "../fly/commands";
-import { obstacle as uploadObstacle } from "../fly/facts";
-import { TransferBar } from "../fly/NextAction";
 import { adopted, fly, isInAir, lease } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { Button } from "../ui/Button";
-import { ErrorBox } from "../ui/ErrorBox";
-import { Outcome } from "../ui/Outcome";
+import { ErrorBox, Outcome } from "../ui/Outcome";
+import { TransferBar } from "../vehicle/TransferBar";
+import { NEXT, uploadPlan, uploadRefusal } from "../vehicle/orders";
 import { ExportMenu, obstacle } from "./ExportMenu";
 
 const PLACE = "upload";

@@ -1,4 +1,4 @@
-import { ErrorBox } from "../ui/ErrorBox";
+import { ErrorBox } from "../ui/Outcome";
 import { SeenInPlan } from "../obstacles/SeenInPlan";
 import { document_ } from "../store/state";
 import { TraversabilitySection } from "../traversability/TraversabilitySection";

@@ -4,7 +4,7 @@ import type { ResultDoc } from "../messages";
 import { edit } from "../store/plan";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
-import { ErrorPanel } from "../ui/ErrorBox";
+import { ErrorPanel } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
 import { OtherSurface } from "../ui/OtherSurface";
 import { computation, isFresh, known, result } from "../store/state";

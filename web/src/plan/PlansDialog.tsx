@@ -4,10 +4,10 @@ import { count, day } from "../format";
 import type { PlanEntry } from "../messages";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
-import { ErrorBox } from "../ui/ErrorBox";
-import { openDialog } from "../shell/ui_state";
+import { ErrorBox } from "../ui/Outcome";
+import { openDialog } from "../store/view";
 import { document_, library, plan, setError } from "../store/state";
-import { deletePlan, newPlan, openPlan, savePlanAs } from "./commands";
+import { deletePlan, newPlan, openPlan, savePlanAs } from "../store/plans";
 
 /** The plan whose deletion has been asked for once. */
 const confirming = signal<string | null>(null);

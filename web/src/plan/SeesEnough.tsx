@@ -1,9 +1,9 @@
 import { metres, withUnit } from "../format";
+import type { AvoidanceStatus, PerceptionSettings, SeesEnough as Speeds } from "../messages";
 import { document_ } from "../store/state";
 import { edit } from "../store/plan";
-import { obstacles, sensed } from "../store/obstacles";
-import { slowestOf } from "../obstacles/sees_enough";
-import { SENSOR_WORDS } from "../obstacles/words";
+import { obstacles, sensed, type SensorName } from "../store/obstacles";
+import { SENSOR_WORDS } from "../obstacles/obstacle_words";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 

@@ -1,10 +1,9 @@
 import { useEffect, useRef } from "preact/hooks";
 import { timecode } from "../format";
 import type { ReviewDoc, ReviewEvent } from "../messages";
-import { playhead_s } from "../store/review";
+import { playhead_s, seek } from "../store/review";
 import { severityLevel, severityWord } from "../store/texts";
 import { Icon, type IconName } from "../ui/Icon";
-import { seek } from "./commands";
 import { eventAt } from "./time";
 
 const KINDS: Readonly<Record<string, IconName>> = {

@@ -1,9 +1,8 @@
 import { DASH, clearance, demanded, deviation, duration, metres, timecode, withUnit } from "../format";
 import type { ReviewDoc, ReviewFigures } from "../messages";
 import { Icon, type IconName } from "../ui/Icon";
-import { seek } from "./commands";
-import { flownLevel, type Level } from "./level";
-import { higherWords } from "./words";
+import { seek } from "../store/review";
+import { flownLevel, higherWords, type Level } from "./judged";
 
 const MARKS: Record<Level, IconName | null> = { good: "check", near: "warning", bad: "cross", neutral: null };
 

@@ -1,7 +1,7 @@
 import { metres, number } from "../format";
 import type { Histogram, ReviewFigures } from "../messages";
-import { tickDecimals } from "../chart/transform";
-import { columns, reachOf, roundStep } from "./time";
+import { roundStep, tickDecimals } from "../chart/axes";
+import { columns, reachOf } from "./time";
 
 /** In its own units; the labels' size does not change with the chart's. */
 const [WIDTH, HEIGHT] = [620, 150];

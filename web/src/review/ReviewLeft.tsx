@@ -1,22 +1,11 @@
 import { useState } from "preact/hooks";
 import { bytes, count, day, duration } from "../format";
 import type { RecordingDoc } from "../messages";
-import { chooseFiles } from "../shell/keyboard";
-import { goTo } from "../shell/views";
+import { chooseFiles } from "../ui/choose_files";
 import { MapExports } from "../obstacles/MapExports";
 import { sendRecording } from "../store/files";
 import { hasSensors } from "../store/obstacles";
 import { pending } from "../store/outcomes";
-import { isPlaying, opening, recordings, review } from "../store/review";
-import { library } from "../store/state";
-import { frame } from "../store/stream";
-import { Button } from "../ui/Button";
-import { Icon } from "../ui/Icon";
-import { Done, Outcome } from "../ui/Outcome";
-import { Section } from "../ui/Section";
-import { Check } from "../ui/fields";
-import { StudyLeft } from "./Studies";
-import { study } from "./study";
 import {
   PLAYING,
   RECORDINGS,
@@ -25,10 +14,24 @@ import {
   deleteRecording,
   fileOf,
   imported,
+  isPlaying,
   openReview,
+  opening,
+  recordings,
+  review,
   terrainChoice,
   togglePlaying,
-} from "./commands";
+} from "../store/review";
+import { library } from "../store/state";
+import { frame } from "../store/stream";
+import { goTo, study } from "../store/view";
+import { Button } from "../ui/Button";
+import { DeleteForGood } from "../ui/DeleteForGood";
+import { Icon } from "../ui/Icon";
+import { Done, Outcome } from "../ui/Outcome";
+import { Section } from "../ui/Section";
+import { Check } from "../ui/fields";
+import { StudyLeft } from "./Studies";
 
 /** Recordings that were dropped or chosen: imported, and the last of them opened. */
 export function takeRecordings(files: readonly File[]): void {

@@ -1,7 +1,7 @@
 import { signal } from "@preact/signals";
 import { day, duration } from "../format";
 import type { ReviewDoc } from "../messages";
-import { Instruments } from "../fly/Instruments";
+import { Instruments } from "../vehicle/Instruments";
 import { MissionAhead } from "../obstacles/MissionAhead";
 import { Looking } from "../obstacles/Looking";
 import { Sensors } from "../obstacles/Sensors";

@@ -5,8 +5,9 @@ import { RadarRight } from "../studies/RadarRight";
 import { ScenarioCentre } from "../studies/ScenarioCentre";
 import { ScenarioLeft } from "../studies/ScenarioLeft";
 import { ScenarioRight } from "../studies/ScenarioRight";
+import { STUDIES, type StudyId } from "../store/address";
+import { study } from "../store/view";
 import { Segmented } from "../ui/Button";
-import { STUDIES, study, type StudyId } from "./study";
 
 interface Study {
   Left: ComponentType;

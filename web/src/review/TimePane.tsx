@@ -7,12 +7,11 @@ import { ResizeHandle } from "../chart/ResizeHandle";
 import type { Size } from "../chart/altitude";
 import type { Palette } from "../chart/palette";
 import { chartHeight_px } from "../store/prefs";
-import { isPlaying, opening, playhead, playhead_s, replay, review, seeking } from "../store/review";
+import { isPlaying, opening, playhead, playhead_s, replay, review, seek, seeking } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { HistogramChart } from "./HistogramChart";
 import { Transport } from "./Transport";
 import { altitudeOverTime, crossTrackOverTime, type Pointing } from "./charts";
-import { seek } from "./commands";
 import { alertTimes, momentAt } from "./time";
 
 type Tab = "altitude" | "cross_track" | "histogram" | "both";

@@ -1,7 +1,17 @@
 import { timecode } from "../format";
-import { isPlaying, playhead_s, replay, review } from "../store/review";
+import {
+  SPEEDS,
+  isPlaying,
+  length_s,
+  playhead_s,
+  replay,
+  review,
+  seek,
+  seekBy,
+  setSpeed,
+  togglePlaying,
+} from "../store/review";
 import { Button } from "../ui/Button";
-import { SPEEDS, length_s, seek, seekBy, setSpeed, togglePlaying } from "./commands";
 
 function Speed() {
   const speed = replay.value?.status.speed ?? 1;

@@ -1,3 +1,6 @@
+import { metres } from "../format";
+import type { ReviewFigures } from "../messages";
+
 export type Level = "good" | "near" | "bad" | "neutral";
 
 /** Below the requirement and touching are red, nearer than certified a warning; without either nothing is compared. */

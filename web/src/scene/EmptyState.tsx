@@ -1,6 +1,6 @@
 import { Button } from "../ui/Button";
-import { chooseFiles } from "../shell/keyboard";
-import { useDemo } from "../plan/commands";
+import { chooseFiles } from "../ui/choose_files";
+import { useDemo } from "../store/plans";
 import { sendTerrain } from "../store/files";
 
 /** No terrain yet: what to do about it. */

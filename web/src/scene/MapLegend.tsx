@@ -1,7 +1,7 @@
 import { metres, number } from "../format";
 import type { ViewDoc } from "../messages";
 import { SensorMark } from "../obstacles/SensorMark";
-import { SENSOR_WORDS } from "../obstacles/words";
+import { SENSOR_WORDS } from "../obstacles/obstacle_words";
 import { drawnOf, hasSensors, obstacles, type MapName, type SensorName } from "../store/obstacles";
 import { hasTracks } from "../store/moving";
 import { isReplaying } from "../store/review";

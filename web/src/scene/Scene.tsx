@@ -1,13 +1,13 @@
+import type { ComponentChildren } from "preact";
 import { listenInside } from "./frame_events";
-import { followed } from "./following";
+import { followed } from "./camera";
 import { EmptyState } from "./EmptyState";
 import { Legend } from "./Legend";
 import { Loading } from "./Loading";
 import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
-import { Toasts } from "../shell/Notices";
-import { activeView } from "../shell/views";
+import { viewId } from "../store/view";
 import { review } from "../store/review";
 import { document_, pageId, selection, terrain, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";

@@ -3,7 +3,7 @@ import type { ViewDoc } from "../messages";
 import { result, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
 import { follows, frame, setView } from "../store/stream";
-import { chase, followed } from "./following";
+import { chase, followed } from "./camera";
 
 type Layer = "show_surface" | "show_path" | "show_unknown" | "show_traversability";
 

@@ -3,7 +3,7 @@ import { heard } from "../store/flying";
 import { isReplaying } from "../store/review";
 import { link, pageId } from "../store/state";
 import { follows, frame } from "../store/stream";
-import { activeView } from "../shell/views";
+import { viewId } from "../store/view";
 
 /** The camera in flight: behind the vehicle by default, and elsewhere for as long as the operator wants it so. */
 

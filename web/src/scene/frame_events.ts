@@ -1,7 +1,7 @@
-import { onKey } from "../shell/keyboard";
-import { carriesFiles } from "../shell/FileDrop";
-import { dragging } from "../shell/ui_state";
 import { holdCamera, send } from "../store/stream";
+import { dragging } from "../store/view";
+import { carriesFiles } from "../ui/choose_files";
+import { throttled } from "../ui/throttle";
 
 const HOVER_PERIOD_MS = 1000 / 15;
 

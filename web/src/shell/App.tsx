@@ -2,9 +2,11 @@ import { Scene } from "../scene/Scene";
 import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
 import { FileDrop } from "./FileDrop";
 import { HelpSheet } from "./HelpSheet";
+import { Toasts } from "./Notices";
 import { StatusBar } from "./StatusBar";
 import { VehicleStrip } from "./VehicleStrip";
-import { drawer, openDialog } from "./ui_state";
+import { drawer, openDialog } from "../store/view";
+import { onKey } from "./keyboard";
 import { activeView } from "./views";
 
 export function App() {

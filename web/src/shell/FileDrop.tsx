@@ -1,13 +1,12 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
-import { study } from "../review/study";
 import { droppedFiles } from "../store/dropped";
 import { isRadarLog, isRecording, takeFiles } from "../store/files";
+import { dragging, goTo, study, viewId } from "../store/view";
 import { bringIn, isRadarSamples } from "../studies/radar";
-import { takeRadarLogs } from "../traversability/commands";
-import { dragging } from "./ui_state";
-import { activeView, goTo } from "./views";
+import { takeRadarLogs } from "../traversability/ground_orders";
+import { carriesFiles } from "../ui/choose_files";
 
 /** A .csv holds points, unless radar files are what is looked at. */
 function isSamples(file: File): boolean {

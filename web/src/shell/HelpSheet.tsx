@@ -1,12 +1,13 @@
+import { HelpPages } from "../help/HelpPages";
 import { goToSignIn } from "../net/api";
-import { act } from "../store/files";
+import { act } from "../store/outcomes";
 import { allSent } from "../store/plan";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
-import { ErrorBox } from "../ui/ErrorBox";
+import { ErrorBox } from "../ui/Outcome";
 import { productVersion } from "../store/state";
 import { SHORTCUTS } from "./shortcuts";
-import { openDialog } from "./ui_state";
+import { openDialog } from "../store/view";
 
 const STEPS = [
   "Give a surface model: drop a GeoTIFF anywhere, or use the demo.",

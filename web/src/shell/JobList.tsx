@@ -1,7 +1,7 @@
 import { percent } from "../format";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
-import { ErrorBox } from "../ui/ErrorBox";
+import { ErrorBox } from "../ui/Outcome";
 import { cancelJob, sending } from "../store/files";
 import { runningJobs } from "../store/state";
 

@@ -2,7 +2,7 @@ import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { clock } from "../format";
 import { Button } from "../ui/Button";
-import { ErrorText } from "../ui/ErrorBox";
+import { ErrorText } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
 import { Menu } from "../ui/Menu";
 import { notices, type Notice } from "../store/state";

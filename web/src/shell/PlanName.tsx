@@ -1,10 +1,10 @@
 import { clock } from "../format";
-import { redo, undo } from "../plan/commands";
+import { redo, undo } from "../store/plans";
 import { edit } from "../store/plan";
 import { document_, link, plan, saving } from "../store/state";
 import { Button } from "../ui/Button";
 import { TextField } from "../ui/fields";
-import { openDialog } from "./ui_state";
+import { openDialog } from "../store/view";
 
 function SavedState() {
   const state = plan.value;

@@ -7,8 +7,8 @@ import { VerdictBadge } from "../plan/Verdict";
 import { JobList } from "./JobList";
 import { NoticeMenu } from "./Notices";
 import { PlanName, UndoRedo } from "./PlanName";
-import { drawer, openDialog } from "./ui_state";
-import { activeView, goTo, views } from "./views";
+import { drawer, goTo, openDialog } from "../store/view";
+import { activeView, views } from "./views";
 
 /** Below it the panels are drawers, as in layout.css. */
 const NARROW_PX = 1100;

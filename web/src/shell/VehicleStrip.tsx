@@ -1,6 +1,14 @@
 import { clock, duration } from "../format";
-import { LEASE, SAFETY, holdPosition, returnHome, takeControl } from "../fly/commands";
-import { batteryLevel, batteryWord, fixLevel, fixWord, linkWords, modeWord, nodeWord } from "../fly/words";
+import { LEASE, SAFETY, holdPosition, returnHome, takeControl } from "../vehicle/orders";
+import {
+  batteryLevel,
+  batteryWord,
+  fixLevel,
+  fixWord,
+  linkWords,
+  modeWord,
+  nodeWord,
+} from "../vehicle/vehicle_words";
 import { isStale } from "../store/ages";
 import { now_ms } from "../store/clock";
 import {
@@ -23,7 +31,7 @@ import { Chip } from "../ui/Chip";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
-import { activeView, goTo } from "./views";
+import { goTo, viewId } from "../store/view";
 
 /** Known to be disarmed just now. In doubt the vehicle may be in the air. */
 function isParked(): boolean {

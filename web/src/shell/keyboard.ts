@@ -1,18 +1,18 @@
 import { setSection } from "../ui/Section";
-import { redo, removeSelectedPoi, undo } from "../plan/commands";
-import { acknowledgeFirst } from "../obstacles/commands";
+import { redo, removeSelectedPoi, undo } from "../store/plans";
+import { acknowledgeFirst } from "../obstacles/obstacle_orders";
 import { switchSound } from "../obstacles/sound";
-import { chase } from "../scene/following";
-import { seekBy, togglePlaying } from "../review/commands";
-import { study } from "../review/study";
+import { openHelpPages } from "../help/HelpPages";
+import { chase } from "../scene/camera";
+import { seekBy, togglePlaying } from "../store/review";
 import { stepFrame } from "../studies/radar";
-import { takeFiles } from "../store/files";
 import { sound } from "../store/prefs";
 import { document_, selection } from "../store/state";
 import { frame, setSelection } from "../store/stream";
-import { drawer, openDialog } from "./ui_state";
-import { afterG, pressedAt_ms, shortcutOf, type Hit, type ViewId } from "./shortcuts";
-import { activeView, goTo } from "./views";
+import { drawer, goTo, openDialog, study, viewId } from "../store/view";
+import { chooseFiles } from "../ui/choose_files";
+import { afterG, pressedAt_ms, shortcutOf, type Hit } from "./shortcuts";
+import { activeView } from "./views";
 
 let pressedG_ms = -Infinity;
 

@@ -1,4 +1,4 @@
-import type { StudyId } from "../review/study";
+import type { StudyId, ViewId } from "../store/address";
 
 /** The keys of the console, in the order of the help sheet. `mod` is Ctrl, or Cmd on a Mac. */
 export const SHORTCUTS = [

@@ -1,4 +1,4 @@
-import { effect, signal } from "@preact/signals";
+import { computed } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { ProfilePane } from "../chart/ProfilePane";
 import { FlyBelow } from "../fly/FlyBelow";
@@ -10,11 +10,8 @@ import { ReviewLeft } from "../review/ReviewLeft";
 import { ReviewRight } from "../review/ReviewRight";
 import { StudyCentre } from "../review/Studies";
 import { TimePane } from "../review/TimePane";
-import { study, studyIn } from "../review/study";
-import { lastView } from "../store/prefs";
-import { selection } from "../store/state";
-import { setSelection } from "../store/stream";
-import { drawer } from "./ui_state";
+import type { ViewId } from "../store/address";
+import { viewId } from "../store/view";
 
 /** A view of the console: what stands left ("what I do"), right ("what is true") and below the 3D view. */
 export interface View {

@@ -1,8 +1,9 @@
 import { signal } from "@preact/signals";
 import type { Imported, JobDoc, RecordingDoc, UwbRule } from "../messages";
-import { asErrorDoc, isCancelled, request, upload, type Upload } from "../net/api";
+import { asErrorDoc, isCancelled, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
 import { folderOf } from "./dropped";
+import { act } from "./outcomes";
 import { document_, jobs, notifyText, setError, terrain } from "./state";
 
 /** A file on its way to the server, before there is a job for it. */

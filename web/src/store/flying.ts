@@ -1,20 +1,12 @@
 import { computed, signal, type Signal } from "@preact/signals";
 import type {
-  FlightMessage,
   FlightStatus,
-  FlyMessage,
   FlyState,
   LeaseDoc,
-  LeaseMessage,
-  LinkMessage,
   LinkStatus,
   NodeDoc,
-  NodesMessage,
-  RecorderMessage,
   RecorderStatus,
-  TextMessage,
-  TrackMessage,
-  TransferMessage,
+  ServerMessage,
   TransferStatus,
   VehicleMessage,
 } from "../messages";

@@ -1,8 +1,8 @@
-import { withoutPoi } from "../store/poi";
-import { command, edit } from "../store/plan";
-import { act } from "../store/files";
-import { document_ } from "../store/state";
-import { setSelection } from "../store/stream";
+import { withoutPoi } from "./poi";
+import { command, edit } from "./plan";
+import { act } from "./outcomes";
+import { document_ } from "./state";
+import { setSelection } from "./stream";
 
 export const undo = () => command("/api/plan/undo", "plan");
 export const redo = () => command("/api/plan/redo", "plan");

@@ -1,5 +1,6 @@
 import { computed, signal } from "@preact/signals";
 import type {
+  PlayReview,
   RecordingDoc,
   RecordingsMessage,
   ReplayMessage,
@@ -7,9 +8,12 @@ import type {
   ReviewDoc,
   ReviewMessage,
 } from "../messages";
+import { asErrorDoc } from "../net/api";
 import { now_ms } from "./clock";
 import { forgetMoving } from "./moving";
 import { forgetObstacles, forgetSensing } from "./obstacles";
+import { order } from "./outcomes";
+import { notifyText, setError } from "./state";
 
 /** Recordings, and the one that is open for review. */
 export type ReviewingMessage = RecordingsMessage | ReviewMessage | ReplayMessage;

@@ -1,7 +1,7 @@
 import type { ComponentChildren } from "preact";
 import { useRef } from "preact/hooks";
 import { useSize } from "../chart/ChartBox";
-import { ticks } from "./axes";
+import { ticks } from "../chart/axes";
 
 export interface Area {
   left: number;

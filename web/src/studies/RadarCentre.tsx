@@ -1,9 +1,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { number, timecode, withUnit } from "../format";
-import { chosen, opened, shownFrame, wantedFrame } from "../store/radar";
+import { chosen, opened, shownFrame, wantedFrame } from "../store/studies";
 import { errors } from "../store/state";
 import { Button } from "../ui/Button";
-import { ErrorBox } from "../ui/ErrorBox";
+import { ErrorBox } from "../ui/Outcome";
 import { FRAME, READING, goToFrame, isBusy, stepFrame } from "./radar";
 import { RadarMaps } from "./RadarMaps";
 

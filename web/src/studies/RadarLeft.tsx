@@ -1,11 +1,12 @@
 import { useEffect, useState } from "preact/hooks";
 import { bytes, count, day } from "../format";
 import type { RadarFileDoc, RadarReading } from "../messages";
-import { chooseFiles } from "../shell/keyboard";
+import { chooseFiles } from "../ui/choose_files";
 import { pending } from "../store/outcomes";
-import { chosen, chosenId, opened, radarFiles, reading } from "../store/radar";
+import { chosen, chosenId, opened, radarFiles, reading } from "../store/studies";
 import { pageId } from "../store/state";
 import { Button } from "../ui/Button";
+import { DeleteForGood } from "../ui/DeleteForGood";
 import { AutoField, SelectField } from "../ui/fields";
 import { Section } from "../ui/Section";
 import { ENDINGS, FILES, READING, bringIn, choose, learnFiles, readAs, remove, setCfg } from "./radar";

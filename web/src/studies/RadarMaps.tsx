@@ -2,9 +2,8 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { number, withUnit } from "../format";
 import type { RadarDetectionDoc, RadarFrame, RadarMap } from "../messages";
-import { marked } from "../store/radar";
-import { GRADIENT } from "./colours";
-import { fan, powerAt, spanOfColumns, spanOfRows, upright, type Picture } from "./maps";
+import { marked } from "../store/studies";
+import { GRADIENT, fan, powerAt, spanOfColumns, spanOfRows, upright, type Picture } from "./maps";
 import { PlotFrame, type Area } from "./PlotFrame";
 
 /** What lies under the pointer, in words. */

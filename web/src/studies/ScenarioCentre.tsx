@@ -1,8 +1,8 @@
 import { duration, metres } from "../format";
 import type { ScenarioFigureDoc, ScenarioPartDoc } from "../messages";
-import { chosenScenario, shownResult } from "../store/scenarios";
+import { chosenScenario, shownResult } from "../store/studies";
 import { Icon } from "../ui/Icon";
-import { limitText, measuredText, textWithUnit } from "./figures";
+import { limitText, measuredText, textWithUnit } from "./scenarios";
 import { ScenarioChart } from "./ScenarioChart";
 
 function FigureRow({ figure }: { figure: ScenarioFigureDoc }) {

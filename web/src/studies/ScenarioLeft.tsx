@@ -1,8 +1,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { day, duration, percent } from "../format";
-import type { ScenarioRunDoc } from "../messages";
+import { LIMITS, type ScenarioRunDoc } from "../messages";
 import { pending } from "../store/outcomes";
-import { chosenName, chosenScenario, running, runs, scenarios, shownResult } from "../store/scenarios";
+import { chosenName, chosenScenario, running, runs, scenarios, shownResult } from "../store/studies";
 import { pageId } from "../store/state";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";

@@ -3,9 +3,9 @@ import type { RadarFileDoc, RadarFrame, RadarOpened, RadarReading } from "../mes
 import { asErrorDoc, isCancelled, requestJson } from "../net/api";
 import { sendFile } from "../store/files";
 import { order } from "../store/outcomes";
-import { chosenId, marked, opened, radarFiles, reading, shownFrame, wantedFrame } from "../store/radar";
+import { chosenId, marked, opened, radarFiles, reading, shownFrame, wantedFrame } from "../store/studies";
 import { pageId, setError } from "../store/state";
-import { study } from "../review/study";
+import { study } from "../store/view";
 import { Newest } from "./newest";
 
 /** Where errors of this study appear: with the files, with how they are read, with the frame. */

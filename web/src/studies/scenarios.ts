@@ -1,8 +1,9 @@
 import { effect, signal } from "@preact/signals";
-import type { ScenarioDoc, ScenarioResultDoc, ScenarioRunDoc } from "../messages";
+import { DASH, number } from "../format";
+import type { ScenarioDoc, ScenarioFigureDoc, ScenarioResultDoc, ScenarioRunDoc } from "../messages";
 import { asErrorDoc, requestJson } from "../net/api";
 import { order } from "../store/outcomes";
-import { chosenName, runs, scenarios, shownResult } from "../store/scenarios";
+import { chosenName, runs, scenarios, shownResult } from "../store/studies";
 import { setError } from "../store/state";
 
 /** Where errors of this study appear. */

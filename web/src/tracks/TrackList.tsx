@@ -1,13 +1,12 @@
-import { DASH, number, withUnit } from "../format";
-import { degreesOf } from "../fly/attitude";
+import { DASH, degreesOf, number, withUnit } from "../format";
 import type { Track, TracksStatus } from "../messages";
-import { distance } from "../obstacles/words";
+import { distance } from "../obstacles/obstacle_words";
 import { now_ms } from "../store/clock";
 import { heard, type Source } from "../store/flying";
 import { movingWatch, moving } from "../store/moving";
 import { Icon } from "../ui/Icon";
 import { inUrgency } from "./velocity";
-import { TRACK_WATCH, closestWords, offNoseOf, trackName, trackSpeed, trackWords } from "./words";
+import { TRACK_WATCH, closestWords, offNoseOf, trackName, trackSpeed, trackWords } from "./track_words";
 
 /** Where it is, seen from the nose. */
 function Bearing({ off_nose_deg }: { off_nose_deg: number | null }) {

@@ -1,7 +1,7 @@
-import type { PerceptionSettings, TrackerSettings, VelocitySettings } from "../messages";
-import { setPerception } from "../obstacles/commands";
+import { LIMITS, type PerceptionSettings, type TrackerSettings, type VelocitySettings } from "../messages";
+import { setPerception } from "../obstacles/obstacle_orders";
 import { lease } from "../store/flying";
-import { NumberField } from "../ui/NumberField";
+import { NumberFields, type NumberSpec } from "../ui/NumberField";
 import { Check, SelectField } from "../ui/fields";
 
 interface Field<Key> {

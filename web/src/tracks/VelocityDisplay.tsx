@@ -1,5 +1,4 @@
-import { DASH } from "../format";
-import { degreesOf } from "../fly/attitude";
+import { DASH, degreesOf } from "../format";
 import type { TracksStatus, VehicleState } from "../messages";
 import { HALF_HEIGHT, HALF_WIDTH, North } from "../obstacles/PolarLayers";
 import { RADIUS } from "../obstacles/polar";
@@ -8,7 +7,7 @@ import type { Source } from "../store/flying";
 import { movingWatch, moving } from "../store/moving";
 import { CLIP, ConeNames, Cones, LimitRing, Now, Proposed, SpeedRings } from "./VelocityLayers";
 import { rimOf, speed_m_s } from "./velocity";
-import { displayWords, headline, speed } from "./words";
+import { displayWords, headline, speed } from "./track_words";
 
 type ArrowKind = "now" | "proposed";
 

@@ -11,7 +11,7 @@ import {
   type Scale,
   type Velocity,
 } from "./velocity";
-import { trackName } from "./words";
+import { trackName } from "./track_words";
 
 /** What the velocity display draws, from below to above. */
 

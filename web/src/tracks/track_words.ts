@@ -1,6 +1,6 @@
 import { number, withUnit } from "../format";
 import type { Track, TracksStatus } from "../messages";
-import { distance, offNose, type Level } from "../obstacles/words";
+import { distance, offNose, type Level } from "../obstacles/obstacle_words";
 import type { MovingWatch } from "../store/moving";
 import { speed_m_s, type Velocity } from "./velocity";
 

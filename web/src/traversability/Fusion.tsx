@@ -1,5 +1,5 @@
 import { AutoField, SelectField } from "../ui/fields";
-import { uwbRule } from "./commands";
+import { uwbRule } from "./ground_orders";
 
 const RULES: readonly { value: "explained" | "paper"; label: string }[] = [
   { value: "explained", label: "Echoes are explained" },

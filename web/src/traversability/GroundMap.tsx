@@ -4,8 +4,8 @@ import { setView } from "../store/stream";
 import { Icon } from "../ui/Icon";
 import { Check } from "../ui/fields";
 import { MapKey } from "./MapKey";
-import { layerFile } from "./commands";
-import { LAYERS, LAYER_ORDER, figures, shownLayer } from "./words";
+import { layerFile } from "./ground_orders";
+import { LAYERS, LAYER_ORDER, figures, shownLayer } from "./ground_words";
 
 /** The finished maps: on the ground in 3D, as figures, as files. */
 

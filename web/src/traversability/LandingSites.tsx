@@ -1,7 +1,7 @@
 import { latLon, metres } from "../format";
-import type { LandingSiteDoc, PlanDoc } from "../messages";
-import { CopyPlace } from "../plan/CopyPlace";
-import { drawer } from "../shell/ui_state";
+import { LIMITS, type LandingSiteDoc, type PlanDoc } from "../messages";
+import { CopyPlace } from "../ui/CopyPlace";
+import { drawer } from "../store/view";
 import { pending } from "../store/outcomes";
 import { selection } from "../store/state";
 import { setSelection } from "../store/stream";
@@ -10,9 +10,9 @@ import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { NumberField } from "../ui/NumberField";
 import { Outcome } from "../ui/Outcome";
-import { LANDING, SPAN_M, aim, findSites, pointOut, rotorSpan_m, searched_m, span_m } from "./commands";
+import { LANDING, aim, findSites, pointOut, rotorSpan_m, searched_m, span_m } from "./ground_orders";
 import { places } from "./places";
-import { reasonsOf, siteMark, siteTitle } from "./words";
+import { reasonsOf, siteMark, siteTitle } from "./ground_words";
 
 function takeAim(): void {
   if (selection.value.tool === "landing") {

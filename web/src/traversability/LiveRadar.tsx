@@ -3,8 +3,8 @@ import { pending } from "../store/outcomes";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
-import { LIVE_RADAR, fuseLive } from "./commands";
-import { leftOut, liveWords } from "./words";
+import { LIVE_RADAR, fuseLive } from "./ground_orders";
+import { leftOut, liveWords } from "./ground_words";
 
 /** A radar that scans now: how it does, what became of its scans, and by which rule. Its silence is said loudly. */
 export function LiveRadar({ live, hasTerrain }: { live: UwbLiveDoc; hasTerrain: boolean }) {

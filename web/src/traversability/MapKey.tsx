@@ -1,5 +1,5 @@
 import { traversability } from "../store/traversability";
-import { legendOf } from "./words";
+import { legendOf } from "./ground_words";
 
 /** What the colours of the layer on show mean, lowest first. */
 export function MapKey({ isOverlay = false }: { isOverlay?: boolean }) {

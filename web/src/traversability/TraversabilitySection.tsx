@@ -1,22 +1,21 @@
 import { count, metres } from "../format";
-import type { PlanDoc, TraversabilityState } from "../messages";
-import { chooseFiles } from "../shell/keyboard";
+import { LIMITS, type PlanDoc, type TraversabilityState } from "../messages";
+import { chooseFiles } from "../ui/choose_files";
 import { radarLog } from "../store/files";
 import { pending } from "../store/outcomes";
 import { runningJobs } from "../store/state";
 import { dismissGroundError, groundError, isGroundJob, traversability } from "../store/traversability";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
-import { ErrorPanel } from "../ui/ErrorBox";
+import { Done, ErrorPanel } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
-import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { AutoField } from "../ui/fields";
 import { Figures, Files, Layers } from "./GroundMap";
 import { Fusion } from "./Fusion";
 import { LandingSites } from "./LandingSites";
 import { LiveRadar } from "./LiveRadar";
-import { TRAVERSABILITY, putAway, resolution_m, takeRadarLogs, workOut } from "./commands";
+import { TRAVERSABILITY, putAway, resolution_m, takeRadarLogs, workOut } from "./ground_orders";
 
 const DEFAULT_M = 0.3;
 const TEACHING = "Slope and roughness of the surface model: where to drive, where to land.";

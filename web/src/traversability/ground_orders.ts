@@ -1,5 +1,12 @@
 import { effect, signal } from "@preact/signals";
-import type { LandingSitesBody, PlaceDoc, TraversabilityBody, UwbRule, ViewDoc } from "../messages";
+import {
+  LIMITS,
+  type LandingSitesBody,
+  type PlaceDoc,
+  type TraversabilityBody,
+  type UwbRule,
+  type ViewDoc,
+} from "../messages";
 import { ruleQuery, sendRadarLog } from "../store/files";
 import { order } from "../store/outcomes";
 import { document_, selection } from "../store/state";

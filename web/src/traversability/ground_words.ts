@@ -1,6 +1,6 @@
 import { number, percent } from "../format";
 import type { LandingSiteDoc, TraversabilityState, UwbLiveDoc } from "../messages";
-import type { MapLayer } from "./commands";
+import type { MapLayer } from "./ground_orders";
 
 /** Traversability in a few words. */
 

@@ -1,7 +1,7 @@
 import { useState } from "preact/hooks";
 import { latLon } from "../format";
 import type { PlaceDoc } from "../messages";
-import { Button } from "../ui/Button";
+import { Button } from "./Button";
 import { notifyText } from "../store/state";
 
 /** Copies latitude and longitude with all 7 decimals. */

@@ -1,5 +1,8 @@
+import { forConsole } from "../format";
+import type { ErrorDoc } from "../messages";
 import { outcomes } from "../store/outcomes";
-import { ErrorBox } from "./ErrorBox";
+import { errors, setError } from "../store/state";
+import { Button } from "./Button";
 import { Icon } from "./Icon";
 
 /** That the last command given at this place was done. */

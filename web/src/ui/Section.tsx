@@ -2,7 +2,7 @@ import type { ComponentChildren } from "preact";
 import { computation, editedPlace, errors } from "../store/state";
 import type { ErrorDoc } from "../messages";
 import { openSections } from "../store/prefs";
-import { ErrorBox, ErrorPanel } from "./ErrorBox";
+import { ErrorBox, ErrorPanel } from "./Outcome";
 import { Icon, type IconName } from "./Icon";
 
 interface Props {

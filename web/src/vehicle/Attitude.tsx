@@ -1,6 +1,6 @@
-import { bearing } from "../format";
+import { bearing, degreesOf } from "../format";
 import type { VehicleState } from "../messages";
-import { HALF_HEIGHT, HALF_WIDTH, ROLL_MARKS_DEG, degreesOf, horizon, ladder, tape } from "./attitude";
+import { HALF_HEIGHT, HALF_WIDTH, ROLL_MARKS_DEG, horizon, ladder, tape } from "./attitude";
 
 const FAR = 400;
 const ROLL_RADIUS = 58;

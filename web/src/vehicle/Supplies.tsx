@@ -1,7 +1,7 @@
 import { number, withUnit } from "../format";
 import type { VehicleState } from "../messages";
 import { Icon, type IconName } from "../ui/Icon";
-import { batteryLevel, batteryWord, fixLevel, fixWord, type Level } from "./words";
+import { batteryLevel, batteryWord, fixLevel, fixWord, type Level } from "./vehicle_words";
 
 interface LineProps {
   icon: IconName;

@@ -1,7 +1,6 @@
 import type { ComponentChildren } from "preact";
-import { DASH, bearing, compassPoint, metres, withUnit } from "../format";
+import { DASH, bearing, compassPoint, degreesOf, metres, withUnit } from "../format";
 import type { FollowDoc, VehicleState } from "../messages";
-import { degreesOf } from "./attitude";
 
 interface TileProps {
   label: string;

@@ -1,3 +1,5 @@
+import { degreesOf } from "../format";
+
 /** The attitude indicator's geometry, in its own units: x right, y down, the aircraft at (0, 0). */
 
 export const HALF_WIDTH = 130;

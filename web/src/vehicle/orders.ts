@@ -3,7 +3,8 @@ import type { CheckRow, FlyState, StartFlight } from "../messages";
 import { fly } from "../store/flying";
 import { order, say } from "../store/outcomes";
 import { allSent } from "../store/plan";
-import { plan } from "../store/state";
+import { verdictOf, type VerdictKind } from "../store/results";
+import { isFresh, plan } from "../store/state";
 
 /** Everything that is asked of the vehicle from this page, each with the place where its outcome appears. */
 

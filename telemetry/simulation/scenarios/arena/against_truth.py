@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
+from mapping.geometry.arrays import F64
 from mapping.radar.detections import Detections
-from mapping.tracker import Tracker, TrackState
-from telemetry.scenarios.arena_radar import Position2Go
+from mapping.tracking import Tracker, TrackState
 from telemetry.sensors.optitrack import Capture
+from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
 
 F64 = NDArray[np.float64]
 NEAR_M = 1.0

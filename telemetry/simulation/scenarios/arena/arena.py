@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from planning.errors import ParameterError
-from telemetry.obstacles import PerceptionSettings
-from telemetry.scenarios.arena_charts import error_charts, errors_by_angle, ways_chart
-from telemetry.scenarios.arena_course import Approach, approaches
-from telemetry.scenarios.arena_flight import Flown, arena_settings, fly
-from telemetry.scenarios.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult
-from telemetry.scenarios.wanted import Wanted
-from telemetry.track_settings import with_figures
+from telemetry.simulation.scenarios.arena.arena_charts import error_charts, errors_by_angle, ways_chart
+from telemetry.simulation.scenarios.arena.arena_course import Approach, approaches
+from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
+from telemetry.simulation.scenarios.stage.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.track_settings import with_figures
 
 NAME = "arena"
 AVOIDED, THROUGH = 1.0, 0.98

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from telemetry.scenarios.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
 from telemetry.scenarios.arena_flight import Flown

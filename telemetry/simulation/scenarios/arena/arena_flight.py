@@ -7,30 +7,31 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.ground import GroundGrid, ground_grid
+from mapping.geometry.arrays import F64
+from mapping.perceiving.ground import GroundGrid, ground_grid
+from mapping.sensor_frames import RadarFrame
 from telemetry.errors import TelemetryError
-from telemetry.flight.avoiding import Avoiding
-from telemetry.flight.rest import rest_of_flight
+from telemetry.flight.avoidance.avoiding import Avoiding
+from telemetry.flight.guided.remaining_mission import remaining_flight
 from telemetry.mavlink.items import items_from_mission
-from telemetry.obstacles import PerceptionSettings
-from telemetry.scenarios.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
-from telemetry.scenarios.arena_radar import Position2Go, SampledPosition2Go
-from telemetry.scenarios.course import Course, Waypoint, course_mission
-from telemetry.scenarios.pilots import MissionPilot
-from telemetry.scenarios.setup import ORDER_S, PERCEPTION_S
-from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S, VEHICLE, Wire
-from telemetry.sensing import RadarFrame, RadarKind, SimTruth
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import SimulatedVehicle
-from telemetry.track_settings import TrackerSettings, VelocitySettings
-from telemetry.tracking.following import Following
-from telemetry.tracks import TracksStatus
+from telemetry.simulation.scenarios.arena.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
+from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel, SampledPosition2Go
+from telemetry.simulation.scenarios.stage.course import Course, Waypoint, course_mission
+from telemetry.simulation.scenarios.stage.pilots import MissionPilot
+from telemetry.simulation.scenarios.stage.setup import ORDER_S, PERCEPTION_S
+from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S, VEHICLE, Wire
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.sensors.radar_sensor import Radar
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.simulated import RadarKind, SimTruth
+from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
+from telemetry.topics.tracks import TracksStatus
+from telemetry.tracking.object_tracking import ObjectTracking
 
 F64 = NDArray[np.float64]
 

@@ -6,15 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, Bools
 from mapping.perceiving.radar_evidence import EvidenceParams
-from telemetry.sensing import RadarFrame, SimTruth, packed, rows
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
-from telemetry.simulator.sensors.iq import IqRadarSensor
-from telemetry.simulator.sensors.iq_model import POSITION2GO_IQ
-from telemetry.track_settings import TrackerSettings
+from mapping.sensor_frames import RadarFrame, packed, rows
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
+from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
+from telemetry.topics.simulated import SimTruth
+from telemetry.topics.track_settings import TrackerSettings
 
 F64 = NDArray[np.float64]
 POLES_M = 6.0

@@ -12,20 +12,35 @@ from affine import Affine
 from pyproj import CRS
 
 from mapping.uwb import Thresholds, UwbParams
-from planning.dsm import Dsm
 from planning.errors import ParameterError
-from planning.geotiff import write_dsm
-from planning.traversable import UwbScans
-from telemetry.scenarios.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
-from telemetry.scenarios.foliage_drive import lawn_drive
-from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, Rates, cleared_by, driven, rates, seconds_per_scan
-from telemetry.scenarios.foliage_roc import echoes_m2, roc_chart, rocs
-from telemetry.scenarios.foliage_rural import route
-from telemetry.scenarios.foliage_trials import BRANCHES_WIDE_M, CELL_M, TRIAL_1, TRIAL_2, Printed, trial_site
-from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult, measured
-from telemetry.scenarios.wanted import Wanted
+from planning.ground.traversable import UwbScans
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import write_dsm
 from telemetry.sensors.uwb_log import write_uwb_log
-from telemetry.simulator.sensors.uwb import UwbModel
+from telemetry.simulation.scenarios.foliage.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
+from telemetry.simulation.scenarios.foliage.foliage_drive import lawn_drive
+from telemetry.simulation.scenarios.foliage.foliage_figures import (
+    PAPERS_RULE,
+    Drive,
+    Rates,
+    cleared_by,
+    driven,
+    rates,
+    seconds_per_scan,
+)
+from telemetry.simulation.scenarios.foliage.foliage_roc import echoes_m2, roc_chart, rocs
+from telemetry.simulation.scenarios.foliage.foliage_rural import route
+from telemetry.simulation.scenarios.foliage.foliage_trials import (
+    BRANCHES_WIDE_M,
+    CELL_M,
+    TRIAL_1,
+    TRIAL_2,
+    Printed,
+    trial_site,
+)
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult, measured
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.sensors.uwb import UwbModel
 
 NAME, ROC = "foliage", "ROC"
 SPARSE = (1, "c")

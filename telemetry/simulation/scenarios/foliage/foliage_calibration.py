@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.uwb import Learning, Thresholds, UwbParams
 from mapping.uwb.sensor_model import bin_ranges, power_scaler
 from telemetry.simulator.sensors.uwb import UwbModel, UwbRadar

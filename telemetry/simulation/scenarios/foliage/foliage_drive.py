@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from mapping.uwb import UwbPose
-from telemetry.scenarios.foliage_trials import CLEAR_SPOTS, OBSTACLES, before
+from telemetry.simulation.scenarios.foliage.foliage_trials import CLEAR_SPOTS, OBSTACLES, before
 
 SPEED_M_S, SCAN_S = 1.0, 0.1
 LOOKS_ASIDE_RAD = (0.0, math.radians(30.0), math.radians(-30.0))

@@ -7,8 +7,8 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F32, U8, Bools
 from mapping.traversability import Traversability, traversability_map
 from mapping.uwb import Cleared, UwbClearing, UwbParams, UwbPose, clear
 from telemetry.scenarios.foliage_trials import CELL_M, PLACED, Site, disc_cells, elevation

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.uwb import UwbParams
 from telemetry.scenarios.charts import Chart, series
 from telemetry.scenarios.foliage_drive import lawn_drive

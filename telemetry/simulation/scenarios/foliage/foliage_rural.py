@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from mapping.geometry.arrays import Bools
 from mapping.traversability import traversability_map
 from mapping.uwb import Cleared, UwbPose
-from telemetry.scenarios.foliage_drive import drive
-from telemetry.scenarios.foliage_figures import Bools, Drive, cleared_by, driven
-from telemetry.scenarios.foliage_trials import CELL_M, Site, disc_cells
-from telemetry.simulator.sensors.uwb_scene import Foliage, Target, target
+from telemetry.simulation.scenarios.foliage.foliage_drive import drive
+from telemetry.simulation.scenarios.foliage.foliage_figures import Drive, cleared_by, driven
+from telemetry.simulation.scenarios.foliage.foliage_trials import CELL_M, Site, disc_cells
+from telemetry.simulation.simulator.sensors.uwb_scene import Foliage, Target, target
 
 SIDE_M = 50.0
 BAND_M, PITCH_M = (-2.5, 2.5), 0.9

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from telemetry.simulator.sensors.uwb_scene import Foliage, Target, screen, target
 

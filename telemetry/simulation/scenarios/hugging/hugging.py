@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import length_m
 from planning.errors import ParameterError
+from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PathParams, Poi, SurfaceParams
 from planning.plan import plan_mission
 from planning.request import PlanRequest

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.alerts import AlertParams
 from mapping.radar_targets import Gate, Variant, in_gate, polar, to_enu

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from mapping.radar import Detections, RadarChain
 from mapping.radar.fft import Window
 from planning.errors import ParameterError

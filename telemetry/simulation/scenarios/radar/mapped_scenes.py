@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from telemetry.scenarios import scenes
-from telemetry.scenarios.map_figures import radar_figures, vision_figures
-from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult
-from telemetry.scenarios.running import flown_of, setup_of
-from telemetry.scenarios.wanted import Wanted
+from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult
+from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 
 WOOD, RUIN = "wood", "ruined-building"
 

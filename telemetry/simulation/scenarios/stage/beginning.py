@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from planning.formats.wpl import write_wpl
-from telemetry.messages import PlanRecord
-from telemetry.scenarios.setup import Setup
-from telemetry.scenarios.wire import T0_UTC_S
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.simulation.scenarios.stage.virtual_link import T0_UTC_S
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.messages import PlanRecord
 
 BOOT_S = 3.0
 

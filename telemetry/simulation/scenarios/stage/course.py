@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, Mission, MissionItem
-from telemetry.messages import GuidedTarget
-from telemetry.requests import Operator, StartGuided
-from telemetry.simulator.frame import Frame
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.requests import Operator, StartGuided
 
 OPERATOR = Operator("scenario", 1)
 WAYPOINT, RETURN, LAND, TAKEOFF, CHANGE_SPEED = 16, 20, 21, 22, 178

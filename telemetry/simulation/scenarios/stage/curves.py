@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from mapping.geometry.arrays import F64
 
 MOST_POINTS = 800
 """Of a series that is kept: more are no more to the eye."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from telemetry.obstacles import Sensor
 from telemetry.scenarios.figures import level_slice, recall, spread, within

@@ -9,10 +9,10 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.dsm import Dsm
-from telemetry.messages import GroundNotice
-from telemetry.scenarios.scenes import Hill
-from telemetry.simulator.frame import Frame
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.scenarios.stage.scenes import Hill
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.topics.messages import GroundNotice
 
 UTM_32N = 32632
 HALF_M, CELL_M = 160.0, 0.5

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections import deque
 
-from telemetry.looks import CloudLook, RadarLook
-from telemetry.messages import FlightStatus, PlanRecord, Published
-from telemetry.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
-from telemetry.perception.changes import ChangeTeller
-from telemetry.perception.ground import ground_around
-from telemetry.perception.kinds import KINDS
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
+from telemetry.perception.known_ground import ground_around
+from telemetry.perception.map_changes import ChangeTeller
+from telemetry.perception.map_worker import FLIGHT_DELTA_S
 from telemetry.perception.perceiver import GroundWanted, Perceiver
+from telemetry.perception.sensor_kinds import KINDS
 from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
-from telemetry.perception.worker import FLIGHT_DELTA_S
-from telemetry.scenarios.setup import PERCEPTION_S, Setup
-from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
-from telemetry.sensing import CloudFrame, RadarFrame, SlamPose
-from telemetry.vehicle import VehicleState
+from telemetry.simulation.scenarios.stage.setup import PERCEPTION_S, Setup
+from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
+from telemetry.topics.looks import CloudLook, RadarLook
+from telemetry.topics.messages import FlightStatus, PlanRecord, Published
+from telemetry.topics.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
+from telemetry.topics.vehicle import VehicleState
 
 TICK_S = 1.0
 

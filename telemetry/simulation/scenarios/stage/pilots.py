@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Literal, Protocol
 
 from telemetry.errors import TelemetryError
-from telemetry.flight.guided import GuidedScript
+from telemetry.flight.guided.guided import GuidedScript
 from telemetry.mavlink.actions import Action, Done, Failed, Message
 from telemetry.mavlink.upload import MissionUpload
-from telemetry.messages import FlightStatus, Item, OnboardMission, UploadReport
-from telemetry.requests import StartGuided
-from telemetry.scenarios.wire import VEHICLE, Wire
-from telemetry.vehicle import VehicleState
+from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
+from telemetry.topics.messages import FlightStatus, Item, OnboardMission, UploadReport
+from telemetry.topics.requests import StartGuided
+from telemetry.topics.vehicle import VehicleState
 
 
 class Pilot(Protocol):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from planning.dsm import Dsm
-from telemetry.messages import Published
+from planning.terrain.dsm import Dsm
 from telemetry.recording.carried_ground import MEDIA_TYPE, NAME, packed
-from telemetry.recording.topics import RECORDED
-from telemetry.recording.writer import RecordingWriter
-from telemetry.scenarios.wire import T0_MONO_S, T0_UTC_S
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.recorded_topics import RECORDED
+from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
+from telemetry.topics.messages import Published
 
 
 class FlightRecording:

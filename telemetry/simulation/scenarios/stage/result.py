@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from telemetry.obstacles import Sensor
-from telemetry.scenarios.charts import Chart
+from telemetry.simulation.scenarios.stage.curves import Chart
+from telemetry.topics.obstacles import Sensor
 
 WITHIN_M = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from planning.dsm import Dsm
 from planning.errors import FormatError
-from telemetry.scenarios.course import course_mission
-from telemetry.scenarios.flight import fly
-from telemetry.scenarios.flown import Flown
-from telemetry.scenarios.record import FlightRecording
-from telemetry.scenarios.scenes import VALLEY, Scene
-from telemetry.scenarios.setup import Setup
-from telemetry.scenarios.terrain import field, known
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.frame import Frame
-from telemetry.simulator.scene import World
-from telemetry.simulator.scene.world_file import read_world
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.scenarios.stage.course import course_mission
+from telemetry.simulation.scenarios.stage.paper_fields import field, known
+from telemetry.simulation.scenarios.stage.record import FlightRecording
+from telemetry.simulation.scenarios.stage.scenes import VALLEY, ScenarioScene
+from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.simulation.scenarios.stage.virtual_flight import fly
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.scene.world_file import read_world
 
 
 def setup_of(scene: Scene, wanted: Wanted, title: str, *, by_script: bool = True, **more: Any) -> Setup:
@@ -65,7 +65,7 @@ def own_ground(path: Path) -> Dsm | None:
     if file.dsm is None:
         return None
     # What reads rasters takes a second to load.
-    from planning.geotiff import read_dsm
+    from planning.terrain.geotiff import read_dsm
 
     return read_dsm(file.dsm)
 

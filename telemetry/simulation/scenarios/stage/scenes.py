@@ -8,9 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from telemetry.scenarios.course import Course, Waypoint
-from telemetry.scenarios.objects import Object, box, cylinder, reflector, tree, wall, world_document
-from telemetry.simulator.frame import Frame
+from telemetry.simulation.scenarios.stage.course import Course, Waypoint
+from telemetry.simulation.scenarios.stage.world_objects import (
+    Object,
+    box,
+    cylinder,
+    reflector,
+    tree,
+    wall,
+    world_document,
+)
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 VALLEY = Frame(43.66, 11.45, 150.0)
 """Where the papers flew, or near it."""

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.poses import Pose
-from telemetry.obstacles import ObstacleAlert, Sensor
+from mapping.geometry.arrays import F64
+from mapping.geometry.poses import Pose
+from mapping.sensor_frames import RadarFrame
 from telemetry.perception.perceiver import Perceiver
 from telemetry.scenarios.result import AlertSeen
 from telemetry.scenarios.watching import RegionWatch

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from telemetry.scenarios.setup import Setup
-from telemetry.sensing import CloudFrame, RadarFrame, SimTruth, SlamPose
-from telemetry.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.simulation.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
+from telemetry.topics.simulated import SimTruth
 
 RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 

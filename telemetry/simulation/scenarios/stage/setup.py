@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from planning.dsm import Dsm
 from planning.model import Mission
-from telemetry.messages import Published
-from telemetry.obstacles import PerceptionSettings, Sensor
-from telemetry.scenarios.course import Course
-from telemetry.sensing import RadarKind
-from telemetry.simulator.gnss_script import GnssEvent
-from telemetry.simulator.scene import World
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.scenarios.stage.course import Course
+from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
+from telemetry.simulation.simulator.scene import World
+from telemetry.topics.messages import Published
+from telemetry.topics.obstacles import PerceptionSettings, Sensor
+from telemetry.topics.simulated import RadarKind
 
 Tell = Callable[[str, Published, float], None]
 """Topic, message, UTC: as on the bus."""

@@ -10,26 +10,27 @@ from pathlib import Path
 
 import numpy as np
 
+from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
 from telemetry.errors import TelemetryError
-from telemetry.flight.avoiding import Avoiding
-from telemetry.flight.rest import rest_of_flight
+from telemetry.flight.avoidance.avoiding import Avoiding
+from telemetry.flight.guided.remaining_mission import remaining_flight
 from telemetry.mavlink.actions import Action
 from telemetry.mavlink.items import items_from_mission
-from telemetry.messages import FlightStatus, Published, Topic
-from telemetry.obstacles import GroundNotice, Sensor
 from telemetry.perception.status import Outcome
-from telemetry.scenarios.beginning import plan_record_of, vehicle_of
-from telemetry.scenarios.course import script_request
-from telemetry.scenarios.flown import Flown, RadarLook, Told
-from telemetry.scenarios.perceiving import Perceiving
-from telemetry.scenarios.pilots import MissionPilot, Pilot, ScriptPilot
-from telemetry.scenarios.sensors import Sensors
-from telemetry.scenarios.setup import ORDER_S, Setup, Tell
-from telemetry.scenarios.terrain import notice
-from telemetry.scenarios.watching import RegionWatch
-from telemetry.scenarios.wire import VEHICLE, Wire
-from telemetry.sensing import CloudFrame, RadarFrame, SimTruth, SlamPose
-from telemetry.vehicle import VehicleState
+from telemetry.simulation.scenarios.stage.beginning import plan_record_of, vehicle_of
+from telemetry.simulation.scenarios.stage.course import script_request
+from telemetry.simulation.scenarios.stage.paper_fields import notice
+from telemetry.simulation.scenarios.stage.perceiving import Perceiving
+from telemetry.simulation.scenarios.stage.pilots import MissionPilot, ScenarioPilot, ScriptPilot
+from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame, Told
+from telemetry.simulation.scenarios.stage.sensor_rates import Sensors
+from telemetry.simulation.scenarios.stage.setup import ORDER_S, Setup, Tell
+from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
+from telemetry.simulation.scenarios.stage.watching import RegionWatch
+from telemetry.topics.messages import FlightStatus, Published, Topic
+from telemetry.topics.obstacles import GroundNotice, Sensor
+from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import VehicleState
 
 NOT_READY_S = 60.0
 TRACK_S = 0.1

@@ -11,15 +11,15 @@ from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.link.streams import StreamRequests
 from telemetry.mavlink.actions import Action, Message, Send
-from telemetry.mavlink.ends import GROUND_STATION
-from telemetry.mavlink.streams import StreamRequests
-from telemetry.messages import RawFrame, VehicleText
-from telemetry.reduce import reduce
-from telemetry.sensing import SimTruth
-from telemetry.simulator.mavlink import Endpoint
-from telemetry.simulator.vehicle import SimulatedVehicle
-from telemetry.vehicle import VehicleState
+from telemetry.mavlink.conversation import GROUND_STATION
+from telemetry.mavlink.reduce import reduce
+from telemetry.simulation.simulator.protocol.mavlink import Endpoint
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
+from telemetry.topics.messages import RawFrame, VehicleText
+from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import VehicleState
 
 SLICE_S = 0.02
 T0_MONO_S = 1000.0

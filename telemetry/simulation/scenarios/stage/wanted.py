@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from telemetry.sensing import RadarKind
+from telemetry.topics.simulated import RadarKind
 
 Report = Callable[[str, float | None], None]
 

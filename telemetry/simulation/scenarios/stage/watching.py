@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64
 from telemetry.perception.perceiver import Perceiver
 from telemetry.perception.status import Outcome
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 GUST_SHARE = 0.15
 """Standard deviation of gusts over the steady speed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 GRAVITY_M_S2 = 9.80665
 

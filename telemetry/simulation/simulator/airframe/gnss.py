@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 GnssKind = Literal["standalone", "rtk", "perfect"]
 CEP_PER_SIGMA = math.sqrt(2 * math.log(2))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 GnssFault = Literal["loss", "glitch"]
 

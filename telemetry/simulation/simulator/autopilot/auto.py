@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from telemetry.simulator.frame import Vec3
-from telemetry.simulator.legs import Motion
-from telemetry.simulator.mission import NAMES, Step
-from telemetry.simulator.modes import TAKEN_OFF_M, Hold, Land, Path, Return, Stage, shaped_from, step_towards
-from telemetry.simulator.pilot import Pilot, Reached
+from telemetry.simulation.simulator.autopilot.flight_modes import (
+    TAKEN_OFF_M,
+    Hold,
+    Landing,
+    Path,
+    Return,
+    Stage,
+    shaped_from,
+    step_towards,
+)
+from telemetry.simulation.simulator.autopilot.leg_curves import Motion
+from telemetry.simulation.simulator.autopilot.mission_steps import NAMES, Step
+from telemetry.simulation.simulator.autopilot.pilot import Reached, SimulatedPilot
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 MissionState = Literal["not_started", "active", "paused", "complete"]
 FASTER = ("waypoint", "loiter", "loiter_time")

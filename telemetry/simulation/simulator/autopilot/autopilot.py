@@ -9,13 +9,21 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from telemetry.simulator.auto import Auto
-from telemetry.simulator.dynamics import Demand
-from telemetry.simulator.failsafe import BatteryFailsafe, Finding, GcsFailsafe
-from telemetry.simulator.frame import Frame, Vec3
-from telemetry.simulator.modes import Guided, Hold, Land, Mode, Return, Stabilize
-from telemetry.simulator.parameters import Parameters
-from telemetry.simulator.pilot import AS_REAL_BOOT_S, Answer, HomeSet, Pilot, Reached, Sensed, StateChanged
+from telemetry.simulation.simulator.airframe.dynamics import Demand
+from telemetry.simulation.simulator.autopilot.auto import Auto
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.failsafe import BatteryFailsafe, Finding, GcsFailsafe
+from telemetry.simulation.simulator.autopilot.flight_modes import Guided, Hold, Landing, Mode, Return, Stabilize
+from telemetry.simulation.simulator.autopilot.pilot import (
+    AS_REAL_BOOT_S,
+    Answer,
+    HomeSet,
+    Reached,
+    Sensed,
+    SimulatedPilot,
+    StateChanged,
+)
+from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
 ARMING_DELAY_S = 2.0
 SPOOL_UP_S = 1.4

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from telemetry.simulator.dynamics import GRAVITY_M_S2
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 POSITION_PER_S = 1.0
 VELOCITY_PER_S = 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.simulator.parameters import Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 
 Takeover = Literal["RTL", "LAND", "none"]
 GCS_ACTIONS: dict[int, Takeover] = {1: "RTL", 2: "RTL", 3: "RTL", 4: "RTL", 5: "LAND", 6: "RTL", 7: "RTL"}

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Literal, Protocol
 
 from planning.flight_time.scurve import Axes
-from telemetry.simulator.frame import Vec3
-from telemetry.simulator.legs import REST, Motion, Track
-from telemetry.simulator.pilot import Pilot
-from telemetry.simulator.shaping import BRAKING_SHARE, Shaped, approach_speed, stopping_point
+from telemetry.simulation.simulator.autopilot.leg_curves import REST, LegTrack, Motion
+from telemetry.simulation.simulator.autopilot.pilot import SimulatedPilot
+from telemetry.simulation.simulator.autopilot.shaping import BRAKING_SHARE, Shaped, approach_speed, stopping_point
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 Stage = Literal["ground", "takeoff", "flight", "landing"]
 LOWEST_RETURN_M = 2.0

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from planning.flight_time.scurve import Axes, Leg, leg, overlap_s
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 Motion = tuple[Vec3, Vec3, Vec3]
 """Position, velocity, acceleration."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from planning.flight_time.scurve import Axes
-from telemetry.simulator.control import PositionControl
-from telemetry.simulator.frame import Frame, Vec3
-from telemetry.simulator.legs import Motion
-from telemetry.simulator.mission import MissionSteps, Step
-from telemetry.simulator.parameters import Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.control import PositionControl
+from telemetry.simulation.simulator.autopilot.leg_curves import Motion
+from telemetry.simulation.simulator.autopilot.mission_steps import MissionSteps, Step
+from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
 AS_REAL_BOOT_S = 41.5
 """From switching on to a usable position estimate, in the recordings."""

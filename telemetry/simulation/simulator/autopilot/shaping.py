@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 
 from planning.flight_time.scurve import Axes
-from telemetry.simulator.frame import Vec3
+from telemetry.simulation.simulator.neu_frame import Vec3
 
 JERK_M_S3 = 5.0
 """ArduCopter's PSC_JERK_XY and PSC_JERK_Z."""

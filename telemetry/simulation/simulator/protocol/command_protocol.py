@@ -9,11 +9,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.autopilot import Autopilot
-from telemetry.simulator.frame import Vec3
-from telemetry.simulator.mission import Step
-from telemetry.simulator.mode_numbers import MODE_NAMES
-from telemetry.simulator.pilot import Answer
+from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
+from telemetry.simulation.simulator.autopilot.mission_steps import Step
+from telemetry.simulation.simulator.autopilot.pilot import Answer
+from telemetry.simulation.simulator.neu_frame import Vec3
+from telemetry.simulation.simulator.protocol.mode_numbers import MODE_NAMES
 
 RESULTS: dict[Answer, int] = {"accepted": 0, "denied": 2, "unsupported": 3, "failed": 4}
 FORCE = 21196

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulator.mission import Step, StepKind
+from planning.mav_cmd import MavCmd, MavFrame
+from telemetry.simulation.simulator.autopilot.mission_steps import Step, StepKind
 
 KEPT_FRAMES = {0: 0, 5: 0, 3: 3, 6: 3}
 """Frame asked for and frame kept: above the sea, above home. Terrain frames are not simulated."""

@@ -12,12 +12,12 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulator.commands import RESULTS, Commands, read_order, whole
-from telemetry.simulator.mission_protocol import MissionProtocol, Reply
-from telemetry.simulator.parameter_protocol import ParameterProtocol
-from telemetry.simulator.pilot import HomeSet, Reached, StateChanged, Text
-from telemetry.simulator.streams import Streams
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.autopilot.pilot import HomeSet, Reached, StateChanged, Text
+from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, Commands, read_order, whole
+from telemetry.simulation.simulator.protocol.message_streams import Streams
+from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol, Reply
+from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterProtocol
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 HEARTBEAT_S = 1.0
 TIMESYNC_S = 10.0

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulator.dynamics import GRAVITY_M_S2, quaternion
-from telemetry.simulator.mission_protocol import MissionProtocol
-from telemetry.simulator.mode_numbers import MODE_NUMBERS
-from telemetry.simulator.pilot import AS_REAL_BOOT_S
-from telemetry.simulator.vehicle import SimulatedVehicle
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, quaternion
+from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S
+from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
+from telemetry.simulation.simulator.protocol.mode_numbers import MODE_NUMBERS
+from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 CAPABILITIES = (
     wire.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT

@@ -9,9 +9,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulator.autopilot import Autopilot
-from telemetry.simulator.mission import Step
-from telemetry.simulator.mission_items import KeptItem, keep
+from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
+from telemetry.simulation.simulator.autopilot.mission_steps import Step
+from telemetry.simulation.simulator.protocol.kept_items import KeptItem, keep
 
 CAPACITY = 650
 REQUEST_AGAIN_S = 1.0

@@ -7,7 +7,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulator.parameters import SPECS, Kind, Parameters
+from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Kind, Parameters
 
 TYPES: dict[Kind, int] = {
     "int8": wire.MAV_PARAM_TYPE_INT8,

@@ -8,9 +8,8 @@ from typing import Self
 import numpy as np
 from affine import Affine
 from numba import njit
-from numpy.typing import NDArray
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
 from telemetry.simulator.frame import Frame
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from telemetry.simulator.scene.materials import MATERIALS, Material
 from telemetry.simulator.scene.primitives import COLUMNS, box_row, cylinder_row, ellipsoid_row

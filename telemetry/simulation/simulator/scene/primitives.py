@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 

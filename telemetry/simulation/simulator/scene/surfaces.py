@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from telemetry.simulator.scene.primitives import BOX, CYLINDER
 from telemetry.simulator.scene.terrain import SceneTerrain

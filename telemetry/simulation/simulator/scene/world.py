@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planning.dsm import Dsm
+from mapping.geometry.arrays import F64, I32
 from planning.errors import ParameterError
 from telemetry.simulator.frame import Frame, Vec3
 from telemetry.simulator.scene import surfaces
@@ -85,7 +84,7 @@ class World:
     def _made(cls, file: WorldFile, frame: Frame | None, terrain: SceneTerrain | None, dsm: Dsm | None) -> Self:
         if terrain is None and dsm is None and file.dsm:
             # What reads rasters takes a second to load.
-            from planning.geotiff import read_dsm
+            from planning.terrain.geotiff import read_dsm
 
             dsm = read_dsm(file.dsm)
         if frame is None:

@@ -11,10 +11,18 @@ from typing import Literal, cast
 
 from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES, check_lat_lon, clean_name, decode_text, load_json
-from telemetry.simulator.scene.fields import Fields
-from telemetry.simulator.scene.materials import MATERIALS
-from telemetry.simulator.scene.motion import REPEATS, Motion, Pair, Repeat
-from telemetry.simulator.scene.shapes import Above, AnyShape, Box, CornerReflector, Cylinder, Tree, wall
+from telemetry.simulation.simulator.scene.fields import Fields
+from telemetry.simulation.simulator.scene.materials import MATERIALS
+from telemetry.simulation.simulator.scene.motion import REPEATS, Motion, Pair, Repeat
+from telemetry.simulation.simulator.scene.world_shapes import (
+    Above,
+    AnyShape,
+    Box,
+    CornerReflector,
+    Cylinder,
+    Tree,
+    wall,
+)
 
 FORMAT, VERSION = "hedgehop-world", 1
 MOST_OBJECTS = 10_000

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.simulator.scene.motion import Motion
+from telemetry.simulation.simulator.scene.motion import Motion
 
 WAVELENGTH_M = 299_792_458.0 / 77.5e9
 """Of the radar that corner reflectors are made for."""

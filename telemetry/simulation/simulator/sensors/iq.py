@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.geometry.arrays import C64
 from mapping.radar import Detections, RadarChain
 from telemetry.sensing import RadarFrame, SimTruth, packed
 from telemetry.simulator.scene.world import World

@@ -14,7 +14,7 @@ from mapping.radar import (
     FmcwParams,
 )
 from mapping.radar.fft import window
-from telemetry.simulator.sensors.radar_model import RadarModel
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 
 
 @dataclass(frozen=True, slots=True)

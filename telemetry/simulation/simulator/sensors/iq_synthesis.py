@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.fft import ifft
 from scipy.special import i0
 
+from mapping.geometry.arrays import C64, C128, F32, F64
 from mapping.radar.params import LIGHT_M_S, FmcwParams
 
 F32 = NDArray[np.float32]

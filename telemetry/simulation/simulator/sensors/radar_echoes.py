@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from telemetry.simulator.scene.world import World
 from telemetry.simulator.sensors.radar_model import RadarModel

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from telemetry.simulator.scene.primitives import BOX
 from telemetry.simulator.scene.rays import GROUND

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from telemetry.sensing import RadarFrame, SimTruth, packed
 from telemetry.simulator.scene.world import World

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from telemetry.sensing import SimTruth, SlamPose
-from telemetry.simulator.sensors.body import of_truth, quaternion_wxyz, rotation_enu_body
+from mapping.sensor_frames import SlamPose
+from telemetry.simulation.simulator.sensors.body import of_truth, quaternion_wxyz, rotation_enu_body
+from telemetry.topics.simulated import SimTruth
 
 DRIFT = 0.01
 """Of the way flown."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from mapping.geometry.arrays import F64, U8, Bools
 from mapping.uwb import UwbGeometry
 from telemetry.simulator.sensors.uwb_scene import UwbScene, chords
 

@@ -2,7 +2,7 @@ import { latLon } from "../../format";
 import type { MissionDoc } from "../../messages";
 import { Button, Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
-import { drawer } from "../../shell/ui_state";
+import { drawer } from "../../store/view";
 import { editGroup } from "../../store/plan";
 import { selection } from "../../store/state";
 import { setSelection } from "../../store/stream";

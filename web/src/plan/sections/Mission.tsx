@@ -1,4 +1,4 @@
-import type { ClearanceDoc, MissionDoc, PlanDoc } from "../../messages";
+import { LIMITS, type ClearanceDoc, type MissionDoc, type PlanDoc } from "../../messages";
 import { Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
 import { Section } from "../../ui/Section";

@@ -1,5 +1,5 @@
 import { degrees } from "../../format";
-import type { PlanDoc, PoiDoc } from "../../messages";
+import { LIMITS, type PlanDoc, type PoiDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
 import { NumberField } from "../../ui/NumberField";
@@ -8,8 +8,8 @@ import { poiTitle, withPoi } from "../../store/poi";
 import { edit } from "../../store/plan";
 import { selection } from "../../store/state";
 import { setSelection } from "../../store/stream";
-import { removeSelectedPoi } from "../commands";
-import { CopyPlace } from "../CopyPlace";
+import { removeSelectedPoi } from "../../store/plans";
+import { CopyPlace } from "../../ui/CopyPlace";
 import { drag, dropClass, movePoi, startDrag } from "./poi_drag";
 
 /** More rows than anyone edits by hand would only make the page slow. */

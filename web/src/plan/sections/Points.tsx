@@ -4,14 +4,14 @@ import { Button, Segmented } from "../../ui/Button";
 import { Icon, type IconName } from "../../ui/Icon";
 import { Section } from "../../ui/Section";
 import { TextField } from "../../ui/fields";
-import { chooseFiles } from "../../shell/keyboard";
-import { drawer } from "../../shell/ui_state";
+import { chooseFiles } from "../../ui/choose_files";
+import { drawer } from "../../store/view";
 import { sendPoints } from "../../store/files";
 import { parsePlace } from "../../store/poi";
 import { edit } from "../../store/plan";
 import { selection, setError } from "../../store/state";
 import { setSelection } from "../../store/stream";
-import { shortestOrder } from "../commands";
+import { shortestOrder } from "../../store/plans";
 import { PoiList } from "./PoiList";
 import { SurveyFields } from "./Survey";
 

@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { JobDoc } from "../../messages";
 import { Button } from "../../ui/Button";
-import { ErrorPanel } from "../../ui/ErrorBox";
+import { ErrorPanel } from "../../ui/Outcome";
 import { Check, SelectField } from "../../ui/fields";
 import {
   forgetJob,
@@ -14,7 +14,7 @@ import {
 } from "../../store/files";
 import { jobs, terrain } from "../../store/state";
 import { isGroundJob } from "../../store/traversability";
-import { chooseFiles } from "../../shell/keyboard";
+import { chooseFiles } from "../../ui/choose_files";
 
 /** Errors that a declaration of the operator can mend, or that a wrong one has made. */
 const MENDABLE = new Set(["raster_no_crs", "raster", "parameter", "datum"]);

@@ -1,10 +1,10 @@
 import { latLon, number } from "../../format";
-import type { CameraDoc, PlanDoc, SurveyDoc } from "../../messages";
+import { LIMITS, type CameraDoc, type PlanDoc, type SurveyDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { AutoField } from "../../ui/fields";
 import { NumberField } from "../../ui/NumberField";
 import { editGroup } from "../../store/plan";
-import { CopyPlace } from "../CopyPlace";
+import { CopyPlace } from "../../ui/CopyPlace";
 
 const DEFAULT_CAMERA: CameraDoc = {
   image_width_px: 4000,

@@ -3,7 +3,7 @@ import { forConsole, metres, number, percent } from "../../format";
 import type { TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
-import { removeSpikes } from "../commands";
+import { removeSpikes } from "../../store/plans";
 import { ReadAgain } from "./RasterHints";
 
 function Spikes({ entry }: { entry: TerrainDoc }) {
