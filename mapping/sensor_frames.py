@@ -1,8 +1,9 @@
-"""What sensors put on the bus: radar frames, point clouds, the camera's own pose, ranges. Frozen dataclasses.
+"""What sensors measure, as it travels: radar frames, point clouds, the camera's own pose, ranges, UWB scans.
 
-Body frame, as in the papers: x to the right, y forward, z up, metres, at the vehicle. Arrays travel as the bytes of
-little-endian float32 in row order; ``rows`` reads and ``packed`` writes them. ``t_mono_s`` is when a frame was
-MEASURED, on this machine's monotonic clock; who brings frames in from elsewhere converts.
+Body frame, as in the papers: x to the right, y forward, z up, metres, at the vehicle. Arrays are kept as the bytes of
+little-endian float32 in row order, on the bus, in recordings and here; ``rows`` reads and ``packed`` writes them.
+``t_mono_s`` is when a frame was MEASURED, on this machine's monotonic clock; who brings frames in from elsewhere
+converts.
 """
 
 from __future__ import annotations
@@ -14,16 +15,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-F32 = NDArray[np.float32]
+from mapping.geometry.arrays import F32
 
-RadarKind = Literal["model", "iq"]
-"""Of a simulated radar. model: targets, with errors drawn to the table of the real one's; iq: samples of its
-converters, and the whole chain of processing."""
+MOST_POINTS = 2_000_000
+"""Of one frame; more than any sensor has."""
+_XYZ_BYTES, _NUMBER_BYTES = 12, 4
 
 
-def packed(values: NDArray[np.floating]) -> bytes:
-    """Any float array as little-endian float32, in row order."""
-    return np.ascontiguousarray(values, dtype="<f4").tobytes()
+def packed(values: ArrayLike) -> bytes:
+    """Any float array as little-endian float32, in row order; what that cannot hold becomes infinite."""
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(values, dtype="<f4").tobytes()
 
 
 def rows(data: bytes, columns: int) -> F32:
@@ -48,6 +50,33 @@ class RadarFrame:
     snr_db: bytes
     """(N,)"""
 
+    @classmethod
+    def of(
+        cls,
+        xyz_m: ArrayLike,
+        radial_speed_m_s: ArrayLike,
+        snr_db: ArrayLike,
+        *,
+        t_mono_s: float,
+        t_utc_s: float,
+        number: int,
+        source: str,
+    ) -> RadarFrame:
+        """Of targets as arrays."""
+        columns = (packed(xyz_m), packed(radial_speed_m_s), packed(snr_db))
+        return cls(t_mono_s, t_utc_s, number, source, *columns)
+
+    @property
+    def is_whole(self) -> bool:
+        """Its columns are of one length; otherwise nothing of it can be read."""
+        count, rest = divmod(len(self.xyz_m), _XYZ_BYTES)
+        numbers = (len(self.radial_speed_m_s), len(self.snr_db))
+        return not rest and count <= MOST_POINTS and numbers == (count * _NUMBER_BYTES,) * 2
+
+    def columns(self) -> tuple[F32, F32, F32]:
+        """(N, 3) places, (N,) radial speeds and (N,) strengths, of a whole frame."""
+        return rows(self.xyz_m, 3), rows(self.radial_speed_m_s, 1)[:, 0], rows(self.snr_db, 1)[:, 0]
+
 
 @dataclass(frozen=True, slots=True)
 class CloudFrame:
@@ -61,6 +90,16 @@ class CloudFrame:
     """(N, 3) body frame"""
     voxel_m: float = 0.0
     """Edge of the voxels that it was thinned to on board; 0: not thinned."""
+
+    @property
+    def is_whole(self) -> bool:
+        count, rest = divmod(len(self.xyz_m), _XYZ_BYTES)
+        return not rest and count <= MOST_POINTS
+
+    @property
+    def points_m(self) -> F32:
+        """(N, 3) of a whole frame."""
+        return rows(self.xyz_m, 3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +135,10 @@ class RangeFrame:
     farthest_m: float = 0.0
     """What is nearer or farther is not measured."""
 
+    @property
+    def is_whole(self) -> bool:
+        return len(self.bearing_rad) == len(self.elevation_rad) == len(self.range_m)
+
 
 @dataclass(frozen=True, slots=True)
 class UwbScan:
@@ -117,20 +160,5 @@ class UwbScan:
     """Of the beam's axis, clockwise from the nose."""
 
 
-@dataclass(frozen=True, slots=True)
-class SimTruth:
-    """Where the simulated vehicle really is: for simulated sensors and for tests, for nobody else."""
-
-    t_mono_s: float
-    t_utc_s: float
-    t_sim_s: float
-    home_lat_deg: float
-    home_lon_deg: float
-    home_alt_amsl_m: float
-    position_enu_m: tuple[float, float, float]
-    """From the simulation's origin, z = 0 on the ground there."""
-    velocity_enu_m_s: tuple[float, float, float]
-    roll_rad: float
-    pitch_rad: float
-    heading_rad: float
-    armed: bool
+SensorFrame = RadarFrame | CloudFrame | RangeFrame
+"""What goes into a map."""

@@ -13,10 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mapping.errors import CapacityError, ParameterError
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F32, Bools
 
 MOST_CELLS = 36_000_000
 """Some 0.5 GB of layers: 6000 x 6000 cells, 1.8 km square at 0.3 m."""

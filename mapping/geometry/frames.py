@@ -14,13 +14,37 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 EQUATOR_M = 6_378_137.0
 FLATTENING = 1 / 298.257223563
 ECCENTRICITY_2 = FLATTENING * (2 - FLATTENING)
 MEAN_RADIUS_M = 6_371_008.8
 """Of the Earth (IUGG): the r of Miccinesi 2022, eq. 2."""
+
+Degrees = TypeVar("Degrees", float, F64)
+
+
+def offset_m(origin_deg: tuple[float, float], lat_deg: Degrees, lon_deg: Degrees) -> tuple[Degrees, Degrees]:
+    """East and north in metres of places near the origin (latitude, longitude), on the sphere of ``SphereFrame``.
+
+    For a step of a flight and for "is it there": off by up to 0.6 % of the distance. A map's frame is ``LocalFrame``.
+    """
+    metres = math.radians(MEAN_RADIUS_M)
+    east_deg = (lon_deg - origin_deg[1] + 180.0) % 360.0 - 180.0
+    return east_deg * (metres * math.cos(math.radians(origin_deg[0]))), (lat_deg - origin_deg[0]) * metres
+
+
+def moved_deg(origin_deg: tuple[float, float], east_m: float, north_m: float) -> tuple[float, float]:
+    """The place that ``offset_m`` puts there."""
+    metres = math.radians(MEAN_RADIUS_M)
+    east_deg = east_m / (metres * math.cos(math.radians(origin_deg[0])))
+    return origin_deg[0] + north_m / metres, origin_deg[1] + east_deg
+
+
+def apart_m(a_deg: tuple[float, float], b_deg: tuple[float, float]) -> float:
+    """Between two places near each other (latitude, longitude), as seen from above."""
+    return math.hypot(*offset_m(a_deg, *b_deg))
 
 
 def _columns(lat_deg: ArrayLike, lon_deg: ArrayLike, alt_m: ArrayLike) -> tuple[F64, F64, F64]:
@@ -117,8 +141,8 @@ class SphereFrame:
     def to_enu(self, lat_deg: ArrayLike, lon_deg: ArrayLike, alt_m: ArrayLike) -> F64:
         """Degrees and metres, each (N,) or a number -> (N, 3) east, north, up."""
         lat, lon, alt = _columns(lat_deg, lon_deg, alt_m)
-        d_lat, d_lon = lat - math.radians(self.lat_deg), lon - math.radians(self.lon_deg)  # eq. 1
-        east_m = MEAN_RADIUS_M * np.sin(d_lon) * np.cos(lat)  # eq. 2
+        d_lat, d_lon = lat - math.radians(self.lat_deg), lon - math.radians(self.lon_deg)  # Miccinesi 2022, eq. 1
+        east_m = MEAN_RADIUS_M * np.sin(d_lon) * np.cos(lat)  # Miccinesi 2022, eq. 2
         return np.column_stack([east_m, MEAN_RADIUS_M * np.sin(d_lat), alt - self.alt_m])
 
     def to_geodetic(self, p_enu: ArrayLike) -> F64:
@@ -132,7 +156,7 @@ class SphereFrame:
 def heading_rotation(heading_rad: float) -> F64:
     """R_enu_body of the heading alone (Miccinesi 2022, eq. 4: the inverse of Rz(psi))."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # Miccinesi 2022, eq. 4
 
 
 def attitude_rotation(heading_rad: float, pitch_rad: float, roll_rad: float) -> F64:
@@ -144,4 +168,4 @@ def attitude_rotation(heading_rad: float, pitch_rad: float, roll_rad: float) -> 
     cr, sr = math.cos(roll_rad), math.sin(roll_rad)
     nose_up = np.array([[1.0, 0.0, 0.0], [0.0, cp, -sp], [0.0, sp, cp]])
     right_down = np.array([[cr, 0.0, sr], [0.0, 1.0, 0.0], [-sr, 0.0, cr]])
-    return heading_rotation(heading_rad) @ nose_up @ right_down
+    return heading_rotation(heading_rad) @ nose_up @ right_down  # Miccinesi 2022, eq. 3

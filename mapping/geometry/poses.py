@@ -11,9 +11,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import quaternions
-
-F64 = NDArray[np.float64]
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F64
 
 DOUBTED_FASTER_M_S = 3.0
 """Than the vehicle says it is: while positions are doubted."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 NEARLY_EQUAL = 0.9995
 """Above this cosine of half the angle between them, slerp is a straight line to 1e-7 rad."""
@@ -33,7 +33,7 @@ def from_attitude(heading_rad: float, pitch_rad: float, roll_rad: float) -> F64:
     turn = (math.cos(h), 0.0, 0.0, math.sin(h))
     nose = (math.cos(p), math.sin(p), 0.0, 0.0)
     bank = (math.cos(r), 0.0, math.sin(r), 0.0)
-    return product(product(turn, nose), bank)
+    return product(product(turn, nose), bank)  # Miccinesi 2022, eq. 3
 
 
 def rotation(q_wxyz: ArrayLike) -> F64:

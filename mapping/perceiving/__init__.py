@@ -6,13 +6,9 @@ from mapping.perceiving.range_perception import RangePerception
 from mapping.perceiving.vision_perception import VisionPerception
 
 __all__ = [
-    "CameraPose",
-    "Cloud",
     "FrameResult",
     "RadarPerception",
-    "RadarScan",
     "RangePerception",
-    "RangeScan",
     "SearchedRegion",
     "Settings",
     "VisionPerception",

@@ -97,7 +97,7 @@ class AlertBook:
         self._open.remove(entry)
         return [AlertEvent(entry.id, kind, "ends", t_mono_s, text)]
 
-    def move(self, R_new_old: NDArray[np.float64], shift_m: NDArray[np.float64]) -> None:
+    def move(self, R_new_old: F64, shift_m: F64) -> None:
         """The map's frame is laid elsewhere, (3, 3) a turn about z and (3,) a shift: open alerts go with it."""
         for entry in self._open:
             if entry.low:

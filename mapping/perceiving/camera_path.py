@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import quaternions
-
-F64 = NDArray[np.float64]
+from mapping.geometry import quaternions
+from mapping.geometry.arrays import F64
 
 JUMP_M, JUMP_RAD = 0.5, math.radians(10.0)
 """Beyond what a vehicle can do: a voxel of the camera's map, and as much again 3 m ahead of it."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.braking import Braking
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import Polyline, along_m
+from mapping.perceiving.braking import Braking
 
 OFF_LINE_M = 15.0
 """A vehicle so far from the mission's line is not flying it."""
@@ -44,17 +44,14 @@ class MissionLine:
         if len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"A mission's line needs two finite points or more, got {points.tolist()}.")
         self.points_enu = points
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        self._s_m = np.concatenate([[0.0], np.cumsum(steps)])
+        self._line = Polyline(points)
         self._near_m: float | None = None
 
     def place(self, position_enu_m: F64) -> Place | None:
         """The place that belongs to the position; None when the vehicle is not on the line."""
-        s, away = _nearest(self.points_enu, self._s_m, position_enu_m, -math.inf, math.inf)
+        s, away = self._line.nearest(position_enu_m)
         if self._near_m is not None:
-            near = _nearest(
-                self.points_enu, self._s_m, position_enu_m, self._near_m - LOOK_BACK_M, self._near_m + LOOK_AHEAD_M
-            )
+            near = self._line.nearest(position_enu_m, self._near_m - LOOK_BACK_M, self._near_m + LOOK_AHEAD_M)
             if near[1] <= away + LOST_M:
                 s, away = near
         if away > OFF_LINE_M:
@@ -64,32 +61,7 @@ class MissionLine:
 
     def ahead(self, s_m: float, length_m: float) -> F64:
         """(K, 3) the piece of the line from ``s_m`` on, its ends included."""
-        end_m = min(s_m + length_m, float(self._s_m[-1]))
-        inner = self.points_enu[(self._s_m > s_m) & (self._s_m < end_m)]
-        return np.vstack([self._at(s_m), inner, self._at(end_m)])
-
-    def _at(self, s_m: float) -> F64:
-        return np.array([np.interp(s_m, self._s_m, self.points_enu[:, k]) for k in range(3)])
-
-
-@njit(cache=True, nogil=True)
-def _nearest(points, s_m, p, from_m, to_m):
-    """(distance along, distance away) of the nearest place between two distances along the line."""
-    best_s, best_sq = 0.0, np.inf
-    for k in range(points.shape[0] - 1):
-        if s_m[k + 1] < from_m or s_m[k] > to_m:
-            continue
-        d = points[k + 1] - points[k]
-        length_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-        share = 0.0
-        if length_sq > 0.0:
-            a = p - points[k]
-            share = min(1.0, max(0.0, (a[0] * d[0] + a[1] * d[1] + a[2] * d[2]) / length_sq))
-        away = points[k] + share * d - p
-        sq = away[0] * away[0] + away[1] * away[1] + away[2] * away[2]
-        if sq < best_sq:
-            best_sq, best_s = sq, s_m[k] + share * (s_m[k + 1] - s_m[k])
-    return best_s, math.sqrt(best_sq)
+        return self._line.ahead(s_m, length_m)
 
 
 def tube_points(line_enu: F64, *, radius_m: float, step_m: float, reach_down: float = 0.0) -> F64:
@@ -99,7 +71,7 @@ def tube_points(line_enu: F64, *, radius_m: float, step_m: float, reach_down: fl
     that cannot tell heights has put lower may stand as high as the line.
     """
     line = np.asarray(line_enu, np.float64).reshape(-1, 3)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    s = along_m(line)
     along = np.linspace(0.0, s[-1], max(2, math.ceil(s[-1] / step_m) + 1))
     middle = np.column_stack([np.interp(along, s, line[:, k]) for k in range(3)])
     disc = _ball(radius_m, step_m)

@@ -10,9 +10,6 @@ from mapping.geometry.arrays import F64, Bools
 from mapping.perceiving.frame_result import Settings
 from mapping.voxels import VoxelMap
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
 
 class FlightMap:
     """Bigazzi 2022, section 2.5: every frame goes in, nothing is taken out; as long as the camera's path holds.
@@ -37,7 +34,7 @@ class FlightMap:
         """What was taken last."""
         if self._waiting is not None:
             (centres, explained), self._waiting = self._waiting, None
-            self.map.insert_hits(centres, explained=explained)
+            self.map.insert_hits(centres, explained=explained)  # Bigazzi 2022, fig. 5
 
     def begin_part(self, why: str, t_mono_s: float) -> None:
         """Nothing while nothing has been seen."""

@@ -46,59 +46,6 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class RadarScan:
-    t_mono_s: float
-    number: int
-    xyz_m: NDArray[np.floating]
-    """(N, 3) body frame"""
-    radial_speed_m_s: NDArray[np.floating]
-    """(N,) positive: moving away"""
-    snr_db: NDArray[np.floating]
-    """(N,)"""
-    source: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Cloud:
-    t_mono_s: float
-    number: int
-    xyz_m: NDArray[np.floating]
-    """(N, 3) body frame"""
-    source: str = ""
-    voxel_m: float = 0.0
-    """Edge of the voxels that it was thinned to on board; 0: not thinned."""
-
-
-@dataclass(frozen=True, slots=True)
-class RangeScan:
-    t_mono_s: float
-    number: int
-    bearing_rad: NDArray[np.floating]
-    """(N,) clockwise from the nose"""
-    elevation_rad: NDArray[np.floating]
-    """(N,) above the horizontal plane"""
-    range_m: NDArray[np.floating]
-    """(N,)"""
-    source: str = ""
-    looks_rad: NDArray[np.floating] = field(default_factory=lambda: np.empty(0))
-    """(M,) bearings of all level directions that were measured in, hit or not, each ``beam_rad`` wide."""
-    beam_rad: float = 0.0
-    nearest_m: float = 0.0
-    farthest_m: float = 0.0
-    """What is nearer or farther is not measured."""
-
-
-@dataclass(frozen=True, slots=True)
-class CameraPose:
-    """Where the camera's own SLAM believes to be, in its own frame: z up, origin and heading arbitrary."""
-
-    t_mono_s: float
-    position_m: tuple[float, float, float]
-    q_wxyz: tuple[float, float, float, float]
-    tracking: Literal["good", "poor", "lost"] = "good"
-
-
-@dataclass(frozen=True, slots=True)
 class SearchedRegion:
     """The sector ahead, as it was for this frame."""
 
@@ -114,7 +61,7 @@ class SearchedRegion:
     """Distance of the nearest thing that stood in the way and cannot be seen now, so that it may still."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FrameResult:
     """What one frame, or the passing of time, has come to."""
 

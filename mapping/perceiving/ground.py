@@ -13,11 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from mapping.ground_beams import BeamShape, Fan, fan_of_ground
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F32, F64, Bools
+from mapping.perceiving.ground_beams import BeamShape, Fan, fan_of_ground
 
 WORKING_CELL_M = 0.25
 """Finer models are taken together to cells of about so much: a look-up then costs the same for all."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F32, F64
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Fan:
 
 
 def fan_of_ground(
-    up_m: NDArray[np.float32],
+    up_m: F32,
     enu_to_cell: F64,
     cell_m: float,
     origin_enu: F64,

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from mapping.geometry.arrays import F64, I64
 
 MOST_VOXELS = 2000
 """Of one search that are clustered, the nearest: a wall that fills the region is no less an obstacle for it."""

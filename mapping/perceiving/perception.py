@@ -22,8 +22,6 @@ from mapping.perceiving.roi import search_sector, sector_points, to_enu
 from mapping.sensor_frames import SensorFrame
 from mapping.voxels import VoxelMap
 
-F64 = NDArray[np.float64]
-
 FUTURE_S = 0.05
 """A frame may be measured so much after now: clocks of one machine are read one after the other."""
 TOO_OLD_S = 2.0
@@ -37,17 +35,6 @@ ROI_STEP_M = 0.5
 """Bigazzi 2022, Table 1; voxels coarser than this are not searched more coarsely."""
 LONGEST_CORRIDOR_M = 120.0
 WITHIN_M, USUAL_ERROR_M = 1.0, 0.3
-
-
-class Frame(Protocol):
-    """What all sensors' frames have in common."""
-
-    @property
-    def t_mono_s(self) -> float: ...
-    @property
-    def number(self) -> int: ...
-    @property
-    def source(self) -> str: ...
 
 
 class Perception:
@@ -165,8 +152,10 @@ class Perception:
 
     # Frames
 
-    def _refusal(self, frame: Frame, now_mono_s: float) -> str | None:
+    def _refusal(self, frame: SensorFrame, now_mono_s: float) -> str | None:
         """Why a frame is not taken at all; counts the frames that are missing before one that is."""
+        if not frame.is_whole:
+            return "columns of different length"
         t = frame.t_mono_s
         if not math.isfinite(t):
             return "time not finite"
@@ -186,7 +175,7 @@ class Perception:
         self._newest = (t, frame.number, frame.source)
         return None
 
-    def _pose_for(self, frame: Frame, now_mono_s: float) -> Pose | FrameResult:
+    def _pose_for(self, frame: SensorFrame, now_mono_s: float) -> Pose | FrameResult:
         """Where the vehicle was when the frame was measured, by GNSS; what comes of a frame that cannot be placed."""
         refusal = self._refusal(frame, now_mono_s)
         if refusal is None and not self._has_fix:
@@ -194,17 +183,24 @@ class Perception:
         pose = self.track.at(frame.t_mono_s) if refusal is None else refusal
         return self._drop(frame, pose, now_mono_s) if isinstance(pose, str) else pose
 
-    def _drop(self, frame: Frame, reason: str, now_mono_s: float, state: State | None = None) -> FrameResult:
+    def _drop(self, frame: SensorFrame, reason: str, now_mono_s: float) -> FrameResult:
         self.dropped[reason] += 1
-        said, text = self._state(now_mono_s)
-        alerts = self.alerts.pass_time(now_mono_s) if said != "running" else []
-        return FrameResult(frame.t_mono_s, state or said, text, False, reason, alerts=tuple(alerts))
+        state, text = self._state(now_mono_s)
+        alerts = self.alerts.pass_time(now_mono_s) if state != "running" else []
+        return FrameResult(
+            t_mono_s=frame.t_mono_s,
+            state=state,
+            text=text,
+            accepted=False,
+            dropped_because=reason,
+            alerts=tuple(alerts),
+        )
 
     def on_tick(self, now_mono_s: float) -> FrameResult:
         """Time has passed without a frame."""
         state, text = self._state(now_mono_s)
         alerts = self.alerts.pass_time(now_mono_s)
-        return FrameResult(now_mono_s, state, text, False, alerts=tuple(alerts))
+        return FrameResult(t_mono_s=now_mono_s, state=state, text=text, accepted=False, alerts=tuple(alerts))
 
     def _state(self, now_mono_s: float) -> tuple[State, str]:
         if self._newest is None:
@@ -239,19 +235,18 @@ class Perception:
         alerts = self.alerts.observe(found if self._flying else [], t_mono_s)
         state, text = self._state(now_mono_s)
         return FrameResult(
-            t_mono_s,
-            state,
-            text,
-            True,
-            None,
-            pose,
-            points,
-            self._region(pose, len(inside) > 0, hidden_m),
-            corridor_m,
-            len(on_way) > 0,
-            tuple(found[:MOST_OBSTACLES]),
-            self._swept(t_mono_s, pose),
-            tuple(alerts),
+            t_mono_s=t_mono_s,
+            state=state,
+            text=text,
+            accepted=True,
+            pose=pose,
+            points=points,
+            region=self._region(pose, len(inside) > 0, hidden_m),
+            corridor_m=corridor_m,
+            corridor_occupied=len(on_way) > 0,
+            obstacles=tuple(found[:MOST_OBSTACLES]),
+            sweep_m=self._swept(t_mono_s, pose),
+            alerts=tuple(alerts),
         )
 
     def _in_sector(self, pose: Pose) -> F64:
@@ -303,10 +298,10 @@ class Perception:
         hidden = self._remembered.look(pose, way, self._sees, self._occupied)
         return float(hidden[0]) if len(hidden) else None
 
-    def _sees(self, range_m: F64, aside_rad: F64) -> NDArray[np.bool_]:
+    def _sees(self, range_m: F64, aside_rad: F64) -> Bools:
         return self.field.sees(range_m, aside_rad)
 
-    def _occupied(self, points_enu: F64) -> NDArray[np.bool_]:
+    def _occupied(self, points_enu: F64) -> Bools:
         """(N,) Whether an unexplained voxel stands at each place."""
         taken = self.map.probability(points_enu) > 0.5
         if not self.settings.paper_bare:

@@ -14,12 +14,7 @@ from mapping.geometry.poses import Pose
 from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.ground_beams import BeamShape
 from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
-from mapping.poses import Pose
-from mapping.radar_targets import Gate, Polar
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
+from mapping.radar.targets import Gate, Polar
 
 BESIDE_RAD = math.radians(3.0)
 """Of the gate, to both sides: the noise of azimuths."""

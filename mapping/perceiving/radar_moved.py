@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.poses import Pose
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.poses import Pose
 
 MOST_SIGHTINGS = 100
 """In one frame; more do not pass by, and no proof of them is wanted."""

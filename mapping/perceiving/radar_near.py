@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F64, Bools
 
 Column = tuple[int, int]
 """One metre wide, seen from above."""

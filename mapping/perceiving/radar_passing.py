@@ -11,11 +11,6 @@ from mapping.geometry.arrays import F64, I32, Bools
 from mapping.geometry.poses import Pose
 from mapping.perceiving.radar_moved import Moved, MovedParams
 from mapping.perceiving.radar_near import Column, cells, columns
-from mapping.poses import Pose
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-I32 = NDArray[np.int32]
 
 Key = tuple[int, int, int]
 

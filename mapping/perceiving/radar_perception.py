@@ -14,11 +14,8 @@ from mapping.perceiving.perception import Perception
 from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence, side_lobes
 from mapping.perceiving.radar_passing import Passing
 from mapping.perceiving.remembered import Field
-from mapping.poses import Pose
-from mapping.radar_targets import Gate, in_gate, polar, to_enu
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.radar.targets import Gate, in_gate, polar, to_enu
+from mapping.sensor_frames import RadarFrame
 
 MOST_TARGETS = 2000
 """In one frame; the AWR1843 sends a few hundred at most."""
@@ -67,27 +64,18 @@ class RadarPerception(Perception):
         self.field = Field(self.gate.nearest_m, self.gate.azimuth_rad)
         self._evidence.set_gate(self.gate)
 
-    def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
+    def on_frame(self, frame: RadarFrame, now_mono_s: float) -> FrameResult:
         """Take one frame; never raises for what is in it."""
-        pose = self._pose_for(scan, now_mono_s)
+        pose = self._pose_for(frame, now_mono_s)
         if isinstance(pose, FrameResult):
             return pose
-        columns = self._columns(scan)
-        if columns is None:
-            return self._drop(scan, "columns of different length", now_mono_s)
-        xyz, speed, snr, ghost = self._kept(scan.t_mono_s, *columns)
-        self._insert(scan.t_mono_s, pose, xyz, speed, snr, ghost)
-        return self._look(scan.t_mono_s, now_mono_s, pose, len(xyz))
+        xyz, speed, snr, ghost = self._kept(frame)
+        self._insert(frame.t_mono_s, pose, xyz, speed, snr, ghost)
+        return self._look(frame.t_mono_s, now_mono_s, pose, len(xyz))
 
-    def _columns(self, scan: RadarScan) -> tuple[F64, F64, F64] | None:
-        xyz = np.asarray(scan.xyz_m, np.float64)
-        speed, snr = np.asarray(scan.radial_speed_m_s, np.float64), np.asarray(scan.snr_db, np.float64)
-        if xyz.ndim != 2 or xyz.shape[1] != 3 or speed.shape != (len(xyz),) or snr.shape != (len(xyz),):
-            return None
-        return xyz, speed, snr
-
-    def _kept(self, t_mono_s: float, xyz: F64, speed: F64, snr: F64) -> tuple[F64, F64, F64, Bools]:
+    def _kept(self, frame: RadarFrame) -> tuple[F64, F64, F64, Bools]:
         """Believable numbers inside the gate, and which of them are side lobes' ghosts; the rest is counted."""
+        xyz, speed, snr = (column.astype(np.float64) for column in frame.columns())
         finite = np.isfinite(xyz).all(axis=1) & np.isfinite(speed) & np.isfinite(snr)
         self._count("points: not finite", len(xyz) - int(finite.sum()))
         xyz, speed, snr = xyz[finite][:MOST_TARGETS], speed[finite][:MOST_TARGETS], snr[finite][:MOST_TARGETS]
@@ -102,7 +90,7 @@ class RadarPerception(Perception):
         self._count("points: outside the gate", len(inside) - int(inside.sum()))
         kept = np.zeros(len(all_xyz), np.bool_)
         kept[good] = inside
-        self.newest = Targets(t_mono_s, all_xyz, kept)
+        self.newest = Targets(frame.t_mono_s, all_xyz, kept)
         return xyz[inside], speed[inside], snr[inside], side_lobes(targets, snr)[inside]
 
     def _insert(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> None:

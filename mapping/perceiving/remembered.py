@@ -12,10 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.poses import Pose
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F64, I64, Bools
+from mapping.geometry.poses import Pose
 
 LOOKS = 3
 """One empty frame may be a drop-out."""
@@ -56,7 +54,7 @@ class Remembered:
         self._row: dict[tuple[int, int], int] = {}
         self._xy_m: F64 = np.empty((0, 2))
         self._free_from_m: F64 = np.empty(0)
-        self._looks: NDArray[np.int64] = np.empty(0, np.int64)
+        self._looks: I64 = np.empty(0, np.int64)
 
     def remember(self, centres_enu: F64) -> None:
         """(N, 3) voxels that stand in the way now."""
@@ -109,7 +107,7 @@ class Remembered:
         beside = (np.abs(aside_rad) <= way.half_angle_rad) | (np.abs(across) <= way.half_width_m + self._edge_m / 2)
         return range_m, aside_rad, beside & (along > -self._edge_m / 2) & (range_m <= way.depth_m)
 
-    def _count(self, rows: NDArray[np.int64], up_m: float, height_m: float, occupied: Callable[[F64], Bools]) -> None:
+    def _count(self, rows: I64, up_m: float, height_m: float, occupied: Callable[[F64], Bools]) -> None:
         """What is looked at now stands there, or is free from here on upwards."""
         if not len(rows):
             return

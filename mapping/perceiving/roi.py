@@ -15,7 +15,6 @@ from mapping.voxels.checks import checked_points
 from mapping.voxels.marks import LARGEST_KEY
 from mapping.voxels.store import EXPLAINED, IN_BLOCK, OCCUPIED, SIDE_BITS, find
 
-F64 = NDArray[np.float64]
 MOST_POINTS = 5_000_000
 
 
@@ -33,9 +32,7 @@ def sector_points(*, depth_m: float, fov_rad: float, height_m: float, resolution
     return points * resolution_m
 
 
-def checked_sector(
-    *, depth_m: float, fov_rad: float, height_m: float, resolution_m: float
-) -> tuple[NDArray[np.int64], int]:
+def checked_sector(*, depth_m: float, fov_rad: float, height_m: float, resolution_m: float) -> tuple[I64, int]:
     """(points on each side of every ring's middle, layers on each side of the middle one), without making a point.
 
     Raises as ``sector_points`` does.
@@ -43,8 +40,8 @@ def checked_sector(
     _check_sector(depth_m, fov_rad, height_m, resolution_m)
     rings = math.ceil(depth_m / resolution_m) + 1
     layers = math.floor(height_m / (2.0 * resolution_m))
-    half_arcs = np.ceil(np.arange(1, rings + 1) * fov_rad / 2.0).astype(np.int64)
-    count = int((2 * half_arcs + 1).sum()) * (2 * layers + 1)
+    half_arcs = np.ceil(np.arange(1, rings + 1) * fov_rad / 2.0).astype(np.int64)  # Bigazzi 2022, eq. A1
+    count = int((2 * half_arcs + 1).sum()) * (2 * layers + 1)  # Bigazzi 2022, table 1
     if count > MOST_POINTS:
         raise CapacityError(
             f"A region {depth_m:g} m deep and {height_m:g} m high at {resolution_m:g} m has {count:,} points.",
@@ -54,12 +51,12 @@ def checked_sector(
     return half_arcs, layers
 
 
-def _ring(n: int, half_arc: int, levels: NDArray[np.int64]) -> F64:
+def _ring(n: int, half_arc: int, levels: I64) -> F64:
     """Of eq. A1, in units of the resolution: the points of one distance, all layers."""
     angle_rad = np.arange(-half_arc, half_arc + 1) / n
     x, z = np.meshgrid(n * np.sin(angle_rad), levels.astype(np.float64))
     y = np.broadcast_to(n * np.cos(angle_rad), x.shape)
-    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])  # eq. A1
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])  # Bigazzi 2022, eq. A1
 
 
 def _check_sector(depth_m: float, fov_rad: float, height_m: float, resolution_m: float) -> None:
@@ -84,11 +81,12 @@ def to_enu(points_body: ArrayLike, position_enu: ArrayLike, heading_rad: float) 
     F = Rz(psi)^-1 F_b + P, psi clockwise from north: Rz(psi)^-1 = [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]].
     """
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    R_enu_body = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    R_enu_body = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])  # Bigazzi 2022, eq. 2
+    # Bigazzi 2022, eq. 1
     return checked_points(points_body) @ R_enu_body.T + np.asarray(position_enu, dtype=np.float64)
 
 
-def search(voxels: VoxelMap, points_enu: ArrayLike, *, include_explained: bool = False) -> NDArray[np.int64]:
+def search(voxels: VoxelMap, points_enu: ArrayLike, *, include_explained: bool = False) -> I64:
     """Indices of the points (N, 3) that lie in occupied, unexplained voxels, in the points' own order."""
     return search_sector(voxels, points_enu, (0.0, 0.0, 0.0), 0.0, include_explained=include_explained)
 
@@ -100,7 +98,7 @@ def search_sector(
     heading_rad: float,
     *,
     include_explained: bool = False,
-) -> NDArray[np.int64]:
+) -> I64:
     """``search`` of ``to_enu`` in one go, 120 m of depth in well under a tenth of a millisecond."""
     x, y, z = np.asarray(position_enu, dtype=np.float64).tolist()
     if not math.isfinite(x + y + z + heading_rad):
@@ -120,7 +118,7 @@ def _search(store, points, x0, y0, z0, cos, sin, resolution, mask):
     last_x, last_y, last_z, block = LARGEST_KEY, 0, 0, -1
     for i in range(points.shape[0]):
         px, py = points[i, 0], points[i, 1]
-        fx = (cos * px + sin * py + x0) * scale  # eq. 1-2
+        fx = (cos * px + sin * py + x0) * scale  # Bigazzi 2022, eq. 1, eq. 2
         fy = (cos * py - sin * px + y0) * scale
         fz = (points[i, 2] + z0) * scale
         if not (abs(fx) < LARGEST_KEY and abs(fy) < LARGEST_KEY and abs(fz) < LARGEST_KEY):

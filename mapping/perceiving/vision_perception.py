@@ -17,12 +17,10 @@ from mapping.geometry.arrays import F32, F64, Bools
 from mapping.geometry.poses import Pose, PoseTrack
 from mapping.perceiving.camera_path import Break, PathWatch
 from mapping.perceiving.flight_map import FlightMap
-from mapping.perceiving.model import CameraPose, Cloud, FrameResult, Settings, State
-from mapping.poses import Pose, PoseTrack
-from mapping.thinning import thinned
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
+from mapping.perceiving.frame_result import FrameResult, Settings, State
+from mapping.perceiving.perception import Perception
+from mapping.sensor_frames import CloudFrame, SlamPose
+from mapping.voxels.downsampling import thinned
 
 NEAREST_M, FARTHEST_M = 0.3, 40.0
 """Bigazzi 2022: vision reaches 40 m."""
@@ -83,7 +81,7 @@ class VisionPerception(Perception):
         self._diverged = False
         self.divergence_m: float | None = None
 
-    def feed_camera(self, pose: CameraPose) -> None:
+    def feed_camera(self, pose: SlamPose) -> None:
         """Where SLAM believes to be. A lost path is laid over GNSS again when it is back."""
         self._tracking = pose.tracking
         if pose.tracking == "lost":
@@ -121,7 +119,7 @@ class VisionPerception(Perception):
         super()._forget()
         self._flight.clear()
 
-    def on_frame(self, cloud: Cloud, now_mono_s: float) -> FrameResult:
+    def on_frame(self, cloud: CloudFrame, now_mono_s: float) -> FrameResult:
         """Take one cloud; never raises for what is in it."""
         refusal = self._refusal(cloud, now_mono_s)
         if refusal is not None:
@@ -216,11 +214,9 @@ class VisionPerception(Perception):
         said = self.alerts.say("divergence", self._diverged, text, result.t_mono_s)
         return replace(result.with_alerts(said, divergence_m=self.divergence_m), placed=self._placed)
 
-    def _points_enu(self, cloud: Cloud, pose: Pose) -> F64:
+    def _points_enu(self, cloud: CloudFrame, pose: Pose) -> F64:
         """(N, 3) believable points in the map's frame."""
-        with np.errstate(over="ignore"):  # what float32 cannot hold is absurd anyway
-            xyz = np.ascontiguousarray(cloud.xyz_m, np.float32).reshape(-1, 3)
-            xyz = self._thinned(xyz)
+        xyz = self._thinned(cloud.points_m)
         points, broken, absurd = _believable(xyz, pose.rotation_enu_body, pose.position_enu_m, NEAREST_M, FARTHEST_M)
         self._count("points: not finite", broken)
         self._count("points: absurd range", absurd)
@@ -241,7 +237,7 @@ class VisionPerception(Perception):
         if self._stands_on_one_path(pose.t_mono_s):
             self._flight.take(centres, explained)
 
-    def _explained(self, centres: F64, pose: Pose) -> NDArray[np.bool_] | None:
+    def _explained(self, centres: F64, pose: Pose) -> Bools | None:
         """(N,) Which voxels are known ground; None: nothing is known of it."""
         ground = self._known_ground
         if ground is None:

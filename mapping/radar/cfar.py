@@ -18,10 +18,6 @@ from mapping.geometry.arrays import F32, I64, Bools
 from mapping.radar.cfar_factors import ca_factor, caso_factor, weights
 from mapping.radar.fft import Window, noise_correlation
 
-F32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
-I64 = NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True)
 class Cfar:

@@ -19,7 +19,6 @@ from scipy.special import betainccinv, gammaincc, gammaln
 from mapping.errors import ParameterError
 from mapping.geometry.arrays import F64
 
-F64 = NDArray[np.float64]
 Weights = tuple[float, ...]
 
 _GRID = 1 << 15

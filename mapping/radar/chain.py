@@ -19,12 +19,7 @@ from mapping.radar.detections import Detections, between_cells, detections
 from mapping.radar.fft import Window
 from mapping.radar.params import FmcwParams
 from mapping.radar.side_lobes import envelope, own_peaks
-from mapping.radar_targets import Gate, Polar, in_gate
-
-C64 = NDArray[np.complex64]
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-
+from mapping.radar.targets import Gate, Polar, in_gate
 
 TI_RANGE, TI_DOPPLER = Cfar(guard=4, training=8), Cfar(guard=2, training=4)
 """As in TI's usual configurations (cfarCfg)."""
@@ -85,7 +80,11 @@ class Spectra:
 
 
 class RadarChain:
-    """Processes frames of one radar; all that depends on its parameters alone is worked out once."""
+    """From samples to targets (Miccinesi 2022, fig. 7; Wessendorp 2021, III-A), one radar's frames one by one.
+
+    All that depends on its parameters alone is worked out once. Not for several threads at once. Raises ParameterError
+    for an array that stands on no grid, or a CFAR that does not fit.
+    """
 
     def __init__(self, params: FmcwParams, settings: ChainSettings = AWR1843_SETTINGS) -> None:
         self.params, self.settings = params, settings
@@ -100,6 +99,7 @@ class RadarChain:
             s.doppler_cfar, name=s.doppler_window, chirps=params.chirps, padding=s.doppler_padding, looks=looks
         )
         self._lobes = envelope(s.doppler_window, params.chirps), envelope(s.range_window, params.samples)
+        # Wessendorp 2021, eq. 1, eq. 3
         self.range_m: F64 = np.arange(self._size[1], dtype=np.float64) * (params.range_resolution_m / s.range_padding)
         self.speed_m_s: F64 = np.fft.fftfreq(self._size[0]).astype(np.float64) * (2 * params.max_velocity_m_s)
 
@@ -111,7 +111,7 @@ class RadarChain:
         """Both transforms and the power. Raises RadarDataError."""
         self._check(cube)
         bins = fft.windowed(cube, *self._windows)
-        bins = fft.doppler_fft(fft.range_fft(bins, self._size[1]), self._size[0])
+        bins = fft.doppler_fft(fft.range_fft(bins, self._size[1]), self._size[0])  # Miccinesi 2022, fig. 7
         power = _mean_power(bins)
         if not np.isfinite(power.sum()):
             raise RadarDataError(
@@ -124,6 +124,7 @@ class RadarChain:
     def detect(self, spectra: Spectra) -> Detections:
         """Both CFAR stages, peaks without side lobes, and their directions."""
         s, power = self.settings, spectra.power
+        # Miccinesi 2022, fig. 7
         cells, noise = cfar.peaks(power, self._range_stage, self._doppler_stage, *self._range_cells())
         strength = power[cells[:, 0], cells[:, 1]].astype(np.float64)
         order = np.argsort(-strength, kind="stable")[: s.most]
@@ -172,7 +173,7 @@ class RadarChain:
     def _slack_m(self) -> float:
         return self.params.range_resolution_m + self.params.coupling_m_per_m_s * self.params.max_velocity_m_s
 
-    def _kept(self, found: Detections) -> NDArray[np.bool_]:
+    def _kept(self, found: Detections) -> Bools:
         s = self.settings
         kept = (found.range_m >= s.nearest_m) & (found.range_m <= s.farthest_m)
         if s.gate is not None:

@@ -10,12 +10,6 @@ from mapping.geometry.arrays import C64, F32, F64, I64, Bools
 from mapping.radar import doa
 from mapping.radar.params import FmcwParams
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-C64 = NDArray[np.complex64]
-I64 = NDArray[np.int64]
-
-
 CLEAR = 20.0
 """Times the noise's mean that a direction besides the strongest must have: noise alone comes to it once in e**20."""
 
@@ -52,7 +46,7 @@ class Detections:
             ]
         )
 
-    def where(self, kept: NDArray[np.bool_] | I64) -> Detections:
+    def where(self, kept: Bools | I64) -> Detections:
         """Some of them, in this order."""
         return Detections(
             self.range_m[kept],

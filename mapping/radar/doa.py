@@ -16,10 +16,6 @@ from mapping.errors import ParameterError
 from mapping.geometry.arrays import C64, F64, I64
 from mapping.radar.params import FmcwParams
 
-C64 = NDArray[np.complex64]
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True)
 class Rows:
@@ -123,7 +119,7 @@ def phase_direction(snapshots: C64, rows: Rows) -> F64:
     """
     first, second = snapshots[:, rows.row[0]], snapshots[:, rows.row[1]]
     lag: F64 = np.angle(first * second.conj()).astype(np.float64)
-    return lag / (2 * np.pi * rows.spacing)  # eq. 2
+    return lag / (2 * np.pi * rows.spacing)  # Wessendorp 2021, eq. 2
 
 
 def elevation_sine(snapshots: C64, sine_right: F64, rows: Rows) -> F64:

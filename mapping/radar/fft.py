@@ -9,10 +9,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
-
-C64 = NDArray[np.complex64]
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import C64, C128, F32
 
 Window = Literal["rectangular", "hann"]
 """Rectangular resolves best and has side lobes of -13 dB; Hann has -31 dB, and peaks twice as wide."""
@@ -48,7 +45,7 @@ def doppler_fft(ranges: C64, size: int) -> C64:
     return np.asarray(scipy.fft.fft(ranges, n=size, axis=0))
 
 
-def noise_correlation(name: Window, count: int) -> NDArray[np.complex128]:
+def noise_correlation(name: Window, count: int) -> C128:
     """(count // 2,) correlation of white noise between cells 0, 1, 2, ... apart, after this window.
 
     Zero without a window: cells of an unwindowed transform are independent. A Hann window makes neighbours alike.

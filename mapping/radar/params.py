@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.errors import ParameterError
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 LIGHT_M_S = 299_792_458.0
 
@@ -76,7 +75,7 @@ class FmcwParams:
     @property
     def range_resolution_m(self) -> float:
         """Width of a range cell, c / 2B."""
-        return LIGHT_M_S / (2 * self.bandwidth_hz)
+        return LIGHT_M_S / (2 * self.bandwidth_hz)  # Wessendorp 2021, eq. 1
 
     @property
     def max_range_m(self) -> float:
@@ -88,7 +87,7 @@ class FmcwParams:
         """What moves faster than this, either way, comes out with the wrong speed and, with transmitters in turn, in
         the wrong direction: whole turns of the phase between chirps cannot be told from none.
         """
-        return self.wavelength_m / (4 * self.chirp_interval_s)
+        return self.wavelength_m / (4 * self.chirp_interval_s)  # Wessendorp 2021, eq. 3
 
     @property
     def velocity_resolution_m_s(self) -> float:

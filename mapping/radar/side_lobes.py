@@ -7,9 +7,6 @@ import numpy as np
 from mapping.geometry.arrays import F64, Bools
 from mapping.radar.fft import Window, window
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
 FINE = 8
 """Steps of an envelope per cell."""
 

@@ -9,10 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.frames import heading_rotation
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.frames import heading_rotation
 
 Variant = Literal["heading_only", "full_attitude", "full_attitude_flat"]
 """Fig. 13 (chosen there, our default), fig. 15a and fig. 15b."""
@@ -72,6 +70,6 @@ def to_enu(
     """
     p_body = np.asarray(xyz_m, np.float64).reshape(-1, 3)
     if variant == "full_attitude":
-        return p_body @ R_enu_body.T + position_enu_m
+        return p_body @ R_enu_body.T + position_enu_m  # Miccinesi 2022, fig. 15
     R = heading_rotation(heading_rad) if variant == "heading_only" else R_enu_body
-    return p_body * (1.0, 1.0, 0.0) @ R.T + position_enu_m  # eqs 5, 6
+    return p_body * (1.0, 1.0, 0.0) @ R.T + position_enu_m  # Miccinesi 2022, eq. 5, eq. 6

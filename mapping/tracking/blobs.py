@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.radar_targets import Polar
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F64, Bools
+from mapping.radar.targets import Polar
 
 SAME_M, SAME_STANDS_M, SAME_M_S = 2.5, 1.0, 0.8
 """Echoes nearer to the strongest one, and as fast as it, are of the same thing. Of what stands still only those that

@@ -67,7 +67,7 @@ def distances(z, P, H, R, found, folded_m_s, gate):
             total = 0.0
             for a in range(3):
                 for b in range(3):
-                    total += off[a] * W[a, b] * off[b]
+                    total += off[a] * W[a, b] * off[b]  # Wessendorp 2021, eq. 6
             out[i, j] = total
     return out
 

@@ -14,13 +14,10 @@ from mapping.perceiving import FrameResult, RadarPerception, Settings
 from mapping.perceiving.frame_result import State
 from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.radar_evidence import EvidenceParams
-from mapping.poses import Pose
-from mapping.radar_targets import polar, to_enu
-from mapping.tracker import Tracker, TrackState
-from telemetry.tracking.blobs import Blobs, blobs
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mapping.radar.targets import polar, to_enu
+from mapping.sensor_frames import RadarFrame
+from mapping.tracking import Tracker, TrackState
+from mapping.tracking.blobs import Blobs, blobs
 
 LEVEL_RAD = math.radians(-10.0)
 """Elevations are measured to 7 degrees: from 0 on, half of the echoes of what comes at the same height were lost."""
@@ -64,20 +61,17 @@ class Movers(RadarPerception):
         self._has_velocity = velocity_enu_m_s is not None
         super().feed_position(t_mono_s, enu_m, velocity_enu_m_s, has_fix=has_fix)
 
-    def on_frame(self, scan: RadarScan, now_mono_s: float) -> FrameResult:
+    def on_frame(self, frame: RadarFrame, now_mono_s: float) -> FrameResult:
         """One step of the tracker; never raises for what is in the frame."""
-        pose = self._pose_for(scan, now_mono_s)
+        pose = self._pose_for(frame, now_mono_s)
         if isinstance(pose, FrameResult):
             return pose
         if not self._has_velocity:
-            return self._drop(scan, "no velocity", now_mono_s)
-        columns = self._columns(scan)
-        if columns is None:
-            return self._drop(scan, "columns of different length", now_mono_s)
-        xyz, speed, snr, ghost = self._kept(scan.t_mono_s, *columns)
-        self.pose, self.blobs = pose, self._believed(scan.t_mono_s, pose, xyz, speed, snr, ghost)
+            return self._drop(frame, "no velocity", now_mono_s)
+        xyz, speed, snr, ghost = self._kept(frame)
+        self.pose, self.blobs = pose, self._believed(frame.t_mono_s, pose, xyz, speed, snr, ghost)
         self.states = self._tracker.step(
-            scan.t_mono_s,
+            frame.t_mono_s,
             self.blobs.detections,
             position_enu_m=pose.position_enu_m[:2],
             velocity_enu_m_s=pose.velocity_enu_m_s[:2],
@@ -85,7 +79,9 @@ class Movers(RadarPerception):
         )
         self.frames += 1
         state, text = self._state(now_mono_s)
-        return FrameResult(scan.t_mono_s, state, text, True, None, pose, len(self.blobs))
+        return FrameResult(
+            t_mono_s=frame.t_mono_s, state=state, text=text, accepted=True, pose=pose, points=len(self.blobs)
+        )
 
     def _believed(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> Blobs:
         """What moves for sure, and what neither known ground nor noise accounts for: something that crosses the line

@@ -9,13 +9,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
 from mapping.errors import ParameterError
-from mapping.tracker import cartesian, polar
-from mapping.tracker.assignment import assign
-from mapping.tracker.kalman import FULL_TURN, distances, spreads, update, variances
-from mapping.tracker.model import TrackerParams, TrackState
-
-F64 = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from mapping.geometry.arrays import F64, I64, Bools
+from mapping.tracking import cartesian, polar
+from mapping.tracking.kalman import FULL_TURN, distances, spreads, update, variances
+from mapping.tracking.tracker_params import TrackerParams, TrackState
 
 FARTHEST_M, FASTEST_M_S = 1e6, 1e4
 """Beyond these nothing is a detection."""
@@ -126,7 +123,7 @@ class Tracker:
     def _expected(self, x: F64) -> tuple[F64, F64]:
         return polar.expected(x) if self.params.coordinates == "polar" else cartesian.expected(x, self._own)
 
-    def _follow(self, found: F64, heading_rad: float) -> NDArray[np.bool_]:
+    def _follow(self, found: F64, heading_rad: float) -> Bools:
         """Gives each object its detection, then each candidate one of the rest -> (M,) those that nobody took."""
         free = np.ones(len(found), np.bool_)
         self._seen[:] = False
@@ -157,7 +154,7 @@ class Tracker:
         self._confirmed |= (spread < self.params.birth) & (self._updates >= self.params.birth_updates)
         self._keep((spread <= self.params.death).nonzero()[0])
 
-    def _keep(self, kept: Indices) -> None:
+    def _keep(self, kept: I64) -> None:
         if len(kept) == len(self._x):
             return
         self._x, self._P = self._x[kept], self._P[kept]
@@ -185,7 +182,7 @@ class Tracker:
         self._seen = np.concatenate([self._seen, np.ones(n, np.bool_)])
         self._confirmed = np.concatenate([self._confirmed, np.zeros(n, np.bool_)])
 
-    def _stands_alone(self, found: F64) -> NDArray[np.bool_]:
+    def _stands_alone(self, found: F64) -> Bools:
         """(M,) Whether a detection is not just another part of an object that was seen in this frame."""
         objects = self._x[self._confirmed & self._seen]
         if not (len(found) and len(objects)):
@@ -222,3 +219,21 @@ class Tracker:
             TrackState(ids[i], x[i, :2], x[i, 2:], P[i], ages[i], updates[i], seen[i], confirmed[i])
             for i in order.tolist()
         ]
+
+
+def assign(distances: F64, *, gate: float, miss_cost: float) -> tuple[I64, I64]:
+    """Squared distances (N objects, M detections) -> which objects, and each one's detection; the rest go without.
+
+    Eq. 4 puts beside the costs a square one with the price of a miss on its diagonal. An object and a detection that
+    cost more than the miss are never matched; so costs less that price, no more than 0, have the same answer in the
+    N x M matrix alone: a pair that comes to 0 is a miss.
+    """
+    likely = distances < min(gate, 2.0 * miss_cost)
+    rows, columns = np.flatnonzero(likely.any(axis=1)), np.flatnonzero(likely.any(axis=0))
+    if not len(rows):
+        return rows, columns
+    near = distances[rows[:, None], columns]
+    gain = np.where(near < gate, np.minimum(0.5 * near - miss_cost, 0.0), 0.0)  # Wessendorp 2021, eq. 6
+    chosen, taken = linear_sum_assignment(gain)  # Wessendorp 2021, eq. 4
+    real = gain[chosen, taken] < 0.0
+    return rows[chosen[real]], columns[taken[real]]

@@ -11,7 +11,6 @@ import numpy as np
 from mapping.errors import ParameterError
 from mapping.geometry.arrays import F64
 
-F64 = NDArray[np.float64]
 Coordinates = Literal["cartesian", "polar"]
 
 
@@ -85,7 +84,7 @@ class TrackerParams:
     @property
     def miss_cost(self) -> float:
         """-l(i,0) of eq. 5."""
-        return -math.log1p(-self.detection_probability)
+        return -math.log1p(-self.detection_probability)  # Wessendorp 2021, eq. 5
 
     def noise(self) -> F64:
         """(7,) As the kernels take it: range, bearing, edge, bearing beyond, radial speed, extent, folding."""

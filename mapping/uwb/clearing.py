@@ -18,9 +18,6 @@ from mapping.uwb.params import UwbGeometry, UwbParams
 from mapping.uwb.sensor_model import bin_evidence
 from mapping.uwb.thresholds import Learning, Thresholds
 
-F32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, slots=True)
 class UwbPose:
@@ -134,7 +131,7 @@ class UwbClearing:
         west_m, north_m = self._corner
         return (north_m - pose.y_m) / cell_m, (pose.x_m - west_m) / cell_m, pose.heading_rad, cell_m
 
-    def _checked(self, scan: ArrayLike, pose: UwbPose) -> NDArray[np.float64]:
+    def _checked(self, scan: ArrayLike, pose: UwbPose) -> F64:
         intensity = np.asarray(scan, np.float64)
         if intensity.shape != (self.geometry.bins,) or not np.isfinite(intensity).all():
             raise ParameterError(

@@ -81,9 +81,9 @@ def fuse(log_odds, time_in_view_s, blocked, place, region, weight, peak, beam, l
             bin_number = math.floor((away_m - first_m) / bin_m + 0.5)
             if not blocked[i, j] or not 0 <= bin_number < len(region) or region[bin_number] == 0:
                 continue
-            chance = weight[bin_number] * (1.0 - 2.0 * off_rad * off_rad / (theta * theta))  # eq. 4
+            chance = weight[bin_number] * (1.0 - 2.0 * off_rad * off_rad / (theta * theta))  # Ahtiainen, eq. 4
             if region[bin_number] != 1:
-                chance *= (farthest_m + nearest_m - away_m) / (2.0 * farthest_m) + 0.5  # eq. 7
+                chance *= (farthest_m + nearest_m - away_m) / (2.0 * farthest_m) + 0.5  # Ahtiainen, eq. 7
             # Below 0.5 a free bin would make a cell MORE occupied, and an echo less: neither says anything then.
             if chance <= 0.5:
                 continue
@@ -115,7 +115,7 @@ def explainers(log_odds, blocked, place, peak, beam, farthest_m, apart_m):
             away_m, off_rad = _seen_from(i, j, place)
             bin_number = math.floor((away_m - first_m) / bin_m + 0.5)
             if abs(off_rad) < half_width_rad and 0 <= bin_number < len(peak):
-                gain = 1.0 - 2.0 * off_rad * off_rad / (theta * theta)
+                gain = 1.0 - 2.0 * off_rad * off_rad / (theta * theta)  # Ahtiainen, eq. 4
                 found[count, 0], found[count, 1], found[count, 2] = i, j, bin_number
                 found[count, 3] = gain / (1.0 + math.exp(-log_odds[i, j]))
                 count += 1

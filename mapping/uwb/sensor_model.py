@@ -11,11 +11,6 @@ from mapping.geometry.arrays import F64, I8, I64, Bools
 from mapping.uwb.params import UwbGeometry, UwbParams
 from mapping.uwb.thresholds import Thresholds
 
-F64 = NDArray[np.float64]
-I8 = NDArray[np.int8]
-I64 = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-
 UNTOLD, DETECTED, FREE_BEFORE, FREE_BEHIND = 0, 1, 2, 3
 """Regions along range: nothing is said; r1, r2 and r3 of the paper."""
 
@@ -42,10 +37,10 @@ def bin_evidence(scan: ArrayLike, thresholds: Thresholds, geometry: UwbGeometry,
     peak = nearest_peaks(intensity, detected)
     weight = np.zeros(len(intensity))
     here = region == DETECTED
-    weight[here] = (power * peak_scaler(peak, params) * params.most_occupied)[here]  # eq. 2
+    weight[here] = (power * peak_scaler(peak, params) * params.most_occupied)[here]  # Ahtiainen, eq. 2
     for which, least in ((FREE_BEFORE, params.free_before), (FREE_BEHIND, params.free_behind)):
         here = region == which
-        weight[here] = (1.0 - power[here]) * (1.0 - least)  # eq. 3
+        weight[here] = (1.0 - power[here]) * (1.0 - least)  # Ahtiainen, eq. 3
     return BinEvidence(region, weight, peak)
 
 
@@ -77,7 +72,7 @@ def power_scaler(over: F64, thresholds: Thresholds, params: UwbParams) -> F64:
     """
     above = params.above_scale * over / (thresholds.highest - thresholds.detection)
     below = params.below_scale * over / np.maximum(thresholds.detection - thresholds.lowest, 1e-6)
-    return 1.0 / (1.0 + np.exp(-np.clip(np.where(over >= 0.0, above, below), -60.0, 60.0)))
+    return 1.0 / (1.0 + np.exp(-np.clip(np.where(over >= 0.0, above, below), -60.0, 60.0)))  # Ahtiainen, eq. 5
 
 
 def nearest_peaks(intensity: F64, detected: Bools) -> I64:
@@ -95,10 +90,11 @@ def peak_scaler(peak: I64, params: UwbParams) -> F64:
     The curve is still 0.61 at four bins; that it "completely eliminates" what lies further away is a cut of ours.
     """
     away = np.abs(np.arange(len(peak)) - peak)
-    curve = np.exp(-(away**2) / (2.0 * params.peak_sigma_bins**2))
+    curve = np.exp(-(away**2) / (2.0 * params.peak_sigma_bins**2))  # Ahtiainen, eq. 6
     return np.where((away <= params.peak_sigma_bins) & (peak >= 0), curve, 0.0)
 
 
 def occupied(evidence: BinEvidence, bin_number: int) -> float:
     """P(z|occ) of a detection straight ahead, not held to 0.5: the numbers of Table II; NaN where none is detected."""
+    # Ahtiainen, table II
     return float(evidence.weight[bin_number]) if evidence.region[bin_number] == DETECTED else float("nan")

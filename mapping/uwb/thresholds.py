@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping.errors import ParameterError
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,4 +45,6 @@ class Learning:
         if self.scans == 0:
             raise ParameterError("No scan of traversable ground has been learnt from.", where="thresholds")
         mean = self._sum / self.scans
-        return Thresholds(mean, self._lowest.copy(), np.maximum(self._highest, mean + least_headroom))  # eq. 1
+        return Thresholds(
+            mean, self._lowest.copy(), np.maximum(self._highest, mean + least_headroom)
+        )  # Ahtiainen, eq. 1

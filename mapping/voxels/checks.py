@@ -73,7 +73,7 @@ def checked_model(prob_hit: float, prob_miss: float, clamp: tuple[float, float],
     return Model(*(np.float32(math.log(p / (1.0 - p))) for p in (prob_hit, prob_miss, lowest, highest, occupied)))
 
 
-def checked_points(points: ArrayLike) -> NDArray[np.float64]:
+def checked_points(points: ArrayLike) -> F64:
     """(N, 3) float64 in one piece. Raises ParameterError."""
     array = np.ascontiguousarray(points, dtype=np.float64)
     if array.size == 0:
@@ -83,7 +83,7 @@ def checked_points(points: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def checked_origin(origin: ArrayLike, resolution_m: float) -> NDArray[np.float64]:
+def checked_origin(origin: ArrayLike, resolution_m: float) -> F64:
     """(3,) near enough to the map's origin that rays from it have keys. Raises ParameterError."""
     array = np.array(origin, dtype=np.float64).reshape(-1)
     if array.size != 3:
@@ -112,7 +112,7 @@ def checked_range(max_range_m: float, resolution_m: float) -> float:
     return min(float(max_range_m), farthest_m)
 
 
-def checked_truths(explained: ArrayLike | None, count: int) -> NDArray[np.bool_]:
+def checked_truths(explained: ArrayLike | None, count: int) -> Bools:
     """Whether each point is UNexplained, (N,), or (1,) for all of them. Raises ParameterError."""
     if explained is None:
         return np.ones(1, np.bool_)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-F32 = NDArray[np.float32]
+from mapping.geometry.arrays import F32
+
 _REACH = 1 << 20
 """Voxels to each side of the origin that a key can tell apart."""
 

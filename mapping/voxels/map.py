@@ -22,9 +22,24 @@ from mapping.voxels.marks import NO_GRID, Grid, mark_points
 from mapping.voxels.rays import mark_rays
 from mapping.voxels.update import apply_blocks, apply_grid, assign, mark_explained
 
-F64 = NDArray[np.float64]
 LARGEST_GRID = 512
 """Voxels a side: 134 MB are set aside, of which a scan fills what its rays cross."""
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """Voxels as they are now, each once. Who has the map of ``revision`` before and puts these in has it as it is."""
+
+    keys: I32
+    """(N, 3) floor(enu / resolution)"""
+    probability: F32
+    """(N,)"""
+    explained: Bools
+    """(N,)"""
+    revision: int
+    """To ask from the next time."""
+    whole: bool
+    """These are all voxels there are: forget what came before."""
 
 
 class VoxelMap:
@@ -116,7 +131,7 @@ class VoxelMap:
         _, log_odds, _ = query.describe(self._store, np.maximum(numbers, 0))
         return np.where(numbers >= 0, _probability(log_odds), np.nan)
 
-    def explained(self, points_enu: ArrayLike) -> NDArray[np.bool_]:
+    def explained(self, points_enu: ArrayLike) -> Bools:
         """(N,) whether points (N, 3) lie in explained voxels; False where never seen."""
         numbers = self._numbers(points_enu)
         _, _, explained = query.describe(self._store, np.maximum(numbers, 0))
@@ -126,13 +141,13 @@ class VoxelMap:
         """(N, 3) centres of occupied voxels: all, or only those that are ``explained`` or not."""
         return self.centres(self.occupied_keys(explained=explained))
 
-    def occupied_keys(self, *, explained: bool | None = None) -> NDArray[np.int32]:
+    def occupied_keys(self, *, explained: bool | None = None) -> I32:
         """(N, 3)"""
         mask = store.OCCUPIED if explained is None else store.OCCUPIED | store.EXPLAINED
         value = store.OCCUPIED | (store.EXPLAINED if explained else 0)
         return query.describe(self._store, query.list_voxels(self._store, mask, value))[0]
 
-    def known(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.bool_]]:
+    def known(self) -> tuple[I32, F32, Bools]:
         """Keys (N, 3), probability (N,) and explained (N,) of all voxels ever seen."""
         numbers = query.list_voxels(self._store, store.KNOWN, store.KNOWN)
         keys, log_odds, explained = query.describe(self._store, numbers)
@@ -215,7 +230,7 @@ class VoxelMap:
         """The arrays, for kernels of this floor that look things up themselves."""
         return self._store
 
-    def _numbers(self, points_enu: ArrayLike) -> NDArray[np.int64]:
+    def _numbers(self, points_enu: ArrayLike) -> I64:
         return query.voxels_of(self._store, checked_points(points_enu), self._resolution_m)
 
     def _grid_around(self, origin: F64, reach_m: float) -> Grid:
@@ -228,5 +243,5 @@ class VoxelMap:
         return Grid(self._marks, side, *(lowest * store.SIDE).tolist())
 
 
-def _probability(log_odds: NDArray[np.float32]) -> NDArray[np.float32]:
+def _probability(log_odds: F32) -> F32:
     return np.float32(1.0) / (np.float32(1.0) + np.exp(-log_odds))

@@ -31,7 +31,7 @@ class Grid(NamedTuple):
     A scan that is too wide for it (length 0) leaves its marks in the map's own blocks: slower, the same outcome.
     """
 
-    marks: NDArray[np.uint8]
+    marks: U8
     """(side^3,) MISS, HIT, UNEXPLAINED_HIT at (z * side + y) * side + x; zeros between scans"""
     side: int
     """A multiple of 8."""

@@ -29,18 +29,18 @@ class OccupancyTree:
     resolution_m: float
     node_count: int
     """Inner nodes and leaves, as the file's header says."""
-    keys: NDArray[np.int32]
+    keys: I32
     """(N, 3) lowest voxel of each leaf, floor(metres / resolution)"""
-    edge_voxels: NDArray[np.int32]
+    edge_voxels: I32
     """(N,) powers of two"""
-    occupied: NDArray[np.bool_]
+    occupied: Bools
     """(N,)"""
 
     @property
     def voxel_count(self) -> int:
         return int((self.edge_voxels.astype(np.int64) ** 3).sum())
 
-    def voxels(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def voxels(self) -> tuple[I32, Bools]:
         """Keys (M, 3) and occupied (M,) of single voxels. Raises CapacityError beyond ``MOST_VOXELS``."""
         if self.voxel_count > MOST_VOXELS:
             raise CapacityError(
@@ -53,7 +53,7 @@ class OccupancyTree:
             return np.empty((0, 3), np.int32), np.empty(0, np.bool_)
         return np.concatenate([keys for keys, _ in parts]), np.concatenate([occupied for _, occupied in parts])
 
-    def _of_edge(self, edge: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    def _of_edge(self, edge: int) -> tuple[I32, Bools]:
         chosen = self.edge_voxels == edge
         inside = np.stack(np.meshgrid(*[np.arange(edge, dtype=np.int32)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
         keys = (self.keys[chosen][:, None, :] + inside[None, :, :]).reshape(-1, 3)
@@ -218,7 +218,7 @@ def _read(body, keys, edges, occupied):
         at += 2
 
 
-def _tree_bytes(keys: NDArray[np.int32], occupied_keys: NDArray[np.int32]) -> tuple[int, bytes]:
+def _tree_bytes(keys: I32, occupied_keys: I32) -> tuple[int, bytes]:
     """Number of nodes, and two bytes per inner node in the order of a walk that goes deep first."""
     codes = _morton(keys)
     order = np.argsort(codes)
@@ -226,7 +226,7 @@ def _tree_bytes(keys: NDArray[np.int32], occupied_keys: NDArray[np.int32]) -> tu
     kinds = np.full(len(codes), FREE, np.uint32)
     kinds[np.searchsorted(codes, _morton(occupied_keys))] = OCCUPIED
     nodes = len(codes)
-    levels: list[tuple[int, NDArray[np.int64], NDArray[np.uint16]]] = []
+    levels: list[tuple[int, I64, U16]] = []
     for depth in range(DEPTH - 1, -1, -1):
         parents, first = np.unique(codes >> 3, return_index=True)
         if not len(parents):
@@ -242,7 +242,7 @@ def _tree_bytes(keys: NDArray[np.int32], occupied_keys: NDArray[np.int32]) -> tu
     return nodes, patterns[np.lexsort((depths, starts))].tobytes()
 
 
-def _morton(keys: NDArray[np.int32]) -> NDArray[np.int64]:
+def _morton(keys: I32) -> I64:
     """(N,) bits of x, y and z in turn, x lowest: the path from the root, three bits a level."""
     code = np.zeros(len(keys), np.int64)
     for axis in range(3):

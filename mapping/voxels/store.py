@@ -37,23 +37,23 @@ class Store(NamedTuple):
     Nothing is ever moved, so that another thread may look things up while a scan is put in.
     """
 
-    table: NDArray[np.int32]
+    table: I32
     """(power of two,) open addressing: block number + 1, 0 is free"""
-    keys: NDArray[np.int32]
+    keys: I32
     """(blocks, 3) floor(enu / (8 * resolution))"""
-    log_odds: NDArray[np.float32]
+    log_odds: F32
     """(blocks, 512) voxel (z & 7) * 64 + (y & 7) * 8 + (x & 7)"""
-    flags: NDArray[np.uint8]
+    flags: U8
     """(blocks, 512)"""
-    occupied: NDArray[np.int32]
+    occupied: I32
     """(blocks,) how many of its voxels are"""
-    stamp: NDArray[np.int32]
+    stamp: I32
     """(blocks,) the last scan that touched it"""
-    touched: NDArray[np.int32]
+    touched: I32
     """(blocks,) those that the scan being put in touches"""
-    log: NDArray[np.uint32]
+    log: U32
     """(power of two,) ring: block * 512 + voxel of every change; revision r is written at r modulo its length"""
-    counts: NDArray[np.int64]
+    counts: I64
 
 
 def blocks_that_fit(memory_limit_bytes: int) -> int:
