@@ -14,9 +14,8 @@ from typing import Literal
 from mapping.geometry.arrays import F64, I64
 from planning.margins.budget import ClearanceBudget
 from planning.margins.following_error import Firmware, Way
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import SMALL_HOLE_M2
 
 SET_DOWN_M = 0.1
 """What is planned holds for a vehicle that stands up to so far beside the planned home."""
@@ -92,7 +91,7 @@ class SurfaceParams:
     """None: R / 10."""
     floor: bool = True
     """Keep the smoothed surface above the DSM dilated with (R, 0.8 H); False is the paper's pipeline."""
-    fill_hole_area_m2: float = 4.0
+    fill_hole_area_m2: float = SMALL_HOLE_M2
     method: Literal["auto", "exact", "fast"] = "auto"
 
 
@@ -169,7 +168,7 @@ class MissionItem:
     """One MAVLink mission item. Params may be NaN ("not given")."""
 
     command: int
-    """MAV_CMD"""
+    """MAV_CMD: `planning.mav_cmd`"""
     frame: int
     """MAV_FRAME: 0 AMSL, 2 none, 3 relative to home, 10 above terrain."""
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)

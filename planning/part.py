@@ -1,4 +1,4 @@
-"""The part of a large surface model that one plan needs, and whether it was enough."""
+"""The part of a large surface model that a plan or a mission made anywhere needs, and whether it was enough."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from planning.request import PlanRequest
 from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
 from planning.terrain.holes import HoleReport, fill_holes
 
-LARGE_PX = 4_000_000
-"""Smaller models are taken whole."""
 MARGIN_M = 10.0
 """Around the points, beside what the ball and the Gaussian reach."""
 GROWTH = 3.0
 FLIGHT_MARGIN_M = 300.0
 """Around a flight: nothing that is farther from it than this decides anything about it."""
 T = TypeVar("T")
+Judged = tuple[FlownLine, Certificate]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +109,43 @@ def was_enough(
     )
     # Distances to cuts are in metres of the CRS.
     return (1.0 + SCALE_TOLERANCE) * found_m < to_cut_m - _cut_holes_m(ground, model)
+
+
+def certify_part(
+    model: SurfaceModel,
+    mission: Mission,
+    params: ClearanceParams,
+    *,
+    max_hole_m2: float,
+    assumptions: Mapping[str, object],
+) -> tuple[Ground, Certificate]:
+    """The part that it took, and the certificate, which is the one over the whole model with its small holes filled."""
+
+    def judge(ground: Ground) -> tuple[Ground, Judged]:
+        line = flown_line(mission, ground.filled)
+        made = {**hole_assumptions(ground.holes, max_hole_m2), **assumptions}
+        return ground, (line, certify(ground.filled, line, params, ground=model, assumptions=made))
+
+    def is_enough(ground: Ground, found: tuple[Ground, Judged]) -> bool:
+        return was_enough(ground, model, *found[1])
+
+    grounds = Grounds(model, max_hole_m2)
+    ground, (_, certificate) = grounds.judged(
+        mission_places(model, mission), params.required_clearance_m + MARGIN_M, judge, is_enough
+    )
+    return ground, certificate
+
+
+def mission_places(model: SurfaceModel, mission: Mission) -> F64:
+    """(N, 2) projected places of home and of all items that have one."""
+    places = [(item.lat_deg, item.lon_deg) for item in mission.items if has_position(item)]
+    home = mission.home
+    return model.xy_from_lat_lon(np.array([*places, (home.lat_deg, home.lon_deg)]))
+
+
+def hole_assumptions(holes: HoleReport, max_hole_m2: float) -> dict[str, object]:
+    """What a certificate writes down about unknown cells that were given a height."""
+    return {"holes_filled": holes.count, "holes_filled_area_m2": holes.area_m2, "max_hole_m2": max_hole_m2}
 
 
 def _needed_box(model: SurfaceModel, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:

@@ -88,7 +88,7 @@ def plan_mission(
     report: Progress = lambda step, share: None,
     assumptions: Mapping[str, object] | None = None,
 ) -> Plan:
-    """Plans, decimates and certifies one mission.
+    """Plans, decimates and certifies one mission (Melita 2020, sections 5 and 6).
 
     ``assumptions`` say what was done to the model before; they join those of the certificate.
     Of a large model only the part that the plan needs is looked at; it grows until the certificate is that
@@ -143,6 +143,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
     first = request.pois[0]
     home_notes = [moved_note((first.lat_deg, first.lon_deg), home, why_moved)] if why_moved else []
     vertices_xy_m, vertex_poi = _vertices(filled, request, home)
+    # Melita 2020, fig. 7
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
     surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
     job.report(PATH_STEP, 0.5)

@@ -17,13 +17,15 @@ LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
 FEWEST_ITEMS = 4
 """Take-off, two waypoints and the return."""
-LOOKS_DOWN_DEG = -90.0
-"""Gimbal pitch of a survey's camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """Everything that decides a plan, apart from the surface model."""
+    """Everything that decides a plan, apart from the surface model.
+
+    Speeds and climb limits are those of ``path`` (``path_params`` takes them from a profile); of ``profile`` count the
+    rest. ``check_request`` says what cannot be.
+    """
 
     pois: tuple[Poi, ...]
     profile: VehicleProfile

@@ -9,8 +9,8 @@ from numba import njit
 
 from mapping.geometry.arrays import F64
 from planning.certificate.quads import away
-
-F64 = NDArray[np.float64]
+from planning.terrain.cells.cells import Cells
+from planning.terrain.cells.lattice import is_rectangular, quad_of
 
 
 @dataclass(frozen=True, slots=True)

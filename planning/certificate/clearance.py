@@ -56,7 +56,6 @@ from planning.terrain.dsm import Dsm, SurfaceModel
 
 __all__ = ["certificate_json", "certify"]
 
-F64 = NDArray[np.float64]
 
 RETURN_STEP_M = 0.5
 """Ways home are judged from pieces of the line at most this long; inside one, the lower altitude counts."""
@@ -73,7 +72,7 @@ def certify(
     trend_step_m: float = 1.0,
     assumptions: dict[str, object] | None = None,
 ) -> Certificate:
-    """Certificate of a flown line against the whole of a surface model.
+    """Certificate of a flown line against the whole of a surface model, both in its CRS and vertical datum, metres.
 
     ``ground`` is the model before its small holes were filled, if it had any: home and landing are judged on it,
     for a filled hole has the height of its rim's highest cell, maybe a wall's, and heights would be counted from it.
@@ -101,7 +100,7 @@ def _judged(
     worst = _worst_point(dsm, line, distance_m, share)
     trend_places, trend_s_m = places_along(line.points_m, trend_step_m)
     trend_places = layout.in_frame(trend_places)
-    trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)
+    trend_m, _ = nearest_distances(pyramid, trend_places, trend_places)  # Melita 2020, fig. 11
     at_home = ground_at_home(ground, line.home_xy_m, params)
     stand = home_stand(at_home, line, params)
     low_line = lowered(line, stand)
@@ -279,7 +278,7 @@ def _following_words(params: ClearanceParams) -> str:
 
 def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: float) -> dict[str, object]:
     return {
-        "version": planning.__version__,
+        "version": __version__,
         "dsm_sha256": dsm.sha256,
         "crs": dsm.crs.to_string() if dsm.crs.to_epsg() else dsm.crs.name,
         "crs_scale": scale,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 SLOPE = 3.0
 NEAR_SLOPE, NEAR_M = 1.0, 10.0

@@ -17,8 +17,7 @@ from mapping.geometry.arrays import F64
 from planning.certificate.nearest import STACK
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
 from planning.certificate.quads import part_inside
-
-F64 = NDArray[np.float64]
+from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 
 
 def height_range(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F64, F64]:

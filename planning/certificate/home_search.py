@@ -10,11 +10,7 @@ from numba import njit
 
 from mapping.geometry.arrays import F32, F64, I64
 from planning.certificate.home_ground import HomeGround, free_step_m, gap_m, home_ground
-from planning.dsm import Dsm, SurfaceModel
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 SEARCHES_M = ((12.0, 0.1), (50.0, 0.2), (150.0, 0.4))
 """(how far around places are looked for, in blocks of which size): most are found in the smallest circle.

@@ -19,8 +19,7 @@ from numba import njit, prange
 from mapping.geometry.arrays import F64
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
 from planning.certificate.quads import quad_distance_sq
-
-F64 = NDArray[np.float64]
+from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 
 STACK = 256
 """Four children for each of up to 60 levels: more than any model needs."""

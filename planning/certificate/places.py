@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def places_along(points_m: F64, step_m: float) -> tuple[F64, F64]:

@@ -8,12 +8,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from planning.cells.cells import Cells
-from planning.cells.lattice import Lattice, bend_range, block_around, is_rectangular, place_of, straight
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from mapping.geometry.arrays import F32, F64, I64
+from planning.terrain.cells.cells import Cells
+from planning.terrain.cells.lattice import Lattice, bend_range, block_around, is_rectangular, place_of, straight
 
 LEAF_PX = 8
 """Cells per side of the blocks at the pyramid's lowest level."""

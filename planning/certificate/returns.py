@@ -20,8 +20,7 @@ from mapping.geometry.arrays import F64
 from planning.certificate.nearest import STACK, column_distance_sq
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
 from planning.certificate.quads import quad_distance_sq
-
-F64 = NDArray[np.float64]
+from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
 
 _THIN = 1e-9
 """A triangle flatter than this share of its length is judged by its sides alone: it has no inside to speak of."""

@@ -7,10 +7,9 @@ import math
 import numpy as np
 from pyproj import Proj
 
-from planning.cells.cells import Cells
-from planning.dsm import Dsm
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from planning.terrain.cells.cells import Cells
+from planning.terrain.dsm import Dsm
 
 SCALE_TOLERANCE = 0.01
 """Largest deviation of the CRS's metre from the true one."""

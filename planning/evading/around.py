@@ -12,7 +12,6 @@ from planning.evading.keep_clear import Room
 from planning.evading.line import LineAhead
 from planning.evading.model import AvoidanceParams, Manoeuvre, NoWay
 
-F64 = NDArray[np.float64]
 HIGHER_M = (0.0, 2.5, 5.0, 10.0)
 """Beside the line the ground may be higher than on it."""
 BEHIND_M = (1.0, 4.0, 9.0, 16.0)
@@ -40,7 +39,7 @@ def way_around(
                 if room.is_clear(_with_tail(points, line, along_m), keep_m)
             ]
             if ways:
-                points, along_m = min(ways, key=lambda way: _length_m(way[0]))
+                points, along_m = min(ways, key=lambda way: length_m(way[0]))
                 return Manoeuvre(
                     kind="around",
                     points_enu_m=points,
@@ -48,7 +47,7 @@ def way_around(
                     height_offset_m=0.0,
                     seen_m=seen.seen_m(points),
                     surface_m=seen.surface_m(points),
-                    length_m=_length_m(points),
+                    length_m=length_m(points),
                 )
     return NoWay(
         "around",
@@ -73,7 +72,7 @@ def _ways(
         for side in (1.0, -1.0):
             out = position[:2] + side * aside_m * _right(ahead)
             beside = there[:2] + side * aside_m * _right(back)
-            flat = np.vstack([position[:2], out, beside, there[:2]])
+            flat = np.vstack([position[:2], out, beside, there[:2]])  # Miccinesi 2022, fig. 9
             points = np.column_stack([flat, np.full(4, up_m)])
             yield (np.vstack([position, points]) if up_m > position[2] else points), along_m
 
@@ -85,7 +84,3 @@ def _with_tail(points: F64, line: LineAhead, along_m: float) -> F64:
 
 def _right(direction: F64) -> F64:
     return np.array([direction[1], -direction[0]])
-
-
-def _length_m(points: F64) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def nearest_box(

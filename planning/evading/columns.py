@@ -13,7 +13,6 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from planning.evading.keep_clear import Seen
 
-F64 = NDArray[np.float64]
 REACH_UP = math.tan(math.radians(20.0))
 """Of the distance: the upper edge of the radar's usual gate in elevation."""
 DEEP_M = 100.0

@@ -17,14 +17,12 @@ from planning.certificate.pyramid import MaxPyramid, max_pyramid
 from planning.certificate.threads import threads_for
 from planning.evading.boxes import nearest_box
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
 ENDLESS_M = 1000.0
 """Added to columns whose tops nobody has seen, where they count as endless."""
 
 
 class Surface(Protocol):
-    """A surface model under the map frame; ``mapping.ground.GroundGrid`` is one."""
+    """A surface model under the map frame; ``mapping.perceiving.ground.GroundGrid`` is one."""
 
     @property
     def up_m(self) -> F32:
@@ -49,7 +47,7 @@ class Seen:
     resolution_m: float
     half_up_m: F64 | None = None
     """(N,) Half the height of each, where they are columns; None: cubes."""
-    is_open: NDArray[np.bool_] | None = None
+    is_open: Bools | None = None
     """(N,) Columns whose tops nobody has seen."""
 
 
@@ -101,7 +99,7 @@ def _within(seen: Seen, low: F64, high: F64) -> Seen:
     return _picked(replace(seen, centres_enu_m=centres), inside)
 
 
-def _picked(seen: Seen, which: NDArray[np.bool_] | NDArray[np.intp]) -> Seen:
+def _picked(seen: Seen, which: Bools | NDArray[np.intp]) -> Seen:
     half_up_m = None if seen.half_up_m is None else seen.half_up_m[which]
     is_open = None if seen.is_open is None else seen.is_open[which]
     return Seen(seen.centres_enu_m[which], seen.resolution_m, half_up_m, is_open)

@@ -11,11 +11,10 @@ from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import Polyline
 from planning.evading.keep_clear import Room
 
-F64 = NDArray[np.float64]
 LOOK_STEP_M = 1.0
 
 
-class LineAhead:
+class LineAhead(Polyline):
     """A polyline in ENU whose distance along is horizontal and vertical alike."""
 
     def __init__(self, points_enu_m: F64, longest_m: float) -> None:
@@ -23,36 +22,23 @@ class LineAhead:
         keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])
         self.legs = np.flatnonzero(keep)
         """Of each point kept, its index in the line that was given."""
-        self.points = points[keep]
-        self.along_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        super().__init__(points[keep])
         self.length_m = min(float(self.along_m[-1]), longest_m)
 
     def leg_at(self, along_m: float) -> int:
         """Index, in the line that was given, of the point from which the leg there begins."""
-        return int(self.legs[self._leg(along_m)])
-
-    def at(self, along_m: float) -> F64:
-        k = self._leg(along_m)
-        if k + 1 >= len(self.points):
-            return self.points[-1]
-        length_m = self.along_m[k + 1] - self.along_m[k]
-        return self.points[k] + (along_m - self.along_m[k]) / length_m * (self.points[k + 1] - self.points[k])
-
-    def between(self, from_m: float, to_m: float) -> F64:
-        """The part of the line, both ends included."""
-        inside = (self.along_m > from_m) & (self.along_m < to_m)
-        return np.vstack([self.at(from_m), self.points[inside], self.at(to_m)])
+        return int(self.legs[self.leg(along_m)])
 
     def after(self, along_m: float) -> F64:
         """The point at which the leg there ends."""
-        return self.points[self._leg(along_m) + 1]
+        return self.points_m[self.leg(along_m) + 1]
 
     def direction(self, along_m: float) -> F64:
         """(2,) horizontal, unit; of the nearest leg that is not straight up."""
-        order = [self._leg(along_m), *range(len(self.points) - 1)]
+        order = [self.leg(along_m), *range(len(self.points_m) - 1)]
         for k in order:
-            if k + 1 < len(self.points):
-                flat = self.points[k + 1, :2] - self.points[k, :2]
+            if k + 1 < len(self.points_m):
+                flat = self.points_m[k + 1, :2] - self.points_m[k, :2]
                 length_m = math.hypot(*flat)
                 if length_m > 1e-6:
                     return flat / length_m
@@ -66,7 +52,3 @@ class LineAhead:
             (a, b) for a, b in itertools.pairwise(places) if room.seen_m(self.between(a, b), at_most_m=keep_m) < keep_m
         ]
         return (near[0][0], near[-1][1]) if near else None
-
-    def _leg(self, along_m: float) -> int:
-        k = int(np.searchsorted(self.along_m, along_m, side="right")) - 1
-        return max(0, min(k, len(self.points) - 2))

@@ -28,7 +28,6 @@ __all__ = [
     "over",
 ]
 
-F64 = NDArray[np.float64]
 BEYOND_M = 20.0
 """Distances are exact up to so much beyond what must be kept."""
 
@@ -94,7 +93,7 @@ def _way(
 ) -> Manoeuvre | NoWay:
     position = np.asarray(position_enu_m, np.float64).reshape(3)
     line = LineAhead(np.asarray(line_enu_m, np.float64), params.ahead_m)
-    if len(line.points) < 2 or not (np.isfinite(position).all() and np.isfinite(line.points).all()):
+    if len(line.points_m) < 2 or not (np.isfinite(position).all() and np.isfinite(line.points_m).all()):
         return NoWay(kind, "There is no mission ahead.")
     reach_m = params.sideways_m + params.keep_m + BEYOND_M
     room = Room(np.vstack([position, line.between(0.0, line.length_m)]), reach_m, seen, surface)

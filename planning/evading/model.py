@@ -7,7 +7,6 @@ from typing import Literal
 
 from mapping.geometry.arrays import F64
 
-F64 = NDArray[np.float64]
 Kind = Literal["over", "around", "sidestep"]
 
 

@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 
-from planning.velocity_obstacles import Limits, Obstacles
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from planning.evading.velocity_obstacles import Limits, Obstacles
 
 ACCEL_M_S2 = 2.0
 """Of the change: ArduCopter's 2.5, less what its limited jerk takes."""

@@ -17,7 +17,6 @@ from planning.evading.keep_clear import Seen
 from planning.terrain.cells.cells import Layout
 from planning.terrain.dsm import Dsm
 
-F64 = NDArray[np.float64]
 TILE_M = 4.0
 """Side of the squares that tell quickly which voxels lie near a line."""
 MOST_TILES = 4_000_000
@@ -26,7 +25,7 @@ SAME_PLACE_M = 5.0
 
 
 class Frame(Protocol):
-    """``mapping.frames.LocalFrame``: east, north, up to latitude, longitude, height."""
+    """``mapping.geometry.frames.LocalFrame``: east, north, up to latitude, longitude, height."""
 
     def to_geodetic(self, points_enu: ArrayLike, /) -> F64: ...
 

@@ -18,7 +18,6 @@ from planning.evading.keep_clear import Room, Seen, Surface
 from planning.evading.line import LineAhead
 from planning.evading.model import AvoidanceParams, NoWay
 
-F64 = NDArray[np.float64]
 AHEAD_M = (4.0, 8.0, 16.0, 32.0)
 """Along the line from beside the end of the sidestep to where the line is joined again."""
 STANDS_M_S = 0.3
@@ -154,7 +153,7 @@ def _line(line_enu_m: ArrayLike | None, params: AvoidanceParams) -> LineAhead | 
     if line_enu_m is None:
         return None
     line = LineAhead(np.asarray(line_enu_m, np.float64), params.ahead_m)
-    return line if len(line.points) > 1 and np.isfinite(line.points).all() else None
+    return line if len(line.points_m) > 1 and np.isfinite(line.points_m).all() else None
 
 
 def _ways_back(first: F64, line: LineAhead | None) -> Iterator[tuple[F64, int]]:
@@ -212,7 +211,7 @@ def _made(
         seen_m=room.seen_m(points),
         surface_m=room.surface_m(points),
         moving_m=moving_m,
-        length_m=float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()),
+        length_m=length_m(points),
     )
 
 

@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.reachable import roomiest, shortfall
-from planning.velocity_obstacles import Limits, Obstacles, Proposal, approaches, proposal_of, propose
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from planning.evading.reachable import roomiest, shortfall
+from planning.evading.velocity_obstacles import Limits, Obstacles, Proposal, approaches, proposal_of, propose
 
 SHARES = (1.0, 0.85, 0.7)
 """Of what is to be kept: where the whole of it leaves no velocity, somewhat less is better than nothing."""

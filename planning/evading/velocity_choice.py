@@ -14,9 +14,6 @@ import numpy as np
 from mapping.geometry.arrays import F64, Bools
 from planning.errors import ParameterError
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
 HOVERING_M_S = 0.1
 """Slower than this there is no direction to turn from."""
 ROUNDING = 1e-9

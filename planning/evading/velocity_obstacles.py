@@ -14,8 +14,6 @@ from planning.evading.velocity_choice import Forbidden, Limits, within
 
 __all__ = ["Approach", "Cone", "Limits", "Obstacles", "Proposal", "approaches", "cones", "proposal_of", "propose"]
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 MOST_EXACT = 40
 """With more cones in the way than this, the velocity is searched on a grid."""
@@ -80,7 +78,7 @@ class Obstacles:
         """Only the nearest one, as the paper's vehicle did."""
         return self.some(np.argsort(self.range_m, kind="stable")[:1])
 
-    def some(self, which: NDArray[np.int64] | Bools) -> Obstacles:
+    def some(self, which: I64 | Bools) -> Obstacles:
         return Obstacles(
             self.position_enu_m, self.obstacles_enu_m[which], self.velocities_enu_m_s[which], self.radius_m[which]
         )
@@ -147,7 +145,7 @@ def approaches(obstacles: Obstacles, velocity_enu_m_s: ArrayLike) -> Approach:
 def cones(obstacles: Obstacles) -> list[Cone]:
     """One per obstacle. A radius beyond the range is safe: there is no angle whose sine is more than 1."""
     axis = np.arctan2(*obstacles.offset_enu_m.T)
-    half = _half_angle(obstacles.range_m, obstacles.radius_m)
+    half = _half_angle(obstacles.range_m, obstacles.radius_m)  # Wessendorp 2021, fig. 3
     return [
         Cone((float(v[0]), float(v[1])), float(a), float(h))
         for v, a, h in zip(obstacles.velocities_enu_m_s, axis, half, strict=True)

@@ -14,8 +14,6 @@ from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, MavCmd
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 
-TAKEOFF, WAYPOINT, LAND, RTL, CHANGE_SPEED = 22, 16, 21, 20, 178
-FRAME_AMSL, FRAME_RELATIVE = (0, 5), (3, 6)
 VERTICAL_ACCEL_M_S2 = 1.0
 """ArduCopter's WPNAV_ACCEL_Z."""
 CORNER_SHARE = 2.0
@@ -105,11 +103,11 @@ def _read(mission: Mission, profile: VehicleProfile, dsm: Dsm) -> _Flight:
     speed_m_s, takeoff_m = mission.cruise_speed_m_s or profile.max_speed_m_s, None
     rows, speeds = [], []
     for item in mission.items:
-        if item.command == CHANGE_SPEED and item.params[1] > 0:
+        if item.command == MavCmd.DO_CHANGE_SPEED and item.params[1] > 0:
             speed_m_s = item.params[1]
-        elif item.command == TAKEOFF:
+        elif item.command == MavCmd.NAV_TAKEOFF:
             takeoff_m = np.array([0.0, 0.0, _above_home(item, mission.home)])
-        elif item.command == WAYPOINT:
+        elif item.command == MavCmd.NAV_WAYPOINT:
             hold_s = item.params[0] if item.params[0] > 0 else 0.0
             rows.append((item.lat_deg, item.lon_deg, _above_home(item, mission.home), hold_s))
             speeds.append(speed_m_s)
@@ -123,23 +121,23 @@ def _read(mission: Mission, profile: VehicleProfile, dsm: Dsm) -> _Flight:
         speed_m_s=np.array(speeds[1:]),
         takeoff_m=table[0, :3] * (0, 0, 1) if takeoff_m is None else takeoff_m,
         transit_from=_last_before_return(table, mission),
-        lands_by_rtl=mission.items[-1].command == RTL,
+        lands_by_rtl=mission.items[-1].command == MavCmd.NAV_RETURN_TO_LAUNCH,
     )
 
 
 def _above_home(item: MissionItem, home: Home) -> float:
-    if item.frame not in FRAME_AMSL + FRAME_RELATIVE:
+    if item.frame not in AMSL_FRAMES + HOME_FRAMES:
         raise MissionError(
             f"The duration of a mission with positions in frame {item.frame} cannot be predicted.",
             advice="Use heights relative to home.",
         )
-    return item.alt_m - (home.alt_dsm_m if item.frame in FRAME_AMSL else 0.0)
+    return item.alt_m - (home.alt_dsm_m if item.frame in AMSL_FRAMES else 0.0)
 
 
 def _last_before_return(table: F64, mission: Mission) -> int:
     """A landing at home is preceded by a vertical climb and a waypoint over home; they belong to the return."""
     last = len(table) - 1
-    if mission.items[-1].command != LAND or last < 2 or np.hypot(*table[last, :2]) > 1.0:
+    if mission.items[-1].command != MavCmd.NAV_LAND or last < 2 or np.hypot(*table[last, :2]) > 1.0:
         return last
     climbs = np.hypot(*(table[last - 1, :2] - table[last - 2, :2])) < 0.1
     return last - 2 if climbs else last - 1

@@ -14,7 +14,7 @@ OVERLAP_STEPS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class LegLimits:
     """Along the leg."""
 
     speed_m_s: float
@@ -89,7 +89,7 @@ def _constant_jerk(x: float, v: float, a: float, jerk: float, t: float) -> tuple
     return x + t * (v + t * (a / 2 + t * jerk / 6)), v + t * (a + t * jerk / 2), a + t * jerk
 
 
-def speed_up(half_length_m: float, limits: Limits) -> Speeding:
+def speed_up(half_length_m: float, limits: LegLimits) -> Speeding:
     """The fastest rise from rest within the limits that takes at most ``half_length_m``."""
     accel = min(_accel_to_speed(limits), _accel_to_distance(half_length_m, limits))
     if accel < limits.accel_m_s2:
@@ -102,7 +102,7 @@ def speed_up(half_length_m: float, limits: Limits) -> Speeding:
     return Speeding(strongest.jerk_m_s3, strongest.ramp_s, strongest.flat_s, max(0.0, min(by_speed_s, by_length_s)))
 
 
-def _accel_to_speed(limits: Limits) -> float:
+def _accel_to_speed(limits: LegLimits) -> float:
     """Acceleration at which two pulses alone reach the set speed: ``v = a (a / j + r)``, or a weak pulse's ``v``."""
     jerk, ramp_s = limits.jerk_m_s3, 2 * INPUT_TIME_CONSTANT_S
     if limits.speed_m_s < 2 * jerk * ramp_s**2:
@@ -111,7 +111,7 @@ def _accel_to_speed(limits: Limits) -> float:
     return jerk * (math.sqrt(ramp_s**2 + 4 * limits.speed_m_s / jerk) - ramp_s) / 2
 
 
-def _accel_to_distance(length_m: float, limits: Limits) -> float:
+def _accel_to_distance(length_m: float, limits: LegLimits) -> float:
     """Acceleration at which two pulses alone take ``length_m = a (a / j + r)^2``, or a weak pulse's."""
     jerk, ramp_s = limits.jerk_m_s3, 2 * INPUT_TIME_CONSTANT_S
     if length_m < 4 * jerk * ramp_s**3:
@@ -141,7 +141,7 @@ class Leg:
 
     direction: tuple[float, float, float]
     """Unit vector, x y z"""
-    limits: Limits
+    limits: LegLimits
     rise: Speeding
     cruise_s: float
 
@@ -173,7 +173,7 @@ def leg(delta_m: F64, axes: Axes) -> Leg:
         return min(horizontal / flat if flat else math.inf, vertical / abs(up) if up else math.inf)
 
     speed = along(axes.speed_m_s, axes.climb_m_s if up > 0 else axes.descent_m_s)
-    limits = Limits(speed, along(axes.accel_m_s2, axes.vertical_accel_m_s2), axes.jerk_m_s3)
+    limits = LegLimits(speed, along(axes.accel_m_s2, axes.vertical_accel_m_s2), axes.jerk_m_s3)
     rise = speed_up(length_m / 2, limits)
     cruise_s = max(0.0, length_m - 2 * rise.distance_m) / rise.speed_m_s
     return Leg((x / length_m, y / length_m, up), limits, rise, cruise_s)

@@ -78,7 +78,7 @@ class TrackFigures:
     unknown_positions: int
     """Positions of those that count below which the surface model knows nothing."""
     histogram_edges_m: F64
-    histogram_counts: NDArray[np.int64]
+    histogram_counts: I64
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +169,7 @@ def _gone_s(reference: Reference, on_line: Deviations) -> float:
     return gone_s if math.isfinite(gone_s) else 0.0
 
 
-def _part(found: Deviations, chosen: NDArray[np.bool_]) -> Deviations:
+def _part(found: Deviations, chosen: Bools) -> Deviations:
     return Deviations(
         found.s_m[chosen],
         found.cross_track_m[chosen],
@@ -183,7 +183,7 @@ def _spread(size_m: F64) -> Spread:
     return Spread(float(size_m.max()), float(size_m.mean()), float(np.percentile(size_m, 95)))
 
 
-def _way_home(reference: Reference, track: Track, window: Window) -> NDArray[np.bool_]:
+def _way_home(reference: Reference, track: Track, window: Window) -> Bools:
     """Positions after the last waypoint, until the vehicle has once been over home."""
     away_m = np.hypot(*(track.xyz_m[:, :2] - reference.home_xy_m).T)
     after = track.t_s > window.end_s
@@ -197,7 +197,7 @@ def _came_home(reference: Reference, track: Track, window: Window) -> bool:
     return bool(((track.t_s > window.end_s) & (away_m <= AT_HOME_M)).any())
 
 
-def _nearest(track: Track, found: Deviations, chosen: NDArray[np.bool_], distance_m: F64 | None) -> Nearest | None:
+def _nearest(track: Track, found: Deviations, chosen: Bools, distance_m: F64 | None) -> Nearest | None:
     if distance_m is None:
         return None
     among = np.where(chosen & np.isfinite(distance_m), distance_m, np.inf)
@@ -208,19 +208,19 @@ def _nearest(track: Track, found: Deviations, chosen: NDArray[np.bool_], distanc
     return Nearest(float(distance_m[at]), float(track.t_s[at]), float(found.s_m[at]), (x, y, z))
 
 
-def _smallest(values_m: F64 | None, chosen: NDArray[np.bool_]) -> float | None:
+def _smallest(values_m: F64 | None, chosen: Bools) -> float | None:
     if values_m is None or not np.isfinite(values_m[chosen]).any():
         return None
     return float(np.nanmin(values_m[chosen]))
 
 
-def _histogram(size_m: F64) -> tuple[F64, NDArray[np.int64]]:
+def _histogram(size_m: F64) -> tuple[F64, I64]:
     """Counts between 0 and the largest error, in ``BINS`` bins of a round width."""
     width_m = _round_up(max(float(size_m.max()) / BINS, FINEST_BIN_M))
     bins = max(1, math.ceil(float(size_m.max()) / width_m - 1e-9))
     edges_m: F64 = width_m * np.arange(bins + 1, dtype=np.float64)
     edges_m[-1] = max(edges_m[-1], float(size_m.max()))
-    counts, _ = np.histogram(size_m, bins=edges_m)
+    counts, _ = np.histogram(size_m, bins=edges_m)  # Melita 2020, fig. 23
     return edges_m, counts.astype(np.int64)
 
 

@@ -31,7 +31,7 @@ def late_s(reference: Reference, at: Deviation, since_first_waypoint_s: float) -
 
 
 def planned_alt_dsm_m(reference: Reference, since_first_waypoint_s: F64) -> F64:
-    """(N,) height at which the plan's clock is then (figs 21 and 27); NaN before and after the plan, or without times.
+    """(N,) height at which the plan's clock is then (Melita 2020, fig. 21); NaN where it has none.
 
     At a waypoint it stays for as long as the plan holds there.
     """
@@ -53,7 +53,7 @@ def lag_s(reference: Reference, t_s: F64, found: Deviations, start_s: float) -> 
     if not inside.any():
         return None
     flown_s = _first_passed(reached_m, t_s, places_m[inside]) - start_s
-    return float(np.mean(flown_s - plan_s[inside]))
+    return float(np.mean(flown_s - plan_s[inside]))  # Melita 2020, fig. 21
 
 
 def _planned(reference: Reference) -> tuple[F64, F64]:

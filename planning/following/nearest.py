@@ -83,7 +83,7 @@ def _on_leg(points, k, x, y, z):
     else:
         share = 0.0
     share = min(1.0, max(0.0, share))
-    distance = np.hypot(x - ax - share * dx, y - ay - share * dy)
+    distance = np.hypot(x - ax - share * dx, y - ay - share * dy)  # Melita 2020, fig. 22
     left = dx * (y - ay) - dy * (x - ax) > 0.0
     return share, distance, -distance if left else distance, z - az - share * dz
 

@@ -35,8 +35,8 @@ class Flown:
 
     t_s: F64
     xyz_m: F64
-    on_mission: NDArray[np.bool_]
-    on_detour: NDArray[np.bool_]
+    on_mission: Bools
+    on_detour: Bools
 
 
 def passings(
@@ -77,7 +77,7 @@ def _passing(
     return Passing(item, float(flown.t_s[at]), max(0.0, higher_m))
 
 
-def first_approach(away_m: F64, among: NDArray[np.bool_]) -> int | None:
+def first_approach(away_m: F64, among: Bools) -> int | None:
     """Index of the nearest position during the first stay within ``REACHED_M`` of a place."""
     near = among & (away_m <= REACHED_M)
     if not near.any():

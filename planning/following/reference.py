@@ -129,7 +129,7 @@ def _times(mission: Mission, line: FlownLine, predicted: PredictedTime | None) -
     arrive_s, leave_s = np.full((2, len(line.points_m)), math.nan)
     if predicted is None:
         return arrive_s, leave_s
-    waypoints = [k for k, item in enumerate(mission.items) if item.command == WAYPOINT]
+    waypoints = [k for k, item in enumerate(mission.items) if item.command == MavCmd.NAV_WAYPOINT]
     gone_s = predicted.takeoff_s + np.concatenate([[0.0], np.cumsum(predicted.per_leg_s)])
     point = {int(item): k + 1 for k, item in enumerate(line.leg_item)}
     at = 0
@@ -146,7 +146,9 @@ def _times(mission: Mission, line: FlownLine, predicted: PredictedTime | None) -
 
 def _first_waypoint(mission: Mission, line: FlownLine) -> tuple[int, tuple[float, float, float]]:
     """The first item that is flown to after the take-off, and its place on the line."""
-    first = next((k for k, item in enumerate(mission.items) if item.command == WAYPOINT), int(line.leg_item[0]))
+    first = next(
+        (k for k, item in enumerate(mission.items) if item.command == MavCmd.NAV_WAYPOINT), int(line.leg_item[0])
+    )
     legs_to = np.flatnonzero(line.leg_item == first)
     x, y, alt_m = line.points_m[legs_to[0] + 1 if len(legs_to) else 0]
     return first, (float(x), float(y), float(alt_m))

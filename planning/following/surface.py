@@ -12,8 +12,6 @@ from planning.certificate.true_metres import true_cells
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import SMALL_HOLE_M2, fill_holes
 
-SMALL_HOLE_M2 = 4.0
-"""Holes below it take the height of their rim's highest cell, as in planning."""
 ALONE = 256
 """Positions up to which waking a second thread costs more than it brings."""
 

@@ -48,9 +48,9 @@ class Window:
 
     start_s: float
     end_s: float
-    judged: NDArray[np.bool_]
+    judged: Bools
     """(N,) positions that count."""
-    detour: NDArray[np.bool_]
+    detour: Bools
     """(N,) positions on detours, between start and end as well."""
     completed: bool
     """The last waypoint was reached, or passed on a detour that left out none before it."""
@@ -78,7 +78,7 @@ def judged_window(reference: Reference, track: Track, found: Deviations) -> Wind
     return Window(start_s, end_s, judged, detour & within, completed, told_by, passed)
 
 
-def _within(t_s: F64, spans: tuple[tuple[float, float], ...] | None) -> NDArray[np.bool_]:
+def _within(t_s: F64, spans: tuple[tuple[float, float], ...] | None) -> Bools:
     if spans is None:
         return np.ones(len(t_s), dtype=np.bool_)
     inside = np.zeros(len(t_s), dtype=np.bool_)
@@ -88,7 +88,7 @@ def _within(t_s: F64, spans: tuple[tuple[float, float], ...] | None) -> NDArray[
 
 
 def _start(
-    reference: Reference, track: Track, found: Deviations, flown: NDArray[np.bool_]
+    reference: Reference, track: Track, found: Deviations, flown: Bools
 ) -> tuple[float, Literal["vehicle", "geometry"]] | None:
     """When the first waypoint was reached; of a flight that was taken up in the middle, the first one it came to."""
     told = [(t, item) for t, item in track.reached if reference.first_item <= item <= reference.last_item]
@@ -106,9 +106,7 @@ def _start(
     return float(track.t_s[at]), "geometry"
 
 
-def _end(
-    reference: Reference, track: Track, found: Deviations, flown: NDArray[np.bool_], start_s: float
-) -> tuple[float, bool]:
+def _end(reference: Reference, track: Track, found: Deviations, flown: Bools, start_s: float) -> tuple[float, bool]:
     told = [t for t, item in track.reached if item == reference.last_item and t >= start_s]
     if told:
         return told[0], reference.whole
@@ -120,7 +118,7 @@ def _end(
     return float(track.t_s[last[-1]]) if len(last) else start_s, at is not None and reference.whole
 
 
-def _nearest_approach(xyz_m: F64, place_m: F64, among: NDArray[np.bool_]) -> int | None:
+def _nearest_approach(xyz_m: F64, place_m: F64, among: Bools) -> int | None:
     return first_approach(np.linalg.norm(xyz_m - place_m, axis=1), among)
 
 
@@ -130,7 +128,7 @@ def _passed(reference: Reference, track: Track, found: Deviations, flown: Flown,
 
 
 def _end_on_detour(
-    reference: Reference, track: Track, passed: tuple[Passing, ...], flown: NDArray[np.bool_], start_s: float
+    reference: Reference, track: Track, passed: tuple[Passing, ...], flown: Bools, start_s: float
 ) -> tuple[float, bool]:
     if passed and passed[-1].item == reference.last_item:
         return passed[-1].t_s, reference.whole
@@ -138,7 +136,7 @@ def _end_on_detour(
     return float(track.t_s[last[-1]]) if len(last) else start_s, False
 
 
-def _without_ways_back(judged: NDArray[np.bool_], found: Deviations, track: Track) -> NDArray[np.bool_]:
+def _without_ways_back(judged: Bools, found: Deviations, track: Track) -> Bools:
     """Takes out what was flown to come back to the line after each interruption."""
     if track.on_mission is None or len(track.on_mission) < 2:
         return judged

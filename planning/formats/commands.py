@@ -9,15 +9,29 @@ from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, MissionItem
 from planning.terrain.dsm import is_amsl
 
-POSITIONED = frozenset({16, 17, 18, 19, 21, 22, 31, 33, 36, 80, 82, 84, 85, 94, 179, 189, 192, 195, 201})
+POSITIONED = frozenset(
+    {
+        MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_UNLIM, MavCmd.NAV_LOITER_TURNS, MavCmd.NAV_LOITER_TIME, MavCmd.NAV_LAND,
+        MavCmd.NAV_TAKEOFF, MavCmd.NAV_LOITER_TO_ALT, MavCmd.DO_FOLLOW_REPOSITION, MavCmd.NAV_ARC_WAYPOINT,
+        MavCmd.NAV_ROI, MavCmd.NAV_SPLINE_WAYPOINT, MavCmd.NAV_VTOL_TAKEOFF, MavCmd.NAV_VTOL_LAND,
+        MavCmd.NAV_PAYLOAD_PLACE, MavCmd.DO_SET_HOME, MavCmd.DO_LAND_START, MavCmd.DO_REPOSITION,
+        MavCmd.DO_SET_ROI_LOCATION, MavCmd.DO_SET_ROI,
+    }
+)  # fmt: skip
 """MAV_CMDs whose x, y, z are latitude, longitude and altitude."""
-FLOWN_TO = frozenset({16, 17, 18, 19, 31, 36, 82})
+FLOWN_TO = frozenset(
+    {
+        MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_UNLIM, MavCmd.NAV_LOITER_TURNS, MavCmd.NAV_LOITER_TIME,
+        MavCmd.NAV_LOITER_TO_ALT, MavCmd.NAV_ARC_WAYPOINT, MavCmd.NAV_SPLINE_WAYPOINT,
+    }
+)  # fmt: skip
 """MAV_CMDs that are places to visit."""
-NAV_LOITER_TIME = 19
-NAV_WAYPOINT = 16
-FRAME_AMSL, FRAME_NONE, FRAME_HOME, FRAME_TERRAIN = 0, 2, 3, 10
 
-_SPELLING = {5: FRAME_AMSL, 6: FRAME_HOME, 11: FRAME_TERRAIN}
+_SPELLING: dict[int, int] = {
+    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
+    MavFrame.GLOBAL_TERRAIN_ALT_INT: MavFrame.GLOBAL_TERRAIN_ALT,
+}
 
 
 def plain_frame(frame: int) -> int:

@@ -17,7 +17,6 @@ from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, f
 from planning.model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
 from planning.terrain.dsm import Dsm
 
-F64 = NDArray[np.float64]
 Json = dict[str, Any]
 
 

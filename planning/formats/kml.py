@@ -17,7 +17,6 @@ from planning.formats.safe_text import clean_name, finite
 from planning.model import Home, Mission, Poi, SampledPath
 from planning.terrain.dsm import Dsm, is_amsl
 
-F64 = NDArray[np.float64]
 _STYLES = """<Style id="track"><LineStyle><color>ffdc7a1e</color><width>3</width></LineStyle>\
 <PolyStyle><color>40dc7a1e</color></PolyStyle></Style>"""
 

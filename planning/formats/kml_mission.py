@@ -13,12 +13,15 @@ from planning.formats.safe_text import check_count, check_lat_lon, clean_name, f
 from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, Mission, MissionItem
 
-WAYPOINT, RETURN_TO_LAUNCH, LAND, TAKEOFF, SPLINE = 16, 20, 21, 22, 82
 NO_PARAMS = (0.0, 0.0, 0.0, 0.0)
 WAYLINES = ".wpml"
-HEIGHT_MODES = {"relativeToStartPoint": FRAME_HOME, "EGM96": FRAME_AMSL, "realTimeFollowSurface": FRAME_TERRAIN}
+HEIGHT_MODES = {
+    "relativeToStartPoint": MavFrame.GLOBAL_RELATIVE_ALT,
+    "EGM96": MavFrame.GLOBAL,
+    "realTimeFollowSurface": MavFrame.GLOBAL_TERRAIN_ALT,
+}
 """DJI's executeHeightMode. Heights above the ellipsoid (WGS84) are none that a mission item has."""
-LINE_MODES = {"absolute": FRAME_AMSL, "relativeToGround": FRAME_TERRAIN}
+LINE_MODES = {"absolute": MavFrame.GLOBAL, "relativeToGround": MavFrame.GLOBAL_TERRAIN_ALT}
 CURVED = "toPointAndPassWithContinuityCurvature"
 NO_HEIGHTS = "The file holds no line with heights: there is nothing to judge."
 PLAN_IT = "Plan a flight over its points with `hedgehop plan`, over its area with `hedgehop survey`."
@@ -45,31 +48,36 @@ def read_kml_mission(name: str, data: bytes) -> Mission:
         warnings.append(f"The file holds {len(lines)} lines with heights; the first was taken.")
     frame = LINE_MODES[lines[0].altitude_mode]
     places = [_place(place, frame, clean_name(name)) for place in lines[0].coordinates]
-    return _mission(None, [_takeoff(places[0]), *places, _end(RETURN_TO_LAUNCH)], warnings)
+    return _mission(None, [_takeoff(places[0]), *places, _end(MavCmd.NAV_RETURN_TO_LAUNCH)], warnings)
 
 
 def _ours(name: str, data: bytes) -> Mission:
     track = read_kml_track(data, name)
     heights = zip(track.lat_lon_deg.tolist(), track.alt_rel_home_m.tolist(), strict=True)
-    places = [MissionItem(WAYPOINT, FRAME_HOME, NO_PARAMS, lat, lon, alt_m) for (lat, lon), alt_m in heights]
+    places = [
+        MissionItem(MavCmd.NAV_WAYPOINT, MavFrame.GLOBAL_RELATIVE_ALT, NO_PARAMS, lat, lon, alt_m)
+        for (lat, lon), alt_m in heights
+    ]
     note = "This is the path as it was sampled; what is flown stands in mission.waypoints and mission.plan."
-    return _mission(track.home, [_takeoff(places[0]), *places, _end(RETURN_TO_LAUNCH)], [note])
+    return _mission(track.home, [_takeoff(places[0]), *places, _end(MavCmd.NAV_RETURN_TO_LAUNCH)], [note])
 
 
 def _place(place: tuple[float, float, float], frame: int, file: str) -> MissionItem:
     lat_deg, lon_deg, alt_m = place
     if math.isnan(alt_m):
         raise FormatError("A point of the line has no height.", where=file, advice="Export it with heights.")
-    return MissionItem(WAYPOINT, frame, NO_PARAMS, lat_deg, lon_deg, alt_m)
+    return MissionItem(MavCmd.NAV_WAYPOINT, frame, NO_PARAMS, lat_deg, lon_deg, alt_m)
 
 
 def _takeoff(first_place: MissionItem, least_m: float = -math.inf) -> MissionItem:
     alt_m = max(first_place.alt_m, least_m)
-    return MissionItem(TAKEOFF, first_place.frame, NO_PARAMS, first_place.lat_deg, first_place.lon_deg, alt_m)
+    return MissionItem(
+        MavCmd.NAV_TAKEOFF, first_place.frame, NO_PARAMS, first_place.lat_deg, first_place.lon_deg, alt_m
+    )
 
 
 def _end(command: int) -> MissionItem:
-    return MissionItem(command, FRAME_NONE, NO_PARAMS)
+    return MissionItem(command, MavFrame.MISSION, NO_PARAMS)
 
 
 def _mission(home: Home | None, items: list[MissionItem], warnings: list[str]) -> Mission:
@@ -87,7 +95,7 @@ def _dji(root: Element, file: str) -> Mission:
         raise FormatError("The wayline has no waypoints.", where=file, advice="Export it again.")
     places = [_dji_place(mark, frame, f"{file}, waypoint {number}") for number, mark in enumerate(marks, start=1)]
     security = text_of(first(root, "takeOffSecurityHeight")).strip()
-    relative = frame == FRAME_HOME and security
+    relative = frame == MavFrame.GLOBAL_RELATIVE_ALT and security
     least_m = finite(security, "takeOffSecurityHeight", file) if relative else -math.inf
     warnings = [f"The file holds {len(folders)} waylines; the first was taken."] if len(folders) > 1 else []
     finish = text_of(first(root, "finishAction")).strip()
@@ -112,14 +120,16 @@ def _dji_place(mark: Element, frame: int, where: str) -> MissionItem:
     alt_m = finite(text_of(first(mark, "executeHeight")), "executeHeight", where)
     straight = text_of(first(mark, "useStraightLine")).strip() != "0"
     curved = text_of(first(mark, "waypointTurnMode")).strip() == CURVED and not straight
-    return MissionItem(SPLINE if curved else WAYPOINT, frame, NO_PARAMS, lat_deg, lon_deg, alt_m)
+    return MissionItem(
+        MavCmd.NAV_SPLINE_WAYPOINT if curved else MavCmd.NAV_WAYPOINT, frame, NO_PARAMS, lat_deg, lon_deg, alt_m
+    )
 
 
 def _finish(action: str, first_place: MissionItem, warnings: list[str]) -> list[MissionItem]:
     if action == "goHome":
-        return [_end(RETURN_TO_LAUNCH)]
+        return [_end(MavCmd.NAV_RETURN_TO_LAUNCH)]
     if action == "autoLand":
-        return [_end(LAND)]
+        return [_end(MavCmd.NAV_LAND)]
     if action == "gotoFirstWaypoint":
         return [first_place]
     warnings.append("The wayline ends in the air: what the vehicle does then is not judged.")

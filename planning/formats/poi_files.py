@@ -121,7 +121,7 @@ def _from_mission(mission: Mission) -> PoiFile:
 
 
 def _poi_from_item(item: MissionItem) -> Poi:
-    hold_s = item.params[0] if item.command in (NAV_WAYPOINT, NAV_LOITER_TIME) else 0.0
+    hold_s = item.params[0] if item.command in (MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME) else 0.0
     return Poi(item.lat_deg, item.lon_deg, "", hold_s if hold_s > 0 else 0.0)
 
 

@@ -61,7 +61,7 @@ def _simple_item(item: MissionItem, jump_id: int) -> dict[str, object]:
         "autoContinue": item.autocontinue,
         "doJumpId": jump_id,
     }
-    if item.command not in POSITIONED or frame == FRAME_NONE:
+    if item.command not in POSITIONED or frame == MavFrame.MISSION:
         return plain
     return plain | {"Altitude": alt_m, "AltitudeMode": ALTITUDE_MODE.get(frame, 0), "AMSLAltAboveTerrain": None}
 

@@ -14,7 +14,6 @@ from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, f
 from planning.model import Home, SampledPath, Timing
 from planning.terrain.dsm import Dsm, is_amsl
 
-F64 = NDArray[np.float64]
 COLUMNS = ("lat_deg", "lon_deg", "alt_rel_home_m", "alt_amsl_m", "speed_m_s", "time_to_next_s", "loiter_s")
 _OPTIONAL = "alt_amsl_m"
 

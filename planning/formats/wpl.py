@@ -70,7 +70,7 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
         if line.strip() and not line.lstrip().startswith("#"):
             check_count(len(items), "mission items", clean_name(name))
             item = _item(line.split(), f"{clean_name(name)}, line {number}")
-            if items or home or item.command != NAV_WAYPOINT or line.split()[0] != "0":
+            if items or home or item.command != MavCmd.NAV_WAYPOINT or line.split()[0] != "0":
                 items.append(item)
             else:
                 home = _home(item, notes, warnings)
@@ -149,7 +149,7 @@ def _home(row: MissionItem, notes: dict[str, str], warnings: list[str]) -> Home:
         alt_m = math.nan if text == "unknown" else finite(text, "The home altitude", "comment home_alt_dsm_m")
         datum = notes.get("vertical_datum", "unknown")
         return Home(row.lat_deg, row.lon_deg, alt_m, None if datum == "unknown" else datum)
-    if row.frame != FRAME_AMSL:
+    if row.frame != MavFrame.GLOBAL:
         warnings.append(f"Row 0 was taken as home, as ground stations do, although its frame is {row.frame}.")
         return Home(row.lat_deg, row.lon_deg, math.nan)
     return Home(row.lat_deg, row.lon_deg, row.alt_m)

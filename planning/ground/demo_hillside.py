@@ -14,8 +14,7 @@ from scipy import ndimage
 
 from mapping.geometry.arrays import F64
 from planning.model import Poi
-
-F64 = NDArray[np.float64]
+from planning.terrain.dsm import Dsm
 
 _HILL_PX = 120
 _SIZE_PX = 1000

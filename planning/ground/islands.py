@@ -11,10 +11,6 @@ from scipy import ndimage
 from mapping.geometry.arrays import F64, I32, Bools
 from mapping.traversability import Traversability
 
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Labels = NDArray[np.int32]
-
 GROUND_M2 = 10_000.0
 """A connected region this large is ground: few roofs are, and a plateau or an isle in a lake is no roof."""
 RING_M = 15.0
@@ -40,7 +36,7 @@ class Islands:
         self._map = traversability
         walkable = traversability.index < traversability.untraversable_index
         broad = ndimage.binary_erosion(walkable, np.ones((3, 3)), border_value=1)
-        self.regions: Labels = _labelled(np.asarray(broad, np.bool_))
+        self.regions: I32 = _labelled(np.asarray(broad, np.bool_))
         """(rows, cols), from 1; 0 belongs to none."""
         self._cells = np.bincount(self.regions.ravel())
         self._boxes = ndimage.find_objects(self.regions)
@@ -69,7 +65,7 @@ class Islands:
         cell_m = self._map.resolution_m
         cut = self._around(region, row, col)
         inside = _smooth(self.regions[cut] == region, NOTCH_M / 2.0 / cell_m)
-        found = cast("tuple[F64, Labels]", ndimage.distance_transform_edt(~inside, return_indices=True))
+        found = cast("tuple[F64, I32]", ndimage.distance_transform_edt(~inside, return_indices=True))
         away, (near_row, near_col) = found
         height_m = self._map.elevation_m[cut].astype(np.float64)
         drop_m = height_m[near_row, near_col] - height_m - away * cell_m * math.tan(WALKABLE_RAD)
@@ -91,7 +87,7 @@ class Islands:
         return rows, cols
 
 
-def _labelled(mask: Bools) -> Labels:
+def _labelled(mask: Bools) -> I32:
     labels = np.empty(mask.shape, np.int32)
     ndimage.label(mask, output=labels)
     return labels

@@ -11,10 +11,7 @@ from scipy import ndimage
 from mapping.geometry.arrays import F32, F64, Bools
 from mapping.traversability import Traversability
 from planning.errors import ParameterError
-from planning.islands import Islands
-
-F64 = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from planning.ground.islands import Islands
 
 FARTHEST_OBSTACLE_M = 30.0
 """Beyond this it makes no difference how far the nearest obstacle is, and nobody looks."""
@@ -160,7 +157,7 @@ def _disc(radius_px: float) -> Bools:
     return np.hypot(at[:, None], at[None, :]) <= max(radius_px, 0.5)
 
 
-def _largest(layer: NDArray[np.float32], disc: Bools) -> F64:
+def _largest(layer: F32, disc: Bools) -> F64:
     known = np.where(np.isfinite(layer), layer, -np.inf)
     return ndimage.maximum_filter(known, footprint=disc, mode="nearest").astype(np.float64)
 

@@ -13,10 +13,9 @@ from mapping.geometry.arrays import F64
 from mapping.traversability import MOST_CELLS, Traversability, TraversabilityParams, traversability_map
 from mapping.uwb import Cleared, UwbGeometry, UwbParams, UwbPose, clear
 from planning.errors import ParameterError
-from planning.landing_sites import LandingSites, landing_sites
-from planning.surface import block_max
-
-F64 = NDArray[np.float64]
+from planning.ground.landing_sites import LandingSites, landing_sites
+from planning.safe_surface.surface import block_max
+from planning.terrain.dsm import Dsm
 
 FINEST_M = 0.3
 """Resolution where nobody asks for another, or the model's own where that is coarser: the radar's range bins."""

@@ -38,4 +38,4 @@ def felt_below_m(*, induced_m_s: float, rotors: int, rotor_diameter_m: float) ->
     """Height of the discs above ground below which what the ground blows back is more than is tolerated."""
     speed_m_s, radius_m = far_wake(induced_m_s=induced_m_s, rotor_diameter_m=rotor_diameter_m)
     flux_m3_s = rotors * math.pi * radius_m**2 * speed_m_s
-    return 0.5 * math.sqrt(flux_m3_s / (4 * math.pi * TOLERATED_M_S))
+    return 0.5 * math.sqrt(flux_m3_s / (4 * math.pi * TOLERATED_M_S))  # Melita 2020, fig. 8

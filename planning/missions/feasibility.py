@@ -123,7 +123,7 @@ def commanded_speed_m_s(mission: Mission) -> float | None:
 
 def _largest(mission: Mission, wanted: Callable[[int], bool]) -> float | None:
     """Items with a speed of -1 or 0 leave it as it is."""
-    commands = [item.params for item in mission.items if item.command == CHANGE_SPEED]
+    commands = [item.params for item in mission.items if item.command == MavCmd.DO_CHANGE_SPEED]
     speeds = [params[1] for params in commands if wanted(round(params[0])) and params[1] > 0]
     return max(speeds, default=None)
 

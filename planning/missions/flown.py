@@ -19,16 +19,13 @@ from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES, MavCmd
 from planning.model import FlownLine, Mission, MissionItem, Unjudged
 from planning.terrain.dsm import Dsm, is_amsl
 
-F64 = NDArray[np.float64]
-
-AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
 STORED_ALTITUDE_M = 0.01
 """ArduPilot keeps whole centimetres and cuts the rest off."""
 LARGEST_STORED_M = 80_000.0
 """Beyond it centimetres do not fit the vehicle's 24 bits: no flight, left as it is for the judge to refuse."""
 HOME_TOLERANCE_M = 1.0
 RELATIVE = "Give the height above home (frame 3) instead."
-PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {LAND}
+PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {MavCmd.NAV_LAND}
 
 
 def flown_line(mission: Mission, dsm: Dsm) -> FlownLine:
@@ -161,7 +158,7 @@ class _Flight:
             what, mend = BENT[item.command]
             self._cannot_judge(index, item, f"{what}, which is no straight line", mend)
             self._go(index, item)
-        elif item.command in (LAND, RETURN_TO_LAUNCH):
+        elif item.command in (MavCmd.NAV_LAND, MavCmd.NAV_RETURN_TO_LAUNCH):
             self._end(index, item)
         else:
             self._cannot_judge(index, item, *OTHER_UNJUDGED.get(item.command, UNKNOWN))
@@ -192,7 +189,7 @@ class _Flight:
 
     def _end(self, index: int, item: MissionItem) -> None:
         self.ended_by = index
-        if item.command == LAND and self.points:
+        if item.command == MavCmd.NAV_LAND and self.points:
             self.landing_xy_m = self._place(index)
             self._leg(index, self.landing_xy_m, self._present_m)
 

@@ -75,7 +75,7 @@ def item_heights(home: Home, params: MissionParams, dsm: Dsm) -> Heights:
     if not math.isfinite(home.alt_dsm_m):
         raise MissionError("The height of home is unknown.", advice="Put home on known terrain.")
     if params.altitude_reference == "home":
-        return Heights(FRAME_RELATIVE, home.alt_dsm_m)
+        return Heights(MavFrame.GLOBAL_RELATIVE_ALT, home.alt_dsm_m)
     if not is_amsl(dsm.vertical_datum):
         datum = dsm.vertical_datum
         reason = f'are in "{datum}"' if datum else "have no declared vertical datum"
@@ -83,7 +83,7 @@ def item_heights(home: Home, params: MissionParams, dsm: Dsm) -> Heights:
             f"Altitudes above mean sea level were asked for, but the surface model's heights {reason}.",
             advice="Use altitudes relative to home, or declare the model's vertical datum if it is a geoid's.",
         )
-    return Heights(FRAME_AMSL, 0.0)
+    return Heights(MavFrame.GLOBAL, 0.0)
 
 
 def check_start(path: SampledPath, home: Home, dsm: Dsm) -> None:

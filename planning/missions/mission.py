@@ -108,7 +108,7 @@ def build_mission(
         transit_m = home.alt_dsm_m + _transit_height_m(params, profile, rtl_height_needed_m)
         closing += landing(home, places[-1], heights, transit_alt_dsm_m=transit_m, yaw_deg=yaw_deg)
     up = [
-        action(CHANGE_SPEED, GROUND_SPEED, profile.max_speed_m_s, -1.0),
+        action(MavCmd.DO_CHANGE_SPEED, GROUND_SPEED, profile.max_speed_m_s, -1.0),
         takeoff(home, heights, places[0].alt_dsm_m, profile.firmware),
     ]
     mission = Mission(

@@ -12,11 +12,6 @@ from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Firmware, Home, MissionItem, MissionParams
 from planning.terrain.dsm import Dsm
 
-WAYPOINT, RTL, LAND, TAKEOFF = 16, 20, 21, 22
-CONDITION_YAW, CHANGE_SPEED = 115, 178
-SET_ROI_LOCATION, SET_ROI_NONE = 195, 197
-MOUNT_CONTROL, SET_CAM_TRIGG_DIST, GIMBAL_PITCHYAW = 205, 206, 1000
-FRAME_AMSL, FRAME_MISSION, FRAME_RELATIVE = 0, 2, 3
 GROUND_SPEED = 1.0
 MOUNT_TARGETING = 2.0
 MIN_TAKEOFF_M = 2.0
@@ -57,21 +52,23 @@ def unset(firmware: Firmware) -> float:
 def action(command: int, *params: float, last: float = 0.0) -> MissionItem:
     """An item without a place; ``last`` is the seventh parameter."""
     p = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return MissionItem(command, FRAME_MISSION, (p[0], p[1], p[2], p[3]), alt_m=last)
+    return MissionItem(command, MavFrame.MISSION, (p[0], p[1], p[2], p[3]), alt_m=last)
 
 
 def takeoff(home: Home, heights: Heights, first_alt_dsm_m: float, firmware: Firmware) -> MissionItem:
     """Straight up over home to the first waypoint's height, two metres at least."""
     top_m = max(first_alt_dsm_m, home.alt_dsm_m + MIN_TAKEOFF_M)
     params = (0.0, 0.0, 0.0, unset(firmware))
-    return MissionItem(TAKEOFF, heights.frame, params, _deg(home.lat_deg), _deg(home.lon_deg), heights.item_m(top_m))
+    return MissionItem(
+        MavCmd.NAV_TAKEOFF, heights.frame, params, _deg(home.lat_deg), _deg(home.lon_deg), heights.item_m(top_m)
+    )
 
 
 def waypoint(place: Place, heights: Heights, *, hold_s: float, yaw_deg: float) -> MissionItem:
     """Hold seconds are rounded up, because the vehicle cuts them to whole ones."""
     params = (float(math.ceil(hold_s)), 0.0, 0.0, yaw_deg)
     alt_m = heights.item_m(place.alt_dsm_m)
-    return MissionItem(WAYPOINT, heights.frame, params, _deg(place.lat_deg), _deg(place.lon_deg), alt_m)
+    return MissionItem(MavCmd.NAV_WAYPOINT, heights.frame, params, _deg(place.lat_deg), _deg(place.lon_deg), alt_m)
 
 
 def _deg(degrees: float) -> float:
@@ -88,9 +85,9 @@ def aiming(params: MissionParams, firmware: Firmware, heights: Heights, dsm: Dsm
         if not -180 <= pitch_deg <= 180:
             raise ParameterError(f"The gimbal's pitch is {pitch_deg} degrees.", advice="Give -90 to look down.")
         if firmware == "ardupilot":
-            items.append(action(MOUNT_CONTROL, pitch_deg, last=MOUNT_TARGETING))
+            items.append(action(MavCmd.DO_MOUNT_CONTROL, pitch_deg, last=MOUNT_TARGETING))
         else:
-            items.append(action(GIMBAL_PITCHYAW, pitch_deg, 0.0, math.nan, math.nan))
+            items.append(action(MavCmd.DO_GIMBAL_MANAGER_PITCHYAW, pitch_deg, 0.0, math.nan, math.nan))
     return items
 
 
@@ -102,16 +99,16 @@ def starting(params: MissionParams, firmware: Firmware) -> list[MissionItem]:
             raise ParameterError(
                 f"The distance between photos is {params.camera_trigger_m} m.", advice="Give metres above zero."
             )
-        items.append(action(SET_CAM_TRIGG_DIST, params.camera_trigger_m, 0.0, 1.0))
+        items.append(action(MavCmd.DO_SET_CAM_TRIGG_DIST, params.camera_trigger_m, 0.0, 1.0))
     if params.heading == "fixed" and firmware == "ardupilot":
-        items.append(action(CONDITION_YAW, fixed_heading_deg(params)))
+        items.append(action(MavCmd.CONDITION_YAW, fixed_heading_deg(params)))
     return items
 
 
 def stopping(params: MissionParams) -> list[MissionItem]:
     """Camera off and the nose free again, after the last waypoint."""
-    camera = [action(SET_CAM_TRIGG_DIST, 0.0)] if params.camera_trigger_m is not None else []
-    return camera + ([action(SET_ROI_NONE)] if params.heading == "point" else [])
+    camera = [action(MavCmd.DO_SET_CAM_TRIGG_DIST, 0.0)] if params.camera_trigger_m is not None else []
+    return camera + ([action(MavCmd.DO_SET_ROI_NONE)] if params.heading == "point" else [])
 
 
 def fixed_heading_deg(params: MissionParams) -> float:
@@ -130,12 +127,14 @@ def _roi(params: MissionParams, heights: Heights, dsm: Dsm) -> MissionItem:
     if not math.isfinite(ground_m):
         raise ParameterError(f"The terrain at the point to look at, {lat_deg}, {lon_deg}, is unknown.", advice=advice)
     alt_m = heights.item_m(ground_m)
-    return MissionItem(SET_ROI_LOCATION, heights.frame, (0.0, 0.0, 0.0, 0.0), _deg(lat_deg), _deg(lon_deg), alt_m)
+    return MissionItem(
+        MavCmd.DO_SET_ROI_LOCATION, heights.frame, (0.0, 0.0, 0.0, 0.0), _deg(lat_deg), _deg(lon_deg), alt_m
+    )
 
 
 def return_to_launch() -> list[MissionItem]:
     """The autopilot's own way home, at its own height."""
-    return [action(RTL)]
+    return [action(MavCmd.NAV_RETURN_TO_LAUNCH)]
 
 
 def landing(
@@ -154,5 +153,7 @@ def landing(
     if (_deg(last.lat_deg), _deg(last.lon_deg)) != (_deg(home.lat_deg), _deg(home.lon_deg)):
         items.append(waypoint(over_home, heights, hold_s=0.0, yaw_deg=yaw_deg))
     ground_m = float(home.alt_dsm_m - heights.origin_alt_dsm_m)
-    land = MissionItem(LAND, heights.frame, (0.0, 0.0, 0.0, yaw_deg), _deg(home.lat_deg), _deg(home.lon_deg), ground_m)
+    land = MissionItem(
+        MavCmd.NAV_LAND, heights.frame, (0.0, 0.0, 0.0, yaw_deg), _deg(home.lat_deg), _deg(home.lon_deg), ground_m
+    )
     return [*items, land]

@@ -26,7 +26,10 @@ def shipped_profiles() -> tuple[str, ...]:
 
 
 def load_profile(name_or_path: str | Path = DEFAULT_PROFILE) -> VehicleProfile:
-    """A shipped profile by its name, or one from a TOML file. Raises ``FormatError``, ``ParameterError``."""
+    """A shipped profile by its name, or one from a TOML file: SI units, the names of ``VehicleProfile``'s fields.
+
+    Raises ``FormatError`` for what is no profile and ``ParameterError`` for a value out of range.
+    """
     path = SHIPPED / f"{name_or_path}.toml" if str(name_or_path) in shipped_profiles() else Path(name_or_path)
     try:
         data = path.read_bytes()
@@ -141,7 +144,7 @@ def _toml(value: str | float) -> str:
 
 
 def path_params(profile: VehicleProfile) -> PathParams:
-    """Path parameters with the vehicle's own limits."""
+    """Path parameters with the vehicle's own speeds and limits, sampled every 0.10 m (Melita 2020, section 6)."""
     return PathParams(
         mean_speed_m_s=profile.mean_speed_m_s,
         max_speed_m_s=profile.max_speed_m_s,

@@ -30,9 +30,22 @@ FILES = (
 
 
 def export_file(
-    name: str, plan: Plan, source: SurfaceModel, *, title: str, created_utc: str, seconds: dict[str, float]
+    name: str,
+    plan: Plan,
+    source: SurfaceModel,
+    *,
+    title: str = "Mission",
+    created_utc: str | None = None,
+    seconds: Mapping[str, float] | None = None,
 ) -> str:
-    """One of ``FILES`` as text; ``source`` is the surface model as read."""
+    """One of ``FILES`` as text (UTF-8), certified or not: ``plan.certificate`` says which.
+
+    ``source`` is the surface model as read. ``created_utc`` is ISO 8601, None: now; ``seconds`` are what each step of
+    the computation took, for the report. Raises KeyError for another name.
+    """
+    if created_utc is None:
+        created_utc = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    seconds = dict(seconds or {})
     writers: dict[str, Callable[[], str]] = {
         "trajectory.csv": lambda: trajectory_csv.write_trajectory(plan.path, plan.timing, plan.mission.home, plan.dsm),
         "trajectory.kml": lambda: kml.write_kml(plan.path, plan.mission, plan.dsm, title=title),

@@ -8,27 +8,27 @@ from collections.abc import Callable
 from planning.formats.safe_text import clean_name
 from planning.mav_cmd import MavCmd
 
-COMMAND_NAMES = {
-    16: "waypoint",
-    17: "loiter without end",
-    18: "loiter turns",
-    19: "loiter",
-    20: "return to launch",
-    21: "land",
-    22: "take-off",
-    82: "spline waypoint",
-    115: "yaw",
-    177: "jump",
-    178: "change speed",
-    195: "region of interest",
-    197: "no region of interest",
-    201: "region of interest",
-    203: "take a photo",
-    205: "gimbal",
-    206: "photo by distance",
-    1000: "gimbal",
-    2000: "take photos",
-    2001: "stop photos",
+COMMAND_NAMES: dict[int, str] = {
+    MavCmd.NAV_WAYPOINT: "waypoint",
+    MavCmd.NAV_LOITER_UNLIM: "loiter without end",
+    MavCmd.NAV_LOITER_TURNS: "loiter turns",
+    MavCmd.NAV_LOITER_TIME: "loiter",
+    MavCmd.NAV_RETURN_TO_LAUNCH: "return to launch",
+    MavCmd.NAV_LAND: "land",
+    MavCmd.NAV_TAKEOFF: "take-off",
+    MavCmd.NAV_SPLINE_WAYPOINT: "spline waypoint",
+    MavCmd.CONDITION_YAW: "yaw",
+    MavCmd.DO_JUMP: "jump",
+    MavCmd.DO_CHANGE_SPEED: "change speed",
+    MavCmd.DO_SET_ROI_LOCATION: "region of interest",
+    MavCmd.DO_SET_ROI_NONE: "no region of interest",
+    MavCmd.DO_SET_ROI: "region of interest",
+    MavCmd.DO_DIGICAM_CONTROL: "take a photo",
+    MavCmd.DO_MOUNT_CONTROL: "gimbal",
+    MavCmd.DO_SET_CAM_TRIGG_DIST: "photo by distance",
+    MavCmd.DO_GIMBAL_MANAGER_PITCHYAW: "gimbal",
+    MavCmd.IMAGE_START_CAPTURE: "take photos",
+    MavCmd.IMAGE_STOP_CAPTURE: "stop photos",
 }
 """MAV_CMD -> words."""
 _UNITS = (

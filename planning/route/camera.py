@@ -7,6 +7,9 @@ import math
 from planning.errors import ParameterError
 from planning.model import Camera
 
+LOOKS_DOWN_DEG = -90.0
+"""Gimbal pitch of a survey's camera."""
+
 
 def height_from_gsd_m(camera: Camera, gsd_cm: float) -> float:
     """Height above the ground at which one pixel covers ``gsd_cm``.
@@ -15,14 +18,14 @@ def height_from_gsd_m(camera: Camera, gsd_cm: float) -> float:
     """
     check_camera(camera)
     _positive("ground sampling distance", gsd_cm, "cm")
-    return camera.image_width_px * gsd_cm * camera.focal_mm / (camera.sensor_width_mm * 100)  # eq. 1
+    return camera.image_width_px * gsd_cm * camera.focal_mm / (camera.sensor_width_mm * 100)  # Melita 2020, eq. 1
 
 
 def gsd_cm(camera: Camera, height_m: float) -> float:
     """Ground sampling distance at ``height_m`` above the ground: eq. 1 of Melita 2020 the other way round."""
     check_camera(camera)
     _positive("height above ground", height_m, "m")
-    return height_m * camera.sensor_width_mm * 100 / (camera.image_width_px * camera.focal_mm)
+    return height_m * camera.sensor_width_mm * 100 / (camera.image_width_px * camera.focal_mm)  # Melita 2020, eq. 1
 
 
 def footprint_m(camera: Camera, height_m: float) -> tuple[float, float]:

@@ -75,7 +75,7 @@ def lspb(length_m: float, params: PathParams) -> Lspb:
     if not (math.isfinite(length_m) and length_m > 0):
         raise ParameterError(f"A segment's length is {length_m} m.", advice="Give two points that differ.")
     peak_m_s, limit_m_s2 = params.max_speed_m_s, params.max_accel_m_s2
-    blend_s = length_m / params.mean_speed_m_s - length_m / peak_m_s
+    blend_s = length_m / params.mean_speed_m_s - length_m / peak_m_s  # Melita 2020, section 6
     if peak_m_s <= limit_m_s2 * blend_s:
         return Lspb(length_m, length_m / params.mean_speed_m_s, blend_s, peak_m_s)
     peak_m_s = min(peak_m_s, math.sqrt(length_m * limit_m_s2))

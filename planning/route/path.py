@@ -27,7 +27,7 @@ def sampled_path(
     the path is the surface itself and the timing slows down. Raises ``PoiError`` where the
     surface is unknown.
     """
-    xy_m, s_m, vertex = sample_segments(vertices_xy_m, params.step_m)
+    xy_m, s_m, vertex = sample_segments(vertices_xy_m, params.step_m)  # Melita 2020, section 6
     if len(vertex_poi) != len(vertex):
         raise ParameterError(f"{len(vertex)} vertices came with {len(vertex_poi)} indices of points.")
     surface_m = np.asarray(surface_at(xy_m) if callable(surface_at) else surface_at, dtype=np.float64)

@@ -34,7 +34,7 @@ class Element:
 
     weights_m: F32
     """(D, P) height at row offset d and column offset p; ``UNKNOWN`` outside."""
-    pairs: NDArray[np.int64]
+    pairs: I64
     """(D,) columns to visit in each row, a multiple of ``PAIRS``."""
 
 
@@ -50,7 +50,7 @@ def ball(*, radius_px: float, height_m: float, block_px: int = 1, lift_m: float 
     inside = ratio2 <= _RIM**2
     pairs = -(-inside.sum(axis=1) // PAIRS) * PAIRS
     weights_m = np.full((reach + 1, int(pairs.max())), UNKNOWN, np.float32)
-    height = height_m * np.sqrt(np.maximum(1 - ratio2, 0)) + lift_m
+    height = height_m * np.sqrt(np.maximum(1 - ratio2, 0)) + lift_m  # Melita 2020, eq. 2
     weights_m[:, : reach + 1][inside] = height[inside]
     return Element(weights_m, pairs.astype(np.int64))
 

@@ -11,9 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from planning.dsm import F32
-
-I64 = NDArray[np.int64]
+from mapping.geometry.arrays import F32, I64
 
 UNKNOWN = np.float32(-1e30)
 """Stands for eq. 2's -inf: finite, so that adding a weight to it is harmless in every comparison."""
@@ -60,7 +58,7 @@ def _merge_pairs(merged_m: F32, weights_m: F32, dx: int, halo: int, best_m: F32)
         a = a if a > b else b
         c = c if c > d else d
         a = a if a > c else c
-        best_m[x] = a if a > best_m[x] else best_m[x]
+        best_m[x] = a if a > best_m[x] else best_m[x]  # Melita 2020, eq. 2
 
 
 @njit(cache=True, nogil=True)

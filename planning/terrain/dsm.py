@@ -17,8 +17,8 @@ from planning.terrain.cells.cells import Cells, square_cells
 from planning.terrain.cells.squares import squares
 from planning.terrain.vertical_datum import is_above_sea_level
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
+LARGE_PX = 4_000_000
+"""A model with more cells is read and looked at in part; a smaller one whole."""
 
 
 class SurfaceModel(ABC):

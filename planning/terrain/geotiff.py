@@ -1,6 +1,6 @@
 """Reads surface models and orthomosaics from GeoTIFF or ESRI ASCII files, and writes surface models.
 
-Decoding happens in a confined child process (``planning.rasters``); what comes back are numbers.
+Decoding happens in a confined child process (``planning.terrain.rasters``); what comes back are numbers.
 """
 
 from __future__ import annotations
@@ -50,7 +50,10 @@ def read_dsm(
     remove_spikes: bool = False,
     progress: Progress | None = None,
 ) -> Dsm:
-    """A surface model in metres from a GeoTIFF or ESRI ASCII grid; see ``read_dsm_reported``."""
+    """A surface model in metres from a GeoTIFF or ESRI ASCII grid: (H, W) heights in the file's own vertical datum.
+
+    ``read_dsm_reported`` says what the options mean. Raises RasterError, with what to do.
+    """
     dsm, _ = _read(path, _declared(crs, z_scale, vertical_datum, limits), progress)
     return without_spikes(dsm, find_spikes(dsm)) if remove_spikes else dsm
 
@@ -70,7 +73,7 @@ def read_dsm_reported(
     ``crs`` and ``vertical_datum`` declare or override what the file says; ``z_scale`` is metres per
     stored unit (0.01 for centimetres). Projected metres stay as they are, feet become metres in their
     places. Degrees and grids whose metres are not true go to the local UTM zone, rotated or oblong cells become
-    squares, no height is lost on the way (``planning.cells.squares``); the file's own cells stay with the model
+    squares, no height is lost on the way (``planning.terrain.cells.squares``); the file's own cells stay with the model
     for whatever must be exact (``Dsm.cells``). ``progress`` may raise to cancel.
     Raises a RasterError that says what to do.
     """

@@ -7,10 +7,8 @@ import math
 import numba as nb
 import numpy as np
 
-from planning.dsm import Dsm
-
-U8 = NDArray[np.uint8]
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, U8
+from planning.terrain.dsm import Dsm
 
 SUN_AZIMUTH_DEG = 315.0
 """Light from the upper left, as maps have it: from elsewhere, relief reads inverted."""

@@ -15,8 +15,8 @@ from numba import njit, prange
 from mapping.geometry.arrays import F32, I32, I64
 from planning.terrain.dsm import Dsm
 
-I32 = NDArray[np.int32]
-I64 = NDArray[np.int64]
+SMALL_HOLE_M2 = 4.0
+"""Holes below it are taken for gaps of the survey."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class HoleReport:
     area_m2: float
 
 
-def fill_holes(dsm: Dsm, max_area_m2: float = 4.0) -> tuple[Dsm, HoleReport]:
+def fill_holes(dsm: Dsm, max_area_m2: float = SMALL_HOLE_M2) -> tuple[Dsm, HoleReport]:
     """Fill holes under ``max_area_m2`` that do not touch the model's edge with the maximum of their rim.
 
     Returns the same model when there is nothing to fill. Holes are found as runs of unknown cells along

@@ -15,7 +15,6 @@ from planning.terrain.cells.squares import Inverse, source_places
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.mapping import source_mapping
 
-U8 = NDArray[np.uint8]
 Bounds = tuple[float, float, float, float]
 
 _EDGE_POINTS = 33
@@ -27,7 +26,7 @@ class Orthophoto:
 
     rgb: U8
     """(H, W, 3) red, green, blue; row 0 northernmost; read-only."""
-    known: NDArray[np.bool_]
+    known: Bools
     """(H, W) whether the orthomosaic covers the pixel; read-only."""
     bounds_m: Bounds
     """West, south, east, north of the outer pixel edges, projected metres."""
@@ -112,7 +111,7 @@ def _check_colours(header: RasterHeader, where: str) -> None:
         )
 
 
-def _outline(window: tuple[float, float, float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _outline(window: tuple[float, float, float, float]) -> tuple[F64, F64]:
     """Points on the border of (first u, first v, size u, size v)."""
     share = np.linspace(0.0, 1.0, _EDGE_POINTS)
     zero, one = np.zeros_like(share), np.ones_like(share)
@@ -121,7 +120,7 @@ def _outline(window: tuple[float, float, float, float]) -> tuple[NDArray[np.floa
     return u, v
 
 
-def _extent(x: NDArray[np.float64], y: NDArray[np.float64]) -> Bounds:
+def _extent(x: F64, y: F64) -> Bounds:
     return float(x.min()), float(y.min()), float(x.max()), float(y.max())
 
 

@@ -30,9 +30,7 @@ class TerrainHit:
     """Along the ray, in lengths of its direction."""
 
 
-def raycast(
-    dsm: Dsm, origin_m: NDArray[np.float64], direction: NDArray[np.float64], *, floor_alt_dsm_m: float
-) -> TerrainHit | None:
+def raycast(dsm: Dsm, origin_m: F64, direction: F64, *, floor_alt_dsm_m: float) -> TerrainHit | None:
     """First touch of the ray ``origin_m + t * direction``, t >= 0, with the model; None when it meets nothing.
 
     Cells are solid columns up to their height, as in the clearance certificate. Unknown cells, and everything
@@ -75,9 +73,7 @@ def _border(start: float, step: float, cell: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _walk(
-    elevation_m: F32, start: NDArray[np.float64], step: NDArray[np.float64], floor_m: float
-) -> tuple[int, float, int, int]:
+def _walk(elevation_m: F32, start: F64, step: F64, floor_m: float) -> tuple[int, float, int, int]:
     """(kind of hit, t, row, column) of a ray in (column, row, height) coordinates."""
     rows, cols = elevation_m.shape
     t_floor = math.inf

@@ -16,8 +16,7 @@ from scipy import ndimage
 
 from mapping.geometry.arrays import F32
 from planning.errors import ParameterError
-
-F32 = NDArray[np.float32]
+from planning.terrain.dsm import Dsm
 
 _RELIEF_FACTOR = 2.0
 """A spike stands at least this many times the relief around it above all of it."""

@@ -12,7 +12,6 @@ import numpy as np
 from mapping.geometry.arrays import F64, I64
 from planning.report.figures.ticks import label, padded, round_step, ticks
 
-F64 = NDArray[np.float64]
 LEFT, RIGHT, TOP, BOTTOM = 58, 16, 34, 46
 INK, MUTED, GRID = "#1f2933", "#5b6770", "#e3e8ec"
 
@@ -218,3 +217,16 @@ def _legend(chart: Chart) -> list[str]:
         entries.append(f'<text x="{x + 28}" y="20" fill="{INK}">{escape(series.name)}</text>')
         x += 28 + 20 + round(6.6 * len(series.name))
     return entries
+
+
+def keep_extremes(y: F64, max_points: int = 1200) -> I64:
+    """Indices of at most about ``max_points`` samples: the ends, and each bucket's lowest and highest.
+
+    NaN samples count as neither; a bucket of nothing but NaN keeps its first, so that gaps stay gaps.
+    """
+    if len(y) <= max_points:
+        return np.arange(len(y))
+    edges = np.linspace(0, len(y), max(2, max_points // 2) + 1).astype(np.int64)
+    low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
+    picked = [a + k for a, b in itertools.pairwise(edges) for k in (np.argmin(low[a:b]), np.argmax(high[a:b]))]
+    return np.unique(np.array([0, len(y) - 1, *picked], dtype=np.int64))

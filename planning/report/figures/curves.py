@@ -14,7 +14,6 @@ from planning.model import Certificate, FlownLine, Poi, SampledPath, Timing
 from planning.report.figures.chart import Chart, Mark, Series, render_chart
 from planning.report.words import metres
 
-F64 = NDArray[np.float64]
 TERRAIN, SURFACE, PATH, FLOWN = "#7a6a55", "#d9822b", "#1769aa", "#243b53"
 GOOD, TIGHT, BAD = "#2e8540", "#d9822b", "#c62828"
 DISTANCE = "Distance flown (m)"
@@ -22,13 +21,13 @@ _LONGEST_MARK = 14
 
 
 def altitude_profile(path: SampledPath, line: FlownLine, certificate: Certificate, pois: Sequence[Poi]) -> str:
-    """Terrain, dilated surface, sampled path and flown waypoints over home, against distance (Melita 2020, fig. 13)."""
+    """Terrain, dilated surface, sampled path and flown waypoints over home, against distance (Melita 2020, fig. 12)."""
     home = line.home_alt_dsm_m
     flown_s_m = line_distance(line)
     series = (
         Series(path.s_m, path.ground_alt_dsm_m - home, "terrain (DSM)", TERRAIN, 1.2, fill="#e6ddd0"),
         Series(path.s_m, path.surface_alt_dsm_m - home, "dilated, smoothed surface", SURFACE, 1.5, dash="5 3"),
-        Series(path.s_m, path.alt_dsm_m - home, "sampled path", PATH, 1.5),
+        Series(path.s_m, path.alt_dsm_m - home, "sampled path", PATH, 1.5),  # Melita 2020, fig. 12
         Series(flown_s_m, line.points_m[:, 2] - home, "waypoints as flown", FLOWN, 1.6, dots=len(flown_s_m) <= 400),
     )
     worst = certificate.worst
@@ -69,8 +68,7 @@ def time_chart(path: SampledPath, timing: Timing, *, width: int = 482) -> str:
 
 def line_distance(line: FlownLine) -> F64:
     """(K,) horizontal distance flown at each point of the line."""
-    steps = np.hypot(*np.diff(line.points_m[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    return along_m(line.points_m[:, :2])
 
 
 def _poi_marks(path: SampledPath, pois: Sequence[Poi]) -> list[Mark]:

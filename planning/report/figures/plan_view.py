@@ -19,7 +19,6 @@ from planning.safe_surface.surface import fit_within
 from planning.terrain.dsm import Dsm
 from planning.terrain.hillshade import height_colors, hillshade, scale_rgb
 
-F64 = NDArray[np.float64]
 MAX_IMAGE_PX = 1000
 MAP_PX, LEGEND_PX = 900.0, 80.0
 MAX_MAP_HEIGHT_PX = 640.0
@@ -73,7 +72,7 @@ def _relief(dsm: Dsm) -> str:
     return "data:image/png;base64," + base64.b64encode(out.getvalue()).decode()
 
 
-def _pale(colors: NDArray[np.uint8]) -> F64:
+def _pale(colors: U8) -> F64:
     """Height colours as a background that lines and labels stand out from."""
     return 0.55 * colors.astype(np.float64) + 0.45 * 235
 

@@ -12,8 +12,6 @@ from mapping.geometry.arrays import F32, F64
 from planning.errors import RasterFormatError
 from planning.terrain.cells.lattice import Lattice, corner, places_of, straight
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
 Mapping = Callable[[F64, F64], tuple[F64, F64]]
 """Raster column, row (fractional) -> projected x, y."""
 

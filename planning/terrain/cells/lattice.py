@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 _STEPS = 12
 _SAME_PLACE_PX = 1e-10

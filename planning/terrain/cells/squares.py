@@ -11,8 +11,6 @@ from numba import njit, prange
 from mapping.geometry.arrays import F32, F64
 from planning.terrain.cells.cells import Cells, Layout
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
 Inverse = Callable[[F64, F64], tuple[F64, F64]]
 """Target projected x, y -> source column, row (fractional)."""
 

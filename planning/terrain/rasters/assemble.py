@@ -10,11 +10,11 @@ from affine import Affine
 
 from mapping.geometry.arrays import F32
 from planning.errors import NoElevationError
-from planning.rasters.heights import HeightStats, doubts, false_sentinels, mask_and_scale
-from planning.rasters.surface_plan import SurfacePlan
-from planning.spikes import Spike
-
-F32 = NDArray[np.float32]
+from planning.terrain.cells.squares import squares
+from planning.terrain.dsm import Dsm
+from planning.terrain.rasters.heights import HeightStats, doubts, false_sentinels, mask_and_scale
+from planning.terrain.rasters.surface_plan import SurfacePlan
+from planning.terrain.spikes import Spike
 
 
 @dataclass(frozen=True, slots=True)

@@ -163,7 +163,7 @@ def _sample(source: Any) -> list[Window]:
     ]
 
 
-def _place(target: BinaryIO, part: NDArray[np.float32], row: int, column: int, width: int) -> None:
+def _place(target: BinaryIO, part: F32, row: int, column: int, width: int) -> None:
     """Write a part where it belongs in a file of rows of ``width`` float32."""
     lines = part.reshape(1, -1) if part.shape[1] == width else part
     for line, heights in enumerate(lines):
@@ -171,7 +171,7 @@ def _place(target: BinaryIO, part: NDArray[np.float32], row: int, column: int, w
         target.write(np.ascontiguousarray(heights).data)
 
 
-def _known_heights(source: Any, window: Window) -> NDArray[np.float32]:
+def _known_heights(source: Any, window: Window) -> F32:
     block = source.read(1, window=window, masked=True)
     with np.errstate(over="ignore", invalid="ignore"):
         heights = block.data.astype(np.float32)

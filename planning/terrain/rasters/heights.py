@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-F32 = NDArray[np.float32]
+from mapping.geometry.arrays import F32
 
 ABSURD = 1e30
 """No height in any unit: float32's limits and the like, written for "unknown"."""

@@ -9,7 +9,8 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS, Transformer
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+
 Mapping = Callable[[F64, F64], tuple[F64, F64]]
 
 EDGE_POINTS = 33

@@ -13,7 +13,6 @@ from planning.terrain.rasters.assemble import north_up_grid
 from planning.terrain.rasters.reading import Pixels
 from planning.terrain.rasters.surface_plan import SurfacePlan
 
-F32 = NDArray[np.float32]
 Part = tuple[slice, slice]
 """Rows and columns."""
 

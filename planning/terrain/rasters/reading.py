@@ -20,7 +20,6 @@ from planning.terrain.rasters.limits import RasterLimits
 from planning.terrain.rasters.magic import driver_of
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 
-F32 = NDArray[np.float32]
 Progress = Callable[[str, float], None]
 """Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
 

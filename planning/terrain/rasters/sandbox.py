@@ -20,8 +20,9 @@ from planning.terrain.rasters.limits import RasterLimits
 Json = dict[str, Any]
 Progress = Callable[[str, float], None]
 
-_ROOT = Path(__file__).resolve().parents[2]
-_COMMAND = [sys.executable, "-P", "-m", "planning.rasters.worker"]
+_PACKAGE = __name__.rpartition(".")[0]
+_ROOT = Path(__file__).resolve().parents[__name__.count(".")]
+_COMMAND = [sys.executable, "-P", "-m", f"{_PACKAGE}.worker"]
 _LONGEST_MESSAGE = 2**20
 _ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
 # GDAL reads these before Python can set them through rasterio.Env: drivers register on import.

@@ -1,6 +1,6 @@
 """The child process that decodes one raster file: a job comes in on stdin, messages go out on stdout, as JSON lines.
 
-Started by ``planning.rasters.sandbox`` with GDAL's settings already in the environment. It imports
+Started by ``planning.terrain.rasters.sandbox`` with GDAL's settings already in the environment. It imports
 little, so that it starts fast and its memory limit means something.
 """
 

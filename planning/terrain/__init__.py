@@ -1,0 +1,1 @@
+"""The surface model: reading it, its datum, its holes and spikes, and how it is shown."""
