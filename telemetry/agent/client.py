@@ -44,7 +44,6 @@ from telemetry.errors import AddressError, SensorLinkError
 
 _log = logging.getLogger(__name__)
 
-F32 = NDArray[np.float32]
 PING_EVERY_S = 1.0
 OPEN_TIMEOUT_S = 10.0
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)
@@ -271,7 +270,7 @@ class Agent:
         if isinstance(reading, UwbReading):
             return encode(msgspec.structs.replace(reading.scan, number=number, t_s=t_s))
         if isinstance(reading, RadarReading):
-            return encode(Radar(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
+            return encode(RadarMessage(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
         points, not_finite, out_of_reach = sendable(reading.xyz_m, REACH_M)
         self.counts.points_not_finite += not_finite
         self.counts.points_out_of_reach += out_of_reach

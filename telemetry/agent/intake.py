@@ -125,7 +125,7 @@ class Intake:
         text = "".join(c if c.isprintable() else " " for c in message.text[:NOTICE_LONGEST])
         return VehicleText(now_utc_s, WARNING if message.warning else INFO, f"{self.name}: {text}")
 
-    def _frame(self, message: Radar | Cloud | Slam | Uwb, now_mono_s: float, now_utc_s: float) -> Frame:
+    def _frame(self, message: RadarMessage | Cloud | Slam | Uwb, now_mono_s: float, now_utc_s: float) -> Frame:
         age_s = now_mono_s - message.t_s
         if not -FUTURE_S <= age_s < 3600.0:
             raise SensorLinkError(f"A frame was measured {-age_s:.2f} s from now.", where=type(message).__name__)
@@ -136,7 +136,7 @@ class Intake:
             return SlamPose(message.t_s, message.position_m, message.q_wxyz, message.tracking)
         if isinstance(message, Uwb):
             return self._scan(message, now_mono_s, now_utc_s - age_s)
-        if isinstance(message, Radar):
+        if isinstance(message, RadarMessage):
             targets = targets_of(message)
             self._count(message)
             xyz_m, speed, snr = packed(targets[:, :3]), packed(targets[:, 3]), packed(targets[:, 4])
@@ -156,7 +156,7 @@ class Intake:
         lies = message.bin_m, message.first_bin_m
         return UwbScan(message.t_s, t_utc_s, message.number, self.name, intensity, *lies, *angles_rad)
 
-    def _count(self, message: Radar | Cloud | Uwb) -> None:
+    def _count(self, message: RadarMessage | Cloud | Uwb) -> None:
         """Numbers count up by one; a smaller one is an agent that began anew, or a frame out of order."""
         last = self._numbers.get(type(message))
         if last is not None and message.number > last + 1:

@@ -30,8 +30,6 @@ STEP_M = 0.005
 REACH_M = STEP_M * 32767
 """16 bits reach 163 m."""
 
-F32 = NDArray[np.float32]
-
 
 class Hello(msgspec.Struct, frozen=True, tag="hello", forbid_unknown_fields=True):
     """The agent's first message."""
@@ -46,7 +44,7 @@ class Ping(msgspec.Struct, frozen=True, tag="ping", forbid_unknown_fields=True):
     t_s: float
 
 
-class Radar(msgspec.Struct, frozen=True, tag="radar", forbid_unknown_fields=True):
+class RadarMessage(msgspec.Struct, frozen=True, tag="radar", forbid_unknown_fields=True):
     """One radar frame: ``targets`` are (N, 5) little-endian float32."""
 
     number: int
@@ -117,7 +115,7 @@ class Report(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=Tr
     text: str
 
 
-FromAgent = Hello | Ping | Radar | Cloud | Slam | Uwb | Notice
+FromAgent = Hello | Ping | RadarMessage | Cloud | Slam | Uwb | Notice
 FromServer = Welcome | Pong | Report
 _from_agent = msgspec.msgpack.Decoder(FromAgent)
 _from_server = msgspec.msgpack.Decoder(FromServer)
@@ -153,7 +151,7 @@ def points_of(message: Cloud) -> F32:
     return steps.astype(np.float32) * np.float32(message.step_m)
 
 
-def targets_of(message: Radar) -> F32:
+def targets_of(message: RadarMessage) -> F32:
     """(N, 5). Raises SensorLinkError for bytes that are no targets, or too many."""
     return _rows(message.targets, "<f4", TARGET_COLUMNS, TARGETS_MAX, "radar").astype(np.float32)
 
@@ -190,3 +188,18 @@ def _decode(decoder: msgspec.msgpack.Decoder[FromAgent] | msgspec.msgpack.Decode
             where="sensor link",
             advice="Agent and ground station must be of the same version.",
         ) from error
+
+
+class Sendable(NamedTuple):
+    """The points (N, 3) that can be sent, and how many cannot."""
+
+    xyz_m: F32
+    not_finite: int
+    out_of_reach: int
+
+
+def sendable(xyz_m: F32, reach_m: float) -> Sendable:
+    """Points whose coordinates are numbers, and none of them beyond ``reach_m``."""
+    known = xyz_m[np.isfinite(xyz_m).all(axis=1)]
+    near = known[(np.abs(known) <= np.float32(reach_m)).all(axis=1)]
+    return Sendable(near, len(xyz_m) - len(known), len(known) - len(near))

@@ -14,7 +14,6 @@ from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.link_messages import TARGETS_MAX
 from telemetry.errors import SensorError
 
-F32 = NDArray[np.float32]
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)
 
 

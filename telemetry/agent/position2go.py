@@ -73,7 +73,7 @@ class Position2Go(LiveRadar):
 
     def _session(self) -> Iterator[RadarReading | NoticeReading]:
         with contextlib.closing(open_port(self._device, BAUD)) as port:
-            session = Session(port, self.status.counts, now=self._now, wait=self._wait)
+            session = BoardSession(port, self.status.counts, now=self._now, wait=self._wait)
             params = session.set_up()
             chain = self._chain_of(params)
             for taken in session.frames(params.chirps * params.chirp_interval_s / 2):
@@ -93,7 +93,7 @@ class Position2Go(LiveRadar):
             self._chain.process(rng.standard_normal((*params.shape, 2), np.float32).view(np.complex64)[..., 0])
         return self._chain
 
-    def _clipped(self, taken: Taken) -> Iterator[NoticeReading]:
+    def _clipped(self, taken: TakenFrame) -> Iterator[NoticeReading]:
         """Told once. Such a frame is processed all the same: what drives the receivers so far is near."""
         is_clipped = taken.frame.clipped > CLIPPED
         self.status.counts.clipped_frames += is_clipped
@@ -101,7 +101,7 @@ class Position2Go(LiveRadar):
             self._told_clipped = True
             yield self._notice(TOO_STRONG, TOO_STRONG)
 
-    def _processed(self, chain: RadarChain, taken: Taken) -> RadarReading:
+    def _processed(self, chain: RadarChain, taken: TakenFrame) -> RadarReading:
         found = chain.process(taken.frame.cube)
         self.status.targets += len(found)
         return reading_of(taken.t_s, found.xyz_m, found.radial_speed_m_s, found.snr_db, taken.lost_before)

@@ -49,10 +49,9 @@ def _reading(message: RadarFrame | CloudFrame | SlamPose | UwbScan) -> Reading:
     t_s = message.t_mono_s
     match message:
         case RadarFrame():
-            columns = (rows(message.xyz_m, 3), rows(message.radial_speed_m_s, 1), rows(message.snr_db, 1))
-            return RadarReading(t_s, np.hstack(columns))
+            return RadarReading(t_s, np.column_stack(message.columns()))
         case CloudFrame():
-            return CloudReading(t_s, rows(message.xyz_m, 3))
+            return CloudReading(t_s, message.points_m)
         case UwbScan():
             return UwbReading(t_s, _scan(message))
         case SlamPose():

@@ -88,13 +88,13 @@ class Bus:
 
     def publish(self, topic: str, message: Published) -> None:
         """Never blocks: a reader that has stopped reading loses messages, nobody else does."""
-        payload = wire.encode_message(topic, message)
+        payload = encoding.encode_message(topic, message)
         self._need_open()
         # Monotonic time is the same for all processes here: a restarted publisher's messages count as newer.
         self._stamp = max(self._stamp + 1, time.monotonic_ns())
-        if wire.is_kept(topic):
+        if encoding.is_kept(topic):
             self._last[topic] = (payload, self._stamp)
-        announced = wire.is_kept(topic) and len(payload) > _LARGE
+        announced = encoding.is_kept(topic) and len(payload) > _LARGE
         self._session.put(
             _LIVE + topic,
             b"" if announced else payload,

@@ -46,7 +46,9 @@ def encode_message(topic: str, message: Published) -> bytes:
     """Raises BusError for a topic that is not in the table or carries another type."""
     expected = MESSAGE_TYPES.get(plain_name(topic))
     if expected is None:
-        raise BusError(f"There is no topic {topic!r} on the bus.", advice="Use a name of telemetry.messages.Topic.")
+        raise BusError(
+            f"There is no topic {topic!r} on the bus.", advice="Use a name of telemetry.topics.messages.Topic."
+        )
     if not isinstance(message, expected):
         raise BusError(f"{topic} carries {expected.__name__}, not {type(message).__name__}.")
     return encode(message)
@@ -113,3 +115,23 @@ def _plain_number(value: object) -> object:
     if item is None or getattr(value, "shape", None) != ():
         raise NotImplementedError(f"{type(value).__name__} cannot travel on the bus")
     return item()
+
+
+def error_info(error: DescribedError) -> ErrorInfo:
+    return ErrorInfo(error.code, error.what, error.where, error.advice)
+
+
+def error_of(info: ErrorInfo) -> DescribedError:
+    """The error again, of the class that has its code; a ``BusError`` when this process knows no such class."""
+    return _class_of(info.code)(info.what, where=info.where, advice=info.advice)
+
+
+def _class_of(code: str) -> type[DescribedError]:
+    # Classes of other floors appear when their modules are imported, so the table is not made once for all.
+    return next((cls for cls in _subclasses(DescribedError) if cls.code == code), BusError)
+
+
+def _subclasses(cls: type[DescribedError]) -> Iterator[type[DescribedError]]:
+    for child in cls.__subclasses__():
+        yield child
+        yield from _subclasses(child)

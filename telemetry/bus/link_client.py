@@ -1,4 +1,4 @@
-"""Asks the link node over the bus: every request of ``telemetry.requests``, its answer with its type."""
+"""Asks the link node over the bus: every request of ``telemetry.topics.requests``, its answer with its type."""
 
 from __future__ import annotations
 

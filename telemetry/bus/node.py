@@ -19,6 +19,10 @@ from telemetry.topics.messages import ServerAlive, Topic
 
 _log = logging.getLogger(__name__)
 
+UNATTENDED_S, GIVEN_UP_S = 60.0, 600.0
+"""Without a server; without a word of a vehicle that a node would go on for."""
+LOOK_EVERY_S = 0.5
+"""Whether a node is still needed."""
 EXIT_ENDED, EXIT_FAILED, EXIT_REFUSED, EXIT_RUNNING_ALREADY = 0, 1, 2, 3
 
 
@@ -38,6 +42,16 @@ class NodeContext:
         """Seconds without a server, counted from the start of this node if there never was one."""
         seen_s = self.server_seen_s()
         return time.monotonic() - self._started_t_mono_s if seen_s is None else seen_s
+
+    def is_needed(self, heard_t_mono_s: float | None = None) -> bool:
+        """Until there has been no server for a minute.
+
+        ``heard_t_mono_s``: when the vehicle was last heard of whose flight this node goes on for, even so; not for one
+        that nobody has heard of for long. None: there is no such flight.
+        """
+        if self.unattended_s() < UNATTENDED_S:
+            return True
+        return heard_t_mono_s is not None and time.monotonic() - heard_t_mono_s < GIVEN_UP_S
 
     def set_replaceable(self, replaceable: bool) -> None:
         """Whether a server may end this node and start another in its place, without asking anybody.

@@ -26,18 +26,47 @@ from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus
 from telemetry.topics.requests import LinkRequest
 from telemetry.topics.tracks import TracksStatus
 
-LOOK_EVERY_S = 0.5
 PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
-UNATTENDED_S = 60.0
-GIVEN_UP_S = 600.0
-"""Without a server, and without a word of a vehicle that was armed."""
 FIND_AGAIN_S = 30.0
 """After a restart: how long the vehicle that was adopted may take to be heard before it counts as gone."""
 
 
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    address: str
+    adopt: bool
+    """The first autopilot heard there is to be adopted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What a link node writes down so that the next one, after a crash, takes up where it ended."""
+
+    connections: tuple[Wanted, ...] = ()
+    adopted: Candidate | None = None
+    flight: FlightStatus = field(default_factory=FlightStatus)
+    highest_token: int = 0
+
+
+def read_memory(file: Path) -> Memory:
+    """An empty one when there is none that can be read: then the operator connects again."""
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=Memory)
+    except (OSError, msgspec.MsgspecError):
+        return Memory()
+
+
+def write_memory(file: Path, memory: Memory) -> None:
+    """Whole or not at all. A disk that is full costs the memory of a crash, nothing else."""
+    new = file.with_suffix(".new")
+    with contextlib.suppress(OSError):
+        new.write_bytes(msgspec.json.encode(memory))
+        os.replace(new, file)
+
+
 class LinkNode:
-    def __init__(self, link: Link, context: NodeContext, file: Path) -> None:
-        self._link, self._context, self._file = link, context, file
+    def __init__(self, link: Link, right: OperatorRight, context: NodeContext, file: Path) -> None:
+        self._link, self._right, self._context, self._file = link, right, context, file
         self._memory = Memory()
         self._started_s = time.monotonic()
         self._expected = False
@@ -57,26 +86,25 @@ class LinkNode:
 
     async def run(self) -> None:
         """Until nobody needs it any more: no server for a minute, and no armed vehicle that can be heard."""
-        while True:
-            may_end = self._may_end()
-            self._context.set_replaceable(may_end)
-            if self._context.unattended_s() > (UNATTENDED_S if may_end else self._patience_s()):
-                return
+        while self._is_needed():
             await self._remember()
             await asyncio.sleep(LOOK_EVERY_S)
 
-    def _may_end(self) -> bool:
-        vehicle = self._link.vehicle
-        if vehicle is not None and vehicle.state.heartbeat_t_mono_s is not None:
-            self._expected = False
-            return not vehicle.state.armed
-        return not self._is_expected
+    def _is_needed(self) -> bool:
+        """With an armed vehicle: for ever while it is heard, and for long when it is not."""
+        may_end, session = self._may_end(), self._link.session
+        self._context.set_replaceable(may_end)
+        if may_end:
+            return self._context.is_needed()
+        heard_s = None if session is None else session.vehicle.state.heartbeat_t_mono_s
+        return self._context.is_needed(heard_s) or self._context.unattended_s() < GIVEN_UP_S
 
-    def _patience_s(self) -> float:
-        """With an armed vehicle: for ever while it is heard."""
-        vehicle = self._link.vehicle
-        heard_s = None if vehicle is None else vehicle.state.heartbeat_t_mono_s
-        return GIVEN_UP_S if heard_s is None or time.monotonic() - heard_s > GIVEN_UP_S else math.inf
+    def _may_end(self) -> bool:
+        session = self._link.session
+        if session is not None and session.vehicle.state.heartbeat_t_mono_s is not None:
+            self._expected = False
+            return not session.vehicle.state.armed
+        return not self._is_expected
 
     @property
     def _is_expected(self) -> bool:
@@ -89,7 +117,7 @@ class LinkNode:
         adopted = link.peers.adopted
         if adopted is None and self._is_expected:
             adopted = self._memory.adopted
-        memory = Memory(wanted, adopted, link.flight.status, link.right.highest)
+        memory = Memory(wanted, adopted, link.flight.status, self._right.highest)
         if memory != self._memory:
             self._memory = memory
             await asyncio.to_thread(write_memory, self._file, memory)
@@ -102,12 +130,10 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
     right = OperatorRight(memory.highest_token)
     log = await asyncio.to_thread(AuditLog, audit)
     try:
-        async with open_link(
-            bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log, right=right
-        ) as link:
-            node = LinkNode(link, context, file)
+        async with open_link(bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log) as link:
+            node = LinkNode(link, right, context, file)
             await node.take_up(memory, links)
-            await bus.serve("link", link.handle, LinkRequest)
+            await bus.serve("link", Answering(link, right).answer, LinkRequest)
             for topic in (*PERCEPTION, Topic.TRACKS, Topic.PERCEPTION_SETTINGS):
                 link.spawn(_listen(bus, link, topic))
             await node.run()

@@ -2,13 +2,8 @@
 
 import sys
 
-from telemetry.perception.kinds import RANGES
-from telemetry.perception.program import run_perception
-
-
-def main() -> int:
-    return run_perception(RANGES, "Maps what the autopilot's range finders see.")
-
+from telemetry.perception.map_node import run_perception
+from telemetry.perception.sensor_kinds import RANGES
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_perception(RANGES, "Maps what the autopilot's range finders see."))

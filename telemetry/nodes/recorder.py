@@ -26,10 +26,7 @@ _log = logging.getLogger(__name__)
 WORK_EVERY_S = 0.1
 """What is lost at SIGKILL is what came in this time, and what waits in the bus."""
 _STATUS_EVERY_S = 1.0
-_UNATTENDED_S = 60.0
 _MOST_UNREAD = 20_000
-_GIVEN_UP_S = 600.0
-"""Without a word of the vehicle, when there is no server either."""
 
 
 class RecorderNode:
@@ -71,14 +68,10 @@ class RecorderNode:
             subscription.close()
 
     async def _work(self) -> None:
-        while self._context.unattended_s() < _UNATTENDED_S or self._has_work():
+        while self._context.is_needed(self._heard_mono_s if self._recorder.recording else None):
             await self._write()
             self._context.set_replaceable(not self._recorder.recording)
             await asyncio.sleep(WORK_EVERY_S)
-
-    def _has_work(self) -> bool:
-        """A recording of a flight goes on without a server, but not of one that nobody has heard of for long."""
-        return self._recorder.recording and time.monotonic() - self._heard_mono_s < _GIVEN_UP_S
 
     async def _write(self) -> None:
         loop = asyncio.get_running_loop()

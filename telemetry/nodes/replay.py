@@ -21,7 +21,6 @@ from telemetry.topics.messages import REPLAY_PREFIX, ErrorInfo, Published, Repla
 from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
 
 _IDLE_STATUS_EVERY_S = 1.0
-_UNATTENDED_S = 60.0
 _PATIENCE_S = 3.0
 """How long a caller waits for a file to open; after that the status tells how it went."""
 _LONGEST_STRETCH = 500
@@ -46,7 +45,7 @@ class Replayer:
     async def run(self, context: NodeContext) -> None:
         """Until there has been no server for long."""
         try:
-            while context.unattended_s() < _UNATTENDED_S:
+            while context.is_needed():
                 await self._step()
         finally:
             async with self._turn:

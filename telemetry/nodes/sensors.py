@@ -34,9 +34,7 @@ REST_HZ = 4.0
 """The radar's, while the vehicle is not armed."""
 FRESH_S = 0.5
 """Older truths are looked from no more: the simulator has stopped."""
-_LOOK_EVERY_S = 0.5
 _TICK_S = 0.005
-_UNATTENDED_S = 60.0
 _SHAPE = 16 / 9
 
 
@@ -65,9 +63,9 @@ async def sense(bus: Bus, context: NodeContext, options: SensorOptions) -> None:
     newest = _Newest()
     tasks = (asyncio.ensure_future(_follow(bus, newest)), asyncio.ensure_future(_work(bus, options, newest)))
     try:
-        while context.unattended_s() < _UNATTENDED_S and not any(task.done() for task in tasks):
+        while context.is_needed() and not any(task.done() for task in tasks):
             context.set_replaceable(newest.fresh() is None)
-            await asyncio.wait(tasks, timeout=_LOOK_EVERY_S, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(tasks, timeout=LOOK_EVERY_S, return_when=asyncio.FIRST_COMPLETED)
     finally:
         ended = [task for task in tasks if task.done()]
         for task in tasks:
@@ -114,7 +112,7 @@ class _Suite:
     """The sensors in their world, each looked through once: numba compiles now and not in flight."""
 
     def __init__(self, options: SensorOptions, truth: SimTruth) -> None:
-        self.world = _world(options, Frame(truth.home_lat_deg, truth.home_lon_deg, truth.home_alt_amsl_m))
+        self.world = _world(options, NeuFrame(truth.home_lat_deg, truth.home_lon_deg, truth.home_alt_amsl_m))
         rows = max(8, round((options.points / _SHAPE) ** 0.5))
         model = StereoModel(columns=round(rows * _SHAPE), rows=rows)
         self._make(options, model)
@@ -128,8 +126,8 @@ class _Suite:
         self.slam = SlamDrift(seed=options.seed)
 
 
-def _world(options: SensorOptions, frame: Frame) -> World:
-    from planning.geotiff import read_dsm
+def _world(options: SensorOptions, frame: NeuFrame) -> World:
+    from planning.terrain.geotiff import read_dsm
 
     dsm = read_dsm(options.dsm) if options.dsm else None
     if options.world:
@@ -181,7 +179,7 @@ class _Beat:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="telemetry.nodes.sensors", description="Sensors of a simulated vehicle.")
+    parser = argparse.ArgumentParser(prog=f"{__package__}.sensors", description="Sensors of a simulated vehicle.")
     default = SensorOptions()
     parser.add_argument("--runtime", type=Path, required=True, help="directory of the bus")
     parser.add_argument("--world", type=Path, help="world file (docs/worlds.md)")

@@ -24,9 +24,7 @@ from telemetry.topics.messages import Topic
 
 _log = logging.getLogger(__name__)
 
-_LOOK_EVERY_S = 0.5
 _TRUTH_EVERY_S = 0.02
-_UNATTENDED_S = 60.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,9 +47,9 @@ async def fly_supervised(bus: Bus, context: NodeContext, options: SimOptions) ->
         pilot = simulator.vehicle.autopilot
         telling = asyncio.ensure_future(_tell_truth(bus, simulator))
         try:
-            while (pilot.armed or context.unattended_s() < _UNATTENDED_S) and not telling.done():
+            while (pilot.armed or context.is_needed()) and not telling.done():
                 context.set_replaceable(not pilot.armed)
-                await asyncio.wait((telling,), timeout=_LOOK_EVERY_S)
+                await asyncio.wait((telling,), timeout=LOOK_EVERY_S)
         finally:
             telling.cancel()
             await asyncio.gather(telling, return_exceptions=True)
@@ -122,7 +120,7 @@ def read_parameter(text: str) -> tuple[str, float]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="telemetry.nodes.simulator", description="A simulated vehicle on MAVLink.")
+    parser = argparse.ArgumentParser(prog=f"{__package__}.simulator", description="A simulated vehicle on MAVLink.")
     default = SimOptions(0.0, 0.0, 0.0)
     parser.add_argument("--link", default=default.link, help="udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT")
     parser.add_argument("--runtime", type=Path, help="directory of the bus; without it no bus is used")

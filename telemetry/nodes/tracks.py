@@ -2,20 +2,8 @@
 
 import sys
 
-import argparse
-import sys
-from pathlib import Path
-
-from telemetry.node import run_node
-from telemetry.tracking.kind import NAME
-from telemetry.tracking.node import live
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(prog=NAME, description="Follows what moves before a radar.")
-    parser.add_argument("--runtime", type=Path, required=True, help="directory of the bus's sockets")
-    return run_node(NAME, parser.parse_args().runtime, live)
-
+from telemetry.perception.sensor_node import run_sensor_node
+from telemetry.tracking.tracks_node import TracksNode
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_sensor_node("tracks", "Follows what moves before a radar.", TracksNode))

@@ -30,8 +30,6 @@ KINDS: tuple[Kind, ...] = ("ply", "bt", "tif", "geojson")
 MOST_CELLS = 100_000_000
 """Of a GeoTIFF: 400 MB before it is compressed."""
 
-F64 = NDArray[np.float64]
-
 
 class ExportError(TelemetryError):
     """A map that cannot be written as it was asked for."""

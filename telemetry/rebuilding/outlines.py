@@ -10,15 +10,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from telemetry.perception.deltas import packed_keys
-
-I32 = NDArray[np.int32]
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, I32, I64
+from telemetry.topics.deltas import packed_keys
 
 _HALF_OF_26 = [d for d in product((-1, 0, 1), repeat=3) if d > (0, 0, 0)]
 
 
-def clusters(keys: I32) -> NDArray[np.int32]:
+def clusters(keys: I32) -> I32:
     """(N, 3) voxels, each once -> (N,) number of the cluster: voxels that touch, corners included, are one."""
     packed = packed_keys(keys)
     order = np.argsort(packed)
@@ -30,7 +28,7 @@ def clusters(keys: I32) -> NDArray[np.int32]:
 
 
 def _neighbours(
-    keys: I32, step: I32, order: NDArray[np.intp], in_order: NDArray[np.int64]
+    keys: I32, step: I32, order: NDArray[np.intp], in_order: I64
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     wanted = packed_keys(keys + step)
     at = np.minimum(np.searchsorted(in_order, wanted), len(in_order) - 1)

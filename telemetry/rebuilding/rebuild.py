@@ -1,7 +1,7 @@
 """A recording's map, made once more from its frames and poses: exactly the one that was there in flight, or another.
 
 Frames are worked on in the order in which the node worked on them, each with what the node knew by then: its status
-after each frame tells (``telemetry.obstacles.Basis``). Where no node ran, every frame is worked on as it came.
+after each frame tells (``telemetry.topics.obstacles.Basis``). Where no node ran, every frame is worked on as it came.
 ``OtherMap`` asks for another resolution or memory limit than in flight.
 """
 
@@ -157,7 +157,7 @@ class _Run:
         self._has_bases, self._mono_minus_utc_s = has_bases, mono_minus_utc_s
         self.topics = {kind.frames, kind.status, Topic.VEHICLE, Topic.SLAM_POSE, Topic.PLAN, Topic.FLIGHT}
         self.topics |= {Topic.PERCEPTION_SETTINGS, Topic.GROUND}
-        self._frames: deque[tuple[float, AnyFrame]] = deque()
+        self._frames: deque[tuple[float, SensorFrame]] = deque()
         self._states: deque[VehicleState] = deque()
         self._cameras: deque[SlamPose] = deque()
         self._bases: deque[tuple[float, Basis]] = deque()
@@ -181,7 +181,7 @@ class _Run:
         elif isinstance(message, SlamPose):
             self._cameras.append(message)
             self._newest_camera_s = max(self._newest_camera_s, message.t_mono_s)
-        elif isinstance(message, RadarFrame | CloudFrame | RangeFrame):
+        elif isinstance(message, SensorFrame):
             self._frames.append((t_mono_s, message))
         elif isinstance(message, PerceptionStatus):
             if message.basis is not None:
@@ -286,7 +286,7 @@ class _Run:
             self._frames.popleft()
             self._work(frame, came_s, ground=True)
 
-    def _work(self, frame: AnyFrame, now_s: float, *, ground: bool) -> None:
+    def _work(self, frame: SensorFrame, now_s: float, *, ground: bool) -> None:
         self._perceiver.feed()
         if self._perceiver.begun != self._begun:
             self._begun, self._frames_seen, self._points = self._perceiver.begun, 0, 0

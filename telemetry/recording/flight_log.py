@@ -9,7 +9,7 @@ from telemetry.recording.mcap_flight import read_mcap_flight
 from telemetry.recording.recorded_flight import FlightLog, HomePosition, RecordedTrack
 from telemetry.recording.tlog_flight import looks_like_tlog, read_tlog_flight
 
-__all__ = ["FlightLog", "HomePosition", "Track", "read_flight_log"]
+__all__ = ["FlightLog", "HomePosition", "RecordedTrack", "read_flight_log"]
 
 
 def read_flight_log(path: Path) -> FlightLog:

@@ -14,7 +14,6 @@ _MISSION, _ACCEPTED = 0, 0
 _GUIDED_CURRENT = (2, 3)
 """MISSION_ITEM.current of "go there now" and "change altitude": no part of a mission."""
 _LOCAL_FRAMES = (1, 4, 7, 8, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
-_HOME_ROW_COMMAND = 16
 
 
 @dataclass(slots=True)
@@ -85,7 +84,7 @@ def item_of(message: Any) -> MissionItem:
 def mission_of(transfer: ItemSet, firmware: Firmware, home: Home | None) -> Mission:
     """The transfer as a mission. ArduPilot's row 0 is its home; elsewhere ``home`` is what the vehicle reported."""
     items, warnings = [transfer.items[number] for number in range(transfer.count)], list[str]()
-    if firmware == "ardupilot" and items[0].command == _HOME_ROW_COMMAND:
+    if firmware == "ardupilot" and items[0].command == MavCmd.NAV_WAYPOINT:
         row = items.pop(0)
         if row.lat_deg or row.lon_deg:
             home = Home(row.lat_deg, row.lon_deg, row.alt_m)

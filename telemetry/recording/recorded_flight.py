@@ -17,12 +17,11 @@ from telemetry.topics.messages import CommandRecord, PlanRecord, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
 
-F64 = npt.NDArray[np.float64]
 Stamped = tuple[float, VehicleState]
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class RecordedTrack:
     """Positions as columns of equal length (N,). NaN where a height or a speed was not known."""
 
     t_utc_s: F64
@@ -58,9 +57,9 @@ class FlightLog:
     end_utc_s: float
     states: tuple[Stamped, ...]
     """One for every position that came, (t_utc_s, all that was known of the vehicle then)."""
-    track: Track
+    track: RecordedTrack
     """The positions of ``states``, row by row."""
-    truth: Track | None
+    truth: RecordedTrack | None
     """Where a simulator said that the vehicle really was (SIM_STATE); velocities unknown."""
     texts: tuple[VehicleText, ...]
     modes: tuple[tuple[float, str], ...]
@@ -95,17 +94,17 @@ class FlightLog:
         return self.track.t_utc_s - self.start_utc_s
 
 
-def track_of(states: Iterable[Stamped]) -> Track:
+def track_of(states: Iterable[Stamped]) -> RecordedTrack:
     """States -> columns, row by row."""
     rows = [
         (t, s.lat_deg, s.lon_deg, s.alt_amsl_m, s.alt_rel_home_m, s.v_north_m_s, s.v_east_m_s, s.v_down_m_s)
         for t, s in states
     ]
     table = np.array(rows, dtype=np.float64).reshape(-1, 8)
-    return Track(*(np.ascontiguousarray(column) for column in table.T))
+    return RecordedTrack(*(np.ascontiguousarray(column) for column in table.T))
 
 
-def truth_of(places: list[TruePosition], home: HomePosition | None) -> Track | None:
+def truth_of(places: list[TruePosition], home: HomePosition | None) -> RecordedTrack | None:
     """True positions -> columns; heights above home only if home's own height is known."""
     if not places:
         return None
@@ -113,7 +112,7 @@ def truth_of(places: list[TruePosition], home: HomePosition | None) -> Track | N
     table = np.array([(p.t_utc_s, p.lat_deg, p.lon_deg, p.alt_amsl_m) for p in places], dtype=np.float64)
     t_utc_s, lat_deg, lon_deg, alt_m = (np.ascontiguousarray(column) for column in table.T)
     unknown = np.full_like(t_utc_s, np.nan)
-    return Track(t_utc_s, lat_deg, lon_deg, alt_m, alt_m - home_alt_m, unknown, unknown, unknown)
+    return RecordedTrack(t_utc_s, lat_deg, lon_deg, alt_m, alt_m - home_alt_m, unknown, unknown, unknown)
 
 
 class StateHistory:

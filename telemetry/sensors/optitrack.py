@@ -15,7 +15,6 @@ import numpy as np
 from mapping.errors import ParameterError, RadarDataError
 from mapping.geometry.arrays import F64
 
-F64 = NDArray[np.float64]
 Forward = Literal["x", "z", "-x", "-z"]
 _FORWARD = {"x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0), "-x": (-1.0, 0.0, 0.0), "-z": (0.0, 0.0, -1.0)}
 _COLUMNS, _FEWEST = 8, 3

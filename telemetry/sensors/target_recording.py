@@ -17,15 +17,8 @@ from telemetry.topics.messages import Topic
 
 def radar_frame(found: Detections, *, number: int, t_mono_s: float, t_utc_s: float, source: str) -> RadarFrame:
     """What a live sensor would have put on the bus."""
-    return RadarFrame(
-        t_mono_s=t_mono_s,
-        t_utc_s=t_utc_s,
-        number=number,
-        source=source,
-        xyz_m=packed(found.xyz_m),
-        radial_speed_m_s=packed(found.radial_speed_m_s),
-        snr_db=packed(found.snr_db),
-    )
+    columns = (found.xyz_m, found.radial_speed_m_s, found.snr_db)
+    return RadarFrame.of(*columns, t_mono_s=t_mono_s, t_utc_s=t_utc_s, number=number, source=source)
 
 
 def write_targets(path: Path, frames: Iterable[tuple[float, Detections]], *, t_utc_s: float, source: str) -> int:

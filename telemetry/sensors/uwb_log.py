@@ -143,7 +143,7 @@ def _check_lengths(intensity: NDArray[Any], scans: Arrays, name: str) -> None:
             raise FormatError(f"{wrong[0]:g} is no such angle.", where=f"{name}: {field}", advice=advice)
 
 
-def _check_times(t_s: NDArray[np.float64], name: str) -> None:
+def _check_times(t_s: F64, name: str) -> None:
     """What a cell is worth is told by the time that it was in view: in another unit all figures would be wrong."""
     where, steps_s = f"{name}: t_s", np.diff(t_s)
     steps_s = steps_s[steps_s > 0]

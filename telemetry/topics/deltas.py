@@ -13,9 +13,6 @@ from telemetry.topics.obstacles import MapDelta, pack_keys, unpack_keys
 MOST_VOXELS = 20_000
 """In one message: some 300 kB."""
 
-I32 = NDArray[np.int32]
-U8 = NDArray[np.uint8]
-
 
 def in_parts(head: MapDelta, keys: I32, probability: U8, explained: U8) -> list[MapDelta]:
     """``head`` with these voxels ((N, 3), (N,), (N,)), cut into parts; at least one, so that an empty map is told."""
@@ -98,7 +95,7 @@ def _newest(several: list[Voxels]) -> Voxels:
     return Voxels(keys[first], probability[first], explained[first])
 
 
-def packed_keys(keys: I32) -> NDArray[np.int64]:
+def packed_keys(keys: I32) -> I64:
     """(N, 3) -> (N,) one number per key, for keys within a million voxels of the origin."""
     shifted = keys.astype(np.int64) + (1 << 20)
     return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]

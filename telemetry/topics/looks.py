@@ -9,7 +9,6 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from telemetry.topics.obstacles import MapOrigin
 
-F64 = NDArray[np.float64]
 REACH_CM = 32_767
 """Of a cloud's points from where it was seen."""
 

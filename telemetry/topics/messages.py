@@ -235,7 +235,7 @@ class FlightStatus:
 
 @dataclass(frozen=True, slots=True)
 class CommandRecord:
-    """Written down before it is sent, chained by hash (telemetry.mavlink.audit)."""
+    """Written down before it is sent, chained by hash (telemetry.link.audit)."""
 
     t_utc_s: float
     operator: str
@@ -260,7 +260,7 @@ class PlanRecord:
     vertical_datum: str | None
     profile_toml: str
     certificate_json: str
-    """``planning.clearance.certificate_json`` of what was read back; empty when there is none."""
+    """``planning.certificate.clearance.certificate_json`` of what was read back; empty when there is none."""
     plan_json: str = ""
     """The plan document of the console, if it came from there."""
     path_csv: str = ""

@@ -67,7 +67,7 @@ def pack_keys(keys: NDArray[np.integer]) -> bytes:
     return np.ascontiguousarray(keys, dtype="<i4").tobytes()
 
 
-def unpack_keys(data: bytes) -> NDArray[np.int32]:
+def unpack_keys(data: bytes) -> I32:
     """(N, 3)"""
     return np.frombuffer(data, dtype="<i4").reshape(-1, 3)
 
@@ -283,7 +283,7 @@ class PerceptionSettings:
     position_error_m: float = 0.3
     brake_decel_m_s2: float = 7.5
     brake_jerk_m_s3: float = 5.0
-    """Both of the vehicle's profile: ``mapping.braking.Braking``."""
+    """Both of the vehicle's profile: ``mapping.perceiving.braking.Braking``."""
     clear_count: int = 0
     """Raised by one to have all maps emptied."""
     radar_resolution_m: float = 1.0

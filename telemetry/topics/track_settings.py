@@ -20,7 +20,7 @@ USUAL_MAX_SPEED_M_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
-    """As ``mapping.tracker.TrackerParams``, of which ``params`` makes them; the defaults are an AWR1843's."""
+    """As ``mapping.tracking.TrackerParams``, of which ``params`` makes them; the defaults are an AWR1843's."""
 
     coordinates: Literal["cartesian", "polar"] = "cartesian"
     """polar: range, bearing and their rates, as in Wessendorp 2021; cartesian: place and velocity over ground."""

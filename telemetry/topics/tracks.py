@@ -1,6 +1,6 @@
 """Moving objects as they travel on the bus: tracks, what they forbid the vehicle to do, and what it might do instead.
 
-Map frame as in ``telemetry.obstacles``: east, north, up in metres from home; velocities are over ground.
+Map frame as in ``telemetry.topics.obstacles``: east, north, up in metres from home; velocities are over ground.
 """
 
 from __future__ import annotations

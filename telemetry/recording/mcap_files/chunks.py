@@ -17,6 +17,9 @@ from telemetry.recording.tlog import Data
 _CHUNK = struct.Struct("<QQQI")
 _MESSAGE = struct.Struct("<HIQQ")
 _LARGEST_CHUNK_BYTES = 256 * 1024 * 1024
+_INDEX_RECORD = struct.Struct("<BQHI")
+_INDEX_ENTRY = struct.Struct("<QQ")
+_INDEX_OPCODE = 7
 
 
 class Message(NamedTuple):
@@ -73,3 +76,17 @@ def messages(content: bytes) -> Iterator[Message]:
             channel, _, t_ns, own_ns = _MESSAGE.unpack_from(content, record.start)
             data = content[record.start + _MESSAGE.size : record.end]
             yield Message(channel, t_ns, own_ns, data, record.offset)
+
+
+def message_index(entries: Mapping[int, Sequence[tuple[int, int]]], offset: int) -> tuple[bytes, dict[int, int]]:
+    """(time in ns, offset in the chunk) of the messages by channel -> records, and where each begins in the file.
+
+    ``offset``: where the first of them will stand.
+    """
+    block, offsets = bytearray(), dict[int, int]()
+    for channel, places in entries.items():
+        offsets[channel] = offset + len(block)
+        size = _INDEX_ENTRY.size * len(places)
+        block += _INDEX_RECORD.pack(_INDEX_OPCODE, 6 + size, channel, size)
+        block += b"".join(_INDEX_ENTRY.pack(*place) for place in places)
+    return bytes(block), offsets

@@ -19,7 +19,6 @@ from telemetry.topics.vehicle import VehicleState
 
 HOME_FRAME, VEHICLE_FRAME = "home", "vehicle"
 """East, north, up of home; forward, left, up of the vehicle."""
-_EARTH_RADIUS_M = 6_371_008.8
 _APPROXIMATED = 1
 _UNKNOWN = 0
 _LOG_LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)
@@ -77,8 +76,8 @@ class Standard:
 
 
 def standard_schema(name: str) -> bytes:
-    if name == clouds.SCHEMA_NAME:
-        return clouds.schema()
+    if name == cloud_codec.SCHEMA_NAME:
+        return cloud_codec.schema()
     if name == track_scene.SCHEMA_NAME:
         return track_scene.schema()
     return json.dumps({"title": name, **_SCHEMAS[name]}).encode()
@@ -95,7 +94,9 @@ class Standards:
         if isinstance(message, VehicleText):
             yield _log(message)
         elif isinstance(message, RadarFrame):
-            yield Standard("foxglove/radar", clouds.SCHEMA_NAME, msgspec.json.encode(clouds.point_cloud(message)))
+            yield Standard(
+                "foxglove/radar", cloud_codec.SCHEMA_NAME, msgspec.json.encode(cloud_codec.point_cloud(message))
+            )
         elif isinstance(message, TracksStatus):
             scene = track_scene.scene_update(message, HOME_FRAME)
             yield Standard("foxglove/tracks", track_scene.SCHEMA_NAME, msgspec.json.encode(scene))
@@ -116,9 +117,7 @@ def east_north_up_m(state: VehicleState) -> tuple[float, float, float] | None:
     home_lat, home_lon = state.home_lat_deg, state.home_lon_deg
     if lat is None or lon is None or up is None or home_lat is None or home_lon is None:
         return None
-    north_m = math.radians(lat - home_lat) * _EARTH_RADIUS_M
-    east_m = math.radians((lon - home_lon + 180.0) % 360.0 - 180.0) * _EARTH_RADIUS_M * math.cos(math.radians(home_lat))
-    return east_m, north_m, up
+    return *offset_m((home_lat, home_lon), lat, lon), up
 
 
 def enu_from_body_quaternion(

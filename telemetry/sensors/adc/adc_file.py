@@ -11,8 +11,6 @@ from mapping.errors import RadarDataError
 from mapping.geometry.arrays import C64
 from mapping.radar.params import FmcwParams
 
-C64 = NDArray[np.complex64]
-
 
 @dataclass(frozen=True, slots=True)
 class AdcFrame:

@@ -13,9 +13,7 @@ from typing import Literal
 import numpy as np
 
 from mapping.errors import RadarDataError
-
-I64 = NDArray[np.int64]
-U16 = NDArray[np.uint16]
+from mapping.geometry.arrays import F32, I64, U16
 
 SampleCode = Literal["auto", "twos-complement", "offset-binary"]
 
@@ -40,7 +38,7 @@ class Code:
     note: str = ""
     """What was found or put right; empty: as usual."""
 
-    def numbers(self, words: U16) -> NDArray[np.float32]:
+    def numbers(self, words: U16) -> F32:
         if self.zero is None:
             return words.view(np.int16).astype(np.float32)
         return words.astype(np.float32) - self.zero

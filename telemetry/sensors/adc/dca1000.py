@@ -53,7 +53,7 @@ def open_dca1000(path: Path, config: TiConfig, *, most: int | None = None, sampl
     return AdcFile(path.name, params, config.frame_period_s, notes, every.in_order, lambda: every)
 
 
-def _counts(path: Path, frame_bytes: int, frames: int) -> NDArray[np.int64]:
+def _counts(path: Path, frame_bytes: int, frames: int) -> I64:
     """How often each word occurs in all frames: the first may be quiet."""
     counts = np.zeros(1 << 16, np.int64)
     with path.open("rb") as file:

@@ -170,7 +170,7 @@ def _code(path: Path, layout: _Layout, asked: SampleCode) -> Code | None:
     return None if code.zero is None and below else code
 
 
-def _words(path: Path, layout: _Layout) -> NDArray[np.int64] | None:
+def _words(path: Path, layout: _Layout) -> I64 | None:
     """How often each whole number from 0 to 65535 occurs, if there are no others; what is no number says nothing.
 
     All frames are looked at until one proves the contrary: the first may be quiet.

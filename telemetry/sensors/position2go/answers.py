@@ -15,8 +15,6 @@ from mapping.geometry.arrays import C64, U32
 from mapping.radar import POSITION2GO, FmcwParams
 from telemetry.errors import SensorError
 
-C64 = NDArray[np.complex64]
-
 BASE, SWEEP = 0x52424153, 0x52464D43
 """Types of the endpoints: "RBAS", "RFMC"."""
 VERSION = 1
@@ -111,7 +109,7 @@ def frame_of(data: bytes) -> Frame:
     return Frame(number, cube, float(ends))
 
 
-def _unpacked(packed: bytes, count: int, bits: int) -> NDArray[np.uint32]:
+def _unpacked(packed: bytes, count: int, bits: int) -> U32:
     """(count,) numbers of so many bits each, the lowest bit first."""
     each = np.unpackbits(np.frombuffer(packed, np.uint8), bitorder="little")[: count * bits].reshape(count, bits)
     return (each @ (1 << np.arange(bits, dtype=np.uint32))).astype(np.uint32)

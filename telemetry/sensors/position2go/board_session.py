@@ -43,7 +43,7 @@ class Position2GoCounts:
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class TakenFrame:
     """A frame, when its middle was (on the clock that was given), and how many before it were lost."""
 
     t_s: float
@@ -51,7 +51,7 @@ class Taken:
     lost_before: int
 
 
-class Session:
+class BoardSession:
     """At an open port. All raise SensorError: another device, refused, silent, or the port has gone."""
 
     def __init__(
@@ -91,7 +91,7 @@ class Session:
         except WrongAnswerError as error:
             raise self._other(f"The radar answers otherwise than a Position2Go. {error}") from error
 
-    def frames(self, middle_s: float) -> Iterator[Taken]:
+    def frames(self, middle_s: float) -> Iterator[TakenFrame]:
         """For ever, ``EVERY_S`` apart; a frame's middle is ``middle_s`` after it was asked for."""
         lost = 0
         while True:
@@ -109,7 +109,7 @@ class Session:
                     ) from None
                 continue
             self._counts.frames += 1
-            yield Taken(asked_s + middle_s, frame, lost)
+            yield TakenFrame(asked_s + middle_s, frame, lost)
             lost = 0
             self._wait(max(0.0, asked_s + EVERY_S - self._now()))
 

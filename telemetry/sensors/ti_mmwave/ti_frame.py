@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-F32 = NDArray[np.float32]
+from mapping.geometry.arrays import F32, U16, Bools
 
 MAGIC = bytes((2, 1, 4, 3, 6, 5, 8, 7))
 HEADER_BYTES, SHORT_HEADER_BYTES = 40, 36
@@ -54,7 +54,7 @@ class TiFrame:
     """(N,) NaN where the sensor sends no side information"""
     noise_db: F32
     """(N,) as ``snr_db``"""
-    range_profile: NDArray[np.uint16]
+    range_profile: U16
     """(range cells,) the firmware's logarithm of the magnitude without motion; empty where it is not sent"""
     packet_bytes: int
     lost_before: int = 0
@@ -157,7 +157,7 @@ def _side_information(data: bytes | None, points: int) -> tuple[F32, F32]:
     return table[:, 0].copy(), table[:, 1].copy()
 
 
-def _plausible(xyz_m: F32, speed: F32) -> NDArray[np.bool_]:
+def _plausible(xyz_m: F32, speed: F32) -> Bools:
     with np.errstate(over="ignore", invalid="ignore"):
         near = np.linalg.norm(xyz_m.astype(np.float64), axis=1) <= FARTHEST_M
     return near & ~(np.abs(speed) > FASTEST_M_S) & ~np.isinf(speed)

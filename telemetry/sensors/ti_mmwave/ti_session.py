@@ -23,6 +23,7 @@ MOST_WAITING = 100
 """Frames that one read is taken to span, at most."""
 SILENT_S = 5.0
 """A radar that sees nothing sends empty frames all the same."""
+CONFIG_BAUD, DATA_BAUD = 115_200, 921_600
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,3 +93,12 @@ def frames(
                 where=device,
                 advice="Check its power, that this is its data port, and that it was started.",
             )
+
+
+def config_port_beside(data_device: str) -> str | None:
+    """The config port that belongs to a data port: on TI's boards the one numbered one lower, if it is there."""
+    match = re.fullmatch(r"(/.*?)(\d+)", data_device)
+    if match is None or int(match[2]) == 0:
+        return None
+    beside = f"{match[1]}{int(match[2]) - 1}"
+    return beside if Path(beside).exists() else None

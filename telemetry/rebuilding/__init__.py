@@ -1,0 +1,1 @@
+"""Maps made again from recordings, and maps as files for other programs."""

@@ -1,0 +1,1 @@
+"""What travels on the bus: plain frozen dataclasses, known to both ends."""
