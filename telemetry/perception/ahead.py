@@ -12,10 +12,9 @@ from mapping.perceiving.corridor import MissionLine
 from planning.evading.columns import REACH_UP
 from planning.evading.seen import conflicts
 from telemetry.perception.convert import frame_of
-from telemetry.perception.deltas import FoldedMap
-from telemetry.perception.mission_line import Line
-
-F64 = NDArray[np.float64]
+from telemetry.perception.mission_line import FlightLine
+from telemetry.topics.deltas import FoldedMap
+from telemetry.topics.obstacles import MapDelta, MapOrigin, MissionConflict, ObstacleAlert, Sensor
 
 EVERY_S = 1.0
 _SLOWEST_M_S = 0.3
@@ -26,13 +25,13 @@ _OVER_AFTER = 2
 class Flight(NamedTuple):
     """What the look ahead needs to know of the vehicle."""
 
-    line: Line
+    line: FlightLine
     origin: MapOrigin
     position_enu_m: tuple[float, float, float]
     speed_m_s: float
     radius_m: float
     reach_up: float = REACH_UP
-    """``planning.avoiding.standing``: of the radar's gate."""
+    """``planning.evading.columns``: of the radar's gate."""
 
 
 class Ahead:
@@ -42,7 +41,7 @@ class Ahead:
         self._sensor: Sensor = sensor
         self._run = run
         self._map = FoldedMap()
-        self._line: tuple[Line | None, MissionLine | None] = (None, None)
+        self._line: tuple[FlightLine | None, MissionLine | None] = (None, None)
         self._number = 0
         self._open: MissionConflict | None = None
         self._missed = 0
@@ -108,7 +107,7 @@ class Ahead:
         return ObstacleAlert(name, self._sensor, "conflict", phase, t_mono_s, t_utc_s, done_s, text)
 
 
-def _item(line: Line, s_m: float) -> int:
+def _item(line: FlightLine, s_m: float) -> int:
     ends_m = np.cumsum(np.linalg.norm(np.diff(line.points_enu, axis=0), axis=1))
     leg = int(np.searchsorted(ends_m, s_m))
     return line.leg_item[min(leg, len(line.leg_item) - 1)]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from telemetry.messages import FlightStatus, PlanRecord
-from telemetry.obstacles import AvoidanceStatus, MapOrigin
-from telemetry.perception.mission_line import Line, mission_line
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from telemetry.perception.mission_line import FlightLine, mission_line
+from telemetry.topics.messages import FlightStatus, PlanRecord
+from telemetry.topics.obstacles import AvoidanceStatus, MapOrigin
 
 _FLOWN_MODES = frozenset({"AUTO", "MISSION"})
 _FLOWN_PHASES = frozenset({"taking_off", "flying", "paused"})
@@ -25,9 +24,9 @@ class FlownLine:
         self.flight = FlightStatus()
         self.avoidance = AvoidanceStatus()
         self.mode = ""
-        self.line: Line | None = None
+        self.line: FlightLine | None = None
         self._asked: tuple[object, ...] = ()
-        self._planned: tuple[object, Line | None] = ((), None)
+        self._planned: tuple[object, FlightLine | None] = ((), None)
 
     @property
     def points_enu(self) -> F64 | None:
@@ -55,13 +54,17 @@ class FlownLine:
             offset_m = max(offset_m, position_enu_m[2] - _height_beside(self._planned[1].points_enu, position_enu_m))
         return np.floor(offset_m / _STEP_M) * _STEP_M
 
-    def _line(self, origin: MapOrigin | None, offset_m: float) -> Line | None:
+    def _line(self, origin: MapOrigin | None, offset_m: float) -> FlightLine | None:
         if self.plan is None or origin is None:
             return None
         if self._planned[0] != (self.plan, origin):
             self._planned = ((self.plan, origin), mission_line(self.plan, origin))
         planned = self._planned[1]
-        return None if planned is None else Line(planned.points_enu + np.array([0.0, 0.0, offset_m]), planned.leg_item)
+        return (
+            None
+            if planned is None
+            else FlightLine(planned.points_enu + np.array([0.0, 0.0, offset_m]), planned.leg_item)
+        )
 
 
 def _height_beside(points_enu: F64, position_enu_m: tuple[float, float, float]) -> float:

@@ -21,8 +21,6 @@ _SAMPLES = 9
 _MOST_AWAY_M = 0.5
 """By which the model's grid may differ from a straight-lined one over that reach."""
 
-F64 = NDArray[np.float64]
-
 
 class GroundError(TelemetryError):
     """The surface model cannot be laid under the map."""
@@ -30,9 +28,7 @@ class GroundError(TelemetryError):
     code = "known_ground"
 
 
-def ground_around(
-    notice: GroundNotice, origin: MapOrigin, elevation_m: NDArray[np.float32] | None = None
-) -> GroundGrid:
+def ground_around(notice: GroundNotice, origin: MapOrigin, elevation_m: F32 | None = None) -> GroundGrid:
     """The model within a kilometre of home, placed so that it has the height 0 at home: home stands on it.
 
     Fine cells are taken together by their highest and lowest part. Reads only that window of the file, or of
@@ -47,7 +43,7 @@ def ground_around(
     return replace(grid, up_m=grid.up_m - home_alt_dsm_m, foot_m=grid.foot_m - home_alt_dsm_m)
 
 
-def _opened(notice: GroundNotice) -> NDArray[np.float32]:
+def _opened(notice: GroundNotice) -> F32:
     try:
         elevation = np.load(notice.elevation_npy, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError) as error:
@@ -87,7 +83,7 @@ def _enu_to_cell(notice: GroundNotice, origin: MapOrigin) -> F64:
     return np.ascontiguousarray(fitted.T, np.float64)
 
 
-def _height_at(elevation: NDArray[np.float32], cell: F64, notice: GroundNotice) -> float:
+def _height_at(elevation: F32, cell: F64, notice: GroundNotice) -> float:
     row, col = (int(v) for v in np.floor(cell))
     rows, cols = elevation.shape
     height_m = float(elevation[row, col]) if 0 <= row < rows and 0 <= col < cols else np.nan
@@ -98,7 +94,7 @@ def _height_at(elevation: NDArray[np.float32], cell: F64, notice: GroundNotice) 
     return height_m
 
 
-def _window(elevation: NDArray[np.float32], enu_to_cell: F64) -> tuple[NDArray[np.float32], F64]:
+def _window(elevation: F32, enu_to_cell: F64) -> tuple[F32, F64]:
     """The cells within reach, and the map to them."""
     corners = np.array([[e, n, 1.0] for e in (-REACH_M, REACH_M) for n in (-REACH_M, REACH_M)])
     cells = corners @ enu_to_cell.T

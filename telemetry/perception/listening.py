@@ -28,9 +28,8 @@ class Listening:
         self._bus, self._inbox, self._kind = bus, inbox, kind
         self._recording_began = recording_began
         self._recording: str | None = None
-        self.armed = False
-        self.heard_mono_s = time.monotonic()
-        """When the vehicle was heard of last."""
+        self.flying_mono_s: float | None = None
+        """When the vehicle was last heard of; None: it was not armed then."""
 
     def parts(self) -> list[Coroutine[Any, Any, None]]:
         """To be run side by side until cancelled."""
@@ -49,7 +48,7 @@ class Listening:
     async def _states(self) -> None:
         async for _, state in self._bus.subscribe(Topic.VEHICLE, keep_all=True, limit=_MOST_UNREAD):
             if isinstance(state, VehicleState):
-                self.armed, self.heard_mono_s = state.armed, time.monotonic()
+                self.flying_mono_s = time.monotonic() if state.armed else None
             self._inbox.put(STATE, state)
 
     async def _messages(self, topic: Topic, kind: str, *, each: bool) -> None:

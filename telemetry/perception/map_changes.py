@@ -70,7 +70,7 @@ class ChangeTeller:
         )
 
 
-def told_probability(probability: NDArray[Any]) -> NDArray[np.uint8]:
+def told_probability(probability: NDArray[Any]) -> U8:
     """255 is 1; above 127 exactly where it is above one half."""
     scaled = np.rint(np.asarray(probability, np.float64) * 255.0)
     return np.where(probability > 0.5, np.maximum(scaled, 128), np.minimum(scaled, 127)).astype(np.uint8)

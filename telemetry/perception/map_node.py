@@ -22,7 +22,7 @@ from telemetry.topics.requests import PerceptionRequest
 _log = logging.getLogger(__name__)
 
 
-class PerceptionNode(NodeShell):
+class PerceptionNode(SensorNode):
     """One sensor's. Nothing in it waits for another sensor's node, and nothing that is slow holds up its frames."""
 
     def __init__(self, bus: Bus, context: NodeContext, kind: SensorKind) -> None:
@@ -34,7 +34,7 @@ class PerceptionNode(NodeShell):
         """Changes that the look ahead does not know yet."""
         self._flight: Flight | None = None
         self._look = asyncio.Event()
-        self._worker = Worker(
+        self._worker = MapWorker(
             kind,
             self._inbox,
             give=self._from_thread(self._publish),
@@ -46,7 +46,6 @@ class PerceptionNode(NodeShell):
         )
 
     async def run(self) -> None:
-        """Until nobody needs it any more."""
         await asyncio.to_thread(warm_up, self._kind)
         await self._bus.serve(self._kind.sensor, self._handle, PerceptionRequest)
         await self._work(self._worker.run, [self._maps.run(), self._flight_maps.run(), self._keep_looking()])
@@ -97,6 +96,6 @@ class PerceptionNode(NodeShell):
                 self._publish(Topic.ALERT, alert)
 
 
-async def live(bus: Bus, context: NodeContext, kind: SensorKind) -> None:
-    """The whole node on an open bus."""
-    await PerceptionNode(bus, context, kind).run()
+def run_perception(kind: SensorKind, description: str) -> int:
+    """Runs one sensor's node until it ends; returns the exit code."""
+    return run_sensor_node(kind.sensor, description, lambda bus, context: PerceptionNode(bus, context, kind))

@@ -1,4 +1,4 @@
-"""The thread that works on one sensor's frames: maps, regions and alerts, and what is told of them."""
+"""What the thread of a perception node does beside its frames: tells the map's changes, shows frames, looks ahead."""
 
 from __future__ import annotations
 
@@ -27,33 +27,14 @@ from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
 from telemetry.topics.obstacles import MapDelta, MapOrigin, PerceptionStatus
 
-_log = logging.getLogger(__name__)
-
-TICK_S = 1.0
 DELTA_S = 0.1
 FLIGHT_DELTA_S = 1.0
 """The map of the whole flight is for looking at: what one voxel goes through in a second is told once."""
 LOOK_S = 1.0
-_REFUSED_S = 0.1
-"""Frames that are refused may come in floods: they are told of at most so often."""
-_FRAMES_IN_A_ROW = 8
-
-Give = Callable[[str, Published], None]
-
-STATE, CAMERA, SETTINGS, PLAN, FLIGHT, AVOIDANCE, NOTICE = (
-    "state",
-    "camera",
-    "settings",
-    "plan",
-    "flight",
-    "avoidance",
-    "notice",
-)
-GROUND, WHOLE, CONFLICT = "ground", "whole", "conflict"
 
 
-class Worker:
-    """``run`` is the thread. ``give`` gets what is to be published, ``ask_ground`` what ground is wanted: from here."""
+class MapWorker(FrameWorker):
+    """Of one sensor's map, regions and alerts."""
 
     def __init__(
         self,
@@ -69,63 +50,46 @@ class Worker:
         clock: Callable[[], float] = time.monotonic,
         utc: Callable[[], float] = time.time,
     ) -> None:
-        self._kind, self._inbox, self._clock = kind, inbox, clock
-        self._give, self._ask_ground, self._look_ahead = give, ask_ground, look_ahead
-        self._tell_map, self._tell_flight_map = tell_map, tell_flight_map
         utc_minus_mono_s = utc() - clock()
-        self.perceiver = Perceiver(kind, run=run, utc_minus_mono_s=utc_minus_mono_s)
+        perceiver = Perceiver(kind, run=run, utc_minus_mono_s=utc_minus_mono_s)
+        super().__init__(perceiver, inbox, status=kind.status, give=give, ask_ground=ask_ground, clock=clock)
+        self._kind, self._look_ahead = kind, look_ahead
+        self._tell_map, self._tell_flight_map = tell_map, tell_flight_map
         self._changes = ChangeTeller(kind.sensor, utc_minus_mono_s)
         self._flight_changes = ChangeTeller("vision_flight", utc_minus_mono_s)
-        self._told_s = self._delta_s = self._flight_delta_s = self._looked_s = clock()
+        self._delta_s = self._flight_delta_s = self._looked_s = clock()
         self._showing = Showing(utc_minus_mono_s)
         self._frame_t_s = 0.0
-        self._asked = GroundWanted(None, None)
-        self._handlers: dict[str, Callable[[Any], None]] = {
-            STATE: self.perceiver.on_state,
-            CAMERA: self.perceiver.on_camera,
-            SETTINGS: self.perceiver.on_settings,
-            PLAN: self.perceiver.on_plan,
+        self._handlers = {
+            **self._handlers,
+            CAMERA: perceiver.on_camera,
             FLIGHT: self._on_flight,
             AVOIDANCE: self._on_avoidance,
-            NOTICE: self.perceiver.on_ground,
-            GROUND: self._on_ground,
             WHOLE: self._on_whole,
             CONFLICT: self._on_conflict,
         }
 
-    def run(self) -> None:
-        """Until the inbox is closed. An error of ours costs one frame, not the node."""
-        while not self._inbox.closed:
-            self._inbox.wait(min(self._told_s + TICK_S, self._delta_s + DELTA_S))
-            try:
-                self.step()
-            except Exception:
-                _log.exception("A frame of the %s could not be worked on", self._kind.sensor)
+    def _due_s(self) -> float:
+        return min(self._told_s + TICK_S, self._delta_s + DELTA_S)
 
-    def step(self) -> None:
-        """All that is due now."""
-        self._take_messages()
-        for _ in range(_FRAMES_IN_A_ROW):
-            frame = self._inbox.frame(self.perceiver.pose_t_mono_s)
-            if frame is None:
-                break
-            self._take_messages()
-            self._frame_t_s = frame.t_mono_s
-            self._tell(self.perceiver.work(frame, self._clock))
-            self._tell_changes()
-            self.perceiver.perception.accumulate()
-        now_s = self._clock()
-        if now_s >= self._told_s + TICK_S:
-            self._tell(self.perceiver.tick(self._clock, feed=True))
+    def _work(self, frame: SensorFrame) -> Outcome[PerceptionStatus]:
+        self._frame_t_s = frame.t_mono_s
+        return self.perceiver.work(frame, self._clock)
+
+    def _tick(self) -> Outcome[PerceptionStatus]:
+        return self.perceiver.tick(self._clock, feed=True)
+
+    def _once_told(self, frame: SensorFrame) -> None:
+        self._tell_changes()
+        self.perceiver.perception.accumulate()
+
+    def _beside(self, now_s: float) -> None:
         self._tell_changes()
         self._tell_flight_changes(now_s)
         self._show(now_s)
         if now_s >= self._looked_s + LOOK_S:
             self._looked_s = now_s
             self._look_ahead(self._flight())
-        if (wanted := self.perceiver.ground_wanted) != self._asked:
-            self._asked = wanted
-            self._ask_ground(wanted)
 
     def _flight(self) -> Flight | None:
         """None while no mission is flown."""
@@ -137,21 +101,6 @@ class Worker:
         radius_m = settings.vehicle_radius_m + settings.position_error_m
         reach_up = math.tan(math.radians(settings.radar_high_deg))
         return Flight(line, where.origin, where.position, where.speed_m_s, radius_m, reach_up)
-
-    def _take_messages(self) -> None:
-        if skipped := self._inbox.skipped():
-            self.perceiver.skip(skipped)
-        for kind, message in self._inbox.messages():
-            self._handlers[kind](message)
-
-    def _tell(self, outcome: Outcome) -> None:
-        now_s = self._clock()
-        if not outcome.accepted and not outcome.alerts and now_s < self._told_s + _REFUSED_S:
-            return
-        for alert in outcome.alerts:
-            self._give(Topic.ALERT, alert)
-        self._told_s = now_s
-        self._give(self._kind.status, outcome.status)
 
     def _tell_changes(self) -> None:
         now_s = self._clock()
@@ -187,11 +136,6 @@ class Worker:
 
     def _on_avoidance(self, message: Any) -> None:
         self.perceiver.flown.avoidance = message
-
-    def _on_ground(self, message: Any) -> None:
-        wanted, grid, why_none = message
-        if wanted == self.perceiver.ground_wanted:
-            self.perceiver.set_ground(grid, why_none)
 
     def _on_whole(self, done: Callable[[], None]) -> None:
         self._changes.forget()

@@ -12,21 +12,21 @@ from mapping.geometry.arrays import F64
 from mapping.geometry.frames import EQUATOR_M
 from planning.errors import PlanningError
 from planning.formats.wpl import read_wpl
-from telemetry.messages import PlanRecord
-from telemetry.obstacles import MapOrigin
-
-F64 = NDArray[np.float64]
+from planning.missions.flown import flown_line
+from planning.terrain.dsm import Dsm
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.obstacles import MapOrigin
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FlightLine:
     points_enu: F64
     """(K, 3) from the top of the take-off to the last waypoint"""
     leg_item: tuple[int, ...]
     """(K - 1,) 1 is the mission's first item"""
 
 
-def mission_line(plan: PlanRecord, origin: MapOrigin) -> Line | None:
+def mission_line(plan: PlanRecord, origin: MapOrigin) -> FlightLine | None:
     """As the vehicle will fly it; None for a mission that is no line."""
     try:
         mission = read_wpl(plan.mission_wpl, plan.name)
@@ -36,7 +36,7 @@ def mission_line(plan: PlanRecord, origin: MapOrigin) -> Line | None:
     if len(flown.points_m) < 2:
         return None
     points = flown.points_m - [0.0, 0.0, flown.home_alt_dsm_m]
-    return Line(points, tuple(int(item) + 1 for item in flown.leg_item))
+    return FlightLine(points, tuple(int(item) + 1 for item in flown.leg_item))
 
 
 def local_crs(origin: MapOrigin) -> CRS:

@@ -125,27 +125,25 @@ class Perceiver:
 
     # What goes out
 
-    def work(self, frame: AnyFrame, clock: Callable[[], float]) -> Outcome:
+    def work(self, frame: SensorFrame, clock: Callable[[], float]) -> Outcome[PerceptionStatus]:
         """One frame into the map; never raises for what is in it."""
         now_s = clock()
-        try:
-            scan = self.kind.scan(frame)
-        except ValueError:
+        if not frame.is_whole:
             self._dropped[BROKEN] += 1
             return self.tick(clock)
         self.feed()
-        result: FrameResult = self.perception.on_frame(scan, now_s)
+        result: FrameResult = self.perception.on_frame(frame, now_s)
         self._basis = replace(self._basis, taken_t_mono_s=now_s, ground=self._ground is not None)
         return self._tell(result, clock(), self._basis)
 
-    def tick(self, clock: Callable[[], float], *, feed: bool = False) -> Outcome:
+    def tick(self, clock: Callable[[], float], *, feed: bool = False) -> Outcome[PerceptionStatus]:
         """A second without a frame. ``feed``: frames have stopped, so that states need not wait for the next one."""
         if feed:
             self.feed()
         result: FrameResult = self.perception.on_tick(clock())
         return self._tell(result, clock(), None)
 
-    def _tell(self, result: FrameResult, done_s: float, basis: Basis | None) -> Outcome:
+    def _tell(self, result: FrameResult, done_s: float, basis: Basis | None) -> Outcome[PerceptionStatus]:
         dropped = Counter(self.perception.dropped) + self._dropped
         return self._teller.outcome(
             result, self.perception, self.where, dropped=dropped, done_s=done_s, basis=basis, conflict=self.conflict
@@ -159,7 +157,7 @@ class Perceiver:
         self._waiting.clear()  # before anything in it can fail: the next frame must not meet it again
         for _, item in waiting:
             if isinstance(item, SlamPose):
-                self.perception.feed_camera(camera_pose(item))
+                self.perception.feed_camera(item)
                 self._basis = replace(self._basis, camera_t_mono_s=item.t_mono_s)
             else:
                 self._feed_state(item)

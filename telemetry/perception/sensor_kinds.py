@@ -14,26 +14,7 @@ from mapping.perceiving.settings_limits import check_settings
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import PerceptionSettings, Sensor
 
-from mapping.braking import Braking
-from mapping.perceiving import (
-    CameraPose,
-    Cloud,
-    RadarPerception,
-    RadarScan,
-    RangePerception,
-    RangeScan,
-    Settings,
-    VisionPerception,
-)
-from telemetry.messages import Topic
-from telemetry.obstacles import PerceptionSettings, Sensor
-from telemetry.sensing import CloudFrame, RadarFrame, RangeFrame, SlamPose, rows
-
-AnyFrame = RadarFrame | CloudFrame | RangeFrame
 AnyPerception = RadarPerception | VisionPerception | RangePerception
-
-MOST_POINTS = 2_000_000
-"""Of one frame; more than any sensor has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +26,6 @@ class SensorKind:
     maps: Topic
     status: Topic
     make: type[AnyPerception]
-    scan: Callable[[Any], Any]
-    """A frame as the perception takes it; ValueError when its arrays do not fit together."""
     settings: Callable[[PerceptionSettings], Settings]
     reach_m: float | None
     """What is seen out to there must fit into the map's memory at once; None: a frame is a handful of voxels."""
@@ -60,46 +39,6 @@ class SensorKind:
     @property
     def uses_camera(self) -> bool:
         return self.sensor == "vision"
-
-
-def _radar_scan(frame: RadarFrame) -> RadarScan:
-    xyz, speed, snr = rows(frame.xyz_m, 3), rows(frame.radial_speed_m_s, 1)[:, 0], rows(frame.snr_db, 1)[:, 0]
-    if not len(xyz) == len(speed) == len(snr):
-        raise ValueError(f"{len(xyz)} places, {len(speed)} speeds and {len(snr)} strengths")
-    return RadarScan(frame.t_mono_s, frame.number, _few(xyz), speed, snr, frame.source)
-
-
-def _cloud(frame: CloudFrame) -> Cloud:
-    return Cloud(frame.t_mono_s, frame.number, _few(rows(frame.xyz_m, 3)), frame.source, frame.voxel_m)
-
-
-def _range_scan(frame: RangeFrame) -> RangeScan:
-    lists = (frame.bearing_rad, frame.elevation_rad, frame.range_m)
-    bearing, elevation, range_m = (np.array(values, np.float64) for values in lists)
-    if not len(bearing) == len(elevation) == len(range_m):
-        raise ValueError(f"{len(bearing)} bearings, {len(elevation)} elevations and {len(range_m)} ranges")
-    return RangeScan(
-        frame.t_mono_s,
-        frame.number,
-        bearing,
-        elevation,
-        range_m,
-        frame.source,
-        np.array(frame.looks_rad, np.float64),
-        frame.beam_rad,
-        frame.nearest_m,
-        frame.farthest_m,
-    )
-
-
-def _few(xyz: Any) -> Any:
-    if len(xyz) > MOST_POINTS:
-        raise ValueError(f"{len(xyz)} points")
-    return xyz
-
-
-def camera_pose(pose: SlamPose) -> CameraPose:
-    return CameraPose(pose.t_mono_s, pose.position_m, pose.q_wxyz, pose.tracking)
 
 
 def _settings(s: PerceptionSettings, depth_m: float, resolution_m: float) -> Settings:
@@ -126,7 +65,6 @@ RADAR = SensorKind(
     Topic.MAP_RADAR,
     Topic.PERCEPTION_RADAR,
     RadarPerception,
-    _radar_scan,
     lambda s: _settings(s, s.radar_depth_m, s.radar_resolution_m),
     reach_m=None,
     backlog=20,  # Its map keeps everything, and a frame takes a millisecond: catching up is better than leaving out.
@@ -138,7 +76,6 @@ VISION = SensorKind(
     Topic.MAP_VISION,
     Topic.PERCEPTION_VISION,
     VisionPerception,
-    _cloud,
     lambda s: replace(_settings(s, s.vision_depth_m, s.vision_resolution_m), cloud_voxel_m=s.cloud_voxel_m),
     reach_m=40.0,
     backlog=1,  # Its map is made of the newest frame alone.
@@ -151,9 +88,37 @@ RANGES = SensorKind(
     Topic.MAP_RANGES,
     Topic.PERCEPTION_RANGES,
     RangePerception,
-    _range_scan,
     lambda s: _settings(s, s.ranges_depth_m, s.vision_resolution_m),
     reach_m=None,
     backlog=40,
 )
 KINDS: dict[str, SensorKind] = {kind.sensor: kind for kind in (RADAR, VISION, RANGES)}
+
+
+def check_perception(settings: PerceptionSettings) -> None:
+    """Raises ParameterError or CapacityError, naming the sensor, the number and what to do."""
+    for kind in KINDS.values():
+        try:
+            own = kind.settings(settings)
+            check_settings(own, reach_m=kind.reach_m, reach_down=kind.make.reach_down(own))
+        except MappingError as error:
+            raise type(error)(error.what, where=f"{kind.sensor} map", advice=error.advice) from None
+    settings.tracker.params()
+
+
+def check_memory(limit_bytes: int, *, maps: int) -> None:
+    """Raises CapacityError where so many maps of that size are more than this computer's memory."""
+    here_bytes = computer_bytes()
+    if maps * limit_bytes > here_bytes:
+        each = "A map" if maps == 1 else f"{maps} maps"
+        raise CapacityError(
+            f"{each} of {limit_bytes / 1e6:,.0f} MB may need {maps * limit_bytes / 1e6:,.0f} MB; this computer has "
+            f"{here_bytes / 1e6:,.0f} MB.",
+            where="memory",
+            advice=f"Allow at most {here_bytes // maps // 1_000_000:,} MB.",
+        )
+
+
+def computer_bytes() -> int:
+    """Memory of this computer."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

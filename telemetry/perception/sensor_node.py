@@ -25,11 +25,8 @@ from telemetry.topics.messages import Published
 
 _log = logging.getLogger(__name__)
 
-_UNATTENDED_S, _GIVEN_UP_S = 60.0, 600.0
-_LOOK_EVERY_S = 0.5
 
-
-class NodeShell:
+class SensorNode:
     """Inbox, listening, known ground, and the life of the node; what is worked on is the subclass's."""
 
     def __init__(self, bus: Bus, context: NodeContext, kind: SensorKind) -> None:
@@ -40,27 +37,24 @@ class NodeShell:
         self._listening = Listening(bus, self._inbox, kind, recording_began=self._on_recording)
         self._wanted, self._ground = asyncio.Event(), GroundWanted(None, None)
 
+    async def run(self) -> None:
+        """Until nobody needs it any more."""
+        raise NotImplementedError
+
     async def _work(self, run: Callable[[], None], parts: Sequence[Coroutine[Any, Any, None]] = ()) -> None:
         """``run`` in a thread, and ``parts`` beside it, until nobody needs the node any more."""
         working = asyncio.ensure_future(asyncio.to_thread(run))
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(p) for p in [*self._listening.parts(), *parts, self._keep_ground()]]
-                while self._is_needed() and not working.done():
-                    await asyncio.sleep(_LOOK_EVERY_S)
+                while self._context.is_needed(self._listening.flying_mono_s) and not working.done():
+                    await asyncio.sleep(LOOK_EVERY_S)
                 for task in tasks:
                     task.cancel()
         finally:
             self._inbox.close()
             await asyncio.wait((working,))
         working.result()
-
-    def _is_needed(self) -> bool:
-        """A flight goes on without a server, but not one that nobody has heard of for long."""
-        unattended_s = self._context.unattended_s()
-        return unattended_s < _UNATTENDED_S or (
-            self._listening.armed and time.monotonic() - self._listening.heard_mono_s < _GIVEN_UP_S
-        )
 
     def _on_recording(self) -> None:
         """A recording has begun: what was told before it is not in it."""
@@ -99,3 +93,14 @@ class NodeShell:
                 self._inbox.put(GROUND, (wanted, None, f"Known ground is not told apart: {why_none(error)}"))
             else:
                 self._inbox.put(GROUND, (wanted, grid, ""))
+
+
+def run_sensor_node(name: str, description: str, make: Callable[[Bus, NodeContext], SensorNode]) -> int:
+    """The program of every such node, until it ends; returns the exit code."""
+    parser = argparse.ArgumentParser(prog=name, description=description)
+    parser.add_argument("--runtime", type=Path, required=True, help="directory of the bus's sockets")
+
+    async def live(bus: Bus, context: NodeContext) -> None:
+        await make(bus, context).run()
+
+    return run_node(name, parser.parse_args().runtime, live)

@@ -23,11 +23,14 @@ _FAR_S = 60.0
 """A refused frame that says it is from farther away in time is told of at the present one."""
 
 
-class Outcome(NamedTuple):
-    status: PerceptionStatus
+Status = TypeVar("Status")
+
+
+class Outcome(NamedTuple, Generic[Status]):
+    status: Status
     alerts: tuple[ObstacleAlert, ...]
     accepted: bool
-    """A frame went into the map."""
+    """A frame went into the map, or into the tracker."""
 
 
 class Teller:
@@ -61,7 +64,7 @@ class Teller:
         done_s: float,
         basis: Basis | None,
         conflict: MissionConflict | None,
-    ) -> Outcome:
+    ) -> Outcome[PerceptionStatus]:
         if result.accepted:
             self._latencies.append(done_s - result.t_mono_s)
         frame, the_map = where.frame if perception.placed else None, perception.map

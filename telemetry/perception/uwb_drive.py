@@ -18,9 +18,8 @@ from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.sensors.uwb_log import MOST_BYTES, read_uwb_log
-from telemetry.vehicle import VehicleState
-
-F64 = NDArray[np.float64]
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 
 WAIT_S = 1.0
 """A scan waits so long for where the vehicle was then."""
@@ -48,7 +47,7 @@ class UwbDrive:
         self._t_s: list[float] = []
         self._lat_lon_deg: list[tuple[float, float]] = []
         self._heading_rad: list[float] = []
-        self._intensity: list[NDArray[np.float32]] = []
+        self._intensity: list[F32] = []
 
     def __len__(self) -> int:
         """Scans with a place."""

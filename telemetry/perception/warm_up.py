@@ -19,16 +19,27 @@ from telemetry.topics.vehicle import VehicleState
 def warm_up(kind: SensorKind) -> None:
     """Three frames of a made-up flight over made-up ground."""
     perceiver = Perceiver(kind, run="warm-up", utc_minus_mono_s=0.0)
-    for number in range(3):
-        t_s = 100.0 + 0.1 * number
-        perceiver.on_state(hovering(t_s))
-        if kind.uses_camera:
-            perceiver.on_camera(SlamPose(t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
-        perceiver.work(_frame(kind, t_s, number), lambda t_s=t_s: t_s)
-        perceiver.set_ground(ground_grid(np.zeros((40, 40), np.float32), [[-1.0, 0.0, 20.0], [0.0, 1.0, 20.0]]))
+    fly_past(perceiver, perceiver.work, partial(_frame, kind), frames=3)
     perceiver.tick(lambda: 101.0, feed=True)
     perceiver.perception.accumulate()
     ChangeTeller(kind.sensor, 0.0).changes(perceiver.perception.map, perceiver.where.origin, 101.0)
+
+
+def fly_past(
+    perceiver: Perceiver,
+    work: Callable[[Any, Callable[[], float]], object],
+    frame: Callable[[float, int], SensorFrame],
+    *,
+    frames: int,
+) -> None:
+    """So many frames, ten a second, from a vehicle that hovers over level ground."""
+    for number in range(frames):
+        t_s = 100.0 + 0.1 * number
+        perceiver.on_state(hovering(t_s))
+        if perceiver.kind.uses_camera:
+            perceiver.on_camera(SlamPose(t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
+        work(frame(t_s, number), lambda t_s=t_s: t_s)
+        perceiver.set_ground(ground_grid(np.zeros((40, 40), np.float32), [[-1.0, 0.0, 20.0], [0.0, 1.0, 20.0]]))
 
 
 def hovering(t_s: float) -> VehicleState:
@@ -55,7 +66,7 @@ def hovering(t_s: float) -> VehicleState:
     )
 
 
-def _frame(kind: SensorKind, t_s: float, number: int) -> RadarFrame | CloudFrame | RangeFrame:
+def _frame(kind: SensorKind, t_s: float, number: int) -> SensorFrame:
     if kind.sensor == "ranges":
         return RangeFrame(t_s, t_s, number, "warm-up", (0.0, 0.1), (0.0, 0.0), (6.0, 6.0), (0.0, 0.1), 0.1, 0.2, 40.0)
     xyz = packed(np.repeat([[0.0, 6.0, 1.0], [0.5, 5.0, 0.2]], 50, axis=0))

@@ -14,7 +14,6 @@ NEW_HOME_M, NEW_HEIGHT_M = 1.0, 0.5
 _NO_FIX = frozenset({"no_fix", "2d"})
 _FIX_COUNTS_S = 3.0
 _CLEAR_OF_GROUND_M = 1.0
-_EARTH_M_PER_DEG = 111_320.0
 
 
 class Whereabouts:
@@ -88,6 +87,5 @@ def is_flying(state: VehicleState) -> bool:
 
 
 def _differ(one: MapOrigin, other: MapOrigin) -> bool:
-    north_m = (other.lat_deg - one.lat_deg) * _EARTH_M_PER_DEG
-    east_m = (other.lon_deg - one.lon_deg) * _EARTH_M_PER_DEG * math.cos(math.radians(one.lat_deg))
-    return math.hypot(north_m, east_m) > NEW_HOME_M or abs(other.alt_amsl_m - one.alt_amsl_m) > NEW_HEIGHT_M
+    away_m = apart_m((one.lat_deg, one.lon_deg), (other.lat_deg, other.lon_deg))
+    return away_m > NEW_HOME_M or abs(other.alt_amsl_m - one.alt_amsl_m) > NEW_HEIGHT_M

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping.poses import Pose
-from mapping.tracker import TrackState
-from planning.velocity_obstacles import Obstacles, approaches
-from telemetry.tracking.blobs import Blobs
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from mapping.geometry.poses import Pose
+from mapping.tracking import TrackState
+from mapping.tracking.blobs import Blobs
+from planning.evading.velocity_obstacles import Obstacles, approaches
 
 SIGNIFICANT = 13.8
 """Chi-square of two degrees of freedom that chance exceeds once in a thousand times."""
@@ -112,7 +111,7 @@ class _Memory:
         return state if self.drift_enu_m_s is None else replace(state, velocity_enu_m_s=self.drift_enu_m_s)
 
 
-class Memory:
+class TrackMemory:
     """Of all tracks that live."""
 
     def __init__(self) -> None:

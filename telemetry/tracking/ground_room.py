@@ -10,7 +10,6 @@ from scipy.ndimage import maximum_filter
 from mapping.geometry.arrays import F64
 from mapping.perceiving.ground import GroundGrid
 
-F64 = NDArray[np.float64]
 DIRECTIONS, FARTHEST_M, STEP_M = 120, 40.0, 0.5
 COARSE_M = 1.0
 """Cells are taken together to so much, and each counts as high as its highest neighbour: no direction misses a spike,

@@ -30,8 +30,7 @@ from telemetry.tracking.followed import UNSEEN_S, Followed, Keep, TrackMemory
 from telemetry.tracking.ground_room import GroundRoom
 from telemetry.tracking.out_of_view import Remembered
 
-F64 = NDArray[np.float64]
-
+USUAL = Limits(max_speed_m_s=USUAL_MAX_SPEED_M_S)
 MOST_TRACKS = 64
 DOWNWASH_M = 0.5
 """Over the ground below it; beside it nothing is added."""
@@ -39,21 +38,32 @@ KEEP_S = UNSEEN_S
 """After the newest frame that could be followed: then its objects are somewhere else, and what it proposed is wrong."""
 
 
-class Told(NamedTuple):
-    status: TracksStatus
-    alerts: tuple[ObstacleAlert, ...]
-    accepted: bool
-    """A frame went into the tracker."""
+def tracks_kind(tracker: Tracker) -> SensorKind:
+    """The tracks node among those that take a sensor's frames: the radar's, into a tracker of its own."""
+
+    def make(settings: Settings, *, alert_prefix: str = "") -> Movers:
+        return Movers(settings, tracker, alert_prefix=alert_prefix)
+
+    return replace(RADAR, status=Topic.TRACKS, make=make)
 
 
-class Following:
+def limits_of(plan: PlanRecord) -> Limits:
+    """What a proposal must keep to, by the profile of the plan on board; the usual where it holds none to be read."""
+    try:
+        profile = parse_profile(plan.profile_toml.encode(), where="plan on board")
+    except DescribedError:
+        return USUAL
+    return Limits(max_speed_m_s=profile.max_speed_m_s)
+
+
+class ObjectTracking:
     """A perceiver whose perception follows what moves; ``perceiver`` takes states, settings and ground."""
 
     def __init__(self, *, run: str, utc_minus_mono_s: float) -> None:
         self._tracker = Tracker(TrackerSettings().params())
         self.perceiver = _Quiet(tracks_kind(self._tracker), run=run, utc_minus_mono_s=utc_minus_mono_s)
         self.limits = USUAL
-        self._memory, self._remembered, self._room = Memory(), Remembered(), GroundRoom()
+        self._memory, self._remembered, self._room = TrackMemory(), Remembered(), GroundRoom()
         self._room_m: tuple[float, ...] = ()
         self._followed: list[Followed] = []
         self._followed_t_s = -math.inf
@@ -68,13 +78,13 @@ class Following:
         after = self.perceiver.settings.tracker
         if after != before:
             self._tracker.tune(after.params())
-            self._memory, self._remembered = Memory(), Remembered()
+            self._memory, self._remembered = TrackMemory(), Remembered()
 
     def on_plan(self, plan: PlanRecord) -> None:
         """Of the vehicle's profile in it come the limits that a proposal keeps to."""
         self.limits = limits_of(plan)
 
-    def work(self, frame: RadarFrame, clock: Callable[[], float]) -> Told:
+    def work(self, frame: RadarFrame, clock: Callable[[], float]) -> Outcome[TracksStatus]:
         """One frame; never raises for what is in it."""
         outcome = self.perceiver.work(frame, clock)
         alerts = self._begin_afresh(outcome)
@@ -85,7 +95,7 @@ class Following:
             alerts += self._pass_time(clock())
         return self._told(outcome, alerts, clock())
 
-    def tick(self, clock: Callable[[], float]) -> Told:
+    def tick(self, clock: Callable[[], float]) -> Outcome[TracksStatus]:
         """A second without a frame."""
         outcome = self.perceiver.tick(clock, feed=True)
         alerts, now_s = self._begin_afresh(outcome), clock()
@@ -97,11 +107,11 @@ class Following:
             self._followed, self._evasion = [], Evasion()
         return self._approaches.pass_time(now_s, now_s)
 
-    def _begin_afresh(self, outcome: Outcome) -> list[ObstacleAlert]:
+    def _begin_afresh(self, outcome: Outcome[PerceptionStatus]) -> list[ObstacleAlert]:
         if self._begun == self.perceiver.begun:
             return []
         self._begun = self.perceiver.begun
-        self._memory, self._remembered = Memory(), Remembered()
+        self._memory, self._remembered = TrackMemory(), Remembered()
         self._followed, self._evasion = [], Evasion()
         return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, FOLLOWED_AFRESH)
 
@@ -118,7 +128,7 @@ class Following:
         rules = Rules(keep_of(settings), velocities.limits(self.limits), velocities.nearest_only, self._room_m)
         self._evasion = evasion(self._followed, pose, rules)
 
-    def _alerts(self, outcome: Outcome) -> list[ObstacleAlert]:
+    def _alerts(self, outcome: Outcome[PerceptionStatus]) -> list[ObstacleAlert]:
         movers = self.perceiver.perception
         if not movers.is_flying:
             return self._approaches.end_all(outcome.status.t_mono_s, outcome.status.done_t_mono_s, LANDED)
@@ -130,7 +140,9 @@ class Following:
             done_t_mono_s=outcome.status.done_t_mono_s,
         )
 
-    def _told(self, outcome: Outcome, alerts: list[ObstacleAlert], done_s: float) -> Told:
+    def _told(
+        self, outcome: Outcome[PerceptionStatus], alerts: list[ObstacleAlert], done_s: float
+    ) -> Outcome[TracksStatus]:
         base, pose, settings = outcome.status, self.perceiver.perception.pose, self.perceiver.settings
         shown, evading = self._followed[:MOST_TRACKS], self._evasion
         state, text = self._state(outcome, done_s)
@@ -159,9 +171,9 @@ class Following:
             origin=base.origin,
             latency_s=base.latency_s,
         )
-        return Told(status, tuple(alerts), outcome.accepted)
+        return Outcome(status, tuple(alerts), outcome.accepted)
 
-    def _state(self, outcome: Outcome, now_s: float) -> tuple[TracksState, str]:
+    def _state(self, outcome: Outcome[PerceptionStatus], now_s: float) -> tuple[TracksState, str]:
         """Frames that come and are refused, all of them, are no better than none."""
         base, unused_s = outcome.status, now_s - self._followed_t_s
         if base.state == "running" and unused_s > SILENT_S:

@@ -14,8 +14,6 @@ from mapping.tracking import TrackState
 from planning.evading.velocity_obstacles import Obstacles, approaches
 from telemetry.tracking.followed import ENOUGH_UPDATES, Followed
 
-F64 = NDArray[np.float64]
-
 WITHIN_M, FORGOTTEN_M = 15.0, 25.0
 """Only what was lost this near is remembered; beyond the other it is seen again before it matters."""
 SURE_S = 0.6
