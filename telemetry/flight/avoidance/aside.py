@@ -25,12 +25,10 @@ from telemetry.flight.avoidance.passing import (
 )
 from telemetry.flight.guided.helm import GUIDED, Helm, here_of, moved
 from telemetry.mavlink.actions import Action
-from telemetry.messages import GuidedTarget
-from telemetry.obstacles import PerceptionSettings
-from telemetry.tracks import TracksStatus
-from telemetry.vehicle import VehicleState
-
-F64 = NDArray[np.float64]
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 OLD_S = 0.7
 """Tracks older than this say nothing about now."""
@@ -173,7 +171,7 @@ class Aside:
             self._stands_since_s = now_s
         if state.mode != GUIDED or not self.sees(now_s):
             return self._helm.stop(now_s)
-        return self._helm.go_to(stopping_place(state), now_s, radius_m=LEAST_LEAD_M, holds=True) if is_new else []
+        return self._helm.stop_in_guided(state, now_s, radius_m=LEAST_LEAD_M) if is_new else []
 
     def _go(
         self, state: VehicleState, found: Proposal, carrot: F64, aside_m: float, *, is_free: bool, now_s: float
@@ -204,10 +202,10 @@ class Aside:
         """(3,) east, north and up of the vehicle, from where it began."""
         assert state.lat_deg is not None
         assert state.lon_deg is not None
-        return np.array([*offset_of(self._origin, state.lat_deg, state.lon_deg), state.alt_rel_home_m or 0.0])
+        return np.array([*offset_m(self._origin, state.lat_deg, state.lon_deg), state.alt_rel_home_m or 0.0])
 
     def _point(self, target: GuidedTarget) -> F64:
-        return np.array([*offset_of(self._origin, target.lat_deg, target.lon_deg), target.alt_rel_home_m])
+        return np.array([*offset_m(self._origin, target.lat_deg, target.lon_deg), target.alt_rel_home_m])
 
     def _drop_passed(self, at: F64) -> None:
         """A target is passed once the vehicle is beside it, or beyond."""
@@ -238,7 +236,7 @@ class Aside:
 def _towards(state: VehicleState, target: GuidedTarget) -> F64:
     assert state.lat_deg is not None
     assert state.lon_deg is not None
-    return np.array(offset_of((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
+    return np.array(offset_m((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
 
 
 def _with_speed(direction: F64, speed_m_s: float) -> F64:

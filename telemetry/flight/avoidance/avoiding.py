@@ -37,7 +37,7 @@ FLOWN_FROM = frozenset({"AUTO", *STOP_MODES, *RETURNS})
 class Avoiding:
     """Of one ArduPilot multirotor. All methods return what is to be sent to it, at once and in this order.
 
-    ``rest``: what is left of the flight, None when nothing is flown that could be gone on with. ``now_s`` is the
+    ``remaining``: what is left of the flight, None when nothing is flown that could be gone on with. ``now_s`` is the
     clock of ``t_mono_s`` in states and perception. ``on_engage`` is called when it takes the vehicle over, ``on_end``
     when all is flown and the way home is commanded.
     """
@@ -46,7 +46,7 @@ class Avoiding:
         self,
         target: tuple[int, int],
         *,
-        rest: Callable[[VehicleState], Rest | None],
+        remaining: Callable[[VehicleState], RemainingMission | None],
         settings: PerceptionSettings | None = None,
         params: DetourParams | None = None,
         own: tuple[int, int] = GROUND_STATION,
@@ -54,7 +54,7 @@ class Avoiding:
         on_end: Callable[[], None] = lambda: None,
     ) -> None:
         settings = settings or PerceptionSettings()
-        self._params, self._rest = params or DetourParams().following(settings), rest
+        self._params, self._remaining = params or DetourParams().following(settings), remaining
         self._on_engage, self._on_end = on_engage, on_end
         self._watch = PilotWatch()
         self.regions = Regions(settings)
@@ -66,8 +66,7 @@ class Avoiding:
         self.released = ""
         """Who has taken over; it stays off for this flight."""
         self._slowing = Slowing(self._helm)
-        self.cannot = False
-        """Something is in the way of a flight that it could not go on with."""
+        self._cannot = False
         self._now_s = 0.0
 
     @property
@@ -77,29 +76,30 @@ class Avoiding:
 
     @property
     def status(self) -> AvoidanceStatus:
-        return status_of(self, self._now_s)
-
-    @property
-    def state(self) -> VehicleState | None:
-        return self._state
+        now = Now(
+            t_s=self._now_s,
+            enabled=self.enabled,
+            by=self.by,
+            released=self.released,
+            failed=self._helm.failed,
+            cannot=self._cannot,
+            speed_m_s=(self._state and self._state.ground_speed_m_s) or 0.0,
+            slowed_to_m_s=self.slowed_to_m_s,
+        )
+        return status_of(now, self.regions, self.detour)
 
     @property
     def slowed_to_m_s(self) -> float | None:
         """The speed that was asked of a flight which was too fast to stop within what is seen."""
         return self._slowing.asked_m_s
 
-    @property
-    def failed(self) -> str:
-        """What the vehicle would not do."""
-        return self._helm.failed
-
     def flight_status(self, *, since_utc_s: float | None = None) -> FlightStatus:
         """Of a flight that it has taken over."""
         detour, target = self.detour, self.detour.target
         phase = {"holding": "paused", "ceiling": "paused", "ending": "returning"}.get(detour.phase, "flying")
-        last = detour.rest.targets[-1].item if detour.rest.targets else None
+        last = detour.remaining.targets[-1].item if detour.remaining.targets else None
         return FlightStatus(
-            way=detour.rest.way,
+            way=detour.remaining.way,
             phase=phase,  # type: ignore[arg-type]
             target=None if target is None else target.item,
             targets=last,
@@ -133,8 +133,8 @@ class Avoiding:
         wanted = self.enabled and self.by == "sidestep"
         return self.detour.stop_aside(now_s) if self.detour.phase == "aside" and not wanted else []
 
-    def fly(self, request: FlyManoeuvre, rest: Rest, now_s: float) -> list[Action]:
-        """A prepared way, then ``rest`` higher by what the request says. Raises NotAllowedError."""
+    def fly(self, request: FlyManoeuvre, remaining: RemainingMission, now_s: float) -> list[Action]:
+        """A prepared way, then ``remaining`` higher by what the request says. Raises NotAllowedError."""
         state = self._state
         self._check_way(request)
         if state is None or not _is_flying(state):
@@ -147,9 +147,9 @@ class Avoiding:
             self._watch.begin()  # what anybody did before this order releases nothing
         self._on_engage()
         if request.kind == "sidestep":
-            return self.detour.sidestep(request.targets, rest, now_s=now_s)
+            return self.detour.sidestep(request.targets, remaining, now_s=now_s)
         return self.detour.fly(
-            request.targets, rest, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
+            request.targets, remaining, over=request.kind == "over", offset_m=request.height_offset_m, now_s=now_s
         )
 
     def fly_rest(self, request: FlyRest, now_s: float) -> list[Action]:
@@ -258,11 +258,13 @@ class Avoiding:
         going = self.detour.phase == "going" and not self.detour.is_manoeuvre
         if self.by != "sidestep" or not _is_flying(state) or (self.is_engaged and not going):
             return []
-        rest = self.detour.rest if going else self._rest(state)
-        if rest is None or not self.detour.aside.wants(state, rest.raised(self.detour.offset_m).targets, now_s):
+        remaining = self.detour.remaining if going else self._remaining(state)
+        if remaining is None or not self.detour.aside.wants(
+            state, remaining.raised(self.detour.offset_m).targets, now_s
+        ):
             return []
         self._on_engage()
-        return self.detour.step_aside(state, rest, now_s)
+        return self.detour.step_aside(state, remaining, now_s)
 
     def _climb_if_blocked(self, state: VehicleState, now_s: float) -> list[Action]:
         """On the way aside something stands so near ahead that it must brake now, or there is no way on."""
@@ -284,7 +286,7 @@ class Avoiding:
         return self.regions.stopping(sight).distance_m(speed_m_s) + SHORT_M
 
     def _look_ahead(self, state: VehicleState, now_s: float) -> list[Action]:
-        going, self.cannot = self.detour.phase == "going" and not self.detour.is_manoeuvre, False
+        going, self._cannot = self.detour.phase == "going" and not self.detour.is_manoeuvre, False
         if self.is_engaged and not going:
             return []
         seen_by = self.regions.seen_by(now_s)
@@ -293,12 +295,12 @@ class Avoiding:
             return actions or self._slow_down(state, now_s)
         if going:
             return self.detour.avoid_again(seen_by, now_s)
-        rest = self._rest(state) if _is_flying(state) else None
-        if rest is None:
-            self.cannot = _is_flying(state)
+        remaining = self._remaining(state) if _is_flying(state) else None
+        if remaining is None:
+            self._cannot = _is_flying(state)
             return []
         self._on_engage()
-        return self.detour.avoid(rest, seen_by, now_s)
+        return self.detour.avoid(remaining, seen_by, now_s)
 
     def _slow_down(self, state: VehicleState, now_s: float) -> list[Action]:
         """What is flown by no pilot: the mission, the script, the way home."""

@@ -4,33 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from telemetry.flight.regions import FASTER_M_S
-from telemetry.obstacles import AvoidanceStatus, Eye
-
-if TYPE_CHECKING:
-    from telemetry.flight.avoiding import Avoiding
-    from telemetry.flight.regions import Sight
-
-State = AvoidanceStatus.__annotations__["state"]
-SENSOR_WORDS = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
+from telemetry.flight.avoidance.detour import Detour
+from telemetry.flight.avoidance.regions import FASTER_M_S, SENSOR_WORDS, Regions, Sight
+from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, Eye
 
 
-def status_of(avoiding: Avoiding, now_s: float) -> AvoidanceStatus:
-    largest_m_s = avoiding.largest_speed_m_s(now_s)
+@dataclass(frozen=True, slots=True)
+class Now:
+    """What there is to tell at ``t_s``. ``released``: by whom; ``failed``: what the vehicle would not do."""
+
+    t_s: float
+    enabled: bool
+    by: AvoidBy
+    released: str
+    failed: str
+    cannot: bool
+    """Something is in the way of a flight that it could not go on with."""
+    speed_m_s: float
+    slowed_to_m_s: float | None
+
+
+def status_of(now: Now, regions: Regions, detour: Detour) -> AvoidanceStatus:
+    slowest = regions.slowest(now.t_s)
     return AvoidanceStatus(
-        enabled=avoiding.enabled and not avoiding.released,
-        state=_state(avoiding, now_s),
-        text=avoiding.failed or _text(avoiding, now_s, largest_m_s),
-        height_offset_m=round(avoiding.detour.offset_m, 2),
-        largest_speed_m_s=None if largest_m_s is None else round(largest_m_s, 1),
-        sensors=avoiding.regions.counted(now_s),
-        eyes=_eyes(avoiding, now_s),
-        by=avoiding.by,
+        enabled=now.enabled and not now.released,
+        state=_state(now, regions, detour),
+        text=now.failed or _text(now, regions, detour),
+        height_offset_m=round(detour.offset_m, 2),
+        largest_speed_m_s=None if slowest is None else round(slowest[1], 1),
+        sensors=regions.counted(now.t_s),
+        eyes=_eyes(regions, now.t_s),
+        by=now.by,
     )
 
 
-def _eyes(avoiding: Avoiding, now_s: float) -> tuple[Eye, ...]:
-    regions = avoiding.regions
+def _eyes(regions: Regions, now_s: float) -> tuple[Eye, ...]:
     return tuple(
         Eye(
             sight.sensor,
@@ -42,14 +50,13 @@ def _eyes(avoiding: Avoiding, now_s: float) -> tuple[Eye, ...]:
     )
 
 
-def _state(avoiding: Avoiding, now_s: float):
-    detour = avoiding.detour
-    if avoiding.released:
+def _state(now: Now, regions: Regions, detour: Detour):
+    if now.released:
         return "released"
     if not detour.is_engaged:
-        if not avoiding.enabled:
+        if not now.enabled:
             return "off"
-        return "watching" if avoiding.regions.eyes(now_s) else "blind"
+        return "watching" if regions.eyes(now.t_s) else "blind"
     if detour.phase in ("holding", "ceiling"):
         return detour.phase
     if detour.is_manoeuvre or detour.phase == "aside":
@@ -57,39 +64,36 @@ def _state(avoiding: Avoiding, now_s: float):
     return "offset" if detour.phase in ("going", "ending") else "climbing"
 
 
-def _text(avoiding: Avoiding, now_s: float, largest_m_s: float | None) -> str:
-    detour = avoiding.detour
-    if avoiding.released:
-        return f"{avoiding.released} Avoidance is off for this flight."
+def _text(now: Now, regions: Regions, detour: Detour) -> str:
+    if now.released:
+        return f"{now.released} Avoidance is off for this flight."
     if detour.is_engaged:
-        return _engaged_text(avoiding, now_s)
-    if not avoiding.enabled:
+        return _engaged_text(regions, detour, now.t_s)
+    if not now.enabled:
         return ""
-    if avoiding.cannot:
+    if now.cannot:
         return "Something is in the way, but what is flown now is nothing that avoidance can go on with."
-    if avoiding.by == "sidestep" and (why := avoiding.detour.aside.why_not(now_s)):
+    if now.by == "sidestep" and (why := detour.aside.why_not(now.t_s)):
         return why
-    slowest = avoiding.regions.slowest(now_s)
+    slowest = regions.slowest(now.t_s)
     if slowest is None:
-        if avoiding.regions.eyes(now_s):
+        if regions.eyes(now.t_s):
             return ""
         return "No sensor sees ahead: nothing brakes by itself."
-    return _speed_words(avoiding, *slowest)
+    return _speed_words(now, *slowest)
 
 
-def _speed_words(avoiding: Avoiding, sight: Sight, largest_m_s: float) -> str:
+def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:
     """Why it is, or was made, no faster than its sensors see."""
-    speed_m_s = avoiding.state.ground_speed_m_s or 0.0 if avoiding.state else 0.0
     sees = f"the {SENSOR_WORDS[sight.sensor]} sees {sight.depth_m:g} m ahead"
-    if speed_m_s > largest_m_s + FASTER_M_S:
-        return f"Too fast to stop, {sees}: {speed_m_s:.1f} m/s, at most {largest_m_s:.1f} m/s."
-    if avoiding.slowed_to_m_s is not None:
-        return f"Slowed to {avoiding.slowed_to_m_s:.1f} m/s: {sees}."
+    if now.speed_m_s > largest_m_s + FASTER_M_S:
+        return f"Too fast to stop, {sees}: {now.speed_m_s:.1f} m/s, at most {largest_m_s:.1f} m/s."
+    if now.slowed_to_m_s is not None:
+        return f"Slowed to {now.slowed_to_m_s:.1f} m/s: {sees}."
     return ""
 
 
-def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
-    detour = avoiding.detour
+def _engaged_text(regions: Regions, detour: Detour, now_s: float) -> str:
     if detour.phase == "holding":
         return detour.why
     if detour.phase == "aside":
@@ -104,7 +108,7 @@ def _engaged_text(avoiding: Avoiding, now_s: float) -> str:
         return (
             "Goes on at its proper height, certified past what was seen." if detour.came_down else "Goes on in GUIDED."
         )
-    seen = avoiding.regions.occupied(now_s)
+    seen = regions.occupied(now_s)
     what = f"{SENSOR_WORDS[seen[0].sensor]}, {seen[0].distance_m or 0.0:.0f} m ahead" if seen else ""
     if detour.phase in ("stopping", "taking"):
         return f"Braking: {what}." if what else "Braking."

@@ -64,5 +64,4 @@ class Backing:
 
 def _apart_m(a: Place, b: Place) -> float:
     """As seen from above."""
-    north_m = (a.lat_deg - b.lat_deg) * METRES_PER_DEG
-    return math.hypot(north_m, (a.lon_deg - b.lon_deg) * METRES_PER_DEG * math.cos(math.radians(a.lat_deg)))
+    return apart_m((a.lat_deg, a.lon_deg), (b.lat_deg, b.lon_deg))

@@ -25,10 +25,7 @@ def joined(targets: tuple[GuidedTarget, ...], state: VehicleState) -> tuple[Guid
     lat_deg, lon_deg, alt_m = state.lat_deg, state.lon_deg, state.alt_rel_home_m
     if lat_deg is None or lon_deg is None or alt_m is None:
         raise NotAllowedError("Where the vehicle is, is not known.", advice="Wait for its position.")
-    shrink = math.cos(math.radians(lat_deg))
-    places = [
-        ((t.lon_deg - lon_deg) * METRES_PER_DEG * shrink, (t.lat_deg - lat_deg) * METRES_PER_DEG) for t in targets
-    ]
+    places = [offset_m((lat_deg, lon_deg), t.lat_deg, t.lon_deg) for t in targets]
     along_m, away_m = _nearest(places)
     if away_m > BESIDE_M:
         what = f"The vehicle is {away_m:.0f} m beside the line that was planned for it."

@@ -10,15 +10,12 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import offset_m
 from planning.errors import ParameterError
-from planning.reachable import shortfall
-from planning.steering import steer, with_ground
-from planning.velocity_obstacles import Limits, Obstacles, Proposal
-from telemetry.flight.handover import METRES_PER_DEG
-from telemetry.obstacles import PerceptionSettings
-from telemetry.tracks import Track, TracksStatus
-from telemetry.vehicle import VehicleState
-
-F64 = NDArray[np.float64]
+from planning.evading.reachable import shortfall
+from planning.evading.steering import steer, with_ground
+from planning.evading.velocity_obstacles import Limits, Obstacles, Proposal
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.tracks import Track, TracksStatus
+from telemetry.topics.vehicle import VehicleState
 
 LATENCY_S = 0.3
 """From measuring a frame to what is flown because of it."""
@@ -55,7 +52,7 @@ def scene_of(
     here = (state.lat_deg, state.lon_deg)
     ahead = velocity_of(state) * LATENCY_S
     places = [
-        np.array(offset_of(here, t.lat_deg, t.lon_deg)) + later_s * np.array(t.velocity_enu_m_s) - ahead for t in near
+        np.array(offset_m(here, t.lat_deg, t.lon_deg)) + later_s * np.array(t.velocity_enu_m_s) - ahead for t in near
     ]
     obstacles = Obstacles.of(
         [0.0, 0.0],
@@ -105,12 +102,6 @@ def _radius_m(track: Track, settings: PerceptionSettings) -> float:
         return safe_m + min(max((SPARE - 1.0) * safe_m, unsure_m), safe_m)
     stands_m = settings.velocities.stands_m
     return stands_m + min(unsure_m, stands_m / 4)
-
-
-def offset_of(origin: tuple[float, float], lat_deg: float, lon_deg: float) -> tuple[float, float]:
-    """East and north in metres."""
-    shrink = math.cos(math.radians(origin[0]))
-    return (lon_deg - origin[1]) * METRES_PER_DEG * shrink, (lat_deg - origin[0]) * METRES_PER_DEG
 
 
 def velocity_of(state: VehicleState) -> F64:

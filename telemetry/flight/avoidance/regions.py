@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from mapping.perceiving.braking import Braking, Stopping
 from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Sensor
 
+SENSOR_WORDS: dict[Sensor, str] = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
 OLD_S = 0.5
 """A frame or pose older than this says nothing about what is ahead now."""
 BLIND_S = 1.0
@@ -150,30 +151,30 @@ class Regions:
     def is_clear(self, engaged: frozenset[Sensor], now_s: float) -> bool:
         """SEEN to be clear: nobody sees anything, and those who did have looked there and seen nothing for several
         fresh frames. Of nobody in particular: whoever works."""
-        witnesses = self._witnesses(engaged, now_s)
+        trusted = self._trusted(engaged, now_s)
         return (
-            len(witnesses) > 0
+            len(trusted) > 0
             and not self.occupied(now_s)
-            and all(_has_seen_clear(sight) and sight.is_fresh(now_s) for sight in witnesses)
+            and all(_has_seen_clear(sight) and sight.is_fresh(now_s) for sight in trusted)
         )
 
     def hidden(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
         """Of the sensors that are counted on: one that cannot see what stood in the way."""
-        witnesses = self._witnesses(engaged, now_s)
-        return next((sight for sight in witnesses if sight.hidden_m is not None or sight.forgot), None)
+        trusted = self._trusted(engaged, now_s)
+        return next((sight for sight in trusted if sight.hidden_m is not None or sight.forgot), None)
 
     def nearest_m(self, engaged: frozenset[Sensor], now_s: float) -> float:
         """Distance of the nearest thing that stands, or may stand, in the way."""
-        known = self._witnesses(engaged, now_s)
+        known = self._trusted(engaged, now_s)
         seen = [sight.distance_m for sight in known if sight.distance_m is not None]
         return min([*seen, *(sight.hidden_m for sight in known if sight.hidden_m is not None)], default=math.inf)
 
     def blind_m(self, engaged: frozenset[Sensor], now_s: float) -> float:
         """What is nearer cannot be seen by one of the sensors that are counted on."""
-        known = self._witnesses(engaged, now_s)
+        known = self._trusted(engaged, now_s)
         return max((sight.nearest_m for sight in known), default=0.0)
 
-    def _witnesses(self, engaged: frozenset[Sensor], now_s: float) -> list[Sight]:
+    def _trusted(self, engaged: frozenset[Sensor], now_s: float) -> list[Sight]:
         return [self.sights[sensor] for sensor in engaged] or self.fresh(now_s)
 
     def oldest(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:

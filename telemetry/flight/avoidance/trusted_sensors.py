@@ -12,7 +12,7 @@ SEEN_FROM_M = 1.5
 """Beyond what is too near to be seen: voxels are a metre wide, and the vehicle drifts."""
 
 
-class Witnesses:
+class TrustedSensors:
     def __init__(self, regions: Regions) -> None:
         self._regions = regions
         self.sensors: frozenset[Sensor] = frozenset()

@@ -112,8 +112,7 @@ def _change(a: Vec3, b: Vec3) -> Vec3:
 
 
 def _leg(a: Vec3, b: Vec3) -> tuple[Vec3, float]:
-    north_m = (b[0] - a[0]) * METRES_PER_DEG
-    east_m = (b[1] - a[1]) * METRES_PER_DEG * math.cos(math.radians(b[0]))
+    east_m, north_m = offset_m(a[:2], b[0], b[1])
     length_m = math.hypot(north_m, east_m, b[2] - a[2])
     if length_m < SHORTEST_M:
         return (0.0, 0.0, 0.0), 0.0
@@ -204,6 +203,5 @@ class FedLeg:
 
     def _reached_m(self, at: Place) -> float:
         a, unit = self._start, self._bounds.unit
-        north_m = (at.lat_deg - a.lat_deg) * METRES_PER_DEG
-        east_m = (at.lon_deg - a.lon_deg) * METRES_PER_DEG * math.cos(math.radians(a.lat_deg))
+        east_m, north_m = offset_m((a.lat_deg, a.lon_deg), at.lat_deg, at.lon_deg)
         return north_m * unit[0] + east_m * unit[1] + (at.alt_rel_home_m - a.alt_rel_home_m) * unit[2]

@@ -60,7 +60,7 @@ class GuidedScript:
         self._leading = None if feed is None else Leading(feed)
         self._came_from: Place | None = None
         """The place that was reached last; nowhere after a take-off or a pause."""
-        self._request, self._ends, self._orders = request, Ends(target, own), Orders(firmware, target)
+        self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
         self._watch, self._punctuality = ModeWatch(), Punctuality()
         self.phase: Phase = "idle"
         self.hint = ""
@@ -68,7 +68,7 @@ class GuidedScript:
         self._index = 0
         self._state = state
         self._home_alt_amsl_m = math.nan
-        self._errand = Errand(self._ends, self._on_failed_command)
+        self._pending = PendingCommand(self._endpoints, self._on_failed_command)
         self._handover: Handover | None = None
         self._speed_m_s: float | None = None
         self._reached_s: float | None = None
@@ -127,18 +127,18 @@ class GuidedScript:
         return self._change_mode(self._orders.guided_mode, now_s, then=self._arm)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
-        if self.is_over or not self._ends.is_from_vehicle(message):
+        if self.is_over or not self._endpoints.is_from_vehicle(message):
             return []
         if message.get_type() == "POSITION_TARGET_GLOBAL_INT" and self._handover is not None:
             self._handover.on_position_target(message, now_s)
-        return self._errand.on_message(message, now_s)
+        return self._pending.on_message(message, now_s)
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         if self.is_over:
             return []
         self._state = state
         self._note_home(state)
-        actions = self._errand.on_state(state, now_s)
+        actions = self._pending.on_state(state, now_s)
         if not self.is_over:
             actions += self._look(state, now_s)
         return actions
@@ -146,7 +146,7 @@ class GuidedScript:
     def on_tick(self, now_s: float) -> list[Action]:
         if self.is_over:
             return []
-        actions = self._errand.on_tick(now_s)
+        actions = self._pending.on_tick(now_s)
         if not self.is_over:
             actions += self._look(self._state, now_s)
         return actions
@@ -198,7 +198,7 @@ class GuidedScript:
     def _is_up(self, state: VehicleState, now_s: float) -> bool:
         height_m = state.alt_rel_home_m
         up = height_m is not None and height_m >= self._request.takeoff_alt_rel_home_m - TAKEOFF_TOLERANCE_M
-        return up and not self._errand.is_under_way and is_fresh(state, now_s)
+        return up and not self._pending.is_under_way and is_fresh(state, now_s)
 
     def _fly(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None
@@ -237,7 +237,7 @@ class GuidedScript:
             return self._land()
         return (
             self._go_home(now_s)
-            if not self._errand.is_under_way and not self._watch.seen and now_s >= self._return_at_s
+            if not self._pending.is_under_way and not self._watch.seen and now_s >= self._return_at_s
             else []
         )
 
@@ -249,16 +249,16 @@ class GuidedScript:
 
     def _change_mode(self, mode: str, now_s: float, *, then: Then | None = None) -> list[Action]:
         message = self._orders.set_mode(mode)
-        return self._errand.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
+        return self._pending.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
 
     def _arm(self, now_s: float) -> list[Action]:
         message = self._orders.arm()
-        return self._errand.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._take_off)
+        return self._pending.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._take_off)
 
     def _take_off(self, now_s: float) -> list[Action]:
         self.phase = "taking_off"
         message = self._orders.take_off(self._request.takeoff_alt_rel_home_m, self._home_alt_amsl_m)
-        return self._errand.begin(message, now_s, once=True, confirm=_is_off_the_ground)
+        return self._pending.begin(message, now_s, once=True, confirm=_is_off_the_ground)
 
     def _hand_over(self, now_s: float) -> list[Action]:
         target, self._reached_s = self.target, None
@@ -296,7 +296,7 @@ class GuidedScript:
 
     def _set_speed(self, speed_m_s: float, now_s: float) -> list[Action]:
         self._speed_m_s = speed_m_s
-        return self._errand.begin(self._orders.change_speed(speed_m_s), now_s)
+        return self._pending.begin(self._orders.change_speed(speed_m_s), now_s)
 
     def _go_to(self, place: Place, now_s: float, *, holds: bool = False) -> list[Action]:
         self._handover = Handover(place, radius_m=self._request.waypoint_radius_m, holds=holds)
@@ -324,7 +324,7 @@ class GuidedScript:
         self._watch.expect(frozenset({mode, "LAND"}), before=self._orders.script_modes)
         return self._change_mode(mode, now_s)
 
-    # Ends.
+    # How it ends.
 
     def _on_failed_command(self, error: TelemetryError, now_s: float) -> list[Action]:
         """On the ground it ends the script; in flight the vehicle is already under way and the script goes on."""

@@ -10,7 +10,6 @@ from telemetry.flight.guided.orders import Place
 from telemetry.mavlink.actions import Message
 from telemetry.topics.vehicle import VehicleState
 
-METRES_PER_DEG = 111_195.0
 SAME_PLACE_M = 1.0
 """Between a target and the one that the vehicle says it flies to."""
 ANSWER_S = 0.7
@@ -28,18 +27,13 @@ def away_m(state: VehicleState, place: Place) -> float:
     """3-D distance; infinite where the vehicle's position is not known."""
     if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
         return math.inf
-    north_m, east_m = _offset_m(place, state.lat_deg, state.lon_deg)
-    return math.hypot(north_m, east_m, state.alt_rel_home_m - place.alt_rel_home_m)
+    flat_m = apart_m((place.lat_deg, place.lon_deg), (state.lat_deg, state.lon_deg))
+    return math.hypot(flat_m, state.alt_rel_home_m - place.alt_rel_home_m)
 
 
 def is_fresh(state: VehicleState, now_s: float) -> bool:
     """Whether the position is of now."""
     return state.position_t_mono_s is not None and now_s - state.position_t_mono_s <= OLD_POSITION_S
-
-
-def _offset_m(place: Place, lat_deg: float, lon_deg: float) -> tuple[float, float]:
-    shrink = math.cos(math.radians(place.lat_deg))
-    return (lat_deg - place.lat_deg) * METRES_PER_DEG, (lon_deg - place.lon_deg) * METRES_PER_DEG * shrink
 
 
 class Handover:
@@ -72,9 +66,10 @@ class Handover:
         self._taken = bool(self._taken) or self._is_same(message)
 
     def _is_same(self, message: Message) -> bool:
-        north_m, east_m = _offset_m(self.place, message.lat_int * 1e-7, message.lon_int * 1e-7)
+        told_deg = message.lat_int * 1e-7, message.lon_int * 1e-7
+        flat_m = apart_m((self.place.lat_deg, self.place.lon_deg), told_deg)
         up_m = message.alt - self.place.home_alt_amsl_m - self.place.alt_rel_home_m
-        return math.hypot(north_m, east_m) <= SAME_PLACE_M and not abs(up_m) > SAME_PLACE_M
+        return flat_m <= SAME_PLACE_M and not abs(up_m) > SAME_PLACE_M
 
     def must_be_sent_again(self, state: VehicleState, now_s: float) -> bool:
         """Not while the position is old: then the link is down, and what is sent now would come late."""

@@ -33,9 +33,9 @@ class Helm:
         *,
         own: tuple[int, int] = GROUND_STATION,
     ) -> None:
-        self._ends, self.orders = Ends(target, own), Orders("ardupilot", target)
+        self._endpoints, self.orders = Endpoints(target, own), GuidedOrders("ardupilot", target)
         self._asked = asked
-        self._errand = Errand(self._ends, self._on_failed)
+        self._pending = PendingCommand(self._endpoints, self._on_failed)
         self._mode, self._mode_s = "", 0.0
         """Commanded last and not given up, and when."""
         self._handover: Handover | None = None
@@ -54,25 +54,25 @@ class Helm:
 
     def let_go(self) -> None:
         """Nothing more is sent."""
-        self._errand = Errand(self._ends, self._on_failed)
+        self._pending = PendingCommand(self._endpoints, self._on_failed)
         self._handover, self._mode, self._speed, self.failed = None, "", None, ""
         self._is_placed = False
 
     # What comes in.
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
-        if not self._ends.is_from_vehicle(message):
+        if not self._endpoints.is_from_vehicle(message):
             return []
         if message.get_type() == "POSITION_TARGET_GLOBAL_INT" and self._handover is not None:
             self._handover.on_position_target(message, now_s)
-        return self._errand.on_message(message, now_s)
+        return self._pending.on_message(message, now_s)
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         self._state = state
-        return [*self._errand.on_state(state, now_s), *self._again_if_needed(now_s)]
+        return [*self._pending.on_state(state, now_s), *self._again_if_needed(now_s)]
 
     def on_tick(self, now_s: float) -> list[Action]:
-        return [*self._errand.on_tick(now_s), *self._mode_again_if_needed(now_s), *self._again_if_needed(now_s)]
+        return [*self._pending.on_tick(now_s), *self._mode_again_if_needed(now_s), *self._again_if_needed(now_s)]
 
     # Orders.
 
@@ -80,6 +80,10 @@ class Helm:
         """Brakes and holds."""
         self._handover, self.failed = None, ""
         return self.change_mode(STOP_MODES[0], now_s)
+
+    def stop_in_guided(self, state: VehicleState, now_s: float, *, radius_m: float = 1.0) -> list[Action]:
+        """The same without leaving GUIDED: it is sent to where it can stand still."""
+        return self.go_to(stopping_place(state), now_s, radius_m=radius_m, holds=True)
 
     def change_mode(self, mode: str, now_s: float, *, then: Then | None = None) -> list[Action]:
         """Nothing when it has been commanded already."""
@@ -93,7 +97,7 @@ class Helm:
         self._speed, self._is_placed = None, False  # a speed is forgotten with a change of mode
         self._asked(mode, now_s)
         message = self.orders.set_mode(mode)
-        return self._errand.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
+        return self._pending.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
 
     def go_to(self, place: Place, now_s: float, *, radius_m: float, holds: bool = False) -> list[Action]:
         """In GUIDED."""
@@ -113,11 +117,11 @@ class Helm:
     def _order_speed(self, now_s: float) -> list[Action]:
         assert self._speed is not None
         kind, speed_m_s = self._speed
-        return self._errand.begin(self.orders.change_speed(speed_m_s, kind), now_s)
+        return self._pending.begin(self.orders.change_speed(speed_m_s, kind), now_s)
 
     def slow_down(self, speed_m_s: float, now_s: float) -> list[Action]:
         """As often as it is asked: a mission's own items change it back. Waits while another order is under way."""
-        if self._errand.is_under_way:
+        if self._pending.is_under_way:
             return []
         self._speed = None
         return self.set_speed(speed_m_s, now_s)
@@ -137,7 +141,7 @@ class Helm:
     def _mode_again_if_needed(self, now_s: float) -> list[Action]:
         """An acknowledgement does not say of which mode it is: what does not show is commanded again."""
         shows = self._state is None or not self._mode or self._state.mode == self._mode
-        waits = self._errand.is_under_way or now_s - self._mode_s < MODE_SHOWS_S
+        waits = self._pending.is_under_way or now_s - self._mode_s < MODE_SHOWS_S
         return [] if shows or waits else self._command_mode(now_s)
 
     def _again_if_needed(self, now_s: float) -> list[Action]:
@@ -156,14 +160,14 @@ class Helm:
     def _on_failed(self, error: TelemetryError, now_s: float) -> list[Action]:
         mode, self._mode, self._speed = self._mode, "", None
         if mode == STOP_MODES[0] and isinstance(error, RefusedError):
-            return self._stop_in_guided(now_s)
+            return self._stop_without_brake(now_s)
         self.failed = str(error)
         return []
 
-    def _stop_in_guided(self, now_s: float) -> list[Action]:
+    def _stop_without_brake(self, now_s: float) -> list[Action]:
         """For a vehicle without BRAKE."""
         if self._state is not None and self._state.mode == GUIDED:
-            return self.go_to(stopping_place(self._state), now_s, radius_m=1.0, holds=True)
+            return self.stop_in_guided(self._state, now_s)
         return self.change_mode(GUIDED, now_s)
 
 
@@ -186,11 +190,5 @@ def here_of(state: VehicleState) -> Place:
 
 
 def moved(place: Place, north_m: float, east_m: float, up_m: float) -> Place:
-    shrink = math.cos(math.radians(place.lat_deg))
-    return Place(
-        place.lat_deg + north_m / METRES_PER_DEG,
-        place.lon_deg + east_m / METRES_PER_DEG / shrink,
-        place.alt_rel_home_m + up_m,
-        place.home_alt_amsl_m,
-        place.heading_rad,
-    )
+    lat_deg, lon_deg = moved_deg((place.lat_deg, place.lon_deg), east_m, north_m)
+    return replace(place, lat_deg=lat_deg, lon_deg=lon_deg, alt_rel_home_m=place.alt_rel_home_m + up_m)

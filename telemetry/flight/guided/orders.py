@@ -31,7 +31,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Orders:
+class GuidedOrders:
     """Messages to one vehicle."""
 
     firmware: Firmware

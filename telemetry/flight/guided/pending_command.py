@@ -14,9 +14,9 @@ Then = Callable[[float], list[Action]]
 OnFailed = Callable[[TelemetryError, float], list[Action]]
 
 
-class Errand:
-    def __init__(self, ends: Ends, on_failed: OnFailed) -> None:
-        self._ends = ends
+class PendingCommand:
+    def __init__(self, endpoints: Endpoints, on_failed: OnFailed) -> None:
+        self._endpoints = endpoints
         self._run: CommandRun | None = None
         self._then: Then | None = None
         self._on_failed = on_failed
@@ -35,7 +35,9 @@ class Errand:
         then: Then | None = None,
     ) -> list[Action]:
         """In place of the one before; ``once`` and ``confirm`` as in CommandRun."""
-        self._run = CommandRun(message, target=self._ends.vehicle, own=self._ends.own, once=once, confirm=confirm)
+        self._run = CommandRun(
+            message, target=self._endpoints.vehicle, own=self._endpoints.own, once=once, confirm=confirm
+        )
         self._then = then
         return self._pass_on(self._run.start(now_s), now_s)
 

@@ -22,46 +22,46 @@ RETURNS = ("RTL", "SMART_RTL", "AUTO_RTL")
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RemainingMission:
     targets: tuple[GuidedTarget, ...]
     end: Literal["rtl", "land", "hold"]
     """What follows the last target."""
     way: Literal["auto", "guided"] = "auto"
 
-    def raised(self, by_m: float) -> Rest:
+    def raised(self, by_m: float) -> RemainingMission:
         """The same, higher."""
         higher = tuple(replace(t, alt_rel_home_m=t.alt_rel_home_m + by_m) for t in self.targets)
         return replace(self, targets=higher)
 
 
-def rest_of_flight(onboard: OnboardMission | None, state: VehicleState) -> Rest | None:
+def remaining_flight(onboard: OnboardMission | None, state: VehicleState) -> RemainingMission | None:
     """Of a mission on board that is flown in AUTO, or of a return; None: nothing that could be gone on with."""
     if state.mode in RETURNS:
-        return Rest((), "rtl") if _is_away(state) else None
-    return rest_of_mission(onboard, state) if onboard is not None and state.mode == "AUTO" else None
+        return RemainingMission((), "rtl") if _is_away(state) else None
+    return remaining_mission(onboard, state) if onboard is not None and state.mode == "AUTO" else None
 
 
-def rest_of_mission(onboard: OnboardMission, state: VehicleState) -> Rest | None:
+def remaining_mission(onboard: OnboardMission, state: VehicleState) -> RemainingMission | None:
     """From the item that is flown to now. None during the take-off and the landing, and for what no script can fly."""
     number = item_of(state)
     if number is None or not 1 <= number <= len(onboard.items):
         return None
     command = onboard.items[number - 1].command
-    if command in TAKEOFFS or command == LAND:
+    if command in TAKEOFFS or command == MavCmd.NAV_LAND:
         return None
-    rest = rest_from(onboard, number)
-    return None if rest is None or (not rest.targets and not _is_away(state)) else rest
+    remaining = remaining_from(onboard, number)
+    return None if remaining is None or (not remaining.targets and not _is_away(state)) else remaining
 
 
-def rest_from(onboard: OnboardMission, number: int) -> Rest | None:
+def remaining_from(onboard: OnboardMission, number: int) -> RemainingMission | None:
     """From an item on, 1 is the first. None for items that no script can fly."""
-    if all(item.command == RETURN_TO_LAUNCH for item in onboard.items[number - 1 :]):
-        return Rest((), "rtl")
+    if all(item.command == MavCmd.NAV_RETURN_TO_LAUNCH for item in onboard.items[number - 1 :]):
+        return RemainingMission((), "rtl")
     try:
         plan = guided_plan(_mission(onboard))
     except MissionError:
         return None
-    return Rest(tuple(t for t in plan.targets if t.item >= number), plan.end)
+    return RemainingMission(tuple(t for t in plan.targets if t.item >= number), plan.end)
 
 
 def _mission(onboard: OnboardMission) -> Mission:
@@ -81,8 +81,7 @@ def _item(item: Item) -> MissionItem:
 
 
 def _is_away(state: VehicleState) -> bool:
-    at, home = (state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)
-    if at[0] is None or at[1] is None or home[0] is None or home[1] is None:
+    lat_deg, lon_deg, home_lat_deg, home_lon_deg = state.lat_deg, state.lon_deg, state.home_lat_deg, state.home_lon_deg
+    if lat_deg is None or lon_deg is None or home_lat_deg is None or home_lon_deg is None:
         return False
-    east_m = (at[1] - home[1]) * METRES_PER_DEG * math.cos(math.radians(at[0]))
-    return math.hypot((at[0] - home[0]) * METRES_PER_DEG, east_m) > LANDS_M
+    return apart_m((lat_deg, lon_deg), (home_lat_deg, home_lon_deg)) > LANDS_M

@@ -20,15 +20,10 @@ from planning.model import Mission, MissionItem
 from planning.terrain.dsm import is_amsl
 from telemetry.topics.messages import GuidedTarget
 
-WAYPOINT, LOITER_UNLIMITED, LOITER_TIME = 16, 17, 19
-CONDITION_YAW, CHANGE_SPEED = 115, 178
-SET_ROI_LOCATION, SET_ROI_NONE, SET_ROI = 195, 197, 201
 GROUND_SPEEDS = (0, 1)
 DEFAULT_SPEED_M_S = 3.0
-FRAME_AMSL, FRAME_HOME = 0, 3
 PRESENT_HEIGHT_M = 0.01
 """ArduPilot takes a height that it stores as 0 cm for the present one."""
-METRES_PER_DEG = 111_195.0
 LEVEL_LEG_M = 1.0
 """A shorter leg over ground has no direction that the nose should turn to."""
 
@@ -75,18 +70,14 @@ def with_timing(targets: Sequence[GuidedTarget], trajectory: Trajectory) -> tupl
 
 def _nearest(lat_lon_deg: F64, target: GuidedTarget) -> int:
     """Index of the first sample of the nearest pass over the target: a route may come by again later."""
-    shrink = math.cos(math.radians(target.lat_deg))
-    north_m = (lat_lon_deg[:, 0] - target.lat_deg) * METRES_PER_DEG
-    east_m = (lat_lon_deg[:, 1] - target.lon_deg) * METRES_PER_DEG * shrink
-    away_m = np.hypot(north_m, east_m)
+    away_m = np.hypot(*offset_m((target.lat_deg, target.lon_deg), lat_lon_deg[:, 0], lat_lon_deg[:, 1]))
     near = np.flatnonzero(away_m <= away_m.min() + 0.05)
     return int(near[0])
 
 
 def bearing_rad(start_deg: tuple[float, float], end_deg: tuple[float, float]) -> float | None:
     """From one latitude and longitude to another; None where they are too near each other to have a direction."""
-    north_m = (end_deg[0] - start_deg[0]) * METRES_PER_DEG
-    east_m = (end_deg[1] - start_deg[1]) * METRES_PER_DEG * math.cos(math.radians(end_deg[0]))
+    east_m, north_m = offset_m(start_deg, *end_deg)
     return None if math.hypot(north_m, east_m) < LEVEL_LEG_M else math.atan2(east_m, north_m) % math.tau
 
 
@@ -105,13 +96,13 @@ class _Reader:
     def read(self, number: int, item: MissionItem) -> None:
         if item.command in TAKEOFFS:
             self.takeoff_m = self._height(number, item)
-        elif item.command in (WAYPOINT, LOITER_TIME):
+        elif item.command in (MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME):
             self._target(number, item)
-        elif item.command == RETURN_TO_LAUNCH:
+        elif item.command == MavCmd.NAV_RETURN_TO_LAUNCH:
             self.end = "rtl"
-        elif item.command == LAND:
+        elif item.command == MavCmd.NAV_LAND:
             self._land(number, item)
-        elif item.command in BENT or item.command in OTHER_UNJUDGED or item.command == LOITER_UNLIMITED:
+        elif item.command in BENT or item.command in OTHER_UNJUDGED or item.command == MavCmd.NAV_LOITER_UNLIM:
             why = BENT.get(item.command) or OTHER_UNJUDGED.get(item.command) or "waits without end"
             raise MissionError(
                 f"The navigation script cannot fly it: command {item.command} {why}.",
@@ -123,13 +114,13 @@ class _Reader:
 
     def _set(self, item: MissionItem) -> None:
         p1, p2, _, relative = item.params
-        if item.command == CHANGE_SPEED and p1 in GROUND_SPEEDS and p2 > 0:
+        if item.command == MavCmd.DO_CHANGE_SPEED and p1 in GROUND_SPEEDS and p2 > 0:
             self._speed_m_s = p2
-        elif item.command == CONDITION_YAW and relative != 1:
+        elif item.command == MavCmd.CONDITION_YAW and relative != 1:
             self._heading_rad = math.radians(p1) % math.tau
-        elif item.command in (SET_ROI_LOCATION, SET_ROI):
+        elif item.command in (MavCmd.DO_SET_ROI_LOCATION, MavCmd.DO_SET_ROI):
             self._look_at = (item.lat_deg, item.lon_deg)
-        elif item.command == SET_ROI_NONE:
+        elif item.command == MavCmd.DO_SET_ROI_NONE:
             self._look_at = None
 
     def _target(self, number: int, item: MissionItem) -> None:
@@ -166,9 +157,9 @@ class _Reader:
         if self._ardupilot and abs(item.alt_m) < PRESENT_HEIGHT_M and self.targets:
             return self.targets[-1].alt_rel_home_m
         frame = plain_frame(item.frame)
-        if frame == FRAME_HOME and math.isfinite(item.alt_m):
+        if frame == MavFrame.GLOBAL_RELATIVE_ALT and math.isfinite(item.alt_m):
             return item.alt_m
-        if frame == FRAME_AMSL and is_amsl(self._home.vertical_datum):
+        if frame == MavFrame.GLOBAL and is_amsl(self._home.vertical_datum):
             height_m = item.alt_m - self._home.alt_dsm_m
             if math.isfinite(height_m):
                 return height_m
@@ -180,9 +171,7 @@ class _Reader:
 
     def _heading(self, lat_deg: float, lon_deg: float, yaw_deg: float) -> float | None:
         if self._look_at is not None:
-            north = self._look_at[0] - lat_deg
-            east = (self._look_at[1] - lon_deg) * math.cos(math.radians(lat_deg))
-            return math.atan2(east, north) % math.tau
+            return math.atan2(*offset_m((lat_deg, lon_deg), *self._look_at)) % math.tau
         if not self._ardupilot and math.isfinite(yaw_deg):
             return math.radians(yaw_deg) % math.tau
         return self._heading_rad

@@ -29,7 +29,6 @@ __all__ = ["LARGEST_SHIFT_M", "Preflight", "Row", "actual_home", "check"]
 
 LARGEST_SHIFT_M = 0.3
 """Heights are re-referenced when the ground at the actual home differs from the planned by more."""
-SMALL_HOLE_M2 = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +83,7 @@ def check(
     home = actual_home(state, dsm)
     shift_m = _shift(home, planned_home, dsm)
     mission = _mission(onboard, firmware, home, dsm)
-    surface = fill_holes(dsm, max_area_m2=SMALL_HOLE_M2)[0] if dsm is not None else None
+    surface = fill_holes(dsm)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
     demanded = replace(clearance, rtl_height_m=height_m, set_down_m=0.0)
     demanded = replace(demanded, home_known_dsm_m=_own_ground(home, state, dsm, demanded))

@@ -137,7 +137,7 @@ def _resumption(preflight: Preflight, options: FlyOptions) -> Resumption | None:
     if options.dsm is None or preflight.mission is None or preflight.clearance is None:
         what = "Without a surface model the way there cannot be proved to be clear."
         raise NotAllowedError(what, where=where, advice="Give the surface model.")
-    surface, _ = fill_holes(options.dsm, max_area_m2=SMALL_HOLE_M2)
+    surface, _ = fill_holes(options.dsm)
     return plan_resumption(preflight.mission, options.from_item, surface, preflight.clearance)
 
 

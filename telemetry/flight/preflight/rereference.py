@@ -24,7 +24,7 @@ def rereference(mission: Mission, shift_m: float, *, home: Home | None = None) -
 
 
 def _moved(item: MissionItem, shift_m: float) -> MissionItem:
-    if item.frame not in HOME_FRAMES or item.command == LAND:
+    if item.frame not in HOME_FRAMES or item.command == MavCmd.NAV_LAND:
         return item  # a landing ends on the ground, wherever that is
     if item.command in TAKEOFFS:
         return replace(item, alt_m=max(_stored(item.alt_m - shift_m), MIN_TAKEOFF_M))

@@ -20,7 +20,6 @@ from planning.model import Certificate, ClearanceParams, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
 
-CHANGE_SPEED = 178
 """The link node sets speeds again."""
 HEADROOM_M = 0.1
 """Above what is needed, so that centimetres that the vehicle cuts do not count."""
@@ -88,7 +87,7 @@ def plan_resumption(
             what, where=where, advice=f"Climb to {least_m:.1f} m." if height_m < least_m else reason.mend
         )
     before = enumerate(mission.items[: number - 1], start=1)
-    skipped = tuple(k for k, item in before if stays(item.command) and item.command != CHANGE_SPEED)
+    skipped = tuple(k for k, item in before if stays(item.command) and item.command != MavCmd.DO_CHANGE_SPEED)
     return Resumption(number, height_m, max(0.0, needed_m), certificate, skipped)
 
 
@@ -107,7 +106,13 @@ def _heights(mission: Mission, item: MissionItem, dsm: Dsm, clearance: Clearance
 def _rest(mission: Mission, number: int, climb_to_m: float) -> Mission:
     """What will be flown: up over home, level to over the item, and the mission from it on."""
     item = mission.items[number - 1]
-    up = replace(item, command=TAKEOFF, frame=3, params=(0.0, 0.0, 0.0, 0.0), alt_m=climb_to_m)
+    up = replace(
+        item,
+        command=MavCmd.NAV_TAKEOFF,
+        frame=MavFrame.GLOBAL_RELATIVE_ALT,
+        params=(0.0, 0.0, 0.0, 0.0),
+        alt_m=climb_to_m,
+    )
     up = replace(up, lat_deg=mission.home.lat_deg, lon_deg=mission.home.lon_deg)
-    over = replace(item, frame=3, alt_m=climb_to_m)
+    over = replace(item, frame=MavFrame.GLOBAL_RELATIVE_ALT, alt_m=climb_to_m)
     return replace(mission, items=(up, over, *mission.items[number - 1 :]))

@@ -59,7 +59,7 @@ def _mission_m_s(onboard: OnboardMission | None, cruise_m_s: float | None) -> fl
     speed_m_s, flown = cruise_m_s, list[float | None]()
     for item in onboard.items if onboard is not None else ():
         kind, value = item.params[0], item.params[1]
-        if item.command == CHANGE_SPEED and kind in GROUND_SPEEDS and value is not None and value > 0:
+        if item.command == MavCmd.DO_CHANGE_SPEED and kind in GROUND_SPEEDS and value is not None and value > 0:
             speed_m_s = value
         elif item.command in STRAIGHT:
             flown.append(speed_m_s)

@@ -1,0 +1,1 @@
+"""Avoidance in flight, sans-IO: stop, climb or step aside, and let go again."""
