@@ -11,14 +11,33 @@ from telemetry.link.link import Link
 from telemetry.link.piloting import Pilot
 from telemetry.topics import requests
 
-if TYPE_CHECKING:
-    from telemetry.mavlink.link import Link
-    from telemetry.mavlink.piloting import Pilot
+
+class OperatorRight:
+    """Requests of an operator whose lease was taken over are refused.
+
+    Knows the highest fencing token it has seen; ``highest`` outlives a restart of the node.
+    """
+
+    def __init__(self, highest: int = 0) -> None:
+        self.highest = highest
+        self.name = ""
+
+    def check(self, operator: requests.Operator) -> None:
+        """Raises NotAllowedError for a token lower than the highest one."""
+        if operator.token < self.highest:
+            by = f" by {self.name}" if self.name and self.name != operator.name else ""
+            raise NotAllowedError(
+                f"{operator.name or 'This session'} is not in charge any more: control was taken over{by}.",
+                advice="Take control again before you command the vehicle.",
+            )
+        self.highest, self.name = operator.token, operator.name
 
 
 class Answering:
-    def __init__(self, link: Link) -> None:
-        self._link = link
+    """What ``telemetry.topics.requests`` promises for each; errors are DescribedErrors."""
+
+    def __init__(self, link: Link, right: OperatorRight) -> None:
+        self._link, self._right = link, right
         self._answers: dict[type, Callable[[Any], Awaitable[object]]] = {
             requests.Connect: self._connect,
             requests.Disconnect: self._disconnect,
@@ -42,7 +61,7 @@ class Answering:
 
     async def answer(self, request: requests.LinkRequest) -> object:
         if not isinstance(request, requests.ReadParameters):
-            self._link.right.check(request.operator)
+            self._right.check(request.operator)
         return await self._answers[type(request)](request)
 
     async def _connect(self, request: requests.Connect) -> None:
@@ -67,58 +86,58 @@ class Answering:
         self._link.release()
 
     async def _upload(self, request: requests.Upload) -> object:
-        _, pilot, transfers = self._link.need_vehicle()
-        _refuse_in_mission(pilot)
+        session = self._link.need_session()
+        _refuse_in_mission(session.pilot)
         await self._record(request, f"upload {len(request.items)} items")
-        _refuse_in_mission(pilot)  # a start may have come while the disk was waited for
-        return await transfers.upload(request)
+        _refuse_in_mission(session.pilot)  # a start may have come while the disk was waited for
+        return await session.transfers.upload(request)
 
     async def _download(self, request: requests.Download) -> object:
-        _, _, transfers = self._link.need_vehicle()
+        transfers = self._link.need_session().transfers
         return await transfers.download()
 
     async def _read_parameters(self, request: requests.ReadParameters) -> object:
-        _, _, transfers = self._link.need_vehicle()
+        transfers = self._link.need_session().transfers
         return await transfers.read_parameters(request.names)
 
     async def _arm(self, request: requests.Arm) -> None:
-        _, pilot, _ = self._link.need_vehicle()
+        pilot = self._link.need_session().pilot
         await self._record(request, "arm")
         await pilot.arm()
 
     async def _disarm(self, request: requests.Disarm) -> None:
-        _, pilot, _ = self._link.need_vehicle()
+        pilot = self._link.need_session().pilot
         await self._record(request, "disarm", must=False)
         await pilot.disarm()
 
     async def _start_auto(self, request: requests.StartAuto) -> None:
-        _, pilot, transfers = self._link.need_vehicle()
-        _refuse_while(transfers.is_busy)
+        session = self._link.need_session()
+        _refuse_while(session.transfers.is_busy)
         await self._record(request, f"start mission {request.digest[:12]} at item {request.from_item}")
-        _refuse_while(transfers.is_busy)
-        await pilot.start_auto(request)
+        _refuse_while(session.transfers.is_busy)
+        await session.pilot.start_auto(request)
 
     async def _start_guided(self, request: requests.StartGuided) -> None:
-        _, pilot, transfers = self._link.need_vehicle()
-        _refuse_while(transfers.is_busy)
+        session = self._link.need_session()
+        _refuse_while(session.transfers.is_busy)
         await self._record(request, f"fly {len(request.targets)} targets in GUIDED")
-        _refuse_while(transfers.is_busy)
-        await pilot.start_guided(request)
+        _refuse_while(session.transfers.is_busy)
+        await session.pilot.start_guided(request)
 
     async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
-        _, pilot, _ = self._link.need_vehicle()
+        pilot = self._link.need_session().pilot
         pilot.avoidance.check_autopilot()
         what = "past a moving object" if request.kind == "sidestep" else f"{request.kind} an obstacle"
         await self._record(request, f"fly {what}, {len(request.targets)} places")
         await pilot.fly_manoeuvre(request)
 
     async def _fly_rest(self, request: requests.FlyRest) -> None:
-        _, pilot, _ = self._link.need_vehicle()
+        pilot = self._link.need_session().pilot
         await self._record(request, f"fly the rest at its proper height, {len(request.targets)} places")
         pilot.avoidance.fly_rest(request)
 
     async def _set_avoidance(self, request: requests.SetAvoidance) -> None:
-        _, pilot, _ = self._link.need_vehicle(live=request.enabled)
+        pilot = self._link.need_session(live=request.enabled).pilot
         if request.enabled:
             await pilot.avoidance.check_may_be_enabled(consent=request.consent)
             by = "" if request.by == "climb" else f" by {request.by}"
@@ -131,27 +150,27 @@ class Answering:
     # Whatever makes a flight end well is tried over a link that seems lost, too.
 
     async def _pause(self, request: requests.Pause) -> None:
-        _, pilot, _ = self._link.need_vehicle(live=False)
+        pilot = self._link.need_session(live=False).pilot
         await self._record(request, "pause", must=False)
         await pilot.pause()
 
     async def _resume(self, request: requests.Resume) -> None:
-        _, pilot, _ = self._link.need_vehicle()
+        pilot = self._link.need_session().pilot
         await self._record(request, "resume")
         await pilot.resume()
 
     async def _return_home(self, request: requests.ReturnHome) -> None:
-        _, pilot, _ = self._link.need_vehicle(live=False)
+        pilot = self._link.need_session(live=False).pilot
         await self._record(request, "return home", must=False)
         await pilot.return_home()
 
     async def _land(self, request: requests.Land) -> None:
-        _, pilot, _ = self._link.need_vehicle(live=False)
+        pilot = self._link.need_session(live=False).pilot
         await self._record(request, "land", must=False)
         await pilot.land()
 
     async def _record(self, request: Any, words: str, *, must: bool = True) -> None:
-        await self._link.trail.record(request.operator, words, must=must)
+        await self._link.commands.record(request.operator, words, must=must)
 
 
 def _refuse_in_mission(pilot: Pilot) -> None:

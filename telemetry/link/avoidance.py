@@ -29,12 +29,12 @@ class Avoidance:
         self,
         vehicle: AdoptedVehicle,
         *,
-        rest: Callable[[VehicleState], Rest | None],
+        remaining: Callable[[VehicleState], RemainingMission | None],
         on_engage: Callable[[], None],
         on_end: Callable[[], None],
     ) -> None:
         self._vehicle = vehicle
-        self._avoiding = Avoiding(vehicle.target, rest=rest, on_engage=on_engage, on_end=on_end)
+        self._avoiding = Avoiding(vehicle.target, remaining=remaining, on_engage=on_engage, on_end=on_end)
 
     @property
     def is_engaged(self) -> bool:
@@ -49,9 +49,9 @@ class Avoidance:
         return self._avoiding.status
 
     @property
-    def rest(self) -> Rest | None:
+    def remaining(self) -> RemainingMission | None:
         """What is left of a flight that was taken over, at its planned heights."""
-        return self._avoiding.detour.rest if self.is_engaged else None
+        return self._avoiding.detour.remaining if self.is_engaged else None
 
     def flight_status(self, since_utc_s: float | None) -> FlightStatus:
         return self._avoiding.flight_status(since_utc_s=since_utc_s)
@@ -86,8 +86,8 @@ class Avoidance:
     def disable(self) -> None:
         self._perform(self._avoiding.disable(time.monotonic()))
 
-    def fly(self, request: FlyManoeuvre, rest: Rest) -> None:
-        self._perform(self._avoiding.fly(request, rest, time.monotonic()))
+    def fly(self, request: FlyManoeuvre, remaining: RemainingMission) -> None:
+        self._perform(self._avoiding.fly(request, remaining, time.monotonic()))
 
     def fly_rest(self, request: FlyRest) -> None:
         self._perform(self._avoiding.fly_rest(request, time.monotonic()))

@@ -1,6 +1,7 @@
-"""The link: every connection, the one adopted vehicle, and the answers to all requests.
+"""The link: every connection, who is heard on them, and the session with the one adopted vehicle.
 
-It checks limits and the operator's right for every command itself: nothing in front of it is trusted with that.
+It checks limits and the operator's right for every command itself (``answering.py``): nothing in front of it is
+trusted with that.
 """
 
 from __future__ import annotations
@@ -28,11 +29,6 @@ from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, Perc
 from telemetry.topics.tracks import TracksStatus
 
 TICK_S = 0.05
-READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
-ALERT = 1
-"""MAV_SEVERITY"""
-AUTOPILOT = Operator("link", 0)
-"""Who is named in the audit log for what the link does by itself."""
 
 
 class Link:
@@ -46,17 +42,14 @@ class Link:
         grace_s: float = 10.0,
         server_age_s: Callable[[], float | None] = lambda: None,
         audit: Audit | None = None,
-        right: OperatorRight | None = None,
     ) -> None:
-        self.publish, self.right = publish, right or OperatorRight()
+        self._publish = publish
         self.peers, self.lines = Peers(), dict[str, Line]()
         self.flight = FlightKeeper()
-        self.vehicle: AdoptedVehicle | None = None
-        self.pilot: Pilot | None = None
-        self.transfers: Transfers | None = None
+        self.session: Session | None = None
         self._tasks, self._running = tasks, dict[str, asyncio.Task[None]]()
         self._own_tasks: set[asyncio.Task[None]] = set()
-        self.trail = Trail(audit, lambda record: publish(Topic.COMMAND, record), self.flight.say)
+        self.commands = CommandLog(audit, lambda record: publish(Topic.COMMAND, record), self.flight.say)
         self._grace, self._server_age_s = Grace(grace_s), server_age_s
         self._heartbeat = Heartbeat(self._beat, self._may_beat)
         self._states = StatePublisher(lambda state: publish(Topic.VEHICLE, state))
@@ -64,13 +57,10 @@ class Link:
         self._told_flight: FlightStatus | None = None
         self._told_avoidance: AvoidanceStatus | None = None
         self._settings: PerceptionSettings | None = None
-        self._answering, self._ranges = Answering(self), RangeReader()
+        self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell)
+        self._ranges = RangeReader()
 
-    # Requests.
-
-    async def handle(self, request: LinkRequest) -> object:
-        """What ``telemetry.requests`` promises for each; errors are DescribedErrors."""
-        return await self._answering.answer(request)
+    # Connections and the vehicle.
 
     async def connect(self, address: str, *, adopt: bool, only: tuple[int, int] | None = None) -> None:
         """Opens a connection and keeps it open; ``only``: adopt no other system and component."""
@@ -88,7 +78,7 @@ class Link:
         text = parse_address(address).text
         if text not in self.lines:
             raise NotAllowedError(f"There is no connection {text}.")
-        if self.vehicle is not None and self.vehicle.line.text == text:
+        if self.session is not None and self.session.vehicle.line.text == text:
             self.release()
         self.peers.forget(text)
         del self.lines[text]
@@ -96,57 +86,31 @@ class Link:
         self._tell()
 
     def adopt(self, candidate: Candidate) -> None:
-        if self.vehicle is not None and self.vehicle.candidate == candidate:
+        if self.session is not None and self.session.vehicle.candidate == candidate:
             return
         self.release(forget_wish=False)
         self.peers.adopt(candidate, time.monotonic())
-        telling = Telling(
-            state=self._on_state,
-            text=self._on_text,
-            unsure=self._read_back,
-            sent=self._on_sent,
-            ordered=self._on_order,
-        )
-        vehicle = AdoptedVehicle(candidate, self.lines[candidate.address], telling, time.monotonic)
-        self.vehicle = vehicle
-        self.transfers = transfers = Transfers(vehicle, lambda status: self.publish(Topic.TRANSFER, status))
-
-        async def read_parameter(name: str) -> float | None:
-            return (await transfers.read_parameters((name,)))[name]
-
-        self.pilot = Pilot(
-            vehicle,
-            self.flight,
-            spawn=self.spawn,
-            read_parameter=read_parameter,
-            read_mission=lambda: transfers.download(own_idea=True),
-            alarm=self._alarm,
-        )
-        if self._settings is not None:
-            self.pilot.avoidance.on_settings(self._settings)
-        vehicle.send_first()
-        self._tell()
-        self._read_back()
+        line = self.lines[candidate.address]
+        self.session = Session(candidate, line, self._around, self._ranges, self._settings)
+        self.session.begin()
 
     def release(self, *, forget_wish: bool = True) -> None:
-        if self.pilot is not None and self.vehicle is not None:
-            self.pilot.close()
-            self.vehicle.exchanges.give_up()
-            self.flight.forget()
+        if self.session is not None:
+            self.session.close()
         if forget_wish:
             self.peers.release()
-        self.vehicle = self.pilot = self.transfers = None
+        self.session = None
         self._tell()
 
-    def need_vehicle(self, *, live: bool = True) -> tuple[AdoptedVehicle, Pilot, Transfers]:
-        """Raises NoVehicleError; ``live``: also when the link to it is lost."""
-        if self.vehicle is None or self.pilot is None or self.transfers is None:
-            advice = "Connect to it and adopt it first."
-            raise NoVehicleError("No vehicle is adopted.", advice=advice)
-        if live and self.vehicle.link_state == "lost":
-            what = f"The link to the vehicle is lost: nothing was heard for {self.vehicle.silent_s:.0f} s."
+    def need_session(self, *, live: bool = True) -> Session:
+        """Raises NoVehicleError; ``live``: also when the link to the vehicle is lost."""
+        if self.session is None:
+            raise NoVehicleError("No vehicle is adopted.", advice="Connect to it and adopt it first.")
+        vehicle = self.session.vehicle
+        if live and vehicle.link_state == "lost":
+            what = f"The link to the vehicle is lost: nothing was heard for {vehicle.silent_s:.0f} s."
             raise NoVehicleError(what, advice="Wait until it is heard again.")
-        return self.vehicle, self.pilot, self.transfers
+        return self.session
 
     def spawn(self, coroutine: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = self._tasks.create_task(coroutine)
@@ -164,128 +128,81 @@ class Link:
             if candidate is not None:
                 self.adopt(candidate)
                 verdict = "adopted"
-        if verdict in ("adopted", "moved") and self.vehicle is not None:
+        session = self.session
+        if session is None:
+            return
+        if verdict in ("adopted", "moved"):
             if verdict == "moved" and self.peers.adopted is not None:
-                self.vehicle.moved(self.peers.adopted)
-            self.publish(Topic.RAW, RawFrame(t_utc_s, False, line.text, bytes(message.get_msgbuf())))
-            self.vehicle.on_message(message, t_utc_s)
-            heading_rad = self.vehicle.state.heading_rad
-            ranges = self._ranges.on_message(message, heading_rad=heading_rad, t_mono_s=now_s, t_utc_s=t_utc_s)
-            if ranges is not None:
-                self.publish(Topic.RANGE_FRAME, ranges)
-            if self.pilot is not None:
-                self.pilot.avoidance.on_message(message)
-        elif verdict == "stranger" and self.vehicle is not None and line is self.vehicle.line:
-            self.vehicle.on_foreign(message)
+                session.vehicle.moved(self.peers.adopted)
+            session.on_message(message, now_s, t_utc_s)
+        elif verdict == "stranger" and line is session.vehicle.line:
+            session.vehicle.on_foreign(message)
 
     def on_perception(self, status: PerceptionStatus) -> None:
         """What a sensor's node says about the regions ahead."""
-        if self.pilot is not None:
-            self.pilot.avoidance.on_perception(status)
+        if self.session is not None:
+            self.session.pilot.avoidance.on_perception(status)
 
     def on_tracks(self, status: TracksStatus) -> None:
         """What moves or stands around, and how far away known ground is."""
-        if self.pilot is not None:
-            self.pilot.avoidance.on_tracks(status)
+        if self.session is not None:
+            self.session.pilot.avoidance.on_tracks(status)
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         """How deep the regions are, and how large the vehicle is."""
         self._settings = settings
-        if self.pilot is not None:
-            self.pilot.avoidance.on_settings(settings)
+        if self.session is not None:
+            self.session.pilot.avoidance.on_settings(settings)
 
     def _gone(self, line: Line, peer: Peer) -> None:
         self.peers.gone(line.text, peer)
-
-    def _on_state(self, state: VehicleState) -> None:
-        self._states.offer(state)
-        if self.pilot is not None:
-            self.pilot.avoidance.on_state(state)
-
-    def _on_order(self, message: Message) -> None:
-        if self.pilot is not None:
-            self.pilot.avoidance.on_order(message)
-
-    def _on_text(self, severity: int, text: str) -> None:
-        self.publish(Topic.TEXT, VehicleText(time.time(), severity, text))
-
-    def _alarm(self, text: str) -> None:
-        """What the pilot must hear at once; what is done about it is written down."""
-        self._on_text(ALERT, text)
-        self.spawn(self.trail.record(AUTOPILOT, f"hold: {text}", must=False))
-
-    def _on_sent(self, frame: bytes) -> None:
-        assert self.vehicle is not None
-        self.publish(Topic.RAW, RawFrame(time.time(), True, self.vehicle.line.text, frame))
-
-    def _read_back(self) -> None:
-        """What is on board is not known: say so, and find out, if nobody is flying by it."""
-        self._tell()
-        if self.transfers is not None and self.vehicle is not None and not self.vehicle.state.armed:
-            self.spawn(self._read_back_quietly(self.transfers))
-
-    async def _read_back_quietly(self, transfers: Transfers) -> None:
-        """A vehicle that has just been switched on may not answer at first."""
-        for pause_s in READ_BACK_AFTER_S:
-            await asyncio.sleep(pause_s)
-            if transfers is not self.transfers or transfers.is_busy or transfers.knows_mission:
-                return
-            # What goes wrong here is seen by mission_state, which stays unknown.
-            with contextlib.suppress(TelemetryError):
-                await transfers.download(own_idea=True)
 
     # What goes out by itself.
 
     def _beat(self, message: Message) -> bool:
         """To the far ends that the operator has named, and to the adopted vehicle; to nobody else."""
-        vehicle = self.vehicle
-        anyone = False
+        session, anyone = self.session, False
         for line in self.lines.values():
-            peer = vehicle.candidate.peer if vehicle is not None and vehicle.line is line else None
+            adopted = session if session is not None and session.vehicle.line is line else None
+            peer = None if adopted is None else adopted.vehicle.candidate.peer
             if peer is None and not line.address.names_far_end:
                 continue
             frame = line.send(message, peer)
             if frame is not None:
                 anyone = True
-                if peer is not None:
-                    self._on_sent(frame)
+                if adopted is not None:
+                    adopted.on_sent(frame)
         return anyone
 
     @property
     def _is_guided(self) -> bool:
-        return self.pilot is not None and self.pilot.is_guided
+        return self.session is not None and self.session.pilot.is_guided
 
     def _may_beat(self) -> bool:
         return self._grace.may_beat(self._server_age_s(), guided=self._is_guided, now_s=time.monotonic())
 
     def _on_tick(self) -> None:
-        if self.vehicle is not None and self.pilot is not None:
-            self.vehicle.on_tick()
-            self.pilot.on_tick()
+        if self.session is not None:
+            self.session.on_tick()
             if self._grace.wants_hold(self._server_age_s(), guided=self._is_guided, now_s=time.monotonic()):
-                self.spawn(self._hold(self.pilot))
+                self.spawn(self.session.hold())
         if self.flight.status != self._told_flight:
             self._told_flight = self.flight.status
-            self.publish(Topic.FLIGHT, self.flight.status)
+            self._publish(Topic.FLIGHT, self.flight.status)
         self._tell_avoidance()
         self._tell()
 
     def _tell_avoidance(self) -> None:
-        status = AvoidanceStatus() if self.pilot is None else self.pilot.avoidance.status
+        status = AvoidanceStatus() if self.session is None else self.session.pilot.avoidance.status
         before, self._told_avoidance = self._told_avoidance, status
         if status == before:
             return
-        self.publish(Topic.AVOIDANCE, status)
+        self._publish(Topic.AVOIDANCE, status)
         if before is not None and before.state != status.state and self._is_guided:
-            self.spawn(self.trail.record(AUTOPILOT, f"avoidance: {status.state}", must=False))
-
-    async def _hold(self, pilot: Pilot) -> None:
-        with contextlib.suppress(TelemetryError):
-            await self.trail.record(AUTOPILOT, "hold: the console is gone", must=False)
-            await pilot.hold()
+            self.spawn(self.commands.record(AUTOPILOT, f"avoidance: {status.state}", must=False))
 
     def status(self) -> LinkStatus:
-        now_s, vehicle = time.monotonic(), self.vehicle
+        now_s, vehicle = time.monotonic(), self.session and self.session.vehicle
         return LinkStatus(
             t_mono_s=now_s,
             connections=tuple(line.status() for line in self.lines.values()),
@@ -317,7 +234,7 @@ class Link:
 
     def close(self) -> None:
         self._states.close()
-        self.trail.close()
+        self.commands.close()
         self.release()
         for task in self._own_tasks:
             task.cancel()

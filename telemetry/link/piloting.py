@@ -48,7 +48,7 @@ class Pilot:
         self.script: GuidedScript | None = None
         self.join: JoinMission | None = None
         self.avoidance = Avoidance(
-            vehicle, rest=self._rest, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
+            vehicle, remaining=self._remaining, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
         )
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
         self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
@@ -174,7 +174,7 @@ class Pilot:
 
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
         """Raises NotAllowedError when nothing is flown that could be gone on with."""
-        self.avoidance.fly(request, self._rest_after(request))
+        self.avoidance.fly(request, self._remaining_after(request))
 
     async def pause(self) -> None:
         if self.avoidance.is_engaged:
@@ -228,32 +228,32 @@ class Pilot:
 
     # What avoidance takes over.
 
-    def _rest(self, state: VehicleState) -> Rest | None:
+    def _remaining(self, state: VehicleState) -> RemainingMission | None:
         """What is left of the flight; None while nothing is flown that avoidance could go on with."""
         if self.script_flies:
             script = self.script
             flies = script is not None and script.phase == "flying"
-            return Rest(script.left, script.end, "guided") if flies and script is not None else None
+            return RemainingMission(script.left, script.end, "guided") if flies and script is not None else None
         if self.join is not None and self.join.is_active:
             return None
-        return rest_of_flight(self.vehicle.onboard.mission, state)
+        return remaining_flight(self.vehicle.onboard.mission, state)
 
-    def _rest_after(self, request: FlyManoeuvre) -> Rest:
+    def _remaining_after(self, request: FlyManoeuvre) -> RemainingMission:
         """What is flown after the way past an obstacle."""
         item = request.rejoin_item
         if item is None:
-            return Rest((), "hold")
-        rest = self.avoidance.rest
-        if rest is None and self.script_flies and self.script is not None:
-            rest = Rest(self.script.left, self.script.end, "guided")
-        if rest is not None:
-            return Rest(tuple(t for t in rest.targets if t.item >= item), rest.end, rest.way)
+            return RemainingMission((), "hold")
+        remaining = self.avoidance.remaining
+        if remaining is None and self.script_flies and self.script is not None:
+            remaining = RemainingMission(self.script.left, self.script.end, "guided")
+        if remaining is not None:
+            return RemainingMission(tuple(t for t in remaining.targets if t.item >= item), remaining.end, remaining.way)
         onboard = self.vehicle.onboard.mission
-        rest = None if onboard is None else rest_from(onboard, item)
-        if rest is None:
+        remaining = None if onboard is None else remaining_from(onboard, item)
+        if remaining is None:
             what = f"What follows from item {item} on cannot be flown in GUIDED."
             raise NotAllowedError(what, advice="Pause, and fly past the obstacle by hand.")
-        return rest
+        return remaining
 
     def _yield_to_avoidance(self) -> None:
         """What is under way sends nothing any more."""

@@ -1,4 +1,7 @@
-"""Publishes the vehicle's state: a new position at once, the rest at most 20 times a second."""
+"""What is published, and how often: of the vehicle's state a new position at once, the rest at most 20 times a second.
+
+The link's status once a second, and at once when something in it is another.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from telemetry.topics.vehicle import VehicleState
 PERIOD_S = 0.05
 SOONEST_S = 0.04
 """Between two positions: a vehicle that was asked for 20 a second does not send them at even intervals."""
+EVERY_S = 1.0
 
 
 class StatePublisher:
@@ -52,3 +56,23 @@ class StatePublisher:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+
+class StatusTeller:
+    def __init__(self, publish: Callable[[LinkStatus], None]) -> None:
+        self._publish = publish
+        self._told: tuple[object, ...] = ()
+        self._told_s = float("-inf")
+
+    def offer(self, status: LinkStatus) -> None:
+        shape = _shape(status)
+        if shape != self._told or status.t_mono_s - self._told_s >= EVERY_S:
+            self._told, self._told_s = shape, status.t_mono_s
+            self._publish(status)
+
+
+def _shape(status: LinkStatus) -> tuple[object, ...]:
+    """All but the figures that change all the time."""
+    lines = tuple((line.address, line.state, line.error and line.error.what) for line in status.connections)
+    mission = (status.mission_state, status.mission_digest)
+    return (lines, status.candidates, status.adopted, status.state, mission, status.warnings)

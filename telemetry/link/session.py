@@ -1,0 +1,139 @@
+"""With the one adopted vehicle: what it is, who flies it and what is transferred, as long as it is adopted.
+
+A frame comes to ``on_message`` and goes on to ``AdoptedVehicle``, which reduces it; a request comes to ``pilot`` or
+``transfers``, which run a protocol machine of ``telemetry.mavlink`` against the vehicle.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from telemetry.errors import TelemetryError
+from telemetry.link.adopted import AdoptedVehicle, Telling
+from telemetry.link.audit import AUTOPILOT, CommandLog
+from telemetry.link.line import Line
+from telemetry.link.piloting import Pilot
+from telemetry.link.procedures import Spawn
+from telemetry.link.publishing import StatePublisher
+from telemetry.link.transferring import Transfers
+from telemetry.mavlink.actions import Message
+from telemetry.mavlink.flight_keeper import FlightKeeper
+from telemetry.mavlink.ranges import RangeReader
+from telemetry.topics.messages import Candidate, Published, RawFrame, Topic, VehicleText
+from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.vehicle import VehicleState
+
+READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
+ALERT = 1
+"""MAV_SEVERITY"""
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What the link lends its sessions. ``changed``: something in the link's status may be another."""
+
+    publish: Callable[[str, Published], None]
+    states: StatePublisher
+    flight: FlightKeeper
+    commands: CommandLog
+    spawn: Spawn
+    changed: Callable[[], None]
+
+
+class Session:
+    def __init__(
+        self, candidate: Candidate, line: Line, around: Around, ranges: RangeReader, settings: PerceptionSettings | None
+    ) -> None:
+        self._around, self._ranges, self._is_over = around, ranges, False
+        telling = Telling(
+            state=self._on_state,
+            text=self._on_text,
+            unsure=self._read_back,
+            sent=self.on_sent,
+            ordered=self._on_order,
+        )
+        self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic)
+        self.transfers = Transfers(self.vehicle, lambda status: around.publish(Topic.TRANSFER, status))
+        self.pilot = Pilot(
+            self.vehicle,
+            around.flight,
+            spawn=around.spawn,
+            read_parameter=self.transfers.read_parameter,
+            read_mission=self.transfers.read_back,
+            alarm=self._alarm,
+        )
+        if settings is not None:
+            self.pilot.avoidance.on_settings(settings)
+
+    def begin(self) -> None:
+        self.vehicle.send_first()
+        self._around.changed()
+        self._read_back()
+
+    def close(self) -> None:
+        self._is_over = True
+        self.pilot.close()
+        self.vehicle.exchanges.give_up()
+        self._around.flight.forget()
+
+    # What comes in.
+
+    def on_message(self, message: Message, now_s: float, t_utc_s: float) -> None:
+        """Any of the vehicle's system."""
+        frame = RawFrame(t_utc_s, False, self.vehicle.line.text, bytes(message.get_msgbuf()))
+        self._around.publish(Topic.RAW, frame)
+        self.vehicle.on_message(message, t_utc_s)
+        heading_rad = self.vehicle.state.heading_rad
+        ranges = self._ranges.on_message(message, heading_rad=heading_rad, t_mono_s=now_s, t_utc_s=t_utc_s)
+        if ranges is not None:
+            self._around.publish(Topic.RANGE_FRAME, ranges)
+        self.pilot.avoidance.on_message(message)
+
+    def on_tick(self) -> None:
+        self.vehicle.on_tick()
+        self.pilot.on_tick()
+
+    def on_sent(self, frame: bytes) -> None:
+        self._around.publish(Topic.RAW, RawFrame(time.time(), True, self.vehicle.line.text, frame))
+
+    def _on_state(self, state: VehicleState) -> None:
+        self._around.states.offer(state)
+        self.pilot.avoidance.on_state(state)
+
+    def _on_order(self, message: Message) -> None:
+        self.pilot.avoidance.on_order(message)
+
+    def _on_text(self, severity: int, text: str) -> None:
+        self._around.publish(Topic.TEXT, VehicleText(time.time(), severity, text))
+
+    # What goes out by itself.
+
+    def _alarm(self, text: str) -> None:
+        """What the pilot must hear at once; what is done about it is written down."""
+        self._on_text(ALERT, text)
+        self._around.spawn(self._around.commands.record(AUTOPILOT, f"hold: {text}", must=False))
+
+    async def hold(self) -> None:
+        with contextlib.suppress(TelemetryError):
+            await self._around.commands.record(AUTOPILOT, "hold: the console is gone", must=False)
+            await self.pilot.hold()
+
+    def _read_back(self) -> None:
+        """What is on board is not known: say so, and find out, if nobody is flying by it."""
+        self._around.changed()
+        if not self.vehicle.state.armed:
+            self._around.spawn(self._read_back_quietly())
+
+    async def _read_back_quietly(self) -> None:
+        """A vehicle that has just been switched on may not answer at first."""
+        for pause_s in READ_BACK_AFTER_S:
+            await asyncio.sleep(pause_s)
+            if self._is_over or self.transfers.is_busy or self.transfers.knows_mission:
+                return
+            # What goes wrong here is seen by mission_state, which stays unknown.
+            with contextlib.suppress(TelemetryError):
+                await self.transfers.read_back()
