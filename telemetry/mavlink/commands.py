@@ -11,6 +11,35 @@ from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.mavlink.texts import VehicleWords
 from telemetry.topics.vehicle import VehicleState
 
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS, CANCELLED = range(7)
+
+_COMMANDS: dict[int, str] = {
+    MavCmd.NAV_WAYPOINT: "fly to a waypoint",
+    MavCmd.NAV_RETURN_TO_LAUNCH: "return home",
+    MavCmd.NAV_LAND: "land",
+    MavCmd.NAV_TAKEOFF: "take off",
+    MavCmd.CONDITION_YAW: "turn to a heading",
+    MavCmd.DO_SET_MODE: "change the flight mode",
+    MavCmd.DO_CHANGE_SPEED: "change the speed",
+    MavCmd.DO_REPOSITION: "fly to a place",
+    MavCmd.DO_PAUSE_CONTINUE: "pause or go on",
+    MavCmd.DO_SET_ROI_LOCATION: "look at a place",
+    MavCmd.DO_SET_MISSION_CURRENT: "go to a mission item",
+    MavCmd.MISSION_START: "start the mission",
+    MavCmd.RUN_PREARM_CHECKS: "check whether it may arm",
+    MavCmd.SET_MESSAGE_INTERVAL: "send a message regularly",
+    MavCmd.REQUEST_MESSAGE: "send a message",
+}
+_RESULTS = {
+    TEMPORARILY_REJECTED: "it cannot do that now",
+    DENIED: "it denied that",
+    UNSUPPORTED: "it does not know that command",
+    FAILED: "it tried and failed",
+    CANCELLED: "that was cancelled",
+    7: "it takes that command only as COMMAND_LONG",
+    8: "it takes that command only as COMMAND_INT",
+    9: "it does not know that altitude frame",
+}
 RESEND_S = 0.7
 LOOK_S = 2.5
 """Longer than a message can be on its way: what has not shown by then in the vehicle's state did not arrive."""
@@ -18,7 +47,7 @@ TAKEOFF_LOOK_S = 6.0
 """Motors need seconds to spin up before anything shows."""
 START_LOOK_S = 1.5
 """A mission that runs is not begun again by another order to, and the motors are off 10 s after arming."""
-LOOKS_S = {TAKEOFF: TAKEOFF_LOOK_S, MISSION_START: START_LOOK_S}
+LOOKS_S = {MavCmd.NAV_TAKEOFF: TAKEOFF_LOOK_S, MavCmd.MISSION_START: START_LOOK_S}
 LOOKS = 6
 LATE_S = 1.0
 """Between two heartbeats: one that came this much before the end of the wait still tells what became of a command."""
@@ -50,7 +79,7 @@ class CommandRun:
         confirm: Callable[[VehicleState], bool] | None = None,
         timeout_s: float | None = None,
     ) -> None:
-        self._message, self._ends = message, Ends(target, own)
+        self._message, self._endpoints = message, Endpoints(target, own)
         self._once, self._confirm = once, confirm
         self._look_s = LOOKS_S.get(message.command, LOOK_S)
         usual_s = max(TIMEOUT_S, LOOKS * self._look_s) if once else TIMEOUT_S
@@ -69,12 +98,12 @@ class CommandRun:
         return self._send(now_s)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
-        if self._over or not self._ends.is_from_vehicle(message):
+        if self._over or not self._endpoints.is_from_vehicle(message):
             return []
         self._words.on_message(message)
         if message.get_type() != "COMMAND_ACK" or message.command != self._message.command:
             return []
-        return self._on_result(message, now_s) if self._ends.is_for_us(message) else []
+        return self._on_result(message, now_s) if self._endpoints.is_for_us(message) else []
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         if self._over or self._confirm is None or state.heartbeat_t_mono_s is None:
@@ -147,3 +176,14 @@ class CommandRun:
         else:
             what = f'The vehicle did not answer "{self._does}" ({self._sendings} times).'
         return SilentError(what, advice="Look at the vehicle and at the link before you try again.")
+
+
+def command_words(command: int, param1: float = 0.0) -> str:
+    """What is asked of the vehicle, as it stands after "to": "arm", "change the flight mode"."""
+    if command == MavCmd.COMPONENT_ARM_DISARM:
+        return "arm" if param1 == 1 else "disarm"
+    return _COMMANDS.get(command, f"do command {command}")
+
+
+def result_words(result: int) -> str:
+    return _RESULTS.get(result, f"it answered with result {result}")

@@ -36,7 +36,7 @@ class MissionDownload:
         lossy: bool = False,
     ) -> None:
         """``lossy``: the link is known to lose messages."""
-        self._firmware, self._ends = firmware, Ends(target, own)
+        self._firmware, self._endpoints = firmware, Endpoints(target, own)
         self._window = 1 if lossy and firmware != "ardupilot" else WINDOW
         self._boot, self._round_trip = BootClock(), RoundTrip()
         self._over, self._most_items = False, 0
@@ -58,7 +58,7 @@ class MissionDownload:
         return self._ask_for_list(now_s)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
-        if self._over or not self._ends.is_from_vehicle(message):
+        if self._over or not self._endpoints.is_from_vehicle(message):
             return []
         self._any_heard_s = now_s
         if self._boot.has_restarted(message):
@@ -70,7 +70,7 @@ class MissionDownload:
             "MISSION_ITEM_INT": self._on_item,
             "MISSION_ACK": self._on_ack,
         }.get(message.get_type())
-        if handler is None or not self._ends.is_for_us(message) or message.mission_type != 0:
+        if handler is None or not self._endpoints.is_for_us(message) or message.mission_type != 0:
             return []
         self._heard_s = now_s
         return handler(message, now_s)
@@ -97,7 +97,7 @@ class MissionDownload:
 
     def _ask_for_list(self, now_s: float) -> list[Action]:
         self._list_s = now_s
-        return [Send(mavlink.MAVLink_mission_request_list_message(*self._ends.vehicle, 0))]
+        return [Send(mavlink.MAVLink_mission_request_list_message(*self._endpoints.vehicle, 0))]
 
     def _on_count(self, message: Message, now_s: float) -> list[Action]:
         if self._count == message.count:
@@ -128,7 +128,7 @@ class MissionDownload:
 
     def _request(self, seq: int, now_s: float) -> Action:
         self._asked_s[seq] = now_s
-        return Send(mavlink.MAVLink_mission_request_int_message(*self._ends.vehicle, seq, 0))
+        return Send(mavlink.MAVLink_mission_request_int_message(*self._endpoints.vehicle, seq, 0))
 
     def _lost(self, lost: list[int], now_s: float) -> list[Action]:
         """ArduPilot: ask for what is missing, in any order. Others: from the gap on, one at a time from now on."""
@@ -178,7 +178,7 @@ class MissionDownload:
         )
 
     def _ack(self, result: int) -> Action:
-        return Send(mavlink.MAVLink_mission_ack_message(*self._ends.vehicle, result, 0))
+        return Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, result, 0))
 
     def _fail(self, error: TransferError | RefusedError | SilentError) -> list[Action]:
         self._over = True

@@ -11,9 +11,8 @@ from telemetry.topics.messages import FlightStatus, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
 Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
-GOING_HOME_COMMANDS = frozenset({20, 21, 189})
+GOING_HOME_COMMANDS = frozenset({MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.NAV_LAND, MavCmd.DO_LAND_START})
 """MAV_CMD of RTL, LAND and DO_LAND_START."""
-TAKEOFF = 22
 UNDER_WAY = frozenset({"arming", "taking_off", "flying", "paused", "returning"})
 GOING_HOME_FROM = frozenset({"taking_off", "flying", "paused", "returning", "interrupted"})
 
@@ -98,7 +97,7 @@ class FlightKeeper:
             self._phase("returning")
         else:
             starting = self.status.phase in ("arming", "taking_off")
-            climbing = starting and (command == TAKEOFF or not target or state.landed == "on_ground")
+            climbing = starting and (command == MavCmd.NAV_TAKEOFF or not target or state.landed == "on_ground")
             self._phase("taking_off" if climbing else "flying")
 
     def _go_home(self) -> None:

@@ -38,6 +38,7 @@ _ONE_BURST_S = 5.0
 """Reasons that come farther apart are of another look at the vehicle."""
 _MOST_REASONS = 5
 _RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+INT16_MAX, UINT16_MAX, INT32_MAX = 32767, 65535, 2147483647
 
 
 def is_vehicle_heartbeat(message: Any) -> bool:
@@ -57,7 +58,7 @@ def autopilot_name(number: int) -> Autopilot:
 def reduce(state: VehicleState | None, message: Any, *, t_mono_s: float, t_utc_s: float) -> VehicleState | None:
     """What is known after ``message`` (a pymavlink message object); the same object when it changes nothing.
 
-    ``state`` None: the first heartbeat of any autopilot begins one. Clocks as in ``telemetry.vehicle``.
+    ``state`` None: the first heartbeat of any autopilot begins one. Clocks as in ``telemetry.topics.vehicle``.
     """
     system, component = message.get_srcSystem(), message.get_srcComponent()
     if state is None:
@@ -275,3 +276,35 @@ _HANDLERS: dict[str, Handler] = {
     "RADIO_STATUS": _rssi,
     "AUTOPILOT_VERSION": _autopilot_version,
 }
+
+
+def finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def heading(yaw_rad: float) -> float | None:
+    """0 to 2 pi; rounding must not let a tiny negative angle become 2 pi itself."""
+    if not math.isfinite(yaw_rad):
+        return None
+    wrapped = yaw_rad % math.tau
+    return wrapped if wrapped < math.tau else 0.0
+
+
+def scaled(value: int, divisor: int, unknown: int) -> float | None:
+    return None if value == unknown else value / divisor
+
+
+def accuracy(millimetres: int) -> float | None:
+    """0 is what a message without the extension fields decodes to, 2**32 - 1 what some receivers write for unknown."""
+    return millimetres / 1000 if 0 < millimetres < 4_000_000_000 else None
+
+
+def share(percent: int) -> float | None:
+    return percent / 100 if 0 <= percent <= 100 else None
+
+
+def lat_lon(lat_e7: int, lon_e7: int) -> tuple[float | None, float | None]:
+    """Both or none. Exactly 0, 0 is what ArduPilot sends before it has a position."""
+    if (lat_e7 == 0 and lon_e7 == 0) or abs(lat_e7) > 900_000_000 or abs(lon_e7) > 1_800_000_000:
+        return None, None
+    return lat_e7 / 1e7, lon_e7 / 1e7

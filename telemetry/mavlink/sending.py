@@ -43,9 +43,15 @@ class MissionSending:
     """``is_complete``: time to read back. It is still to be fed then: the vehicle may turn out to lack an item."""
 
     def __init__(
-        self, items: tuple[Item, ...], home: tuple[float, float, float], *, firmware: Firmware, ends: Ends, now_s: float
+        self,
+        items: tuple[Item, ...],
+        home: tuple[float, float, float],
+        *,
+        firmware: Firmware,
+        endpoints: Endpoints,
+        now_s: float,
     ) -> None:
-        self._items, self._ends = items, ends
+        self._items, self._endpoints = items, endpoints
         self.rows_before = int(firmware == "ardupilot")
         """Rows that the vehicle keeps before the first item: ArduPilot's home."""
         self._rows = self._encode(items, home, firmware)
@@ -63,7 +69,7 @@ class MissionSending:
     def _encode(
         self, items: tuple[Item, ...], home: tuple[float, float, float], firmware: Firmware
     ) -> tuple[Message, ...]:
-        target, first = self._ends.vehicle, self.rows_before
+        target, first = self._endpoints.vehicle, self.rows_before
         rows = tuple(
             item_message(item, seq, target=target, number=seq + 1 - first, firmware=firmware)
             for seq, item in enumerate(items, start=first)
@@ -100,7 +106,7 @@ class MissionSending:
         kind = message.get_type()
         if kind not in ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") or self._refusal is not None:
             return []
-        if not self._ends.is_for_us(message) or message.mission_type != 0:
+        if not self._endpoints.is_for_us(message) or message.mission_type != 0:
             return []
         self._heard_s = now_s
         return self._on_ack(message.type, now_s) if kind == "MISSION_ACK" else self._on_request(message.seq, now_s)
@@ -154,7 +160,7 @@ class MissionSending:
 
     def _send_count(self, now_s: float) -> list[Action]:
         self._sent_s = now_s
-        return [Send(mavlink.MAVLink_mission_count_message(*self._ends.vehicle, len(self._rows), 0))]
+        return [Send(mavlink.MAVLink_mission_count_message(*self._endpoints.vehicle, len(self._rows), 0))]
 
     def _send_row(self, seq: int, now_s: float) -> list[Action]:
         self._sent_s, self._highest_sent = now_s, max(seq, self._highest_sent)

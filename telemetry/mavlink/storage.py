@@ -13,30 +13,28 @@ from planning.model import Firmware
 from telemetry.mavlink.items import PLACED
 from telemetry.topics.messages import Item
 
-WAYPOINT, LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, RTL, LAND, TAKEOFF, SPLINE = 16, 17, 18, 19, 20, 21, 22, 82
-FRAME_AMSL = 0
-WHOLE_SECONDS = frozenset({WAYPOINT, LOITER_TIME, SPLINE})
+WHOLE_SECONDS = frozenset({MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME, MavCmd.NAV_SPLINE_WAYPOINT})
 """Commands whose first parameter, a time, ArduPilot cuts to whole seconds."""
 LARGEST_CM = 2**31
 
 _KEPT: dict[int, frozenset[int]] = {
-    WAYPOINT: frozenset({1}),
-    LOITER_UNLIMITED: frozenset(),
-    LOITER_TURNS: frozenset({1, 3}),
-    LOITER_TIME: frozenset({1}),
-    RTL: frozenset(),
-    LAND: frozenset(),
-    TAKEOFF: frozenset(),
-    SPLINE: frozenset({1}),
-    178: frozenset({1, 2, 3}),  # DO_CHANGE_SPEED
-    195: frozenset(),  # DO_SET_ROI_LOCATION
-    197: frozenset(),  # DO_SET_ROI_NONE
-    201: frozenset(),  # DO_SET_ROI
-    205: frozenset({1, 2, 3}),  # DO_MOUNT_CONTROL
-    206: frozenset({1, 3}),  # DO_SET_CAM_TRIGG_DIST
+    MavCmd.NAV_WAYPOINT: frozenset({1}),
+    MavCmd.NAV_LOITER_UNLIM: frozenset(),
+    MavCmd.NAV_LOITER_TURNS: frozenset({1, 3}),
+    MavCmd.NAV_LOITER_TIME: frozenset({1}),
+    MavCmd.NAV_RETURN_TO_LAUNCH: frozenset(),
+    MavCmd.NAV_LAND: frozenset(),
+    MavCmd.NAV_TAKEOFF: frozenset(),
+    MavCmd.NAV_SPLINE_WAYPOINT: frozenset({1}),
+    MavCmd.DO_CHANGE_SPEED: frozenset({1, 2, 3}),
+    MavCmd.DO_SET_ROI_LOCATION: frozenset(),
+    MavCmd.DO_SET_ROI_NONE: frozenset(),
+    MavCmd.DO_SET_ROI: frozenset(),
+    MavCmd.DO_MOUNT_CONTROL: frozenset({1, 2, 3}),
+    MavCmd.DO_SET_CAM_TRIGG_DIST: frozenset({1, 3}),
 }
 _EVERY = frozenset({1, 2, 3, 4, 7})
-_DIRECTION = frozenset({LOITER_UNLIMITED, LOITER_TIME})
+_DIRECTION = frozenset({MavCmd.NAV_LOITER_UNLIM, MavCmd.NAV_LOITER_TIME})
 """Commands whose third parameter is the sense of a circle, which no multirotor flies."""
 
 
@@ -73,7 +71,7 @@ def _ardupilot(item: Item) -> Item:
         alt_m = item.alt_m if 7 in kept else 0.0
     return replace(
         item,
-        frame=plain_frame(item.frame) if placed else FRAME_AMSL,
+        frame=plain_frame(item.frame) if placed else MavFrame.GLOBAL,
         params=(values[0], values[1], values[2], values[3]),
         alt_m=alt_m,
         autocontinue=True,

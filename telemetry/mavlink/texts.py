@@ -1,4 +1,4 @@
-"""STATUSTEXT messages, the parts of long ones put together in the order in which they were sent."""
+"""STATUSTEXT messages: put together in the order in which they were sent, and heard while something is asked."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from telemetry.mavlink.actions import Message
 PART_BYTES = 50
 PATIENCE_S = 1.0
 """After this a text is given out with what came of it."""
+WARNING = 4
+"""MAV_SEVERITY; what is less urgent is no reason for a refusal."""
+MOST = 5
 
 
 class Texts:
@@ -41,3 +44,38 @@ class Texts:
 def clean(text: str) -> str:
     """Without what vehicles add to it: PX4 ends with a tab what it says by an event, too."""
     return text.strip("\0").strip()
+
+
+class VehicleWords:
+    """The warnings heard since ``clear``; texts in several parts are put together."""
+
+    def __init__(self) -> None:
+        self._parts: dict[int, dict[int, str]] = {}
+        self._texts: list[str] = []
+
+    def clear(self) -> None:
+        self._parts.clear()
+        self._texts.clear()
+
+    def on_message(self, message: Message) -> None:
+        if message.get_type() != "STATUSTEXT" or message.severity > WARNING:
+            return
+        if message.id == 0:
+            self._add(message.text)
+        else:
+            self._parts.setdefault(message.id, {})[message.chunk_seq] = message.text
+
+    def _add(self, text: str) -> None:
+        text = clean(text)
+        if text and text not in self._texts:
+            self._texts = [*self._texts, text][-MOST:]
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        joined = (clean("".join(text for _, text in sorted(parts.items()))) for parts in self._parts.values())
+        return (*self._texts, *(text for text in joined if text))
+
+    def sentence(self) -> str:
+        """``It says: "...".`` or nothing."""
+        quoted = " ".join(f'"{text}"' for text in self.texts)
+        return f" It says: {quoted}." if quoted else ""

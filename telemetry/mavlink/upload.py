@@ -37,8 +37,8 @@ class MissionUpload:
         if not items:
             raise TransferError("The mission has no items.", advice="Plan a mission first.")
         self._firmware: Firmware = firmware
-        self._items, self._ends, self._boot = items, Ends(target, own), BootClock()
-        self._sending = MissionSending(items, home, firmware=firmware, ends=self._ends, now_s=now_s)
+        self._items, self._endpoints, self._boot = items, Endpoints(target, own), BootClock()
+        self._sending = MissionSending(items, home, firmware=firmware, endpoints=self._endpoints, now_s=now_s)
         self._download: MissionDownload | None = None
         self._over = False
         self._started_s = now_s
@@ -48,12 +48,12 @@ class MissionUpload:
         return [Progress("sending", 0, len(self._items)), *self._sending.begin(now_s)]
 
     def cancel(self, now_s: float) -> list[Action]:
-        stop = Send(mavlink.MAVLink_mission_ack_message(*self._ends.vehicle, CANCELLED, 0))
+        stop = Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, CANCELLED, 0))
         error = TransferError("The upload was cancelled.", advice=UNKNOWN)
         return [] if self._over else [stop, *self._end(Failed(error))]
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
-        if self._over or not self._ends.is_from_vehicle(message):
+        if self._over or not self._endpoints.is_from_vehicle(message):
             return []
         if self._boot.has_restarted(message):
             advice = f"Wait until it is ready. {UNKNOWN}"
@@ -96,8 +96,8 @@ class MissionUpload:
     def _read_back(self, now_s: float) -> list[Action]:
         self._download = MissionDownload(
             firmware=self._firmware,
-            target=self._ends.vehicle,
-            own=self._ends.own,
+            target=self._endpoints.vehicle,
+            own=self._endpoints.own,
             now_s=now_s,
             lossy=self._sending.disturbed,
         )

@@ -1,0 +1,67 @@
+"""A conversation with a vehicle: its two ends, a restart meanwhile, and how long to wait before asking again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from telemetry.mavlink.actions import Message
+
+GROUND_STATION = (255, 190)
+"""System and component that ground stations use."""
+BACKWARDS_MS = 5000
+"""More than messages can be late."""
+FACTOR, MARGIN_S = 1.5, 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoints:
+    """System and component numbers of the vehicle and of this ground station."""
+
+    vehicle: tuple[int, int]
+    own: tuple[int, int] = GROUND_STATION
+
+    def is_from_vehicle(self, message: Message) -> bool:
+        return (message.get_srcSystem(), message.get_srcComponent()) == self.vehicle
+
+    def is_for_us(self, message: Message) -> bool:
+        """From the vehicle and addressed to us; 0 addresses everyone, as older autopilots do."""
+        return (
+            self.is_from_vehicle(message)
+            and message.target_system in (self.own[0], 0)
+            and message.target_component in (self.own[1], 0)
+        )
+
+
+class BootClock:
+    """Notices that a vehicle has started anew: its clock of milliseconds since boot runs backwards."""
+
+    def __init__(self) -> None:
+        self._newest_ms: int | None = None
+
+    def has_restarted(self, message: Message) -> bool:
+        """Whether this message of the vehicle is younger than an earlier one."""
+        t_boot_ms = getattr(message, "time_boot_ms", None)
+        if t_boot_ms is None:
+            return False
+        if self._newest_ms is not None and t_boot_ms < self._newest_ms - BACKWARDS_MS:
+            return True
+        self._newest_ms = max(t_boot_ms, self._newest_ms or 0)
+        return False
+
+
+class RoundTrip:
+    """Learnt from the answers that came. Exponential average; only messages that were sent once may be measured."""
+
+    def __init__(self, *, unknown_s: float = 0.25, shortest_s: float = 0.1, longest_s: float = 1.0) -> None:
+        self._unknown_s, self._shortest_s, self._longest_s = unknown_s, shortest_s, longest_s
+        self._mean_s: float | None = None
+
+    def measure(self, round_trip_s: float) -> None:
+        before_s = round_trip_s if self._mean_s is None else self._mean_s
+        self._mean_s = 0.8 * before_s + 0.2 * round_trip_s
+
+    @property
+    def patience_s(self) -> float:
+        if self._mean_s is None:
+            return self._unknown_s
+        return min(max(FACTOR * self._mean_s + MARGIN_S, self._shortest_s), self._longest_s)
