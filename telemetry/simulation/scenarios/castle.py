@@ -43,7 +43,7 @@ CASES = (
 )
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     parts = []
     for case in CASES:
         wanted.report(case.title, len(parts) / len(CASES))
@@ -51,7 +51,7 @@ def run(wanted: Wanted) -> ScenarioResult:
     return ScenarioResult(NAME, wanted.seed, tuple(parts))
 
 
-def fly_case(case: Case, wanted: Wanted, *, ahead_m: float = scenes.CASTLE_AHEAD_M) -> FlightResult:
+def fly_case(case: Case, wanted: ScenarioRequest, *, ahead_m: float = scenes.CASTLE_AHEAD_M) -> FlightResult:
     """``ahead_m``: how far away the building's face is."""
     scene = scenes.castle_building(wanted.seed, ahead_m=ahead_m)
     setup = setup_of(

@@ -32,14 +32,14 @@ SCENARIOS = (
         "Sideways past a reflector 68 m ahead.",
         "Its returns lie where it stands, in one cluster; the spread of the three rotations.",
         "Miccinesi 2022, figs 10-15",
-        "corner_reflector",
+        "radar.corner_reflector",
     ),
     Scenario(
         "wood",
         "Past trees, mapped by the radar.",
         "Precision and recall of the map against the true surfaces.",
         "Miccinesi 2022, figs 16-21",
-        "mapped_scenes",
+        "radar.mapped_scenes",
         "run_wood",
         draws=False,
     ),
@@ -48,7 +48,7 @@ SCENARIOS = (
         "Past walls, mapped by the radar.",
         "Precision and recall of the map against the true surfaces.",
         "Miccinesi 2022, figs 16-21",
-        "mapped_scenes",
+        "radar.mapped_scenes",
         "run_ruin",
         draws=False,
     ),
@@ -64,7 +64,7 @@ SCENARIOS = (
         "5 m over a volcano's flank, among things that its surface model does not know.",
         "False alarms per km, objects alarmed in time.",
         "Melita 2020, the flight on Etna",
-        "terrain_hugging",
+        "hugging.terrain_hugging",
         draws=False,
     ),
     Scenario(
@@ -72,7 +72,7 @@ SCENARIOS = (
         "The same for an hour.",
         "The map's memory grows with new voxels alone.",
         "Bigazzi 2022, the global map",
-        "long_flight",
+        "hugging.long_flight",
         draws=False,
         hours=True,
     ),
@@ -81,21 +81,21 @@ SCENARIOS = (
         "26 and 78 ways past two poles, by the tracks and the sidestep that fly live.",
         "None touched; the tracks' error by distance from boresight.",
         "Wessendorp 2021, figs 5-8",
-        "arena",
+        "arena.arena",
     ),
     Scenario(
         "iq-reflector",
         "Nothing is flown: a reflector from ADC samples on.",
         "Errors in range, speed and azimuth; two targets resolved.",
         "Miccinesi 2022, fig. 7; Wessendorp 2021, eqs 1-3",
-        "iq_reflector",
+        "radar.iq_reflector",
     ),
     Scenario(
         "foliage",
         "A rover with a UWB radar past foliage and obstacles.",
         "Table II and fig. 6 reproduced; foliage cleared, obstacles kept.",
         "Ahtiainen, Tables II and III, figs 6 and 9",
-        "foliage",
+        "foliage.foliage",
     ),
 )
 NAMES = tuple(scenario.name for scenario in SCENARIOS)
@@ -106,10 +106,10 @@ def scenario_named(name: str) -> Scenario:
     return next(scenario for scenario in SCENARIOS if scenario.name == name)
 
 
-def run_scenario(name: str, wanted: Wanted) -> ScenarioResult:
+def run_scenario(name: str, wanted: ScenarioRequest) -> ScenarioResult:
     """Loads only what the scenario needs: kernels and rasters take seconds.
 
     Raises FormatError for a broken world file, RecordingError and TelemetryError.
     """
     chosen = scenario_named(name)
-    return getattr(import_module(f"telemetry.scenarios.{chosen.module}"), chosen.function)(wanted)
+    return getattr(import_module(f".{chosen.module}", __package__), chosen.function)(wanted)

@@ -109,5 +109,5 @@ def _drone() -> dict[str, object]:
 def _towards(poi: int) -> tuple[float, float]:
     """East and north of one of the demo's points from its first."""
     home, other = demo_pois()[0], demo_pois()[poi]
-    north, east, _ = Frame(home.lat_deg, home.lon_deg, 0.0).neu_from_geodetic(other.lat_deg, other.lon_deg, 0.0)
+    north, east, _ = NeuFrame(home.lat_deg, home.lon_deg, 0.0).neu_from_geodetic(other.lat_deg, other.lon_deg, 0.0)
     return east, north

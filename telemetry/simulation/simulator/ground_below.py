@@ -48,7 +48,7 @@ class SurfaceGround:
     Where the model knows nothing the ground is as low as its lowest cell.
     """
 
-    def __init__(self, dsm: Dsm, frame: Frame) -> None:
+    def __init__(self, dsm: Dsm, frame: NeuFrame) -> None:
         self._dsm = dsm
         self._frame = frame
         self._lowest_m = float(np.nanmin(dsm.elevation_m))

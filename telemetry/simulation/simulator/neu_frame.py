@@ -13,7 +13,7 @@ ECCENTRICITY_2 = 0.00669437999014
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class NeuFrame:
     """A plane that touches WGS84 at the origin; good to some centimetres within kilometres."""
 
     lat_deg: float

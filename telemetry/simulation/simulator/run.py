@@ -190,7 +190,7 @@ async def _until_stopped(options: SimOptions, announce: Callable[[str], None]) -
 
 def _vehicle(options: SimOptions) -> SimulatedVehicle:
     _check(options)
-    frame = Frame(options.home_lat_deg, options.home_lon_deg, options.home_alt_amsl_m)
+    frame = NeuFrame(options.home_lat_deg, options.home_lon_deg, options.home_alt_amsl_m)
     capacity_mah = Pack().hover_a * options.endurance_s / 3.6
     parameters = Parameters(
         BATT_CAPACITY=capacity_mah, SIM_WIND_SPD=options.wind_m_s, SIM_WIND_DIR=options.wind_from_deg
@@ -211,7 +211,7 @@ def _vehicle(options: SimOptions) -> SimulatedVehicle:
     )
 
 
-def _surroundings(options: SimOptions, frame: Frame) -> tuple[Ground | None, Obstacles | None]:
+def _surroundings(options: SimOptions, frame: NeuFrame) -> tuple[Ground | None, Obstacles | None]:
     # What reads rasters and casts rays takes a second to load; level ground starts without it.
     if options.dsm is None and options.world is None:
         return None, None

@@ -38,7 +38,7 @@ class SimulatedVehicle:
 
     def __init__(
         self,
-        frame: Frame,
+        frame: NeuFrame,
         *,
         ground: Ground | None = None,
         obstacles: Obstacles | None = None,

@@ -16,7 +16,6 @@ from mapping.tracking import Tracker, TrackState
 from telemetry.sensors.optitrack import Capture
 from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
 
-F64 = NDArray[np.float64]
 NEAR_M = 1.0
 """An object nearer to a pole than this, and nearest to it, is that pole."""
 
@@ -43,7 +42,7 @@ class Pole:
 
 
 @dataclass(slots=True)
-class Comparison:
+class TruthComparison:
     poles: list[Pole]
     others: list[Seen] = field(default_factory=list)
     """Objects that were followed where no pole is."""
@@ -55,11 +54,11 @@ class Comparison:
 
 def compared(
     frames: Iterable[tuple[float, Detections]], capture: Capture, poles_en_m: F64, *, offset_s: float = 0.0
-) -> Comparison:
+) -> TruthComparison:
     """``offset_s``: how long after the capture's first row the radar's first frame was. Raises RadarDataError."""
-    radar = Position2Go()
+    radar = Position2GoModel()
     tracker = Tracker(radar.errors.params())
-    found = Comparison([Pole((float(east), float(north))) for east, north in poles_en_m])
+    found = TruthComparison([Pole((float(east), float(north))) for east, north in poles_en_m])
     for t_radar_s, detections in frames:
         t_s = t_radar_s + offset_s
         if not capture.covers(t_s):
@@ -82,12 +81,14 @@ def compared(
     return found
 
 
-def _in_view(radar: Position2Go, found: Detections) -> F64:
+def _in_view(radar: Position2GoModel, found: Detections) -> F64:
     kept = radar.sees(found.range_m, found.azimuth_rad)
     return np.column_stack([found.range_m, found.azimuth_rad, found.radial_speed_m_s])[kept]
 
 
-def _note(found: Comparison, radar: Position2Go, states: list[TrackState], where: tuple[float, F64, float]) -> None:
+def _note(
+    found: TruthComparison, radar: Position2GoModel, states: list[TrackState], where: tuple[float, F64, float]
+) -> None:
     t_s, position, heading_rad = where
     places = [_from_nose(state.position_enu_m - position, heading_rad) for state in states]
     true = [_from_nose(np.array(pole.place_en_m) - position, heading_rad) for pole in found.poles]

@@ -21,7 +21,7 @@ NAME = "arena"
 AVOIDED, THROUGH = 1.0, 0.98
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     """26 ways as the paper's vehicle flew them, past the nearest obstacle only, and 78 past all of them.
 
     Raises ParameterError for a world or a recording of one's own: the hall has a vehicle of its own.
@@ -42,13 +42,13 @@ def run(wanted: Wanted) -> ScenarioResult:
 
 
 def through(
-    title: str, count: int, random: np.random.Generator, *, nearest_only: bool, wanted: Wanted | None = None
+    title: str, count: int, random: np.random.Generator, *, nearest_only: bool, wanted: ScenarioRequest | None = None
 ) -> FlightResult:
     """So many ways from all around."""
-    wanted = wanted or Wanted()
+    wanted = wanted or ScenarioRequest()
     settings = _settings(wanted, nearest_only=nearest_only)
     ways = approaches(count, random)
-    flown: list[Flown] = []
+    flown: list[ArenaFlown] = []
     for way in ways:
         wanted.report(f"{title}, way {len(flown) + 1} of {count}", len(flown) / count)
         flown.append(fly(way, random, settings=settings, radar=wanted.radar or "model"))
@@ -67,7 +67,7 @@ def through(
     )
 
 
-def _settings(wanted: Wanted, *, nearest_only: bool) -> PerceptionSettings:
+def _settings(wanted: ScenarioRequest, *, nearest_only: bool) -> PerceptionSettings:
     usual = arena_settings(nearest_only=nearest_only)
     return replace(
         usual,
@@ -76,7 +76,7 @@ def _settings(wanted: Wanted, *, nearest_only: bool) -> PerceptionSettings:
     )
 
 
-def _figures(title: str, ways: Sequence[Approach], flown: Sequence[Flown], printed: str) -> tuple[Figure, ...]:
+def _figures(title: str, ways: Sequence[Approach], flown: Sequence[ArenaFlown], printed: str) -> tuple[Figure, ...]:
     straight = np.array([way.gap_straight_on_m() <= 0.0 for way in ways])
     clear = np.array([one.nearest_gap_m > 0.0 for one in flown])
     errors = np.array([error for one in flown for error in one.errors]).reshape(-1, 3)
@@ -103,7 +103,7 @@ def _errors_by_angle(errors: Sequence[tuple[float, float, float]]) -> tuple[str,
     )
 
 
-def _alerts(flown: Sequence[Flown]) -> tuple[AlertSeen, ...]:
+def _alerts(flown: Sequence[ArenaFlown]) -> tuple[AlertSeen, ...]:
     """When each way was first left for an obstacle, on the clock of all of them."""
     out, began_s = [], 0.0
     for one in flown:

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from telemetry.scenarios.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
-from telemetry.scenarios.arena_flight import Flown
-from telemetry.scenarios.charts import Chart, series
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from telemetry.simulation.scenarios.arena.arena_course import HALF_M, POLE_RADIUS_M, VEHICLE_RADIUS_M, Approach
+from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown
+from telemetry.simulation.scenarios.stage.curves import Chart, series
 
 FAR_DEG = tuple(range(0, 40, 5))
 """Off the nose: the steps of the table of errors."""
@@ -49,7 +48,7 @@ def _error_chart(title: str, label: str, rows: Sequence[tuple[int, float]]) -> C
     )
 
 
-def ways_chart(title: str, ways: Sequence[Approach], flown: Sequence[Flown]) -> Chart:
+def ways_chart(title: str, ways: Sequence[Approach], flown: Sequence[ArenaFlown]) -> Chart:
     """Figs 5 and 6, in which the poles stand the same for all: here each way is seen from the pole that it passes
     nearest, its own direction up.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 HALF_M = 5.0
 """Of the hall's side."""

@@ -33,9 +33,7 @@ from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 from telemetry.topics.tracks import TracksStatus
 from telemetry.tracking.object_tracking import ObjectTracking
 
-F64 = NDArray[np.float64]
-
-FRAME = Frame(51.9906, 4.3754, 0.0)
+FRAME = NeuFrame(51.9906, 4.3754, 0.0)
 CRUISE_M_S, UP_M = 1.2, 3.0
 LOOKS_UP_M = 2.0
 """Lower nothing is followed: every echo would graze the floor."""
@@ -53,7 +51,7 @@ DRAWN_EVERY = 10
 
 
 @dataclass(slots=True)
-class Flown:
+class ArenaFlown:
     """What one way came to, from where the vehicle left its start on."""
 
     duration_s: float = 0.0
@@ -67,16 +65,12 @@ class Flown:
     """Five times a second, in the hall's east and north."""
 
 
-class Radar(Protocol):
-    def frame(self, truth: SimTruth) -> RadarFrame: ...
-
-
 def arena_settings(*, nearest_only: bool, tracker: TrackerSettings | None = None) -> PerceptionSettings:
     """Of the paper's vehicle in its hall; what a console would be set to."""
     return PerceptionSettings(
         vehicle_radius_m=VEHICLE_RADIUS_M,
         position_error_m=0.1,
-        tracker=tracker or Position2Go().errors,
+        tracker=tracker or Position2GoModel().errors,
         velocities=VelocitySettings(
             max_speed_m_s=MAX_SPEED_M_S,
             max_turn_deg=MAX_TURN_DEG,
@@ -87,7 +81,9 @@ def arena_settings(*, nearest_only: bool, tracker: TrackerSettings | None = None
     )
 
 
-def fly(approach: Approach, random: np.random.Generator, *, settings: PerceptionSettings, radar: RadarKind) -> Flown:
+def fly(
+    approach: Approach, random: np.random.Generator, *, settings: PerceptionSettings, radar: RadarKind
+) -> ArenaFlown:
     """From a stand at one wall to the other one."""
     return _Way(approach, random, settings, radar).run()
 
@@ -96,23 +92,25 @@ class _Way:
     def __init__(
         self, approach: Approach, random: np.random.Generator, settings: PerceptionSettings, radar: RadarKind
     ) -> None:
-        self._approach, self._flown = approach, Flown()
+        self._approach, self._flown = approach, ArenaFlown()
         seed = int(random.integers(2**31))
         self._wire = Wire(_vehicle(seed, approach.heading_rad), order_latency_s=ORDER_S)
         self._radar: Radar = _radar_of(radar, approach, np.random.default_rng(seed))
         self._radar_due_s = 0.0
         self._waiting: deque[RadarFrame] = deque()
-        self._following = Following(run="arena", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
+        self._following = ObjectTracking(run="arena", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
         self._following.on_settings(settings)
         self._until_ready()
         self._pilot = pilot = MissionPilot(self._wire, items_from_mission(_mission(approach)))
-        self._avoiding = Avoiding(VEHICLE, rest=lambda state: rest_of_flight(pilot.onboard, state), settings=settings)
+        self._avoiding = Avoiding(
+            VEHICLE, remaining=lambda state: remaining_flight(pilot.onboard, state), settings=settings
+        )
         self._avoiding.on_settings(settings)
         self._avoiding.enable(self._wire.now_s, "sidestep")
         self._began_s: float | None = None
         self._slices = 0
 
-    def run(self) -> Flown:
+    def run(self) -> ArenaFlown:
         wire, flown, until_s = self._wire, self._flown, self._wire.now_s + LATEST_S
         while wire.now_s < until_s and not flown.arrived:
             self._step()
@@ -146,7 +144,7 @@ class _Way:
 
     def _sense(self, truth: SimTruth) -> None:
         if truth.armed and truth.position_enu_m[2] > LOOKS_UP_M and truth.t_sim_s >= self._radar_due_s - 1e-6:
-            self._radar_due_s = max(self._radar_due_s + Position2Go().every_s, truth.t_sim_s)
+            self._radar_due_s = max(self._radar_due_s + Position2GoModel().every_s, truth.t_sim_s)
             self._waiting.append(self._radar.frame(truth))
 
     def _follow(self, truth: SimTruth) -> None:
@@ -188,7 +186,7 @@ class _Detections:
 
     def __init__(self, poles_enu_m: F64, random: np.random.Generator) -> None:
         self._poles_enu_m, self._random = poles_enu_m, random
-        self._radar, self._number = Position2Go(), 0
+        self._radar, self._number = Position2GoModel(), 0
 
     def frame(self, truth: SimTruth) -> RadarFrame:
         self._number += 1
@@ -227,7 +225,7 @@ def _floor() -> GroundGrid:
 
 def _errors(approach: Approach, status: TracksStatus, truth: SimTruth) -> list[tuple[float, float, float]]:
     """Of the track nearest to each pole in view: an echo comes from the side of a pole that faces the radar."""
-    out, sensor = [], Position2Go()
+    out, sensor = [], Position2GoModel()
     place = np.array(truth.position_enu_m[:2])
     back_s = truth.t_mono_s - status.t_mono_s
     then = place - back_s * np.array(truth.velocity_enu_m_s[:2])

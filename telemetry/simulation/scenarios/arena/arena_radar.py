@@ -17,7 +17,6 @@ from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
 from telemetry.topics.simulated import SimTruth
 from telemetry.topics.track_settings import TrackerSettings
 
-F64 = NDArray[np.float64]
 POLES_M = 6.0
 """High."""
 
@@ -36,7 +35,7 @@ ERRORS = TrackerSettings(
 
 
 @dataclass(frozen=True, slots=True)
-class Position2Go:
+class Position2GoModel:
     """Wessendorp 2021, III-D. What it prints as accuracies is taken as one sigma, the harder reading."""
 
     half_fov_rad: float = math.radians(38.0)
@@ -59,7 +58,7 @@ class Position2Go:
         xyz_m = np.column_stack([range_m * np.sin(bearing_rad), range_m * np.cos(bearing_rad), np.zeros(len(range_m))])
         return _frame(truth, number, xyz_m, speed_m_s, _snr_db(np.ones(len(range_m)), range_m))
 
-    def sees(self, range_m: F64, bearing_rad: F64) -> NDArray[np.bool_]:
+    def sees(self, range_m: F64, bearing_rad: F64) -> Bools:
         return (np.abs(bearing_rad) <= self.half_fov_rad) & (range_m >= self.nearest_m) & (range_m <= self.farthest_m)
 
     def frame(self, true: F64, random: np.random.Generator) -> F64:
@@ -97,7 +96,7 @@ class Position2Go:
 class SampledPosition2Go:
     """The same radar from its samples on: echoes of the poles and the floor, and the live chain of processing."""
 
-    def __init__(self, frame: Frame, poles_enu_m: F64, radius_m: float, *, seed: int) -> None:
+    def __init__(self, frame: NeuFrame, poles_enu_m: F64, radius_m: float, *, seed: int) -> None:
         poles = [
             {"type": "cylinder", "at_m": pole, "radius_m": radius_m, "height_m": POLES_M, "material": "plaster"}
             for pole in poles_enu_m.tolist()

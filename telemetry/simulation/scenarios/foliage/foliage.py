@@ -53,7 +53,7 @@ SITE_UTM = (55, 332_000.0, 6_250_000.0)
 """Zone (south), easting and northing of the recorded site's middle."""
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     """All trials of the paper. Raises ParameterError for a world of one's own and for a record of another kind."""
     if wanted.world is not None:
         raise ParameterError("This scenario brings its own sites.", where="--world", advice="Leave --world away.")

@@ -11,10 +11,8 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.uwb import Learning, Thresholds, UwbParams
 from mapping.uwb.sensor_model import bin_ranges, power_scaler
-from telemetry.simulator.sensors.uwb import UwbModel, UwbRadar
-from telemetry.simulator.sensors.uwb_scene import TABLE_II, Foliage, Target, screen, uwb_scene
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.simulator.sensors.uwb import UwbModel, UwbRadar
+from telemetry.simulation.simulator.sensors.uwb_scene import TABLE_II, Foliage, Target, screen, uwb_scene
 
 PRINTED = {
     "Metal Jerry": 0.8000, "Large reflector": 0.8000, "Plastic Jerry": 0.7999, "Plywood": 0.7996, "3 bricks": 0.7950,

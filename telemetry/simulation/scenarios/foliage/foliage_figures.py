@@ -11,12 +11,9 @@ import numpy as np
 from mapping.geometry.arrays import F32, U8, Bools
 from mapping.traversability import Traversability, traversability_map
 from mapping.uwb import Cleared, UwbClearing, UwbParams, UwbPose, clear
-from telemetry.scenarios.foliage_trials import CELL_M, PLACED, Site, disc_cells, elevation
-from telemetry.simulator.sensors.uwb import UwbRadar
-from telemetry.simulator.sensors.uwb_scene import Target, uwb_scene
-
-F32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
+from telemetry.simulation.scenarios.foliage.foliage_trials import CELL_M, PLACED, Site, disc_cells, elevation
+from telemetry.simulation.simulator.sensors.uwb import UwbRadar
+from telemetry.simulation.simulator.sensors.uwb_scene import Target, uwb_scene
 
 PAPERS_RULE = UwbParams(explained_apart_m=math.inf)
 BEFORE_M = 2.0
@@ -33,7 +30,7 @@ class Drive:
     obstacle: Bools
     """(rows, cols) Untraversable without any foliage there: "the obstacle locations and size without the foliage"."""
     poses: list[UwbPose]
-    scans: NDArray[np.uint8]
+    scans: U8
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,14 +8,19 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.uwb import UwbParams
-from telemetry.scenarios.charts import Chart, series
-from telemetry.scenarios.foliage_drive import lawn_drive
-from telemetry.scenarios.foliage_figures import PAPERS_RULE, Drive, cleared_by, driven, labels, placed_cells
-from telemetry.scenarios.foliage_trials import TRIAL_1, TRIAL_2, trial_site
-from telemetry.simulator.sensors.uwb import ECHO_M2_PER_M, LAYERS, transmission
-from telemetry.simulator.sensors.uwb_scene import TABLE_II
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.scenarios.foliage.foliage_drive import lawn_drive
+from telemetry.simulation.scenarios.foliage.foliage_figures import (
+    PAPERS_RULE,
+    Drive,
+    cleared_by,
+    driven,
+    labels,
+    placed_cells,
+)
+from telemetry.simulation.scenarios.foliage.foliage_trials import TRIAL_1, TRIAL_2, trial_site
+from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.simulator.sensors.uwb import ECHO_M2_PER_M, LAYERS, transmission
+from telemetry.simulation.simulator.sensors.uwb_scene import TABLE_II
 
 TRIALS = ((1, "c"), (2, "e"), (2, "f"))
 """Sparse foliage, and the thick that is hardest to tell."""

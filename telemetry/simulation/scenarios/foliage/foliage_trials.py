@@ -9,11 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from telemetry.simulator.sensors.uwb_scene import Foliage, Target, screen, target
-
-F64 = NDArray[np.float64]
-F32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
+from mapping.geometry.arrays import F32, Bools
+from telemetry.simulation.simulator.sensors.uwb_scene import Foliage, Target, screen, target
 
 CELL_M = 0.1
 SITE_M = 30.0

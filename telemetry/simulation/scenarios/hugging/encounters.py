@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.braking import Braking
-from telemetry.obstacles import PerceptionSettings, Sensor
-from telemetry.scenarios.flown import Flown, Told
-from telemetry.scenarios.nearness import away_m, level_away_m, objects_of
-from telemetry.scenarios.result import Figure
-from telemetry.scenarios.setup import ORDER_S
-from telemetry.simulator.scene import World
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from mapping.perceiving.braking import Braking
+from telemetry.simulation.scenarios.stage.result import Figure
+from telemetry.simulation.scenarios.stage.seen_flight import Flown, Told
+from telemetry.simulation.scenarios.stage.setup import ORDER_S
+from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.scene.primitives import distances
+from telemetry.topics.obstacles import PerceptionSettings, Sensor
 
 IN_THE_WAY_M = 0.5
 """An object this near to the line, or nearer, must be alarmed."""
@@ -23,6 +22,8 @@ ITS_OWN_M, ITS_OWN_RAD = 2.0, math.radians(3.5)
 """An alert is about an object when it is this near to it as seen from above: two of the radar's voxels, and, seen from
 the vehicle, three sigma of its azimuth with the heading's bias."""
 MOST_FALSE_PER_KM, LEAST_ALARMED = 1.0, 0.95
+LOW, HIGH = 3, 4
+"""Columns of a primitive's row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +125,28 @@ def _false_words(told: Told, flown: Flown, world: World) -> str:
         f"{alert.obstacle.distance_m:.1f} m away, {alert.obstacle.voxels} voxels, {above_m:.1f} m over the ground, "
         f"{level_away_m(world.placed.rows, place):.1f} m from the nearest object"
     )
+
+
+def objects_of(world: World) -> dict[str, F64]:
+    """The rows of each object's primitives, by its name; of several with one name all."""
+    rows: dict[str, list[F64]] = {}
+    for row, owner in zip(world.placed.rows, world.placed.owner.tolist(), strict=True):
+        rows.setdefault(world.shapes[owner].name, []).append(row)
+    return {name: np.array(several) for name, several in rows.items()}
+
+
+def away_m(rows: F64, points_enu: F64) -> F64:
+    """(N, 3) -> (N,) to the nearest of the primitives, 0 inside."""
+    points = np.ascontiguousarray(points_enu, np.float64).reshape(-1, 3)
+    nearest_m, index = np.empty(len(points)), np.empty(len(points), np.int32)
+    distances(np.ascontiguousarray(rows), points, nearest_m, index)
+    return np.maximum(nearest_m, 0.0)
+
+
+def level_away_m(rows: F64, place_enu: F64) -> float:
+    """As seen from above, of one place: infinite where there are no primitives."""
+    found = np.inf
+    for row in rows:
+        middle = np.array([[place_enu[0], place_enu[1], (row[LOW] + row[HIGH]) / 2]])
+        found = min(found, float(away_m(row[None], middle)[0]))
+    return found

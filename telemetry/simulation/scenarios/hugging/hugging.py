@@ -13,10 +13,8 @@ from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PathParams, Poi, SurfaceParams
 from planning.plan import plan_mission
 from planning.request import PlanRequest
-from planning.vehicle_profile import load_profile
-from telemetry.simulator.frame import Frame
-
-F64 = NDArray[np.float64]
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 HEIGHT_M, RADIUS_M = 5.0, 20.0
 """H and R = 4 H, the defaults of Melita 2020."""
@@ -31,13 +29,13 @@ TRIES = 2000
 class Hugging:
     dsm: Dsm
     mission: Mission
-    frame: Frame
+    frame: NeuFrame
     line_enu_m: F64
     """(K, 3) From the top of the take-off to the last waypoint; up counts from home."""
 
     @property
     def length_m(self) -> float:
-        return float(np.hypot(*np.diff(self.line_enu_m[:, :2], axis=0).T).sum())
+        return length_m(self.line_enu_m[:, :2])
 
 
 def hugging(dsm: Dsm, pois: tuple[Poi, ...]) -> Hugging:
@@ -50,7 +48,7 @@ def hugging(dsm: Dsm, pois: tuple[Poi, ...]) -> Hugging:
     )
     plan = plan_mission(dsm, request)
     home = plan.mission.home
-    frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
+    frame = NeuFrame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
     lat_lon = plan.dsm.lat_lon_from_xy(plan.line.points_m[:, :2])
     north_per_deg, east_per_deg = frame.metres_per_degree
     line = np.column_stack(

@@ -9,23 +9,21 @@ from pathlib import Path
 import numpy as np
 
 from planning.errors import ParameterError
-from telemetry.messages import Published, Topic
-from telemetry.obstacles import PerceptionStatus
-from telemetry.scenarios.encounters import encounters
-from telemetry.scenarios.flight import fly
-from telemetry.scenarios.hugging import hugging, random_route
-from telemetry.scenarios.map_figures import radar_figures
-from telemetry.scenarios.objects import world_document
-from telemetry.scenarios.record import FlightRecording
-from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
-from telemetry.scenarios.running import surveyed
-from telemetry.scenarios.setup import Setup, Tell
-from telemetry.scenarios.strewn import strewn
-from telemetry.scenarios.terrain_hugging import APART_M, etna
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.scene import SceneTerrain, World
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.scenarios.hugging.encounters import encounters
+from telemetry.simulation.scenarios.hugging.hugging import hugging, random_route
+from telemetry.simulation.scenarios.hugging.strewn import strewn
+from telemetry.simulation.scenarios.hugging.terrain_hugging import APART_M, etna
+from telemetry.simulation.scenarios.stage.map_figures import radar_figures
+from telemetry.simulation.scenarios.stage.record import FlightRecording
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.simulation.scenarios.stage.running import surveyed
+from telemetry.simulation.scenarios.stage.setup import Setup, Tell
+from telemetry.simulation.scenarios.stage.virtual_flight import fly
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.world_objects import world_document
+from telemetry.simulation.simulator.scene import SceneTerrain, World
+from telemetry.topics.messages import Published, Topic
+from telemetry.topics.obstacles import PerceptionStatus
 
 NAME = "long-flight"
 HOUR_S, LOOK_S = 3600.0, 300.0
@@ -71,14 +69,14 @@ class Growth:
             self.looks.append(Look(t_s, message.voxels_occupied, message.map_bytes, file_bytes))
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     """Raises ParameterError for a world of one's own: the route is made for the generated hillside."""
     if wanted.world is not None:
         raise ParameterError("This scenario brings its own world.", where="--world", advice="Leave --world away.")
     return run_for(wanted, HOUR_S, LOOK_S)
 
 
-def run_for(wanted: Wanted, seconds: float, every_s: float) -> ScenarioResult:
+def run_for(wanted: ScenarioRequest, seconds: float, every_s: float) -> ScenarioResult:
     with tempfile.TemporaryDirectory(prefix="hedgehop-long-flight-") as folder:
         path = wanted.record or Path(folder) / "flight.mcap"
         setup = _setup(wanted.seed, seconds)

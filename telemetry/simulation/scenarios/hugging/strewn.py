@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from telemetry.scenarios.objects import Object, cylinder, tree, wall
-from telemetry.simulator.scene import SceneTerrain
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import length_m
+from telemetry.simulation.scenarios.stage.world_objects import Object, cylinder, tree, wall
+from telemetry.simulation.simulator.scene import SceneTerrain
 
 FIRST_M, APART_M, LAST_M = 30.0, 35.0, 15.0
 """The first stands so far along the line, the next ones so far apart, and none this near to its end."""
@@ -26,7 +26,7 @@ def strewn(
     objects: list[Object] = []
     places: list[tuple[float, float]] = []
     s_m = FIRST_M + float(random.uniform(0.0, 10.0))
-    while s_m < _length_m(line_enu_m) - LAST_M:
+    while s_m < length_m(line_enu_m[:, :2]) - LAST_M:
         (east, north, up), heading_rad = _at(line_enu_m, s_m)
         if all(math.dist((east, north), place) >= ALONE_M for place in places):
             places.append((east, north))
@@ -54,10 +54,6 @@ def _object(
     east, north = half_m * math.sin(across), half_m * math.cos(across)
     ends = (at_m[0] - east, at_m[1] - north), (at_m[0] + east, at_m[1] + north)
     return wall(name, *ends, height_m, thickness_m=0.3, material="concrete")
-
-
-def _length_m(line: F64) -> float:
-    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
 
 
 def _at(line: F64, s_m: float) -> tuple[tuple[float, float, float], float]:

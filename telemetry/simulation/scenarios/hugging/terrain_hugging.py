@@ -8,28 +8,26 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.demo import demo_dsm
-from planning.dsm import Dsm
-from telemetry.scenarios.encounters import encounters
-from telemetry.scenarios.hugging import Hugging, hugging, random_route
-from telemetry.scenarios.map_figures import radar_figures, vision_figures
-from telemetry.scenarios.objects import world_document
-from telemetry.scenarios.result import FlightResult, ScenarioResult
-from telemetry.scenarios.running import flown_of, own_ground, surveyed
-from telemetry.scenarios.setup import Setup
-from telemetry.scenarios.strewn import strewn
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.scene import SceneTerrain, World
-from telemetry.simulator.scene.world_file import read_world
-
-F64 = NDArray[np.float64]
+from planning.ground.demo_hillside import demo_dsm
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.scenarios.hugging.encounters import encounters
+from telemetry.simulation.scenarios.hugging.hugging import Hugging, hugging, random_route
+from telemetry.simulation.scenarios.hugging.strewn import strewn
+from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
+from telemetry.simulation.scenarios.stage.result import FlightResult, ScenarioResult
+from telemetry.simulation.scenarios.stage.running import flown_of, own_ground, surveyed
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.world_objects import world_document
+from telemetry.simulation.simulator.scene import SceneTerrain, World
+from telemetry.simulation.simulator.scene.world_file import read_world
 
 NAME = "etna-like"
 ETNA_SEED = 7
 POINTS, APART_M = 5, 90.0
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     own = own_ground(wanted.world) if wanted.world is not None else None
     return run_over(own or etna(), wanted, NAME)
 
@@ -40,7 +38,7 @@ def etna() -> Dsm:
 
 
 def run_over(
-    dsm: Dsm, wanted: Wanted, name: str, *, apart_m: float = APART_M, most_m: float = math.inf
+    dsm: Dsm, wanted: ScenarioRequest, name: str, *, apart_m: float = APART_M, most_m: float = math.inf
 ) -> ScenarioResult:
     """A random route over a surface model; the flight goes through what it meets, to look at the next.
 
@@ -67,7 +65,7 @@ def run_over(
     return ScenarioResult(name, wanted.seed, (flight,))
 
 
-def _setup(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator, most_m: float) -> Setup:
+def _setup(plan: Hugging, wanted: ScenarioRequest, name: str, random: np.random.Generator, most_m: float) -> Setup:
     return Setup(
         title=name,
         world=world_of(plan, wanted, name, random),
@@ -79,7 +77,7 @@ def _setup(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator
     )
 
 
-def world_of(plan: Hugging, wanted: Wanted, name: str, random: np.random.Generator) -> World:
+def world_of(plan: Hugging, wanted: ScenarioRequest, name: str, random: np.random.Generator) -> World:
     """The wanted one, or things strewn over the plan's own ground. Raises FormatError for a broken file."""
     if wanted.world is not None and not _is_bare(wanted.world):
         return World.load(wanted.world, frame=plan.frame, dsm=plan.dsm)

@@ -6,21 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.alerts import AlertParams
-from mapping.radar_targets import Gate, Variant, in_gate, polar, to_enu
-from telemetry.obstacles import PerceptionSettings
-from telemetry.scenarios import scenes
-from telemetry.scenarios.charts import Chart, series
-from telemetry.scenarios.figures import clusters_of, spread, within
-from telemetry.scenarios.flown import Flown, RadarLook
-from telemetry.scenarios.result import Figure, FlightResult, MapFigures, ScenarioResult
-from telemetry.scenarios.running import flown_of, setup_of
-from telemetry.scenarios.wanted import Wanted
-from telemetry.sensing import rows
-from telemetry.simulator.sensors.body import of_truth
-from telemetry.simulator.sensors.radar_model import RadarModel
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, Bools
+from mapping.perceiving.alerts import AlertParams
+from mapping.radar.targets import Gate, Variant, in_gate, polar, to_enu
+from mapping.sensor_frames import rows
+from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.scenarios.stage.map_against_world import clusters_of, spread, within
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
+from telemetry.topics.obstacles import PerceptionSettings
 
 NAME = "corner-reflector"
 RANGE_GATE_M, WEAKEST = 1.5, 0.01
@@ -33,7 +32,7 @@ DRAWN_M = 12.0
 
 
 @dataclass(frozen=True, slots=True)
-class Returns:
+class ReflectorReturns:
     """The reflector's own, one row each."""
 
     range_m: F64
@@ -44,7 +43,7 @@ class Returns:
     """(N, 3) In the world's frame, as each variant of fig. 15 puts it."""
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     scene = scenes.corner_reflector()
     setup = setup_of(scene, wanted, NAME, sensors=("radar",))
     flown = flown_of(setup, wanted)
@@ -67,7 +66,7 @@ def run(wanted: Wanted) -> ScenarioResult:
     return ScenarioResult(NAME, wanted.seed, (_result(flown, radar, figures, (note,), _charts(returns, places[0])),))
 
 
-def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> Returns:
+def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> ReflectorReturns:
     """Those in the paper's gate whose range and strength fit the reflector."""
     range_m: list[float] = []
     up_m: list[float] = []
@@ -82,10 +81,10 @@ def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> Returns
     stacked: dict[Variant, F64] = {
         name: np.concatenate(places or [np.empty((0, 3))]) for name, places in mapped.items()
     }
-    return Returns(np.array(range_m), np.array(up_m), stacked)
+    return ReflectorReturns(np.array(range_m), np.array(up_m), stacked)
 
 
-def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
+def _own(look: SeenRadarFrame, reflector: F64, cross_section_m2: float) -> F64:
     """(N, 3) body"""
     xyz = np.array(rows(look.frame.xyz_m, 3), np.float64)
     power = 10 ** (rows(look.frame.snr_db, 1)[:, 0] / 10)
@@ -96,7 +95,7 @@ def _own(look: RadarLook, reflector: F64, cross_section_m2: float) -> F64:
     return xyz[own & (np.abs(measured.range_m - true.range_m) <= RANGE_GATE_M)]
 
 
-def _charts(returns: Returns, reflector: F64) -> tuple[Chart, ...]:
+def _charts(returns: ReflectorReturns, reflector: F64) -> tuple[Chart, ...]:
     """From above (fig. 14) by the variant that was chosen, and from the side (fig. 15) by all three."""
     words: dict[Variant, str] = {
         "full_attitude": "measured elevation",
@@ -123,7 +122,7 @@ def _charts(returns: Returns, reflector: F64) -> tuple[Chart, ...]:
     )
 
 
-def _place_figures(returns: Returns, errors_m: F64) -> tuple[Figure, ...]:
+def _place_figures(returns: ReflectorReturns, errors_m: F64) -> tuple[Figure, ...]:
     far = (returns.range_m >= FAR_M[0]) & (returns.range_m <= FAR_M[1])
     near = returns.range_m <= NEAR_M
     return (
@@ -148,7 +147,7 @@ def _cluster_figure(voxels: F64) -> Figure:
     )
 
 
-def _spread_figures(returns: Returns) -> tuple[Figure, ...]:
+def _spread_figures(returns: ReflectorReturns) -> tuple[Figure, ...]:
     level = _level(returns)
     chosen = spread(returns.mapped["heading_only"][level, 2])
     measured = spread(returns.mapped["full_attitude"][level, 2])
@@ -163,12 +162,12 @@ def _spread_figures(returns: Returns) -> tuple[Figure, ...]:
     )
 
 
-def _level(returns: Returns) -> NDArray[np.bool_]:
+def _level(returns: ReflectorReturns) -> Bools:
     """Those of the part flown at constant altitude."""
     return np.abs(returns.up_m - scenes.LEVEL_FLIGHT_M) <= LEVEL_WITHIN_M
 
 
-def _share(hits: NDArray[np.bool_]) -> float:
+def _share(hits: Bools) -> float:
     return float(hits.mean()) if len(hits) else 0.0
 
 

@@ -11,14 +11,12 @@ from mapping.geometry.arrays import F64
 from mapping.radar import Detections, RadarChain
 from mapping.radar.fft import Window
 from planning.errors import ParameterError
-from telemetry.scenarios.charts import Chart, Series, series
-from telemetry.scenarios.result import Figure, FlightResult, ScenarioResult, measured
-from telemetry.scenarios.wanted import Wanted
-from telemetry.simulator.sensors.iq import noise
-from telemetry.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
-from telemetry.simulator.sensors.iq_synthesis import Returns, sampled
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.scenarios.stage.curves import Chart, Series, series
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult, measured
+from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.simulator.sensors.iq import noise
+from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
+from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled
 
 NAME = "iq-reflector"
 SNR_DB, PLACES = 15.0, 300
@@ -65,7 +63,7 @@ SENSORS = (
 )
 
 
-def run(wanted: Wanted) -> ScenarioResult:
+def run(wanted: ScenarioRequest) -> ScenarioResult:
     """Raises ParameterError for a world or a recording: nothing is flown."""
     if wanted.world is not None or wanted.record is not None:
         raise ParameterError(

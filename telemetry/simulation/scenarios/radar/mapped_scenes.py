@@ -11,15 +11,15 @@ from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 WOOD, RUIN = "wood", "ruined-building"
 
 
-def run_wood(wanted: Wanted) -> ScenarioResult:
+def run_wood(wanted: ScenarioRequest) -> ScenarioResult:
     return _run(WOOD, scenes.wood(wanted.seed), wanted)
 
 
-def run_ruin(wanted: Wanted) -> ScenarioResult:
+def run_ruin(wanted: ScenarioRequest) -> ScenarioResult:
     return _run(RUIN, scenes.ruined_building(wanted.seed), wanted)
 
 
-def _run(name: str, scene: scenes.Scene, wanted: Wanted) -> ScenarioResult:
+def _run(name: str, scene: scenes.ScenarioScene, wanted: ScenarioRequest) -> ScenarioResult:
     setup = setup_of(scene, wanted, name)
     flown = flown_of(setup, wanted)
     radar, vision = radar_figures(flown, setup), vision_figures(flown, setup)

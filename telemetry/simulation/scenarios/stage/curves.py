@@ -62,7 +62,7 @@ def ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     )
 
 
-def _thinned(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _thinned(places: F64) -> F64:
     """The last point stays: it is an end."""
     step = math.ceil(len(places) / MOST_POINTS)
     if step <= 1:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import KDTree
 
-from telemetry.scenarios.result import WITHIN_M
-from telemetry.sensing import SimTruth
-from telemetry.simulator.scene import World
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, I64
+from telemetry.simulation.scenarios.stage.result import WITHIN_M
+from telemetry.simulation.simulator.scene import World
+from telemetry.topics.simulated import SimTruth
 
 LOOK_EVERY_S = 0.5
 SLICE_RAYS = 361
@@ -65,7 +64,7 @@ def recall(truth_enu: F64, map_enu: F64, *, voxel_m: float, within_m: float) -> 
     return float(np.mean(away_m <= within_m))
 
 
-def clusters_of(points_enu: F64, *, link_m: float) -> NDArray[np.int64]:
+def clusters_of(points_enu: F64, *, link_m: float) -> I64:
     """(N,) number of the cluster of each place; places nearer than ``link_m`` to each other are one."""
     if len(points_enu) == 0:
         return np.empty(0, np.int64)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from telemetry.obstacles import Sensor
-from telemetry.scenarios.figures import level_slice, recall, spread, within
-from telemetry.scenarios.flown import Flown
-from telemetry.scenarios.result import MapFigures
-from telemetry.scenarios.setup import Setup
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from telemetry.simulation.scenarios.stage.map_against_world import level_slice, recall, spread, within
+from telemetry.simulation.scenarios.stage.result import MapFigures
+from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.setup import Setup
+from telemetry.topics.obstacles import Sensor
 
 NEAR_M: dict[Sensor, float] = {"radar": 2.0, "vision": 1.0}
 """A voxel this near to a true surface is right, a surface this near to a voxel is found."""

@@ -20,7 +20,7 @@ KNOWN_SIGMA_M = 0.05
 """How well a surface model is known, cell by cell: drone photogrammetry reaches 0.023 m (Melita 2020)."""
 
 
-def field(frame: Frame, hills: tuple[Hill, ...]) -> Dsm:
+def field(frame: NeuFrame, hills: tuple[Hill, ...]) -> Dsm:
     """Level ground around the frame's origin, at its height, with hills on it."""
     crs = CRS.from_epsg(UTM_32N)
     cells = round(2 * HALF_M / CELL_M)

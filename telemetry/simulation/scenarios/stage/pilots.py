@@ -14,7 +14,7 @@ from telemetry.topics.requests import StartGuided
 from telemetry.topics.vehicle import VehicleState
 
 
-class Pilot(Protocol):
+class ScenarioPilot(Protocol):
     """Begins on the ground with a vehicle that is ready, and is over when it has landed."""
 
     @property

@@ -23,7 +23,9 @@ from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.scene.world_file import read_world
 
 
-def setup_of(scene: Scene, wanted: Wanted, title: str, *, by_script: bool = True, **more: Any) -> Setup:
+def setup_of(
+    scene: ScenarioScene, wanted: ScenarioRequest, title: str, *, by_script: bool = True, **more: Any
+) -> Setup:
     """The scene's flight. ``more``: further fields of ``Setup``. Raises FormatError for a broken world file."""
     frame, dsm = VALLEY, field(VALLEY, scene.hills)
     if wanted.world is not None:
@@ -47,7 +49,7 @@ def surveyed(dsm: Dsm, seed: int) -> Dsm:
     return known(dsm, np.random.default_rng([seed, 11]))
 
 
-def flown_of(setup: Setup, wanted: Wanted, *, part: str = "") -> Flown:
+def flown_of(setup: Setup, wanted: ScenarioRequest, *, part: str = "") -> Flown:
     """The flight, recorded if that is wanted; ``part`` tells the files of several flights apart."""
     if wanted.record is None:
         return fly(setup)
@@ -70,7 +72,7 @@ def own_ground(path: Path) -> Dsm | None:
     return read_dsm(file.dsm)
 
 
-def _own_ground(path: Path, frame: Frame, dsm: Dsm) -> tuple[Frame, Dsm]:
+def _own_ground(path: Path, frame: NeuFrame, dsm: Dsm) -> tuple[NeuFrame, Dsm]:
     own, origin = own_ground(path), read_world(path).origin
     if own is None:
         return frame, dsm
@@ -81,4 +83,4 @@ def _own_ground(path: Path, frame: Frame, dsm: Dsm) -> tuple[Frame, Dsm]:
             advice='Add "origin": {"lat_deg": ..., "lon_deg": ...}: there the vehicle takes off.',
         )
     height_m = float(own.elevation_at(own.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
-    return Frame(origin.lat_deg, origin.lon_deg, height_m if math.isfinite(height_m) else 0.0), own
+    return NeuFrame(origin.lat_deg, origin.lon_deg, height_m if math.isfinite(height_m) else 0.0), own

@@ -20,7 +20,7 @@ from telemetry.simulation.scenarios.stage.world_objects import (
 )
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 
-VALLEY = Frame(43.66, 11.45, 150.0)
+VALLEY = NeuFrame(43.66, 11.45, 150.0)
 """Where the papers flew, or near it."""
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -35,7 +35,7 @@ class Hill:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ScenarioScene:
     """What stands where, and the flight that looks at it."""
 
     document: dict[str, Any]
@@ -47,7 +47,7 @@ REFLECTOR_AHEAD_M, REFLECTOR_HIGHER_M = 68.0, 3.0
 LEVEL_FLIGHT_M = 2.0
 
 
-def corner_reflector() -> Scene:
+def corner_reflector() -> ScenarioScene:
     """Miccinesi 2022, figs 10-11: a naval corner reflector on a small hill, lateral flight left and right."""
     post_m = 0.5
     place = (0.0, REFLECTOR_AHEAD_M)
@@ -65,14 +65,14 @@ def corner_reflector() -> Scene:
         takeoff_m=low,
         end="land",
     )
-    return Scene(document, course, (Hill(place, REFLECTOR_HIGHER_M - post_m, 8.0),))
+    return ScenarioScene(document, course, (Hill(place, REFLECTOR_HIGHER_M - post_m, 8.0),))
 
 
 WOOD_FROM_M, WOOD_TO_M, WOOD_HALF_WIDTH_M = 60.0, 84.0, 32.0
 TREE_SPACING_M = 4.5
 
 
-def wood(seed: int) -> Scene:
+def wood(seed: int) -> ScenarioScene:
     """Miccinesi 2022, fig. 16: towards a wood from 60 m, climbing, then along its edge; bushes before it."""
     random = np.random.default_rng(seed)
     objects: list[Object] = []
@@ -98,10 +98,10 @@ def wood(seed: int) -> Scene:
         takeoff_m=4.0,
         end="land",
     )
-    return Scene(world_document("wood", objects), course)
+    return ScenarioScene(world_document("wood", objects), course)
 
 
-def ruined_building(seed: int) -> Scene:
+def ruined_building(seed: int) -> ScenarioScene:
     """Miccinesi 2022, figs 19-21: a roofless building scanned along its face, twice, and turned before at the end."""
     random = np.random.default_rng(seed)
     objects = [
@@ -127,7 +127,7 @@ def ruined_building(seed: int) -> Scene:
         takeoff_m=up,
         end="land",
     )
-    return Scene(world_document("ruined building", objects), course)
+    return ScenarioScene(world_document("ruined building", objects), course)
 
 
 def _facade(random: np.random.Generator, north: float) -> list[Object]:
@@ -148,7 +148,7 @@ CASTLE_HEIGHT_M, CASTLE_AHEAD_M = 6.0, 40.0
 STEEPEST_DEG = 60.0
 
 
-def castle_building(seed: int, *, ahead_m: float = CASTLE_AHEAD_M) -> Scene:
+def castle_building(seed: int, *, ahead_m: float = CASTLE_AHEAD_M) -> ScenarioScene:
     """Bigazzi 2022, figs 11-12: straight into a building and back; its face is up to 60 degrees off square.
 
     ``ahead_m``: the middle of the face.
@@ -181,7 +181,7 @@ def castle_building(seed: int, *, ahead_m: float = CASTLE_AHEAD_M) -> Scene:
         ),
         takeoff_m=CASTLE_HEIGHT_M,
     )
-    return Scene(world_document("castle building", objects), course)
+    return ScenarioScene(world_document("castle building", objects), course)
 
 
 def _moved(at: tuple[float, float], random: np.random.Generator, by_m: float) -> tuple[float, float]:

@@ -11,15 +11,14 @@ from mapping.geometry.arrays import F64
 from mapping.geometry.poses import Pose
 from mapping.sensor_frames import RadarFrame
 from telemetry.perception.perceiver import Perceiver
-from telemetry.scenarios.result import AlertSeen
-from telemetry.scenarios.watching import RegionWatch
-from telemetry.sensing import RadarFrame, SimTruth
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.scenarios.stage.result import AlertSeen
+from telemetry.simulation.scenarios.stage.watching import RegionWatch
+from telemetry.topics.obstacles import ObstacleAlert, Sensor
+from telemetry.topics.simulated import SimTruth
 
 
 @dataclass(frozen=True, slots=True)
-class RadarLook:
+class SeenRadarFrame:
     frame: RadarFrame
     truth: SimTruth
     """When the frame was measured."""
@@ -52,7 +51,7 @@ class Flown:
     """Between the vehicle's centre and the nearest object."""
     hit: str | None = None
     told: list[Told] = field(default_factory=list)
-    radar: list[RadarLook] = field(default_factory=list)
+    radar: list[SeenRadarFrame] = field(default_factory=list)
     vision: list[F64] = field(default_factory=list)
     """Believed voxels of each local map, in the world's frame."""
     said: list[tuple[float, str]] = field(default_factory=list)

@@ -70,7 +70,7 @@ class _Flight:
         self._slices = 0
         self._revision: int | None = None
         self._avoiding: Avoiding | None = None
-        self._pilot: Pilot = self._pilot_of(setup)
+        self._pilot: ScenarioPilot = self._pilot_of(setup)
 
     def run(self) -> Flown:
         flown, wire, setup = self._flown, self._wire, self._setup
@@ -99,13 +99,13 @@ class _Flight:
                 return state
         raise TelemetryError("The simulated vehicle did not become ready.")
 
-    def _pilot_of(self, setup: Setup) -> Pilot:
+    def _pilot_of(self, setup: Setup) -> ScenarioPilot:
         if setup.course is not None:
             return ScriptPilot(self._wire, script_request(setup.course, setup.world.frame))
         pilot = MissionPilot(self._wire, items_from_mission(setup.mission))
         if setup.avoids:
             self._avoiding = Avoiding(
-                VEHICLE, rest=lambda state: rest_of_flight(pilot.onboard, state), settings=setup.settings
+                VEHICLE, remaining=lambda state: remaining_flight(pilot.onboard, state), settings=setup.settings
             )
             self._avoiding.enable(self._wire.now_s)
         return pilot
@@ -208,7 +208,7 @@ class _Flight:
             truth = self._truths.popleft()
             pose = perception.track.at(frame.t_mono_s)
             if not isinstance(pose, str):
-                flown.radar.append(RadarLook(frame, truth, pose))
+                flown.radar.append(SeenRadarFrame(frame, truth, pose))
             self._watch_frozen(outcome)
         else:
             flown.vision.append(perception.map.occupied(explained=False) - perception.offset_enu_m + flown.map_to_world)

@@ -31,7 +31,7 @@ LINK = "scenario:virtual"
 HEARTBEAT_EVERY = 50
 
 
-class Machine(Protocol):
+class LinkMachine(Protocol):
     """A sans-IO machine that talks to the vehicle, such as ``GuidedScript`` or ``MissionUpload``."""
 
     def on_message(self, message: Message, now_s: float) -> list[Action]: ...

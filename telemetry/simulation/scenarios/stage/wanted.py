@@ -17,7 +17,7 @@ def _to_nobody(step: str, share: float | None) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ScenarioRequest:
     seed: int = 0
     """Of the scene, the sensors' noise and the wind."""
     world: Path | None = None

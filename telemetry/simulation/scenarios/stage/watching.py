@@ -10,8 +10,6 @@ from mapping.geometry.arrays import F64
 from telemetry.perception.perceiver import Perceiver
 from telemetry.perception.status import Outcome
 
-F64 = NDArray[np.float64]
-
 
 class RegionWatch:
     """Looks at one sensor's map from where the vehicle believes to be, many times a frame."""

@@ -1,4 +1,4 @@
-"""Wind over the simulated world: a steady part and gusts."""
+"""What disturbs the simulated vehicle: wind with its gusts, and how wrong its own idea of its attitude is."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ GUST_SHARE = 0.15
 """Standard deviation of gusts over the steady speed."""
 GUST_S = 3.0
 """Correlation time of gusts."""
+HEADING_BIAS_RAD = math.radians(0.5)
+"""At most, to either side; constant for a flight."""
+LEVEL_SIGMA_RAD = math.radians(0.2)
 
 
 class Wind:
@@ -32,3 +35,22 @@ class Wind:
         self._gust = [keep * gust + spread * kick for gust, kick in zip(self._gust, kicks, strict=True)]
         north, east, up = self._gust
         return north - speed_m_s * math.cos(from_rad), east - speed_m_s * math.sin(from_rad), up / 2
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeError:
+    """Reported minus true."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    heading_rad: float = 0.0
+
+    @classmethod
+    def drawn(cls, random: np.random.Generator) -> AttitudeError:
+        roll, pitch = (LEVEL_SIGMA_RAD * np.clip(random.standard_normal(2), -2, 2)).tolist()
+        return cls(roll, pitch, float(random.uniform(-HEADING_BIAS_RAD, HEADING_BIAS_RAD)))
+
+    def reported(self, true_rad: Vec3) -> Vec3:
+        """Roll, pitch, heading."""
+        roll, pitch, heading = true_rad
+        return roll + self.roll_rad, pitch + self.pitch_rad, (heading + self.heading_rad) % (2 * math.pi)

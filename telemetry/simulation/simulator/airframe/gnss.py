@@ -18,7 +18,7 @@ DRAWS = 18
 
 
 @dataclass(frozen=True, slots=True)
-class Receiver:
+class GnssReceiver:
     """One sigma per axis, and how long an error lasts."""
 
     horizontal_m: float
@@ -31,11 +31,11 @@ class Receiver:
     v_acc_m: float
 
 
-RECEIVERS: dict[GnssKind, Receiver] = {
+RECEIVERS: dict[GnssKind, GnssReceiver] = {
     # The vertical error is that of the fused height (a barometer holds it between fixes), not of GNSS alone.
-    "standalone": Receiver(2.5 / CEP_PER_SIGMA, 0.8, 180.0, "3d", 14, 0.85, 2.5, 3.5),
-    "rtk": Receiver(0.05 / math.sqrt(2), 0.05, 60.0, "rtk_fixed", 24, 0.6, 0.05, 0.05),
-    "perfect": Receiver(0.0, 0.0, 60.0, "rtk_fixed", 10, 1.21, 0.3, 0.3),
+    "standalone": GnssReceiver(2.5 / CEP_PER_SIGMA, 0.8, 180.0, "3d", 14, 0.85, 2.5, 3.5),
+    "rtk": GnssReceiver(0.05 / math.sqrt(2), 0.05, 60.0, "rtk_fixed", 24, 0.6, 0.05, 0.05),
+    "perfect": GnssReceiver(0.0, 0.0, 60.0, "rtk_fixed", 10, 1.21, 0.3, 0.3),
 }
 
 

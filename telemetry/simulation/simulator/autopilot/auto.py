@@ -34,14 +34,14 @@ class Auto:
         self.state: MissionState = "not_started"
         self._step = Step("home")
         self._path: Path | None = None
-        self._other: Hold | Land | Return | None = None
+        self._other: Hold | Landing | Return | None = None
         self._goal: Vec3 = (0.0, 0.0, 0.0)
         self.goal: Vec3 | None = None
         self._left_s = 0.0
         self._joined = False
         self._cleared = False
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         """Goes on where the mission broke off; from its beginning when it had ended or MIS_RESTART says so."""
         mission = pilot.mission
         if len(mission.steps) < 2:
@@ -61,13 +61,13 @@ class Auto:
             self._begin(pilot, max(1, mission.current))
         return None
 
-    def clear_to_start(self, pilot: Pilot) -> None:
+    def clear_to_start(self, pilot: SimulatedPilot) -> None:
         """The pilot's word that the vehicle may leave the ground."""
         if not self._cleared:
             self._cleared = True
             self._begin(pilot, max(1, pilot.mission.current))
 
-    def pause(self, pilot: Pilot) -> bool:
+    def pause(self, pilot: SimulatedPilot) -> bool:
         if self._path is None or self._other:
             return False
         self._path.paused, self.state = True, "paused"
@@ -79,14 +79,14 @@ class Auto:
         self._path.paused, self.state = False, "active"
         return True
 
-    def jump_to(self, pilot: Pilot, seq: int) -> None:
+    def jump_to(self, pilot: SimulatedPilot, seq: int) -> None:
         """The mission's current step was set from outside while it is being flown."""
         if pilot.flying:
             self._path = None
             self.state = "active"
             self._begin(pilot, seq)
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         if self._other:
             motion = self._other.update(pilot, dt_s)
             self.stage, self.goal = self._other.stage, self._other.goal
@@ -98,13 +98,13 @@ class Auto:
             return self._take_off(pilot, dt_s)
         return self._follow(pilot, dt_s)
 
-    def _take_off(self, pilot: Pilot, dt_s: float) -> Motion:
+    def _take_off(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         motion = step_towards(self._shaped, self._goal, pilot, dt_s)
         if abs(self._goal[2] - motion[0][2]) < TAKEN_OFF_M:
             self._done(pilot)
         return motion
 
-    def _follow(self, pilot: Pilot, dt_s: float) -> Motion:
+    def _follow(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         assert self._path is not None
         motion = self._path.update(pilot, dt_s)
         if self._path.passed and (self._joined or pilot.near(self._goal)):
@@ -113,14 +113,14 @@ class Auto:
                 self._done(pilot)
         return motion
 
-    def _done(self, pilot: Pilot) -> None:
+    def _done(self, pilot: SimulatedPilot) -> None:
         at = pilot.mission.current
         pilot.tell(Reached(at))
         if self._step.kind != "takeoff":
             pilot.say(6, f"Reached command #{at}")
         self._begin(pilot, at + 1)
 
-    def _begin(self, pilot: Pilot, start: int) -> None:
+    def _begin(self, pilot: SimulatedPilot, start: int) -> None:
         found, settings = pilot.mission.next_move(start)
         pilot.facing_fixed = False
         for step in settings:
@@ -138,21 +138,21 @@ class Auto:
         else:
             self._start_leg(pilot, found, step)
 
-    def _start_climb(self, pilot: Pilot, step: Step) -> None:
+    def _start_climb(self, pilot: SimulatedPilot, step: Step) -> None:
         self.stage = "takeoff"
         self._shaped = shaped_from(pilot)
         n, e, u = pilot.p_neu
         self.goal = self._goal = (n, e, max(u, pilot.place(step)[2]))
 
-    def _start_end(self, pilot: Pilot, step: Step) -> None:
+    def _start_end(self, pilot: SimulatedPilot, step: Step) -> None:
         if step.kind == "return":
             self._other = Return()
             self._other.enter(pilot)
         else:
-            self._other = Land()
+            self._other = Landing()
             self._other.over(pilot, pilot.place(step))
 
-    def _start_leg(self, pilot: Pilot, at: int, step: Step) -> None:
+    def _start_leg(self, pilot: SimulatedPilot, at: int, step: Step) -> None:
         if self._path is None:
             self._path = Path(pilot)
         self.stage = "flight"
@@ -168,7 +168,7 @@ class Auto:
         if int(pilot.parameters["WP_YAW_BEHAVIOR"]) > 0 and not pilot.facing_fixed:
             pilot.face(self._goal, at_least_m=TURN_FROM_M)
 
-    def _end(self, pilot: Pilot) -> None:
+    def _end(self, pilot: SimulatedPilot) -> None:
         """Nothing left to do: stay."""
         self.state = "complete"
         self._other = Hold("AUTO", armable=False)

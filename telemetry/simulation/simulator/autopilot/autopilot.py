@@ -34,14 +34,14 @@ HIGHEST_M = 10_000.0
 STICKS_NEEDED = ("ALT_HOLD", "POSHOLD", "ACRO", "SPORT", "DRIFT")
 
 
-class Autopilot(Pilot):
+class Autopilot(SimulatedPilot):
     """``update`` makes one step; the other methods are the commands that it takes between steps.
 
     Waits for people (DISARM_DELAY, FS_GCS_TIMEOUT) are counted in their time: simulated time over ``speedup``.
     """
 
     def __init__(
-        self, frame: Frame, parameters: Parameters, *, boot_s: float = AS_REAL_BOOT_S, speedup: float = 1.0
+        self, frame: NeuFrame, parameters: Parameters, *, boot_s: float = AS_REAL_BOOT_S, speedup: float = 1.0
     ) -> None:
         super().__init__(frame, parameters, boot_s)
         self.auto = Auto()
@@ -218,7 +218,7 @@ class Autopilot(Pilot):
     def _mode(self, name: str) -> Mode | None:
         if name == "AUTO":
             return self.auto
-        made = {"STABILIZE": Stabilize, "GUIDED": Guided, "RTL": Return, "LAND": Land}.get(name)
+        made = {"STABILIZE": Stabilize, "GUIDED": Guided, "RTL": Return, "LAND": Landing}.get(name)
         if made:
             return made()
         return Hold(name, armable=name == "LOITER") if name in ("LOITER", "BRAKE") else None

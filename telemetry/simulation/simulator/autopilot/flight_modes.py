@@ -32,11 +32,11 @@ class Mode(Protocol):
     goal: Vec3 | None
     """Where it is going."""
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         """Why the mode cannot be had now, or None."""
         ...
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         """The target after one more step."""
         ...
 
@@ -48,10 +48,10 @@ class Stabilize:
     stage: Stage = "ground"
     goal: Vec3 | None = None
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         return "no RC receiver" if pilot.flying else None
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         return pilot.target
 
 
@@ -64,14 +64,14 @@ class Hold:
         self.name, self.armable = name, armable
         self.stage: Stage = "flight"
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         self.stage = "flight" if pilot.flying else "ground"
         self._shaped = shaped_from(pilot)
         self._place: Vec3 | None = None
         self.goal: Vec3 | None = None
         return None
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         if self._place is None:
             if self.name == "BRAKE":
                 self._shaped.brake(pilot.axes(), dt_s)
@@ -88,7 +88,7 @@ class Guided:
 
     name, needs_position, armable = "GUIDED", True, True
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         self.stage: Stage = "flight" if pilot.flying else "ground"
         self._shaped = shaped_from(pilot)
         self._stopping = Hold(self.name, armable=True)
@@ -102,33 +102,33 @@ class Guided:
         self.goal: Vec3 | None = None
         return None
 
-    def take_off(self, pilot: Pilot, up_m: float) -> None:
+    def take_off(self, pilot: SimulatedPilot, up_m: float) -> None:
         """``up_m``: height in the frame."""
         self.stage = "takeoff"
         self._path, self._velocity_neu, self._sent = None, None, ""
         self.goal = self._place = (pilot.p_neu[0], pilot.p_neu[1], up_m)
 
-    def go_to(self, pilot: Pilot, goal_neu: Vec3) -> None:
+    def go_to(self, pilot: SimulatedPilot, goal_neu: Vec3) -> None:
         self._begin(pilot, "places")
         self._velocity_neu, self._path = None, self._leg(pilot, goal_neu)
         self.goal = self._place = goal_neu
         self.stage = "flight"
 
-    def fly_at(self, pilot: Pilot, v_neu: Vec3) -> None:
+    def fly_at(self, pilot: SimulatedPilot, v_neu: Vec3) -> None:
         """At this velocity, until it has not been told again for too long."""
         self._begin(pilot, "velocities")
         self._velocity_neu, self._told_s = v_neu, pilot.now_s
         self.goal = self._place = self._path = None
         self.stage = "flight"
 
-    def follow(self, pilot: Pilot, goal_neu: Vec3, v_neu: Vec3) -> None:
+    def follow(self, pilot: SimulatedPilot, goal_neu: Vec3, v_neu: Vec3) -> None:
         """After this place, which moves on at this velocity until it has not been told again for too long."""
         self._begin(pilot, "both")
         self._velocity_neu, self._told_s, self._path = v_neu, pilot.now_s, None
         self.goal = self._place = goal_neu
         self.stage = "flight"
 
-    def _begin(self, pilot: Pilot, by: Literal["places", "velocities", "both"]) -> None:
+    def _begin(self, pilot: SimulatedPilot, by: Literal["places", "velocities", "both"]) -> None:
         """What was set before the first of a kind is forgotten, and the vehicle's own speeds count, over ground and up:
         recorded for places."""
         if self._sent != by:
@@ -136,14 +136,14 @@ class Guided:
             self._sent = by
         self._shaped = shaped_from(pilot)
 
-    def _leg(self, pilot: Pilot, goal_neu: Vec3) -> Path | None:
+    def _leg(self, pilot: SimulatedPilot, goal_neu: Vec3) -> Path | None:
         if not int(pilot.parameters["GUID_OPTIONS"]) & STRAIGHT_LEGS:
             return None
         path = Path(pilot)
         path.go_on(goal_neu, pilot.axes(pilot.speed_m_s), None)
         return path
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         if not pilot.flying:
             self._shaped = Shaped(pilot.p_neu)
             return pilot.target
@@ -161,7 +161,7 @@ class Guided:
             self.stage = "flight"
         return motion
 
-    def _moved(self, pilot: Pilot, v_neu: Vec3, dt_s: float) -> Motion:
+    def _moved(self, pilot: SimulatedPilot, v_neu: Vec3, dt_s: float) -> Motion:
         """At a velocity, or after a place that has it."""
         axes = pilot.axes(pilot.speed_m_s)
         if self._place is None:
@@ -173,24 +173,24 @@ class Guided:
         return self._shaped.motion
 
 
-class Land:
+class Landing:
     """Down here, slowly on the last metres."""
 
     name, needs_position, armable = "LAND", False, False
 
-    def enter(self, pilot: Pilot) -> str | None:
+    def enter(self, pilot: SimulatedPilot) -> str | None:
         self.stage: Stage = "landing" if pilot.flying else "ground"
         self._shaped = shaped_from(pilot)
         self._over = stopping_point(self._shaped, pilot.axes())
         self.goal: Vec3 | None = None
         return None
 
-    def over(self, pilot: Pilot, place_neu: Vec3) -> None:
+    def over(self, pilot: SimulatedPilot, place_neu: Vec3) -> None:
         """Land at a place straight below or nearly so."""
         self.enter(pilot)
         self._over = place_neu
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         axes = pilot.axes()
         slow_m_s, low_m = pilot.parameters["LAND_SPEED"] / 100, pilot.parameters["LAND_ALT_LOW"] / 100
         fast_m_s = pilot.parameters["LAND_SPEED_HIGH"] / 100 or axes.descent_m_s
@@ -205,8 +205,8 @@ class Return:
 
     name, needs_position, armable = "RTL", True, False
 
-    def enter(self, pilot: Pilot) -> str | None:
-        self._land: Land | None = None
+    def enter(self, pilot: SimulatedPilot) -> str | None:
+        self._land: Landing | None = None
         self._wait_s = pilot.parameters["RTL_LOIT_TIME"] / 1000
         self.stage: Stage = "flight" if pilot.flying else "ground"
         axes = pilot.axes(pilot.parameters["RTL_SPEED"] / 100 or None)
@@ -220,7 +220,7 @@ class Return:
         self._axes = axes
         return None
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         if self._land:
             return self._land.update(pilot, dt_s)
         motion = self._path.update(pilot, dt_s)
@@ -236,12 +236,12 @@ class Return:
                 self._descend(pilot)
         return motion
 
-    def _descend(self, pilot: Pilot) -> None:
-        self._land = Land()
+    def _descend(self, pilot: SimulatedPilot) -> None:
+        self._land = Landing()
         self._land.over(pilot, pilot.home_neu)
         self.stage = self._land.stage
 
-    def _height_m(self, pilot: Pilot) -> float:
+    def _height_m(self, pilot: SimulatedPilot) -> float:
         """Above home: RTL_ALT, less within the cone around home, never below where the vehicle is."""
         p = pilot.parameters
         now_m = max(0.0, self._path.start_neu[2] - pilot.home_neu[2])
@@ -256,10 +256,10 @@ class Return:
 class Path:
     """A track that a moving vehicle joins: what it brings along of place and speed fades away."""
 
-    def __init__(self, pilot: Pilot) -> None:
+    def __init__(self, pilot: SimulatedPilot) -> None:
         shaped = shaped_from(pilot)
         self.start_neu = s = stopping_point(shaped, pilot.axes())
-        self._track = Track(s, pilot.parameters["WPNAV_RADIUS"] / 100)
+        self._track = LegTrack(s, pilot.parameters["WPNAV_RADIUS"] / 100)
         p = shaped.p_neu
         self._offset = Shaped((p[0] - s[0], p[1] - s[1], p[2] - s[2]), shaped.v_neu)
         self._offset.accel_neu = shaped.accel_neu
@@ -272,7 +272,7 @@ class Path:
     def passed(self) -> bool:
         return self._track.passed
 
-    def update(self, pilot: Pilot, dt_s: float) -> Motion:
+    def update(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         p, v, a = self._track.target()
         change = self._change_flow(math.hypot(*v), self._wanted_flow(pilot), pilot.axes().accel_m_s2, dt_s)
         self._track.advance(dt_s * self._flow * _scale(p, v, pilot.p_neu))
@@ -293,7 +293,7 @@ class Path:
         self._axes = axes
         self._track.go_on(goal_neu, axes, following)
 
-    def _wanted_flow(self, pilot: Pilot) -> float:
+    def _wanted_flow(self, pilot: SimulatedPilot) -> float:
         """Its time runs slower when its speed is lowered on the way; a higher one counts from the next leg on."""
         if self.paused:
             return 0.0
@@ -306,7 +306,7 @@ class Path:
         self._flow = max(wanted, before - step) if before > wanted else min(wanted, before + step)
         return (self._flow - before) / dt_s
 
-    def _fade(self, pilot: Pilot, dt_s: float) -> Motion:
+    def _fade(self, pilot: SimulatedPilot, dt_s: float) -> Motion:
         """What is left of the motion that the vehicle came with."""
         if self._arriving:
             self._offset.stop(pilot.axes(), dt_s)
@@ -325,7 +325,7 @@ def _scale(p: Vec3, v: Vec3, at: Vec3) -> float:
     return max(0.1, min(1.0, 1.0 - (behind_m - 0.5) / 2))
 
 
-def shaped_from(pilot: Pilot) -> Shaped:
+def shaped_from(pilot: SimulatedPilot) -> Shaped:
     """A target that goes on from the present one, or stands where the vehicle stands."""
     if not pilot.flying:
         return Shaped(pilot.p_neu)
@@ -335,6 +335,6 @@ def shaped_from(pilot: Pilot) -> Shaped:
     return shaped
 
 
-def step_towards(shaped: Shaped, goal_neu: Vec3, pilot: Pilot, dt_s: float) -> Motion:
+def step_towards(shaped: Shaped, goal_neu: Vec3, pilot: SimulatedPilot, dt_s: float) -> Motion:
     shaped.towards(goal_neu, pilot.axes(pilot.speed_m_s), dt_s)
     return shaped.motion

@@ -18,7 +18,7 @@ REST: Vec3 = (0.0, 0.0, 0.0)
 SHORTEST_M = 1e-6
 
 
-class Track:
+class LegTrack:
     """Flies from a place at rest through one waypoint after the other.
 
     ``advance`` moves along; when ``passed`` says that the target is through the waypoint (half way

@@ -60,10 +60,10 @@ class Sensed:
     used_mah: float
 
 
-class Pilot:
+class SimulatedPilot:
     """State that modes read and change. Positions are in the frame, as estimated."""
 
-    def __init__(self, frame: Frame, parameters: Parameters, boot_s: float) -> None:
+    def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:
         self.frame = frame
         self.parameters = parameters
         self.boot_s = boot_s

@@ -30,7 +30,7 @@ OF_THE_BODY = (8, 9)
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ReceivedOrder:
     """COMMAND_LONG and COMMAND_INT in one."""
 
     command: int
@@ -41,11 +41,11 @@ class Order:
     frame: int
 
 
-def read_order(message: Any) -> Order:
+def read_order(message: Any) -> ReceivedOrder:
     params = (message.param1, message.param2, message.param3, message.param4)
     if message.get_type() == "COMMAND_INT":
-        return Order(message.command, params, message.x / 1e7, message.y / 1e7, message.z, message.frame)
-    return Order(message.command, params, message.param5, message.param6, message.param7, 3)
+        return ReceivedOrder(message.command, params, message.x / 1e7, message.y / 1e7, message.z, message.frame)
+    return ReceivedOrder(message.command, params, message.param5, message.param6, message.param7, 3)
 
 
 def whole(value: float) -> int:
@@ -58,7 +58,7 @@ class Commands:
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._pilot = autopilot
-        self._handlers: dict[int, Callable[[Order], Answer]] = {
+        self._handlers: dict[int, Callable[[ReceivedOrder], Answer]] = {
             wire.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
             wire.MAV_CMD_RUN_PREARM_CHECKS: self._check,
             wire.MAV_CMD_DO_SET_MODE: lambda order: self.set_mode(order.params[0], order.params[1]),
@@ -74,7 +74,7 @@ class Commands:
             wire.MAV_CMD_DO_SET_MISSION_CURRENT: lambda order: autopilot.set_current(whole(order.params[0])),
         }
 
-    def run(self, order: Order) -> int:
+    def run(self, order: ReceivedOrder) -> int:
         """MAV_RESULT."""
         if order.command in WITHOUT_MOTION:
             return RESULTS["accepted"]
@@ -116,20 +116,20 @@ class Commands:
         c, s = math.cos(turn), math.sin(turn)
         return vx * c - vy * s, vx * s + vy * c, -vz
 
-    def _arm(self, order: Order) -> Answer:
+    def _arm(self, order: ReceivedOrder) -> Answer:
         force = whole(order.params[1]) == FORCE
         if order.params[0] == 1:
             return self._pilot.arm(force=force)
         return self._pilot.disarm(force=force) if order.params[0] == 0 else "unsupported"
 
-    def _check(self, order: Order) -> Answer:
+    def _check(self, order: ReceivedOrder) -> Answer:
         self._pilot.repeat_prearm()
         return "accepted" if not self._pilot.armed else "failed"
 
-    def _start(self, order: Order) -> Answer:
+    def _start(self, order: ReceivedOrder) -> Answer:
         return self._pilot.start_mission() if order.params[0] == 0 and order.params[1] == 0 else "denied"
 
-    def _reposition(self, order: Order) -> Answer:
+    def _reposition(self, order: ReceivedOrder) -> Answer:
         goal = self._place(order.lat_deg, order.lon_deg, order.alt_m, order.frame)
         if goal is None or not self._pilot.flying:
             return "denied"
@@ -141,12 +141,12 @@ class Commands:
             self._pilot.change_speed(1, order.params[0])
         return self._pilot.go_to(goal, heading_rad=_heading(order.params[3]))
 
-    def _pause(self, order: Order) -> Answer:
+    def _pause(self, order: ReceivedOrder) -> Answer:
         if order.params[0] == 0:
             return self._pilot.pause()
         return self._pilot.go_on() if order.params[0] == 1 else "denied"
 
-    def _turn(self, order: Order) -> Answer:
+    def _turn(self, order: ReceivedOrder) -> Answer:
         if not self._pilot.flying or not math.isfinite(order.params[0]):
             return "failed"
         self._pilot.apply(Step("yaw", values=order.params))

@@ -11,29 +11,46 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from planning.mav_cmd import MavCmd, MavFrame
 from telemetry.simulation.simulator.autopilot.mission_steps import Step, StepKind
 
-KEPT_FRAMES = {0: 0, 5: 0, 3: 3, 6: 3}
+KEPT_FRAMES: dict[int, int] = {
+    MavFrame.GLOBAL: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_RELATIVE_ALT: MavFrame.GLOBAL_RELATIVE_ALT,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
+}
 """Frame asked for and frame kept: above the sea, above home. Terrain frames are not simulated."""
-PLACES = {16, 17, 19, 21, 22, 179, 189, 195, 201}
+PLACES = {
+    MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_UNLIM, MavCmd.NAV_LOITER_TIME, MavCmd.NAV_LAND, MavCmd.NAV_TAKEOFF,
+    MavCmd.DO_SET_HOME, MavCmd.DO_LAND_START, MavCmd.DO_SET_ROI_LOCATION, MavCmd.DO_SET_ROI,
+}  # fmt: skip
 """Commands whose position is kept."""
 KINDS: dict[int, StepKind] = {
-    16: "waypoint",
-    17: "loiter",
-    19: "loiter_time",
-    20: "return",
-    21: "land",
-    22: "takeoff",
-    93: "delay",
-    115: "yaw",
-    177: "jump",
-    178: "speed",
+    MavCmd.NAV_WAYPOINT: "waypoint",
+    MavCmd.NAV_LOITER_UNLIM: "loiter",
+    MavCmd.NAV_LOITER_TIME: "loiter_time",
+    MavCmd.NAV_RETURN_TO_LAUNCH: "return",
+    MavCmd.NAV_LAND: "land",
+    MavCmd.NAV_TAKEOFF: "takeoff",
+    MavCmd.NAV_DELAY: "delay",
+    MavCmd.CONDITION_YAW: "yaw",
+    MavCmd.DO_JUMP: "jump",
+    MavCmd.DO_CHANGE_SPEED: "speed",
 }
 WITHOUT_MOTION = {
-    112, 179, 181, 183, 184, 189, 195, 197, 201, 203, 204, 205, 206, 211, 212, 214, 220, 222, 530, 531, 1000, 2000,
-    2001, 2500, 2501,
+    MavCmd.CONDITION_DELAY, MavCmd.DO_SET_HOME, MavCmd.DO_SET_RELAY, MavCmd.DO_SET_SERVO, MavCmd.DO_REPEAT_SERVO,
+    MavCmd.DO_LAND_START, MavCmd.DO_SET_ROI_LOCATION, MavCmd.DO_SET_ROI_NONE, MavCmd.DO_SET_ROI,
+    MavCmd.DO_DIGICAM_CONTROL, MavCmd.DO_MOUNT_CONFIGURE, MavCmd.DO_MOUNT_CONTROL, MavCmd.DO_SET_CAM_TRIGG_DIST,
+    MavCmd.DO_GRIPPER, MavCmd.DO_AUTOTUNE_ENABLE, MavCmd.DO_SET_CAM_TRIGG_INTERVAL, MavCmd.DO_MOUNT_CONTROL_QUAT,
+    MavCmd.DO_GUIDED_LIMITS, MavCmd.SET_CAMERA_MODE, MavCmd.SET_CAMERA_ZOOM, MavCmd.DO_GIMBAL_MANAGER_PITCHYAW,
+    MavCmd.IMAGE_START_CAPTURE, MavCmd.IMAGE_STOP_CAPTURE, MavCmd.VIDEO_START_CAPTURE, MavCmd.VIDEO_STOP_CAPTURE,
 }  # fmt: skip
 """Cameras, gimbals, servos, regions of interest: taken, kept and passed over."""
-YAW_MAY_BE_NAN = {16, 21, 22, 195, 197, 201}
-WHOLE_SECONDS = {16, 19, 112}
+FIRST_ALONE = PLACES & KINDS.keys()
+"""Places that are flown to: of their parameters the first alone is kept."""
+YAW_MAY_BE_NAN = {
+    MavCmd.NAV_WAYPOINT, MavCmd.NAV_LAND, MavCmd.NAV_TAKEOFF, MavCmd.DO_SET_ROI_LOCATION, MavCmd.DO_SET_ROI_NONE,
+    MavCmd.DO_SET_ROI,
+}  # fmt: skip
+WHOLE_SECONDS = {MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME, MavCmd.CONDITION_DELAY}
 HIGHEST_M = 83_000.0
 
 
@@ -61,7 +78,7 @@ class KeptItem:
             lat_deg=self.lat_e7 / 1e7,
             lon_deg=self.lon_e7 / 1e7,
             alt_m=self.alt_cm / 100,
-            above="home" if self.frame == 3 else "sea",
+            above="home" if self.frame == MavFrame.GLOBAL_RELATIVE_ALT else "sea",
             seconds=self.params[0] if kind in ("waypoint", "loiter_time", "delay") else 0.0,
             values=self.params,
         )
@@ -100,8 +117,8 @@ def _refusal(item: wire.MAVLink_mission_item_int_message) -> int:
 
 
 def _kept_params(command: int, params: tuple[float, ...]) -> tuple[float, float, float, float]:
-    if command in (16, 17, 19, 21, 22):
-        whole = float(int(max(0.0, min(params[0], 65535.0)))) if command != 17 else 0.0
+    if command in FIRST_ALONE:
+        whole = 0.0 if command == MavCmd.NAV_LOITER_UNLIM else float(int(max(0.0, min(params[0], 65535.0))))
         return whole, 0.0, 0.0, 0.0
     first, second, third, fourth = (value if math.isfinite(value) else 0.0 for value in params)
     return (float(int(first)) if command in WHOLE_SECONDS else first), second, third, fourth

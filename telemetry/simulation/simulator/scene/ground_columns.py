@@ -11,10 +11,8 @@ from numba import njit
 
 from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Frame
-
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 _BLOCK = 16
 _FIT_M = 500.0
@@ -40,7 +38,7 @@ class SceneTerrain:
         return cls(np.full((1, 1), np.nan, np.float32), np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), 0.0)
 
     @classmethod
-    def from_dsm(cls, dsm: Dsm, frame: Frame) -> Self:
+    def from_dsm(cls, dsm: Dsm, frame: NeuFrame) -> Self:
         """Raises ParameterError where the surface model knows no height at the frame's origin."""
         to_cells = _fit(dsm, frame)
         at_origin = dsm.elevation_at(_xy(dsm, frame, [(0.0, 0.0)]))[0]
@@ -65,12 +63,12 @@ class SceneTerrain:
         return out
 
 
-def _xy(dsm: Dsm, frame: Frame, east_north_m: list[tuple[float, float]]) -> F64:
+def _xy(dsm: Dsm, frame: NeuFrame, east_north_m: list[tuple[float, float]]) -> F64:
     places = [frame.geodetic_from_neu((north, east, 0.0))[:2] for east, north in east_north_m]
     return dsm.xy_from_lat_lon(np.array(places))
 
 
-def _fit(dsm: Dsm, frame: Frame) -> F64:
+def _fit(dsm: Dsm, frame: NeuFrame) -> F64:
     """(2, 3) (column, row) of (east, north, 1), by central differences around the origin."""
     here, east, west, north, south = _xy(
         dsm, frame, [(0.0, 0.0), (_FIT_M, 0.0), (-_FIT_M, 0.0), (0.0, _FIT_M), (0.0, -_FIT_M)]

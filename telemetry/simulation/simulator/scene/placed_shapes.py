@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from telemetry.simulator.scene.materials import MATERIALS, Material
-from telemetry.simulator.scene.primitives import COLUMNS, box_row, cylinder_row, ellipsoid_row
-from telemetry.simulator.scene.shapes import AnyShape, Box, CornerReflector, Cylinder, Tree
-from telemetry.simulator.scene.terrain import SceneTerrain
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, I32
+from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
+from telemetry.simulation.simulator.scene.materials import MATERIALS, Material
+from telemetry.simulation.simulator.scene.primitives import COLUMNS, box_row, cylinder_row, ellipsoid_row
+from telemetry.simulation.simulator.scene.world_shapes import AnyShape, Box, CornerReflector, Cylinder, Tree
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
     rows: F64
     """(K, 10) primitives"""
-    owner: NDArray[np.int32]
+    owner: I32
     """(K,) number of the shape that each belongs to"""
     reflectivity: F64
     """(K,) radar cross section over the area seen"""

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 BOX, CYLINDER, ELLIPSOID = 0.0, 1.0, 2.0
 COLUMNS = 10

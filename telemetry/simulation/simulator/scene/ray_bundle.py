@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from telemetry.simulator.scene.primitives import bounding_spheres, span
-from telemetry.simulator.scene.terrain import SceneTerrain, first_ground
-
-F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
+from mapping.geometry.arrays import F64, I32
+from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain, first_ground
+from telemetry.simulation.simulator.scene.primitives import bounding_spheres, span
 
 GROUND, NOTHING = -1, -2
 

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from telemetry.simulator.scene.primitives import BOX, CYLINDER
-from telemetry.simulator.scene.terrain import SceneTerrain
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
+from telemetry.simulation.simulator.scene.primitives import BOX, CYLINDER
 
 _STEP_M = 0.5
 

@@ -11,16 +11,15 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, I32
 from planning.errors import ParameterError
-from telemetry.simulator.frame import Frame, Vec3
-from telemetry.simulator.scene import surfaces
-from telemetry.simulator.scene.materials import GROUND as GROUND_MATERIAL
-from telemetry.simulator.scene.placing import moved, place
-from telemetry.simulator.scene.primitives import bounding_spheres, distances, top_under
-from telemetry.simulator.scene.rays import Hits, cast
-from telemetry.simulator.scene.terrain import SceneTerrain
-from telemetry.simulator.scene.world_file import WorldFile, parse_world, read_world
-
-F64 = NDArray[np.float64]
+from planning.terrain.dsm import Dsm
+from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
+from telemetry.simulation.simulator.scene import surfaces
+from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
+from telemetry.simulation.simulator.scene.materials import GROUND as GROUND_MATERIAL
+from telemetry.simulation.simulator.scene.placed_shapes import moved, place
+from telemetry.simulation.simulator.scene.primitives import bounding_spheres, distances, top_under
+from telemetry.simulation.simulator.scene.ray_bundle import Hits, cast
+from telemetry.simulation.simulator.scene.world_file import WorldFile, parse_world, read_world
 
 MOST_AWAY_M = 50_000.0
 """Between the file's origin and the frame's: the frame is a plane."""
@@ -29,7 +28,7 @@ MOST_AWAY_M = 50_000.0
 class World:
     """Places are east, north, up in metres from the frame's origin, on the ground there."""
 
-    def __init__(self, file: WorldFile, frame: Frame, terrain: SceneTerrain) -> None:
+    def __init__(self, file: WorldFile, frame: NeuFrame, terrain: SceneTerrain) -> None:
         self.name = file.name
         self.frame = frame
         self.terrain = terrain
@@ -52,7 +51,7 @@ class World:
 
     @classmethod
     def load(
-        cls, path: Path, *, frame: Frame | None = None, terrain: SceneTerrain | None = None, dsm: Dsm | None = None
+        cls, path: Path, *, frame: NeuFrame | None = None, terrain: SceneTerrain | None = None, dsm: Dsm | None = None
     ) -> Self:
         """A world file. ``frame`` is the vehicle's; without one it is the file's own origin.
 
@@ -67,7 +66,7 @@ class World:
         cls,
         data: object,
         *,
-        frame: Frame | None = None,
+        frame: NeuFrame | None = None,
         terrain: SceneTerrain | None = None,
         dsm: Dsm | None = None,
         folder: Path | None = None,
@@ -76,12 +75,12 @@ class World:
         return cls._made(parse_world(data, folder=folder), frame, terrain, dsm)
 
     @classmethod
-    def empty(cls, frame: Frame, *, terrain: SceneTerrain | None = None, dsm: Dsm | None = None) -> Self:
+    def empty(cls, frame: NeuFrame, *, terrain: SceneTerrain | None = None, dsm: Dsm | None = None) -> Self:
         """Nothing but ground: level unless a surface model is given."""
         return cls._made(WorldFile("", None, None, ()), frame, terrain, dsm)
 
     @classmethod
-    def _made(cls, file: WorldFile, frame: Frame | None, terrain: SceneTerrain | None, dsm: Dsm | None) -> Self:
+    def _made(cls, file: WorldFile, frame: NeuFrame | None, terrain: SceneTerrain | None, dsm: Dsm | None) -> Self:
         if terrain is None and dsm is None and file.dsm:
             # What reads rasters takes a second to load.
             from planning.terrain.geotiff import read_dsm
@@ -144,11 +143,11 @@ class World:
         """Height of the highest solid shape under a place, -inf without one. Crowns carry nobody."""
         return float(top_under(self.placed.rows, *p_enu))
 
-    def cast(self, origin_enu: F64, directions_enu: F64, luck: F64, *, most_m: float, near: NDArray[np.int32]) -> Hits:
+    def cast(self, origin_enu: F64, directions_enu: F64, luck: F64, *, most_m: float, near: I32) -> Hits:
         """What rays meet first; ``near`` are the numbers of the primitives that come into question (``ahead``)."""
         return cast(self.terrain, self.placed.rows[near], near, origin_enu, directions_enu, luck, most_m=most_m)
 
-    def ahead(self, origin_enu: F64, axis_enu: F64, *, within_m: float, half_angle_rad: float) -> NDArray[np.int32]:
+    def ahead(self, origin_enu: F64, axis_enu: F64, *, within_m: float, half_angle_rad: float) -> I32:
         """Numbers of the primitives that may be that near and in a cone around the axis; nearest first."""
         offset, radius = self._spheres[:, :3] - origin_enu, self._spheres[:, 3]
         away = np.linalg.norm(offset, axis=1)
@@ -159,33 +158,33 @@ class World:
         order = np.argsort((away - radius)[kept], kind="stable")
         return np.flatnonzero(kept)[order].astype(np.int32)
 
-    def reflectivity(self, what: NDArray[np.int32]) -> F64:
+    def reflectivity(self, what: I32) -> F64:
         """Radar cross section over the area seen, of what rays met; nothing has none."""
         return self._of(what, self.placed.reflectivity, 10 ** (GROUND_MATERIAL.reflectivity_db / 10), 0.0)
 
-    def texture(self, what: NDArray[np.int32]) -> F64:
+    def texture(self, what: I32) -> F64:
         return self._of(what, self.placed.texture, GROUND_MATERIAL.texture, 0.0)
 
-    def velocity_enu_m_s(self, what: NDArray[np.int32]) -> F64:
+    def velocity_enu_m_s(self, what: I32) -> F64:
         """(N, 3) Of what rays met; the ground stands still."""
         return np.concatenate([self.placed.velocity_enu_m_s, np.zeros((2, 3))])[what]
 
-    def _of(self, what: NDArray[np.int32], values: F64, ground: float, nothing: float) -> F64:
+    def _of(self, what: I32, values: F64, ground: float, nothing: float) -> F64:
         # GROUND is -1 and NOTHING -2: they stand at the end.
         return np.concatenate([values, [nothing, ground]])[what]
 
-    def _nearest(self, points_enu: F64) -> tuple[F64, NDArray[np.int32]]:
+    def _nearest(self, points_enu: F64) -> tuple[F64, I32]:
         points = np.ascontiguousarray(np.asarray(points_enu, dtype=np.float64).reshape(-1, 3))
         nearest_m, index = np.empty(len(points)), np.empty(len(points), np.int32)
         distances(self.placed.rows, points, nearest_m, index)
         return nearest_m, index
 
 
-def _own_frame(file: WorldFile, dsm: Dsm | None) -> Frame:
+def _own_frame(file: WorldFile, dsm: Dsm | None) -> NeuFrame:
     origin = file.origin
     if origin is None:
-        return Frame(0.0, 0.0, 0.0)
+        return NeuFrame(0.0, 0.0, 0.0)
     height_m = 0.0
     if dsm:
         height_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
-    return Frame(origin.lat_deg, origin.lon_deg, height_m if math.isfinite(height_m) else 0.0)
+    return NeuFrame(origin.lat_deg, origin.lon_deg, height_m if math.isfinite(height_m) else 0.0)

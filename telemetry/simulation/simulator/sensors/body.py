@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from telemetry.sensing import SimTruth
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from telemetry.topics.simulated import SimTruth
 
 
 def rotation_enu_body(roll_rad: float, pitch_rad: float, heading_rad: float) -> F64:
@@ -19,7 +18,7 @@ def rotation_enu_body(roll_rad: float, pitch_rad: float, heading_rad: float) -> 
     turn = np.array([[ch, sh, 0.0], [-sh, ch, 0.0], [0.0, 0.0, 1.0]])
     nose = np.array([[1.0, 0.0, 0.0], [0.0, cp, -sp], [0.0, sp, cp]])
     wing = np.array([[cr, 0.0, sr], [0.0, 1.0, 0.0], [-sr, 0.0, cr]])
-    return turn @ nose @ wing
+    return turn @ nose @ wing  # Miccinesi 2022, eq. 3
 
 
 def of_truth(truth: SimTruth) -> F64:

@@ -12,14 +12,13 @@ import numpy as np
 
 from mapping.geometry.arrays import C64
 from mapping.radar import Detections, RadarChain
-from telemetry.sensing import RadarFrame, SimTruth, packed
-from telemetry.simulator.scene.world import World
-from telemetry.simulator.sensors.body import of_truth, rotation_enu_body
-from telemetry.simulator.sensors.iq_model import AWR1843_IQ, IqModel
-from telemetry.simulator.sensors.iq_synthesis import Returns, sampled, strongest
-from telemetry.simulator.sensors.radar_echoes import echoes
-
-C64 = NDArray[np.complex64]
+from mapping.sensor_frames import RadarFrame, packed
+from telemetry.simulation.simulator.scene.world import World
+from telemetry.simulation.simulator.sensors.body import of_truth, rotation_enu_body
+from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, IqModel
+from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled, strongest
+from telemetry.simulation.simulator.sensors.radar_echoes import echoes
+from telemetry.topics.simulated import SimTruth
 
 
 class IqRadarSensor:

@@ -14,10 +14,6 @@ from scipy.special import i0
 from mapping.geometry.arrays import C64, C128, F32, F64
 from mapping.radar.params import LIGHT_M_S, FmcwParams
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-C64 = NDArray[np.complex64]
-
 _TAPS, _OVERSAMPLING = 6, 2
 _BETA = 2.34 * _TAPS
 _TABLE_STEPS = 2048
@@ -34,7 +30,7 @@ class Returns:
     azimuth_rad: F64
     """Clockwise from the boresight."""
     elevation_rad: F64
-    amplitude: NDArray[np.complex128]
+    amplitude: C128
     """(N,) of each sample, where the noise of one sample has variance 1"""
 
 
@@ -70,6 +66,7 @@ def sampled(params: FmcwParams, returns: Returns) -> C64:
     kept = np.flatnonzero((beat >= 0.0) & (beat < 1.0))
     kept = kept[np.argsort(beat[kept])]
     turns = _antenna_turns(params, returns)[kept]
+    # Wessendorp 2021, eq. 3
     per_chirp = 2 * returns.radial_speed_m_s[kept] / params.wavelength_m * params.chirp_interval_s
     # Time counts from the middle of a chirp, and of the frame.
     start = returns.amplitude[kept] * np.exp(
@@ -86,7 +83,7 @@ def sampled(params: FmcwParams, returns: Returns) -> C64:
 
 def _beats(params: FmcwParams, returns: Returns) -> tuple[F64, F64]:
     """(N,) beat in turns per sample, and by how much it grows per chirp because the scatterer moves."""
-    per_metre = 2 * params.slope_hz_per_s / LIGHT_M_S / params.sample_rate_hz
+    per_metre = 2 * params.slope_hz_per_s / LIGHT_M_S / params.sample_rate_hz  # Wessendorp 2021, eq. 1
     doppler = 2 * returns.radial_speed_m_s / params.wavelength_m / params.sample_rate_hz
     return (
         per_metre * returns.range_m + doppler,

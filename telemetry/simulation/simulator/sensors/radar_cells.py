@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from telemetry.simulator.sensors.radar_model import RadarModel
-
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
+from mapping.geometry.arrays import F64, I64
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 
 
 @dataclass(frozen=True, slots=True)

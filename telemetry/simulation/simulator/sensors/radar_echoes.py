@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from telemetry.simulator.scene.world import World
-from telemetry.simulator.sensors.radar_model import RadarModel
-from telemetry.simulator.sensors.radar_rays import rays
-
-F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
+from mapping.geometry.arrays import F64, I32
+from telemetry.simulation.simulator.scene.world import World
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
+from telemetry.simulation.simulator.sensors.radar_rays import rays
 
 NEAREST_M = 0.3
 _MARGIN_RAD = 0.3

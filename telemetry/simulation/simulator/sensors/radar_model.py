@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 @dataclass(frozen=True, slots=True)

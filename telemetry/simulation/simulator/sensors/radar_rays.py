@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from telemetry.simulator.scene.primitives import BOX
-from telemetry.simulator.scene.rays import GROUND
-from telemetry.simulator.sensors.radar_model import RadarModel
-
-F64 = NDArray[np.float64]
-I32 = NDArray[np.int32]
+from mapping.geometry.arrays import F64, I32
+from telemetry.simulation.simulator.scene.primitives import BOX
+from telemetry.simulation.simulator.scene.ray_bundle import GROUND
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 
 _LEAST_AZIMUTH, _LEAST_ELEVATION = 4, 8
 """Rays on each shape, however small it looks."""

@@ -8,15 +8,15 @@ from typing import Protocol
 
 import numpy as np
 
-from telemetry.sensing import RadarFrame, SimTruth, packed
-from telemetry.simulator.scene.world import World
-from telemetry.simulator.sensors.body import of_truth
-from telemetry.simulator.sensors.radar_cells import Scatterers, detect
-from telemetry.simulator.sensors.radar_echoes import NEAREST_M, echoes
-from telemetry.simulator.sensors.radar_model import RadarModel
-from telemetry.simulator.sensors.radar_rays import unit
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+from mapping.sensor_frames import RadarFrame, packed
+from telemetry.simulation.simulator.scene.world import World
+from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.simulation.simulator.sensors.radar_cells import Scatterers, detect
+from telemetry.simulation.simulator.sensors.radar_echoes import NEAREST_M, echoes
+from telemetry.simulation.simulator.sensors.radar_model import RadarModel
+from telemetry.simulation.simulator.sensors.radar_rays import unit
+from telemetry.topics.simulated import RadarKind, SimTruth
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +124,17 @@ def _joined(parts: list[_Targets]) -> _Targets:
         np.concatenate([part.speed_m_s for part in parts]),
         np.concatenate([part.power for part in parts]),
     )
+
+
+class Radar(Protocol):
+    def frame(self, truth: SimTruth) -> RadarFrame: ...
+
+
+def radar_sensor(kind: RadarKind, world: World, *, seed: int) -> Radar:
+    """An AWR1843 in a world."""
+    if kind == "model":
+        return RadarSensor(world, seed=seed)
+    # The kernels of the whole chain take a moment to load.
+    from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
+
+    return IqRadarSensor(world, seed=seed)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from telemetry.sensing import CloudFrame, SimTruth, packed
-from telemetry.simulator.scene.world import World
-from telemetry.simulator.sensors.body import of_truth
-
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, Bools
+from mapping.sensor_frames import CloudFrame, packed
+from telemetry.simulation.simulator.scene.world import World
+from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.topics.simulated import SimTruth
 
 _PRIMES = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
@@ -88,7 +88,7 @@ class StereoSensor:
         # An error of depth moves a point along its ray.
         return rays * (np.maximum(noisy, 0.05) / rays[:, 1])[:, None] + np.array([0.0, 0.0, model.mount_m])
 
-    def _matched(self, range_m: F64, places_enu: F64, texture: F64) -> NDArray[np.bool_]:
+    def _matched(self, range_m: F64, places_enu: F64, texture: F64) -> Bools:
         """Which points the two pictures agree on. A patch without texture has none from any side, and tomorrow."""
         model = self.model
         far = np.clip((range_m - model.best_m) / (model.farthest_m - model.best_m), 0.0, 1.0)

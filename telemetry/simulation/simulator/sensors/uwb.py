@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64, U8, Bools
 from mapping.uwb import UwbGeometry
-from telemetry.simulator.sensors.uwb_scene import UwbScene, chords
-
-F64 = NDArray[np.float64]
+from telemetry.simulation.simulator.sensors.uwb_scene import UwbScene, chords
 
 EXTINCTION, EXTINCTION_POWER = 0.096, 2.24
 """There and back through n layers exp(-0.096 n^2.24) is left: 0.91, 0.64, 0.32, 0.12 and 0.03 for one to five, so
@@ -93,7 +91,7 @@ class UwbRadar:
         faces = self._random.exponential(size=(len(scene.cross_section_m2), max(1, self.model.aspects)))
         self._faces = np.column_stack([faces, faces[:, 0]])
 
-    def scan(self, x_m: float, y_m: float, heading_rad: float) -> NDArray[np.uint8]:
+    def scan(self, x_m: float, y_m: float, heading_rad: float) -> U8:
         """(bins,) counts; heading clockwise from y."""
         power = self.echoes(x_m, y_m, heading_rad)
         counts = self._clutter(x_m, y_m, heading_rad)
@@ -125,7 +123,7 @@ class UwbRadar:
         power = faced_m2 * (10.0 / range_m[near]) ** 4 * self._gain(off_rad[near]) * left
         return range_m[near], power
 
-    def _facing(self, which: NDArray[np.bool_], aspect_rad: F64) -> F64:
+    def _facing(self, which: Bools, aspect_rad: F64) -> F64:
         """(K,) Share of its mean echo that each chosen thing shows on this side."""
         if self.model.aspects == 0:
             return np.ones(len(aspect_rad))
@@ -159,7 +157,7 @@ class UwbRadar:
         reached_m = np.clip(range_m[:, None] - enters_m, 0.0, inside_m)
         return reached_m @ (scene.layers / (2.0 * scene.foliage_radius_m))
 
-    def _hidden(self, at_m: F64, directions: F64, range_m: F64) -> NDArray[np.bool_]:
+    def _hidden(self, at_m: F64, directions: F64, range_m: F64) -> Bools:
         """(K,) Whether something solid stands on the way."""
         scene = self._scene
         enters_m, _ = chords(scene.target_xy_m[scene.solid], scene.target_radius_m[scene.solid], at_m, directions)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, Bools
 
 LAYER_M = 0.1
 """Thickness of one of the paper's layers of branches."""
@@ -92,7 +92,7 @@ class UwbScene:
     """(N, 2)"""
     target_radius_m: F64
     cross_section_m2: F64
-    solid: NDArray[np.bool_]
+    solid: Bools
     foliage_xy_m: F64
     """(M, 2)"""
     foliage_radius_m: F64

@@ -1,0 +1,1 @@
+"""A simulated vehicle, and the papers' field tests flown with it."""

@@ -1,0 +1,1 @@
+"""Terrain hugging among things that the surface model knows nothing of."""

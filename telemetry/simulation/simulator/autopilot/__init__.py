@@ -1,0 +1,1 @@
+"""The simulated autopilot: arming, modes, failsafes, missions."""

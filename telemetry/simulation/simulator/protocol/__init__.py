@@ -1,0 +1,1 @@
+"""The simulated vehicle's MAVLink: machines without sockets or clock, and the sockets."""
