@@ -146,7 +146,7 @@ def load_settings(**overrides: Any) -> Settings:
 
 
 def settings_document() -> str:
-    """``SETTINGS.md``: python -c "from server.settings import settings_document as d; print(d(), end='')"."""
+    """``docs/settings.md``: python -c "from server.settings import settings_document as d; print(d(), end='')"."""
     return f"""# Settings
 
 Nothing has to be set: `hedgehop serve` runs with the defaults below. What is set in several places is taken from

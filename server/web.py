@@ -61,19 +61,19 @@ MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
 """Joins the bus and all that hangs on it."""
 ROUTERS = (
-    session,
-    plan,
-    terrain,
-    traversability,
-    view,
-    console,
-    link,
-    flight,
-    obstacles,
-    sensors,
-    recordings,
-    radar,
-    scenarios,
+    session_routes,
+    plan_routes,
+    terrain_routes,
+    traversability_routes,
+    view_routes,
+    console_routes,
+    link_routes,
+    flight_routes,
+    obstacle_routes,
+    sensor_routes,
+    recording_routes,
+    radar_file_routes,
+    scenario_routes,
     proxy,
 )
 

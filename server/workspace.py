@@ -45,7 +45,7 @@ _FILES_NICENESS = 10
 
 
 class Streams(Protocol):
-    """The part of ``server.hub.Hub`` that the workspace uses."""
+    """The part of ``server.door.hub.Hub`` that the workspace uses."""
 
     def publish(self, message: ServerMessage) -> None: ...
 

@@ -46,6 +46,23 @@ async def asset(path: str, request: Request) -> Response:
     )
 
 
+@router.get("/help")
+@router.get("/help/")
+async def help_contents() -> Response:
+    return RedirectResponse("/help/index.html")
+
+
+@router.get("/help/{path:path}")
+async def help_page(path: str, request: Request) -> Response:
+    """The documents, as they were when the console was built."""
+    try:
+        session_of(request)
+    except SignInError:
+        return _to_sign_in(request)
+    file = _file_below(parts_of(request).settings.console_dir / "help", path)
+    return FileResponse(file, headers={"cache-control": "no-cache"})
+
+
 @router.get("/favicon.svg")
 async def favicon(request: Request) -> Response:
     return FileResponse(

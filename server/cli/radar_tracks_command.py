@@ -73,7 +73,7 @@ def _frames(file: Path) -> Iterator[tuple[float, Detections]]:
         yield frame.t_s, chain.process(frame.cube)
 
 
-def _answer(file: Path, found: Comparison, *, as_json: bool) -> None:
+def _answer(file: Path, found: TruthComparison, *, as_json: bool) -> None:
     """One JSON object, or a few lines."""
     poles = [_figures(pole) for pole in found.poles]
     if as_json:

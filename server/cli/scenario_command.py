@@ -63,7 +63,7 @@ def scenario(
         results: list[ScenarioResult] = []
         for number in range(seed, seed + seeds):
             progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
-            wanted = Wanted(number, o.existing(world), radar, own, record, charts=plots is not None)
+            wanted = ScenarioRequest(number, o.existing(world), radar, own, record, charts=plots is not None)
             results.append(run_scenario(name, wanted))
             end_progress()
             if not as_json:

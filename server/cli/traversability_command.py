@@ -31,7 +31,7 @@ from server.cli.shared.terrain_given import ModelOptions, read_model
 from server.work.clocks import StepTimer
 from telemetry.perception.uwb_drive import read_scans
 
-Layers = dict[str, NDArray[np.float32]]
+Layers = dict[str, F32]
 
 WORK_STEP, RADAR_STEP = "Working out slope and roughness", "Clearing foliage"
 
@@ -148,7 +148,7 @@ def _write(out: Path, ground: TraversableGround, cleared: Cleared | None, found:
         write_files(out, {"sites.geojson": json.dumps(_geojson(ground, found), indent=1) + "\n"})
 
 
-def _write_layer(path: Path, ground: TraversableGround, layer: NDArray[np.float32]) -> None:
+def _write_layer(path: Path, ground: TraversableGround, layer: F32) -> None:
     write_dsm(path, replace(ground.dsm, elevation_m=layer.astype(np.float32), vertical_datum=None))
 
 

@@ -26,6 +26,8 @@ log = logging.getLogger("hedgehop.http")
 JSON_LIMIT_BYTES = 8 * 1024**2
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 CHUNK_TIMEOUT_S = 30.0
+DRAIN_LIMIT_BYTES = 64 * 1024**2
+DRAIN_TIMEOUT_S = 5.0
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 UPLOADS = frozenset(
     {"/api/terrains", "/api/orthophotos", "/api/recordings/import", "/api/traversability/uwb", "/api/radar/files"}
@@ -121,6 +123,7 @@ class Guard:
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
         headers = Headers(scope=scope)
         started, status = time.monotonic(), 0
+        body = _Metered(receive, self._body_limit(scope["path"]))
 
         async def dressed(message: Message) -> None:
             nonlocal status
@@ -129,15 +132,17 @@ class Guard:
                 answer_headers = MutableHeaders(scope=message)
                 _dress(scope, headers.get("host", ""), answer_headers)
                 if status in (408, 413):
-                    # The rest of the body will not be read.
+                    # No other request follows on what is left of the body.
                     answer_headers["connection"] = "close"
+            elif (status == 413 or refusal) and not message.get("more_body", False):
+                await send({**message, "more_body": True})
+                await body.drain()
+                message = {"type": "http.response.body"}
             await send(message)
 
         try:
-            if refusal := self._refusal(scope, headers):
-                await refusal(scope, receive, dressed)
-            else:
-                await self._app(scope, _Metered(receive, self._body_limit(scope["path"])), dressed)
+            refusal = self._refusal(scope, headers)
+            await (refusal or self._app)(scope, body, dressed)
         finally:
             seconds = time.monotonic() - started
             # The path only: a sign-in link's token stands in the query.
@@ -210,6 +215,16 @@ class _Metered:
         if self._seen > self._limit:
             raise HTTPException(413, too_large(self._limit).what)
         return message
+
+    async def drain(self) -> None:
+        """Reads on for a while: a connection closed on unread bytes is reset, and who still sends hears no answer."""
+        left = DRAIN_LIMIT_BYTES
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(DRAIN_TIMEOUT_S):
+                while not self._complete and left > 0:
+                    message = await self._receive()
+                    left -= len(message.get("body", b""))
+                    self._complete = not message.get("more_body", False)
 
 
 def _dress(scope: Scope, host: str, headers: MutableHeaders) -> None:

@@ -133,7 +133,7 @@ class Hub:
             page.put(message, outgoing)
 
     def publish_each(self, make: Callable[[str], schemas.ServerMessage]) -> None:
-        """To every page, what its session (by ``server.auth.session_key``) may know."""
+        """To every page, what its session (by ``server.door.auth.session_key``) may know."""
         for page in list(self._pages.values()):
             message = make(page.session_key)
             page.put(message, _Outgoing(message))

@@ -124,16 +124,6 @@ def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
     )
 
 
-def seen_in(record: PlanRecord) -> str | None:
-    """What was seen before and taken into the plan: what is flown is checked against it as well."""
-    return PlanDoc.model_validate_json(record.plan_json).seen_id
-
-
-def clearance_of(record: PlanRecord) -> ClearanceParams:
-    """What the plan demands."""
-    return demands_from_doc(PlanDoc.model_validate_json(record.plan_json)).clearance()
-
-
 def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
     """The mission as the navigation script hands it over, with the paper's timing. Raises MissionError."""
     from telemetry.flight.guided.targets import guided_plan, with_timing
@@ -158,7 +148,7 @@ def climb_for_resuming(
     from telemetry.flight.preflight.resume import plan_resumption
 
     report("Finding the way back into the mission", None)
-    surface, _ = fill_holes(load_planned_terrain(directory, seen_id), max_area_m2=SMALL_HOLE_M2)
+    surface, _ = fill_holes(load_planned_terrain(directory, seen_id))
     way = plan_resumption(mission, from_item, surface, clearance)
     return way.from_item, way.climb_to_m
 

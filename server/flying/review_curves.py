@@ -134,7 +134,7 @@ def _distances(flight: Flight) -> F64:
     return flight.surface.distances_m(flight.track.xyz_m)
 
 
-def thinned(count: int, peaks: tuple[F64, ...]) -> NDArray[np.int64]:
+def thinned(count: int, peaks: tuple[F64, ...]) -> I64:
     """Rows to keep of a long track: of every stretch the first, and where each curve is lowest and highest."""
     if count <= STRETCHES * (2 * len(peaks) + 1):
         return np.arange(count)

@@ -36,7 +36,6 @@ SAME_PLACE_M = 10.0
 """A waypoint that the vehicle said it reached is one of this mission if it was this near to it then."""
 SLOW_M_S, LONGEST_GAP_S, FEWEST_STEPS, CLOCK_TOLERANCE = 0.5, 1.0, 20, 0.25
 """Of comparing the vehicle's clock with the recording's."""
-METRES_PER_DEG = 111_320.0
 DETOUR_STATES = frozenset({"holding", "climbing", "offset", "manoeuvre", "ceiling"})
 """Of ``AvoidanceStatus``: it has taken the vehicle over."""
 
@@ -265,17 +264,12 @@ def _reached(log: FlightLog, mission: Mission | None, notes: list[str]) -> tuple
 def _away_m(log: FlightLog, t_utc_s: float, mission: Mission, item: int) -> float:
     row = min(int(np.searchsorted(log.track.t_utc_s, t_utc_s)), len(log.track) - 1)
     place = mission.items[item]
-    return apart_m(float(log.track.lat_deg[row]), float(log.track.lon_deg[row]), place.lat_deg, place.lon_deg)
-
-
-def apart_m(lat_a_deg: float, lon_a_deg: float, lat_b_deg: float, lon_b_deg: float) -> float:
-    """Horizontal distance of two places near each other."""
-    east = (lon_a_deg - lon_b_deg) * math.cos(math.radians(lat_b_deg))
-    return METRES_PER_DEG * math.hypot(lat_a_deg - lat_b_deg, east)
+    at_deg = float(log.track.lat_deg[row]), float(log.track.lon_deg[row])
+    return apart_m(at_deg, (place.lat_deg, place.lon_deg))
 
 
 def _is_at(item: MissionItem, target: SentTarget) -> bool:
-    return apart_m(target.lat_deg, target.lon_deg, item.lat_deg, item.lon_deg) <= HANDED_OVER_M
+    return apart_m((target.lat_deg, target.lon_deg), (item.lat_deg, item.lon_deg)) <= HANDED_OVER_M
 
 
 def _as_far_as_led(

@@ -39,8 +39,8 @@ _SEEK_S = 2.0
 """A jump of the clock beyond what playing explains."""
 
 
-class Screen(Protocol):
-    """The part of ``server.on_show.OnShow`` that shows a recording in the 3D view instead of the plan."""
+class ReplayScreen(Protocol):
+    """The part of ``server.plan.on_show.OnShow`` that shows a recording in the 3D view instead of the plan."""
 
     @property
     def document(self) -> PlanDoc: ...
@@ -64,7 +64,7 @@ class Reviewing:
         self,
         library: Library,
         shelf: RecordingShelf,
-        screen: Screen,
+        screen: ReplayScreen,
         channel: Channel,
         *,
         ask: Callable[[ReplayRequest], Awaitable[object]],

@@ -20,8 +20,8 @@ _TRACK_EVERY = 5
 """Of the periods: a path grows by half a metre in one."""
 
 
-class Stage(Protocol):
-    """The part of ``server.scene.vehicles.Vehicles`` that is used here."""
+class VehicleStage(Protocol):
+    """The part of ``server.scene.layers.vehicles.Vehicles`` that is used here."""
 
     @property
     def dsm(self) -> Dsm | None: ...
@@ -34,7 +34,7 @@ class Stage(Protocol):
 class Scenery:
     """Draws only what has changed since the last time."""
 
-    def __init__(self, stage: Stage | None, channels: dict[Source, Channel]) -> None:
+    def __init__(self, stage: VehicleStage | None, channels: dict[Source, Channel]) -> None:
         self._stage = stage
         self._actors = {source: _Actor(source, channel) for source, channel in channels.items()}
         self._placer: Placer | None = None
@@ -76,13 +76,13 @@ class _Actor:
         self._placed = 0
         self._points = np.zeros((0, 3))
 
-    def move(self, stage: Stage, placer: Placer) -> None:
+    def move(self, stage: VehicleStage, placer: Placer) -> None:
         state = self._channel.state
         if state is not self._drawn:
             self._drawn = state
             stage.move(self._source, None if state is None else _pose(state, placer))
 
-    def draw_track(self, stage: Stage, placer: Placer) -> None:
+    def draw_track(self, stage: VehicleStage, placer: Placer) -> None:
         states = self._channel.track.states
         if len(states) == self._placed:
             return

@@ -73,7 +73,7 @@ def _has_moved(then: VehicleState, now: VehicleState) -> bool:
     if places[0] is None or places[1] is None or then.alt_amsl_m is None or now.alt_amsl_m is None:
         return True
     rose_m = 0.0 if now.armed else abs(now.alt_amsl_m - then.alt_amsl_m)
-    return metres_apart(places[0], places[1]) > MOVED_M or rose_m > ROSE_M
+    return apart_m(places[0], places[1]) > MOVED_M or rose_m > ROSE_M
 
 
 def _place(state: VehicleState) -> tuple[float, float] | None:

@@ -110,3 +110,26 @@ class Channel:
             self.track.add(state, self.follow)
         self._told_mono_s = self._now_mono_s()
         self._tell(VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow))
+
+
+class Pace:
+    """A token bucket on a clock that the caller reads."""
+
+    def __init__(self, rate_hz: float, *, burst: float) -> None:
+        self._rate_hz, self._burst = rate_hz, burst
+        self._tokens, self._at_mono_s = burst, 0.0
+
+    def wait_s(self, now_mono_s: float) -> float:
+        """Until the next message may go; 0: it goes now, and counts."""
+        self._tokens = min(self._burst, self._tokens + self._rate_hz * max(0.0, now_mono_s - self._at_mono_s))
+        self._at_mono_s = now_mono_s
+        if self._tokens >= 1.0:
+            self._tokens -= 1.0
+            return 0.0
+        return (1.0 - self._tokens) / self._rate_hz
+
+
+class Asks(Protocol):
+    """The part of ``telemetry.bus.link_client.LinkClient`` that the server uses."""
+
+    async def call(self, request: LinkRequest) -> Any: ...

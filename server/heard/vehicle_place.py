@@ -8,11 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from planning.dsm import Dsm, is_amsl
-from planning.model import F64
-from telemetry.vehicle import VehicleState
-
-_EARTH_RADIUS_M = 6_371_008.8
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import offset_m
+from planning.terrain.dsm import Dsm, is_amsl
+from telemetry.topics.vehicle import VehicleState
 
 
 class Placer:
@@ -65,13 +64,5 @@ def home_distance_bearing(state: VehicleState) -> tuple[float | None, float | No
     """Metres from the vehicle to its home, and degrees clockwise from north; on the sphere."""
     if state.lat_deg is None or state.lon_deg is None or state.home_lat_deg is None or state.home_lon_deg is None:
         return None, None
-    north = math.radians(state.home_lat_deg - state.lat_deg)
-    east = math.radians(state.home_lon_deg - state.lon_deg) * math.cos(math.radians(state.lat_deg))
-    return _EARTH_RADIUS_M * math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360.0
-
-
-def metres_apart(a_lat_lon_deg: tuple[float, float], b_lat_lon_deg: tuple[float, float]) -> float:
-    """Between two places near each other, on the sphere."""
-    north = math.radians(b_lat_lon_deg[0] - a_lat_lon_deg[0])
-    east = math.radians(b_lat_lon_deg[1] - a_lat_lon_deg[1]) * math.cos(math.radians(a_lat_lon_deg[0]))
-    return _EARTH_RADIUS_M * math.hypot(north, east)
+    east_m, north_m = offset_m((state.lat_deg, state.lon_deg), state.home_lat_deg, state.home_lon_deg)
+    return math.hypot(east_m, north_m), math.degrees(math.atan2(east_m, north_m)) % 360.0

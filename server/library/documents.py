@@ -62,6 +62,16 @@ def demands_from_doc(document: PlanDoc) -> PlanRequest:
     )
 
 
+def seen_in(record: PlanRecord) -> str | None:
+    """What was seen before and taken into the plan: what is flown is checked against it as well."""
+    return PlanDoc.model_validate_json(record.plan_json).seen_id
+
+
+def clearance_of(record: PlanRecord) -> ClearanceParams:
+    """What the plan demands."""
+    return demands_from_doc(PlanDoc.model_validate_json(record.plan_json)).clearance()
+
+
 def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:
     survey = document.survey
     return survey_lines(

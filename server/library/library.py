@@ -29,6 +29,9 @@ from server.library.terrains import TerrainManifest
 from server.library.whole_files import clean, new_id, storage_errors, write_atomically
 from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
 
+_SEEN = "seen-"
+_KEPT_IN = (f"{plans.FOLDER}/**/*.json", "set-aside/**/*.json", "*.json", "run/*.json")
+"""Plans with all their undo steps, damaged ones that were set aside, and what is on board of a vehicle."""
 _LAST_PLAN = "last-plan"
 _PROFILES = "profiles"
 
@@ -231,3 +234,66 @@ def _open_directory(data_dir: Path) -> DirectoryLock:
             advice="Change its permissions, or start with another --data-dir.",
         ) from error
     return lock
+
+
+class DirectoryLock:
+    """Held from construction to ``release``; raises ``DataDirError`` when another process holds it."""
+
+    def __init__(self, folder: Path) -> None:
+        self._handle = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.read(self._handle, 32).decode("ascii", "replace").strip()
+            os.close(self._handle)
+            raise DataDirError(
+                f"Another Hedgehop (process {holder or 'unknown'}) uses this data directory.",
+                where=str(folder),
+                advice="Stop it, or start this one with another --data-dir.",
+            ) from error
+        os.truncate(self._handle, 0)
+        os.pwrite(self._handle, f"{os.getpid()}\n".encode(), 0)
+
+    def release(self) -> None:
+        """The second time nothing happens: the number may belong to another file by then."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+
+def read_profiles(folder: Path) -> tuple[list[ProfileEntry], list[ErrorDoc]]:
+    """All profiles by name, and why some of the user's files could not be read."""
+    with storage_errors(folder):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        own = sorted(path for path in folder.glob("*.toml") if path.is_file())
+    found = {name: ProfileEntry(id=name, profile=doc_from_profile(load_profile(name))) for name in shipped_profiles()}
+    faults: list[ErrorDoc] = []
+    for path in own:
+        try:
+            found[path.stem] = ProfileEntry(id=path.stem, profile=doc_from_profile(load_profile(path)))
+        except (PlanningError, ValidationError) as error:
+            faults.append(error_doc(error))
+    return [found[name] for name in sorted(found)], faults
+
+
+def remove_unneeded(root: Path) -> list[Path]:
+    """Those that were removed. Raises ``StorageError``; then, and in doubt, everything stays.
+
+    A file is needed where its id stands, in whatever field and format: ids are random, nothing else reads the same.
+    """
+    with storage_errors(root):
+        folders = [folder for folder in (root / terrains.FOLDER).iterdir() if folder.is_dir()]
+        files = [path for folder in folders for path in folder.glob(f"{_SEEN}*.npz")]
+        left = _not_named(files, (path.read_bytes() for pattern in _KEPT_IN for path in root.glob(pattern)))
+        for path in left:
+            path.unlink()
+        for folder in folders:
+            clean(folder)
+    return left
+
+
+def _not_named(files: list[Path], texts: Iterator[bytes]) -> list[Path]:
+    left = {path.stem.removeprefix(_SEEN).encode(): path for path in files}
+    while left and (text := next(texts, None)) is not None:
+        left = {seen_id: path for seen_id, path in left.items() if seen_id not in text}
+    return list(left.values())

@@ -16,7 +16,7 @@ Pair = tuple[float, float]
 
 
 class CellsManifest(BaseModel):
-    """Where the cells lie: ``planning.cells.cells.Layout``."""
+    """Where the cells lie: ``planning.terrain.cells.cells.Layout``."""
 
     model_config = ConfigDict(frozen=True)
 

@@ -81,7 +81,7 @@ def _apart(pois: list[PoiDoc]) -> list[PoiDoc]:
     """Turns of a mission may stand one above the other: as points they are one."""
     out: list[PoiDoc] = []
     for poi in pois:
-        if not out or metres_apart((out[-1].lat_deg, out[-1].lon_deg), (poi.lat_deg, poi.lon_deg)) > SAME_M:
+        if not out or apart_m((out[-1].lat_deg, out[-1].lon_deg), (poi.lat_deg, poi.lon_deg)) > SAME_M:
             out.append(poi)
     return out
 
@@ -137,7 +137,7 @@ def _targets(mission: Mission, situation: Situation) -> tuple[GuidedTarget, ...]
     return tuple(piece for k in range(len(numbered)) for piece in _pieces(numbered[k - 1] if k else None, numbered[k]))
 
 
-def _items(line: Line | None, enu: F64, target: int) -> list[int]:
+def _items(line: FlightLine | None, enu: F64, target: int) -> list[int]:
     """Of the mission on board: each place's on the leg that is nearest to it, never back."""
     if line is None:
         return [target] * len(enu)
@@ -150,7 +150,7 @@ def _items(line: Line | None, enu: F64, target: int) -> list[int]:
     return out
 
 
-def _away_m(line: Line, leg: int, place: F64) -> float:
+def _away_m(line: FlightLine, leg: int, place: F64) -> float:
     a, d = line.points_enu[leg, :2], line.points_enu[leg + 1, :2] - line.points_enu[leg, :2]
     share = float(np.clip((place - a) @ d / max(float(d @ d), 1e-9), 0.0, 1.0))
     return float(np.linalg.norm(a + share * d - place))

@@ -40,8 +40,8 @@ NEAR_M, FAR_EVERY_S = 48.0, 1.0
 TOLD_EVERY_S = 1.0
 
 
-class Stage(Protocol):
-    """The part of ``server.scene.sights.Sights`` that is used here."""
+class MapStage(Protocol):
+    """The part of ``server.scene.layers.sights.Sights`` that is used here."""
 
     def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None: ...
 
@@ -101,7 +101,7 @@ class MapDrawing:
 
     def __init__(
         self,
-        stage: Stage | None,
+        stage: MapStage | None,
         watches: Mapping[Source, Watch],
         routes: Routes,
         tracks: Mapping[Source, TracksWatch],
@@ -121,7 +121,7 @@ class MapDrawing:
             group.create_task(self._draw_now(stage))
             group.create_task(self._draw_maps(stage))
 
-    async def _draw_now(self, stage: Stage) -> None:
+    async def _draw_now(self, stage: MapStage) -> None:
         """Apart from the maps: a region turns red at once."""
         while True:
             await asyncio.sleep(PERIOD_S)
@@ -133,7 +133,7 @@ class MapDrawing:
             stage.draw_now(source, origin, watch.statuses, routes, tracks)
             stage.draw_cloud(source, watch.fresh_cloud())
 
-    async def _draw_maps(self, stage: Stage) -> None:
+    async def _draw_maps(self, stage: MapStage) -> None:
         while True:
             await asyncio.sleep(PERIOD_S)
             source = self._shown_source()
@@ -147,7 +147,7 @@ class MapDrawing:
 
     def draw(
         self,
-        stage: Stage,
+        stage: MapStage,
         name: MapName,
         mirror: MapMirror,
         vehicle_enu_m: tuple[float, float, float] | None = None,
@@ -173,7 +173,7 @@ class MapDrawing:
 
     def _draw_waiting(
         self,
-        stage: Stage,
+        stage: MapStage,
         name: MapName,
         mirror: MapMirror,
         picture: _Picture,

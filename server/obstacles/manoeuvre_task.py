@@ -31,66 +31,6 @@ BESIDE_M = 3.0
 """A vehicle farther than this from where its leg begins is on its way to it."""
 NEAR_M = 250.0
 """Farther from the vehicle no way leads."""
-_HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """Where everything is at one moment."""
-
-    alert: ObstacleAlert | None
-    """Of what stands in the way."""
-    state: VehicleState
-    flight: FlightStatus
-    height_offset_m: float
-    """So much higher than planned the mission is flown already."""
-    record: PlanRecord
-    terrain: Path
-    origin: MapOrigin
-    maps: tuple[Voxels, ...]
-    """Each with an origin of its own: home may move a little between the starts of two sensors' nodes."""
-    radius_m: float = 0.5
-    """Of the vehicle."""
-    ceiling_m: float = 30.0
-    """Above the plan: no way leads higher."""
-    radar_high_deg: float = 20.0
-    """Upper edge of the radar's gate: what it has seen may be as high."""
-    approach: ObstacleAlert | None = None
-    """Of a moving object."""
-    tracks: TracksStatus | None = None
-    """None unless they are of now."""
-    safety_radius_m: float = 3.0
-    """Kept from moving objects."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A manoeuvre that is on show, and what flying it takes."""
-
-    doc: ManoeuvreDoc
-    targets: tuple[GuidedTarget, ...] = ()
-    rejoin_item: int | None = None
-    height_offset_m: float = 0.0
-    points_enu_m: tuple[tuple[float, float, float], ...] = ()
-    """From the vehicle on, in the maps' frame; empty when there is no way."""
-    begins_lat_lon_deg: tuple[float, float] | None = None
-    """Where the vehicle was when it was prepared."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ahead:
-    """What is left of the mission."""
-
-    line: Line
-    points_enu_m: F64
-    """From beside the vehicle on."""
-    leg: int
-    """Of the mission's line, on which they begin; the one before where the vehicle has yet to come to the line."""
-
-    def item(self, leg: int) -> int:
-        """That is flown to at the end of a leg of ``points_enu_m``."""
-        items = self.line.leg_item
-        return items[max(0, min(self.leg + leg, len(items) - 1))]
 
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
@@ -162,7 +102,7 @@ def _surface(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
     return ground_around(notice, origin)
 
 
-def _ahead(line: Line, position: F64, situation: Situation) -> Ahead:
+def _ahead(line: FlightLine, position: F64, situation: Situation) -> Ahead:
     """The rest of the mission from the place of the leg that is flown which is nearest to the vehicle."""
     points = line.points_enu + np.array([0.0, 0.0, situation.height_offset_m])
     target = situation.flight.target or 0
@@ -205,19 +145,6 @@ def _prepared(
     begins = frame.to_geodetic(way.points_enu_m[:1])[0].tolist()
     height_offset_m = situation.height_offset_m + way.height_offset_m
     return Prepared(doc, targets, item, height_offset_m, points, (begins[0], begins[1]))
-
-
-def handle_of(kind: str, alert: ObstacleAlert) -> str:
-    return f"{kind}-{_HANDLE.sub('-', alert.id)}"[:80]
-
-
-def impossible(way: NoWay, alert: ObstacleAlert) -> Prepared:
-    handle = handle_of(way.kind, alert)
-    return Prepared(ManoeuvreDoc(id=handle, kind=way.kind, for_alert=alert.id, possible=False, text=way.reason))
-
-
-def cruise_m_s(record: PlanRecord) -> float:
-    return parse_profile(record.profile_toml.encode(), where="the plan's profile").mean_speed_m_s
 
 
 def _words(way: Manoeuvre, climb_m: float) -> str:

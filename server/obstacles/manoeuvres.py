@@ -110,7 +110,7 @@ class Manoeuvres:
         state = self._vehicle()
         if state is None or state.lat_deg is None or state.lon_deg is None or prepared.begins_lat_lon_deg is None:
             return
-        away_m = metres_apart(prepared.begins_lat_lon_deg, (state.lat_deg, state.lon_deg))
+        away_m = apart_m(prepared.begins_lat_lon_deg, (state.lat_deg, state.lon_deg))
         if away_m > MOVED_ON_M:
             raise NotAllowedError(
                 f"The vehicle is {away_m:.0f} m from where this manoeuvre begins.",

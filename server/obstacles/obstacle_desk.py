@@ -42,7 +42,7 @@ log = logging.getLogger("hedgehop.obstacles")
 
 
 class SeesPlans(Protocol):
-    """The part of ``server.plan_requests.PlanRequests`` that takes what was seen into the plan."""
+    """The part of ``server.plan.plan_requests.PlanRequests`` that takes what was seen into the plan."""
 
     async def plan_with_seen(
         self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None

@@ -55,7 +55,7 @@ def rest_of_plan(part: Part, underway: Underway | None, *, terrain_id: str) -> d
     left = [_poi("home", "Home", home)] if part == "home" else _left(underway, mission, here)
     if not left:
         raise NotReadyError("Nothing is left of the mission.", advice="Plan the way home.")
-    if _apart_m(here, left[0]) > SAME_PLACE_M:
+    if apart_m((here.lat_deg, here.lon_deg), (left[0].lat_deg, left[0].lon_deg)) > SAME_PLACE_M:
         left.insert(0, _poi("here", "From here", here))
     return {"source": "pois", "pois": _numbered(left), "home": home, **_survey_fields(_flown(record), part)}
 
@@ -91,11 +91,11 @@ def _left(underway: Underway, mission: Mission, here: PlaceDoc) -> list[PoiDoc]:
     if line is None:
         raise NotReadyError("The mission is no line that could be gone on with.", advice="Plan the whole anew.")
     frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
-    along_m = _along_m(line)
-    at_m = _flown_m(line, along_m, underway.flight.target or 0, _flat(frame, here))
+    s_m = along_m(line.points_enu[:, :2])
+    at_m = _flown_m(line, s_m, underway.flight.target or 0, _flat(frame, here))
     points = _points(underway.record, mission)
-    met_m = _met_m(line, along_m, np.array([_flat(frame, point) for point in points]))
-    return [point for point, s_m in zip(points, met_m, strict=True) if s_m > at_m]
+    met_m = _met_m(line, s_m, np.array([_flat(frame, point) for point in points]))
+    return [point for point, there_m in zip(points, met_m, strict=True) if there_m > at_m]
 
 
 def _points(record: PlanRecord, mission: Mission) -> list[PoiDoc]:
@@ -118,36 +118,26 @@ def _flown(record: PlanRecord) -> PlanDoc:
         return PlanDoc()
 
 
-def _along_m(line: Line) -> F64:
-    """(K,) over ground, of the line's points."""
-    steps = np.linalg.norm(np.diff(line.points_enu[:, :2], axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def _flown_m(line: Line, along_m: F64, target: int, here: F64) -> float:
+def _flown_m(line: FlightLine, s_m: F64, target: int, here: F64) -> float:
     """How far along the line the vehicle is, by the item that it flies to."""
     leg = next((n for n, item in enumerate(line.leg_item) if item >= target), len(line.leg_item) - 1)
-    return float(along_m[leg]) + _nearest(line, leg, here)[0]
+    return float(s_m[leg]) + _nearest(line, leg, here)[0]
 
 
-def _met_m(line: Line, along_m: F64, points: F64) -> list[float]:
+def _met_m(line: FlightLine, s_m: F64, points: F64) -> list[float]:
     """Where the line meets points (N, 2), one after the other."""
     met, leg = [], 0
     for point in points:
         found = [(n, *_nearest(line, n, point)) for n in range(leg, len(line.leg_item))]
         nearest_m = min(away_m for _, _, away_m in found)
         leg, passed_m, _ = next(f for f in found if f[2] <= max(SAME_PLACE_M, nearest_m))
-        met.append(float(along_m[leg]) + passed_m)
+        met.append(float(s_m[leg]) + passed_m)
     return met
 
 
-def _nearest(line: Line, leg: int, point: F64) -> tuple[float, float]:
+def _nearest(line: FlightLine, leg: int, point: F64) -> tuple[float, float]:
     """(metres from the leg's begin, metres away) of the place that is nearest over ground."""
-    a, b = line.points_enu[leg, :2], line.points_enu[leg + 1, :2]
-    length_m = float(np.linalg.norm(b - a))
-    passed_m = 0.0 if length_m == 0 else float(np.clip((point - a) @ (b - a) / length_m, 0.0, length_m))
-    there = a if length_m == 0 else a + (b - a) * (passed_m / length_m)
-    return passed_m, float(np.linalg.norm(point - there))
+    return Polyline(line.points_enu[leg : leg + 2, :2]).nearest(point)
 
 
 def _place(state: VehicleState) -> PlaceDoc | None:
@@ -162,10 +152,6 @@ def _poi(name: str, words: str, place: PlaceDoc) -> PoiDoc:
 
 def _flat(frame: LocalFrame, place: PlaceDoc | PoiDoc) -> F64:
     return frame.to_enu(place.lat_deg, place.lon_deg, frame.alt_m)[0, :2]
-
-
-def _apart_m(one: PlaceDoc, other: PoiDoc) -> float:
-    return math.hypot(*_flat(LocalFrame(one.lat_deg, one.lon_deg, 0.0), other))
 
 
 def _numbered(pois: list[PoiDoc]) -> list[PoiDoc]:

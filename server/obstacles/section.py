@@ -16,10 +16,7 @@ from mapping.sensor_frames import rows
 from server.obstacles.obstacle_watch import Watch
 from server.scene.mirror import Voxels
 from server.schemas import RadarTargetsDoc, SectionDoc, SectionMap, Source
-from telemetry.obstacles import MAP_NAMES, MapOrigin, PerceptionStatus
-from telemetry.sensing import rows
-
-F64 = NDArray[np.float64]
+from telemetry.topics.obstacles import MAP_NAMES, MapOrigin, PerceptionStatus
 
 MOST_CELLS = 4_000
 """Of one map: more than a panel has pixels for."""
@@ -27,7 +24,7 @@ _GROUND_SAMPLES = 121
 
 
 class Grounds(Protocol):
-    """The part of ``server.scene.sights.Sights`` that knows heights."""
+    """The part of ``server.scene.layers.sights.Sights`` that knows heights."""
 
     def ground_up_m(self, origin: MapOrigin, enu_m: F64) -> F64: ...
 

@@ -23,6 +23,12 @@ from server.plan.plan_desk import PlanDesk
 from server.plan.seen_task import keep_seen
 from server.scene.mirror import Voxels
 from server.schemas import Imported, PlanDoc, PlanEdit, PlanState
+from server.work.clocks import utc_now
+from server.work.jobs import Lane
+
+ALL = "all.zip"
+MOST_POINTS = 1000
+"""Beyond, finding the order takes minutes, and no vehicle holds so many."""
 
 
 class PlanRequests:
@@ -101,8 +107,8 @@ class PlanRequests:
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""
-        ordered = await ordering.shortest(self._lane, self._desk.document, self._dsm())
-        await self._desk.propose(lambda document: ("Shortest order", ordering.reordered(document, ordered)))
+        ordered = await shortest(self._lane, self._desk.document, self._dsm())
+        await self._desk.propose(lambda document: ("Shortest order", reordered(document, ordered)))
         return self.state
 
     async def export(self, file: str) -> bytes:
@@ -129,3 +135,43 @@ class PlanRequests:
             lambda document: ("Plan without what was seen", document.model_copy(update={"seen_id": None}))
         )
         return self.state
+
+
+async def shortest(lane: Lane, document: PlanDoc, dsm: Dsm | None) -> list[str]:
+    """Ids of the points in the shortest order that keeps the first. Raises PoiError."""
+    if dsm is None or len(document.pois) < 3:
+        raise PoiError("There is nothing to reorder.", advice="Choose a surface model and add three points or more.")
+    if len(document.pois) > MOST_POINTS:
+        raise PoiError(f"{len(document.pois)} points are too many to reorder: at most {MOST_POINTS}.")
+    xy_m = dsm.xy_from_lat_lon(np.array([(poi.lat_deg, poi.lon_deg) for poi in document.pois]))
+    if not np.isfinite(xy_m).all():
+        raise PoiError("Some points are nowhere near the surface model.", advice="Move or delete them first.")
+    order = await lane.call(tasks.order_points, xy_m)
+    return [document.pois[i].id for i in order]
+
+
+def reordered(document: PlanDoc, poi_ids: list[str]) -> PlanDoc:
+    """Raises ConflictError when points have come or gone meanwhile."""
+    by_id = {poi.id: poi for poi in document.pois}
+    if len(document.pois) != len(poi_ids) or set(by_id) != set(poi_ids):
+        raise ConflictError("The points have changed meanwhile.", advice="Order them again.")
+    return document.model_copy(update={"pois": [by_id[poi_id] for poi_id in poi_ids]})
+
+
+async def exported(lane: Lane, library: Library, document: PlanDoc, file: str) -> bytes:
+    """One file of the plan, or all of them zipped. Raises NotReadyError, PlanningError."""
+    hint = missing(document)
+    if hint:
+        raise NotReadyError("There is no plan to export yet.", advice=hint)
+    directory = library.terrain_dir(document.terrain_id or "")
+    names = list(FILES) if file == ALL else [file]
+    files = await lane.call(tasks.export_plan, directory, document, names, utc_now())
+    return await asyncio.to_thread(_zipped, files) if file == ALL else files[file]
+
+
+def _zipped(files: dict[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    return buffer.getvalue()

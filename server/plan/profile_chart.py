@@ -10,8 +10,6 @@ from mapping.geometry.polyline import along_m
 from planning.plan import Plan
 from server.schemas import Chart
 
-F64 = NDArray[np.float64]
-
 _MAX_POINTS = 1600
 
 
@@ -27,7 +25,7 @@ def chart(plan: Plan) -> Chart:
         ground_rel_home_m=_nullable(path.ground_alt_dsm_m[keep] - home_m),
         surface_rel_home_m=_nullable(path.surface_alt_dsm_m[keep] - home_m),
         path_rel_home_m=_nullable(path.alt_dsm_m[keep] - home_m),
-        flown_s_m=_rounded(along(flown)),
+        flown_s_m=_rounded(along_m(flown[:, :2])),
         flown_rel_home_m=_rounded(flown[:, 2] - home_m),
         trend_s_m=_rounded(plan.certificate.trend_s_m[trend_keep]),
         trend_distance_m=_nullable(plan.certificate.trend_distance_m[trend_keep]),
@@ -36,12 +34,7 @@ def chart(plan: Plan) -> Chart:
     )
 
 
-def along(points_m: F64) -> F64:
-    """(K, 3) -> (K,) horizontal distance from the first point."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points_m[:, :2], axis=0).T))])
-
-
-def thinned(s_m: F64, *curves: F64, must_keep: NDArray[np.int64] | None = None) -> NDArray[np.intp]:
+def thinned(s_m: F64, *curves: F64, must_keep: I64 | None = None) -> NDArray[np.intp]:
     """Indices that keep each curve's minimum and maximum in every bin, both ends and ``must_keep``."""
     count = len(s_m)
     if count <= _MAX_POINTS:

@@ -1,4 +1,4 @@
-"""Owns the viser server: on loopback, behind a secret, reached only through ``server.scene.proxy``.
+"""Owns the viser server: on loopback, behind a secret, reached only through ``server.api.proxy``.
 
 viser itself checks neither Origin nor identity and lets any client open tunnels and press buttons. So its socket
 refuses every handshake without a secret that only the proxy knows, and its own handlers for tunnels are taken out.

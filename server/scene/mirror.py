@@ -11,10 +11,6 @@ from numpy.typing import NDArray
 from mapping.geometry.arrays import F64, I32, I64, U8, Bools
 from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin, unpack_keys
 
-I32 = NDArray[np.int32]
-I64 = NDArray[np.int64]
-U8 = NDArray[np.uint8]
-F64 = NDArray[np.float64]
 ChunkKey = tuple[int, int, int]
 
 CHUNK_M = 32.0
@@ -32,7 +28,7 @@ class Chunk:
 
     ids: I64
     probability: U8
-    explained: NDArray[np.bool_]
+    explained: Bools
     boxes: tuple[int, ...] = ()
     """How many boxes it is at each of ``DETAILS``."""
 
@@ -44,7 +40,7 @@ class Voxels:
     keys: I32
     """(N, 3) floor(enu / resolution)"""
     probability: U8
-    explained: NDArray[np.bool_]
+    explained: Bools
     resolution_m: float
     origin: MapOrigin | None
     sensor: MapName
@@ -139,7 +135,7 @@ class MapMirror:
             self.origin, self.resolution_m = delta.origin, delta.resolution_m
         self.t_mono_s, self.revision = delta.t_mono_s, delta.revision
 
-    def _take(self, keys: I32, probability: U8, explained: NDArray[np.bool_]) -> None:
+    def _take(self, keys: I32, probability: U8, explained: Bools) -> None:
         if not len(keys):
             return
         per_chunk = max(1, round(CHUNK_M / self.resolution_m))
@@ -151,7 +147,7 @@ class MapMirror:
             x, y, z = place[part[0]].tolist()
             self._merge((x, y, z), ids[part], probability[part], explained[part])
 
-    def _merge(self, key: ChunkKey, ids: I64, probability: U8, explained: NDArray[np.bool_]) -> None:
+    def _merge(self, key: ChunkKey, ids: I64, probability: U8, explained: Bools) -> None:
         """The delta's word on a voxel is the last."""
         old = self._chunks.get(key)
         if old is not None:

@@ -1,6 +1,6 @@
 """Everything that crosses the door, once: REST bodies and the messages of the ``/ws`` stream.
 
-``web/src/messages.ts`` is generated from this package (``server.typescript``); a test fails when they differ.
+``web/src/messages.ts`` is generated from this package (``server.schemas.typescript``); a test fails when they differ.
 Numbers are SI, degrees only for latitude, longitude, heading and gimbal pitch. NaN and infinity become null.
 """
 

@@ -1,6 +1,6 @@
 """Flying: the vehicle, the link to it, what may be done with it, and by whom.
 
-What the bus carries (``telemetry.messages``, ``telemetry.vehicle``) goes to the pages as it is; it is not
+What the bus carries (``telemetry.topics.messages``, ``telemetry.topics.vehicle``) goes to the pages as it is; it is not
 written down a second time here.
 """
 

@@ -1,6 +1,6 @@
 """Obstacles: what perception sees, what is alerted, what can be done about it.
 
-What the bus carries (``telemetry.obstacles``) goes to the pages as it is; it is not written down a second time here.
+What the bus carries (``telemetry.topics.obstacles``) goes to the pages as it is; it is not written down twice.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ class Chart(Strict):
 
 
 class SurveyResult(Strict):
-    """What a survey's photos see over the surface; the fields of ``planning.survey_coverage.SurveyCoverage``."""
+    """What a survey's photos see over the surface; the fields of ``planning.route.survey_coverage.SurveyCoverage``."""
 
     height_m: float
     """Above the surface: height H of this plan."""

@@ -105,7 +105,7 @@ def _azimuth_map(chain: RadarChain, spectra: Spectra) -> RadarMap | None:
     return _map(power, rows=spectra.range_m, columns=sine)
 
 
-def _map(power: NDArray[Any], *, rows: NDArray[np.float64], columns: NDArray[np.float64]) -> RadarMap:
+def _map(power: NDArray[Any], *, rows: F64, columns: F64) -> RadarMap:
     power, rows = _pooled(power, rows)
     turned, columns = _pooled(power.T, columns)
     level_db = 10.0 * np.log10(np.maximum(turned.T, 1e-12))
@@ -124,7 +124,7 @@ def _map(power: NDArray[Any], *, rows: NDArray[np.float64], columns: NDArray[np.
     )
 
 
-def _pooled(power: NDArray[Any], along: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[np.float64]]:
+def _pooled(power: NDArray[Any], along: F64) -> tuple[NDArray[Any], F64]:
     """Neighbouring rows joined to their strongest until there are few enough, and where these lie."""
     joined = -(-len(along) // MOST_CELLS)
     if joined == 1:
@@ -134,7 +134,7 @@ def _pooled(power: NDArray[Any], along: NDArray[np.float64]) -> tuple[NDArray[An
     return np.maximum.reduceat(power, begins, axis=0), along[begins] + step * (joined - 1) / 2
 
 
-def _step(along: NDArray[np.float64]) -> float:
+def _step(along: F64) -> float:
     """1 where there is but one cell."""
     return float(along[1] - along[0]) if len(along) > 1 else 1.0
 

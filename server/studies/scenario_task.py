@@ -15,7 +15,7 @@ from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 def fly(name: str, seed: int, *, report: Progress) -> tuple[list[ScenarioPartDoc], bool]:
     """Its parts, and whether every figure was reached."""
     report("Getting ready", None)
-    result = run_scenario(name, Wanted(seed, charts=scenario_named(name).draws, report=report))
+    result = run_scenario(name, ScenarioRequest(seed, charts=scenario_named(name).draws, report=report))
     return [part_doc(part) for part in result.flights], result.passed
 
 

@@ -14,10 +14,6 @@ import numpy as np
 from mapping.geometry.arrays import F32, U8, Bools
 from server.schemas import LayerName
 
-F32 = NDArray[np.float32]
-U8 = NDArray[np.uint8]
-Bools = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, slots=True)
 class Shade:

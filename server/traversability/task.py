@@ -26,9 +26,6 @@ from telemetry.perception.uwb_drive import read_scans
 DRAWN_CELLS = 1024
 """Per side at most, of what the 3D view lays over the model."""
 
-F32 = NDArray[np.float32]
-U8 = NDArray[np.uint8]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Worked:

@@ -1,4 +1,4 @@
-"""Seconds per step of a job, read off its progress reports."""
+"""The one place that asks for the time of day, and the seconds of each step of a job, read off its reports."""
 
 from __future__ import annotations
 
@@ -39,3 +39,8 @@ class StepTimer:
         if self._key is not None:
             self._seconds[self._key] += now - self._since
         self._since = now
+
+
+def utc_now() -> str:
+    """ISO 8601 with milliseconds and Z."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

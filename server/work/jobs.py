@@ -25,7 +25,8 @@ T = TypeVar("T")
 
 _REAP_S = 5.0
 # Not multiprocessing's own way: that would import the server's main module, web frameworks and all, in every worker.
-_MAIN = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from server.worker import main; main()"
+_PACKAGE = __name__.rpartition(".")[0]
+_MAIN = f"import json, sys; sys.path[:] = json.loads(sys.argv[1]); from {_PACKAGE}.worker_process import main; main()"
 
 
 class _Worker:

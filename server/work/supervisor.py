@@ -57,7 +57,7 @@ class Supervisor:
     """
 
     def __init__(
-        self, runtime_dir: Path, *, changed: Callable[[list[NodeState]], None], package: str = "telemetry.nodes"
+        self, runtime_dir: Path, *, changed: Callable[[list[NodeState]], None], package: str = nodes.__name__
     ) -> None:
         self._runtime_dir = runtime_dir.absolute()
         self._changed = changed

@@ -18,7 +18,7 @@ _TRUE, _FOLLOWED = ("#e4a13a", "#6ab4d8", "#8cc084"), ("#c0392b", "#1f3f8b", "#2
 _GREY = "#999999"
 
 
-def write_tracks(folder: Path, found: Comparison, title: str) -> Path:
+def write_tracks(folder: Path, found: TruthComparison, title: str) -> Path:
     """One figure. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     figure = Figure(figsize=(11.0, 5.6), dpi=120, layout="constrained")
@@ -32,7 +32,7 @@ def write_tracks(folder: Path, found: Comparison, title: str) -> Path:
     return path
 
 
-def _over_ground(axes: Axes, found: Comparison) -> None:
+def _over_ground(axes: Axes, found: TruthComparison) -> None:
     path = np.array(found.path_en_m)
     axes.plot(path[:, 0], path[:, 1], color="#444444", linewidth=1.2, label="vehicle")
     axes.plot(*path[0], "o", color="#444444", markersize=5, label="start")
@@ -44,8 +44,8 @@ def _over_ground(axes: Axes, found: Comparison) -> None:
     axes.legend(fontsize=8, loc="lower right")
 
 
-def _from_radar(axes: Axes, found: Comparison) -> None:
-    radar = Position2Go()
+def _from_radar(axes: Axes, found: TruthComparison) -> None:
+    radar = Position2GoModel()
     for side in (-1, 1):
         right, forward = math.sin(side * radar.half_fov_rad), math.cos(radar.half_fov_rad)
         axes.plot([0.0, radar.farthest_m * right], [0.0, radar.farthest_m * forward], color=_GREY, linewidth=0.8)

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from server.scene.frame import LocalFrame
-from server.scene.payload import F32, F64, HeightGrid
-
-U32 = NDArray[np.uint32]
+from mapping.geometry.arrays import F32, F64, U32, Bools
+from server.scene.geometry.payload import HeightGrid
+from server.scene.geometry.scene_frame import LocalFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ def _shares(count: int) -> F64:
     return shares
 
 
-def _faces(known: NDArray[np.bool_]) -> U32:
+def _faces(known: Bools) -> U32:
     number = np.cumsum(known.ravel()).reshape(known.shape).astype(np.uint32) - np.uint32(1)
     nw, ne, sw, se = (
         (number[r : r - 1 or None, c : c - 1 or None], known[r : r - 1 or None, c : c - 1 or None])
@@ -60,7 +59,7 @@ def _faces(known: NDArray[np.bool_]) -> U32:
     return np.concatenate([_drawn(*corners) for corners in triangles])
 
 
-_Corner = tuple[U32, NDArray[np.bool_]]
+_Corner = tuple[U32, Bools]
 
 
 def _drawn(a: _Corner, b: _Corner, c: _Corner) -> U32:

@@ -58,7 +58,7 @@ def probability_rgb(hue: tuple[int, int, int], probability: F64) -> U8:
     return np.round((_FAINT_SHARE + (1 - _FAINT_SHARE) * share)[:, None] * np.array(hue)).astype(np.uint8)
 
 
-def dimmed(rgb: NDArray[np.uint8] | tuple[int, int, int], *, stale: bool) -> U8:
+def dimmed(rgb: U8 | tuple[int, int, int], *, stale: bool) -> U8:
     """Greyed while a newer answer is being computed."""
     color = np.asarray(rgb, dtype=np.float64)
     return (color + _DIM_SHARE * (np.array(_DIM) - color) if stale else color).astype(np.uint8)

@@ -8,10 +8,6 @@ from mapping.geometry.arrays import F32, F64, U8, U32
 from planning.terrain.dsm import Dsm
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
 
-F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-U8 = NDArray[np.uint8]
-
 
 @dataclass(frozen=True, slots=True)
 class HeightGrid:
@@ -31,7 +27,7 @@ class Relief:
 
     points_m: F64
     """(V, 3) x, y, alt_dsm"""
-    faces: NDArray[np.uint32]
+    faces: U32
     """(F, 3) counter-clockwise seen from above"""
 
 

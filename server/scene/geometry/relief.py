@@ -33,8 +33,6 @@ _ROUNDS_MAX, _STEPS_MAX = 12, 400
 _EDGE = 1e-9
 """Of a triangle's share: a place on an edge is in one of both triangles."""
 
-Bools = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
@@ -218,3 +216,23 @@ def _over_known(safe: Dsm, points_m: F64, triangles: NDArray[np.intp]) -> NDArra
         known &= np.isfinite(safe.elevation_at(place))
     turned = np.where((twice < 0)[:, None], triangles[:, ::-1], triangles)
     return turned[known]
+
+
+def kept_within(s: F64, value: F64, tolerance: float, *, must_keep: I64 | None = None) -> NDArray[np.intp]:
+    """Indices between which straight lines stay within ``tolerance`` of every value (Douglas and Peucker 1973)."""
+    ends = np.unique(np.r_[0, len(s) - 1, [] if must_keep is None else must_keep].astype(np.intp))
+    kept = set(ends.tolist())
+    stretches = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+    while stretches:
+        first, last = stretches.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        length = s[last] - s[first]
+        share = (s[inner] - s[first]) / length if length > 0 else np.zeros(last - first - 1)
+        off = np.abs(value[first] + share * (value[last] - value[first]) - value[inner])
+        worst = first + 1 + int(np.argmax(off))
+        if off[worst - first - 1] > tolerance:
+            kept.add(worst)
+            stretches += [(first, worst), (worst, last)]
+    return np.array(sorted(kept), dtype=np.intp)

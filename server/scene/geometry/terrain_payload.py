@@ -24,7 +24,7 @@ TEXTURE_PX = 2048
 _DARKEST = 0.45
 """Share of a colour's brightness that the steepest shadow leaves: relief must not drown the legend's colours."""
 _FLAT_LIGHT = 0.7071
-"""What the sun of `planning.hillshade` gives flat ground."""
+"""What the sun of `planning.terrain.hillshade` gives flat ground."""
 _NO_PHOTO_RGB = (176, 176, 180)
 
 

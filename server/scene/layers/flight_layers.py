@@ -15,6 +15,7 @@ from server.scene.geometry.mark_shapes import GEM, dots_node, label_node, line_n
 from server.scene.geometry.payload import PlanScene
 from server.scene.geometry.stage import Drawing
 
+_PLANNED_PX, _FLOWN_PX = 3.0, 3.0
 _MOST_WAYPOINT_MARKS = 1500
 _WAYPOINT_PX, _WORST_PX = 6.0, 13.0
 _CURTAIN_OPACITY = 0.42
@@ -37,7 +38,7 @@ def path_clearance_m(plan: PlanScene) -> F64:
     piece_m = np.minimum(above_m[:-1], above_m[1:])
     if not len(plan.flown_distance_m):
         return piece_m
-    leg_end_s_m = np.cumsum(np.hypot(*np.diff(plan.flown_m[:, :2], axis=0).T))
+    leg_end_s_m = along_m(plan.flown_m[:, :2])[1:]
     middle_s_m = (plan.path_s_m[:-1] + plan.path_s_m[1:]) / 2
     leg = np.minimum(np.searchsorted(leg_end_s_m, middle_s_m), len(leg_end_s_m) - 1)
     return np.minimum(piece_m, plan.flown_distance_m[leg])
@@ -118,3 +119,18 @@ def _distance_words(nearest_m: float) -> str:
     if not math.isfinite(nearest_m):
         return "Unknown terrain"
     return f"Nearest {metres(nearest_m)}" if nearest_m > 0 else "Inside terrain"
+
+
+def review_nodes(drawing: Drawing) -> list[Node]:
+    review = drawing.state.review
+    if review is None:
+        return []
+    lines = (
+        ("/recorded_plan", review.planned_m, palette.RECORDED_PLAN, _PLANNED_PX),
+        ("/recorded_flight", review.flown_m, palette.REPLAY_NOSE, _FLOWN_PX),
+    )
+    return [
+        line_node(name, drawing.frame.scene_from_model(points_m), color, width_px=width_px)
+        for name, points_m, color, width_px in lines
+        if len(points_m) >= 2
+    ]

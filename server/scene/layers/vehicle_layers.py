@@ -30,7 +30,7 @@ _ROTOR_AT = 0.72
 
 @dataclass(frozen=True, slots=True)
 class VehiclePose:
-    """A vehicle on the surface model that is on show; angles as in ``telemetry.vehicle``."""
+    """A vehicle on the surface model that is on show; angles as in ``telemetry.topics.vehicle``."""
 
     place_m: F64
     """(3,) x, y, alt_dsm"""

@@ -26,6 +26,7 @@ from telemetry.perception.showing import MOST_POINTS
 from telemetry.topics.looks import CloudLook, points_enu_m
 from telemetry.topics.obstacles import MapName
 
+POINT_M = 0.12
 HUES: Mapping[MapName, tuple[int, int, int]] = {
     "radar": palette.RADAR,
     "vision": palette.VISION,
@@ -122,3 +123,21 @@ def _filled_up(rows: np.ndarray) -> np.ndarray:
 def _box(edge_m: float, stretch: float) -> tuple[np.ndarray, np.ndarray]:
     mesh = trimesh.creation.box((edge_m, edge_m, edge_m * stretch))
     return np.asarray(mesh.vertices, dtype=np.float32), np.asarray(mesh.faces, dtype=np.uint32)
+
+
+def cloud_nodes(drawing: Drawing, placing: EnuPlacing, look: CloudLook | None, *, prefix: str) -> list[Node]:
+    """Always as long: only places travel, 6 bytes a point."""
+    if look is None or not drawing.state.view.show_cloud or not look.points_cm:
+        return []
+    points = drawing.frame.scene_from_model(placing.model_from_enu(points_enu_m(look)))[:MOST_POINTS]
+    middle = points.mean(axis=0)
+    at = np.concatenate([points, np.broadcast_to(points[:1], (MOST_POINTS - len(points), 3))]) - middle
+    x, y, z = (float(value) for value in middle)
+    props = {
+        "points": at.astype(np.float16),
+        "colors": palette.VISION,
+        "point_size": POINT_M * math.sqrt(drawing.frame.exaggeration),
+        "point_shape": "circle",
+        "position": (x, y, z),
+    }
+    return [Node(f"{prefix}/cloud", "point_cloud", props)]
