@@ -116,6 +116,8 @@ export function deviation(value_m: number | null | undefined, words: { more: str
   return `${size} ${value_m > 0 ? words.more : words.less}`;
 }
 
+export const degreesOf = (rad: number) => (rad * 180) / Math.PI;
+
 /** A compass bearing with three digits: 074°. */
 export function bearing(value_deg: number | null | undefined): string {
   if (!known(value_deg)) return DASH;

@@ -13,6 +13,25 @@ import { VerticalLine } from "./ChartBox";
 
 const REDRAW_MS = 200;
 
+/** Where along the path the mission ahead meets what was seen. */
+function ConflictMark({ plot }: { plot: uPlot }) {
+  const s_m = heard.live.value?.message.follow?.s_m;
+  const { conflict } = aheadOf(watching("live"));
+  if (s_m == null || !conflict) return null;
+  const at = s_m + conflict.ahead_m;
+  const x = plot.valToPos(at, "x");
+  if (x < 0 || x > plot.over.clientWidth) return null;
+  const style = { left: `${plot.over.offsetLeft + x}px`, top: `${plot.over.offsetTop}px` };
+  return (
+    <>
+      <VerticalLine plot={plot} at={at} kind="conflict-line" testid="conflict-line" />
+      <span class="conflict-mark" style={style} title={`Conflict ${conflictWhere(conflict)}`}>
+        <Icon name="warning" size={16} />
+      </span>
+    </>
+  );
+}
+
 /** The flown path on a canvas of its own: the chart below is not drawn again for each new place. */
 function draw(canvas: HTMLCanvasElement, plot: uPlot): void {
   const { clientWidth: width, clientHeight: height } = plot.over;

@@ -124,14 +124,3 @@ export function flownSpan(s_m: Curve, alt_m: Curve): Span | null {
   if (low > high) return null;
   return [Math.floor(low / FLOWN_STEP_M) * FLOWN_STEP_M, Math.ceil(high / FLOWN_STEP_M) * FLOWN_STEP_M];
 }
-
-const MOST_DECIMALS = 4;
-
-/** As few decimals as tell an axis's steps exactly: 1 for a step of 2.5, none for 5. */
-export function tickDecimals(step: number): number {
-  for (let decimals = 0; decimals < MOST_DECIMALS; decimals++) {
-    const scaled = step * 10 ** decimals;
-    if (Math.abs(scaled - Math.round(scaled)) < 1e-6) return decimals;
-  }
-  return MOST_DECIMALS;
-}

@@ -18,25 +18,11 @@ import {
   startSimulator,
   takeControl,
   uploadPlan,
-} from "./commands";
-import { presentStep } from "./facts";
-import type { Step } from "./next_step";
-
-const PHASES = { sending: "Sending", reading_back: "Reading back", done: "Done", failed: "Failed" } as const;
-
-/** A mission on its way, in items. */
-export function TransferBar() {
-  const now = transfer.value;
-  if (!now || now.phase === "done" || now.phase === "failed") return null;
-  return (
-    <div class="transfer" data-testid="transfer" role="status">
-      <span>
-        {PHASES[now.phase]} <span class="number">{`${now.done} of ${count(now.total, "item")}`}</span>
-      </span>
-      <Bar label={PHASES[now.phase]} share={now.total > 0 ? now.done / now.total : null} />
-    </div>
-  );
-}
+  uploadRefusal,
+} from "../vehicle/orders";
+import { TransferBar } from "../vehicle/TransferBar";
+import { now_ms } from "../store/clock";
+import { nextStep, type Step } from "./next_step";
 
 function startLabel(): string {
   const from = resumeFrom.value;
@@ -46,6 +32,7 @@ function startLabel(): string {
 function Primary({ step }: { step: Step }) {
   const why = "why" in step ? step.why : undefined;
   const isPending = pending.value.has(NEXT);
+  // Another step is another button (its key): a press that is meant for one never lands on the next.
   const plain = (
     label: string,
     icon: Parameters<typeof Button>[0]["icon"],
@@ -53,6 +40,7 @@ function Primary({ step }: { step: Step }) {
     disabled = false,
   ) => (
     <Button
+      key={step.id}
       kind="primary"
       class="wide"
       icon={icon}
@@ -73,6 +61,7 @@ function Primary({ step }: { step: Step }) {
     case "take_control":
       return (
         <HoldButton
+          key={step.id}
           wide
           kind="primary"
           label="Take control"
@@ -89,6 +78,7 @@ function Primary({ step }: { step: Step }) {
     case "start":
       return (
         <HoldButton
+          key={step.id}
           wide
           kind="primary"
           label={startLabel()}
@@ -128,6 +118,27 @@ function LastFlight() {
     </Button>
   );
 }
+
+function checkAge_s(): number {
+  const checked_ms = Date.parse(fly.value?.preflight?.checked_utc ?? "");
+  const age_s = (performance.timeOrigin + now_ms.value - checked_ms) / 1000;
+  return Number.isFinite(age_s) ? age_s : 0;
+}
+
+/** What comes next, by what is known now. */
+const presentStep = (): Step =>
+  nextStep({
+    link: linkStatus.value?.status ?? null,
+    vehicle: vehicle.value,
+    flight: flight.live.value,
+    fly: fly.value,
+    transfer: transfer.value,
+    inAir: isInAir.value,
+    mine: lease.value.mine,
+    accepted: accepted.value,
+    check_age_s: checkAge_s(),
+    obstacle: uploadRefusal(),
+  });
 
 /** The next step of the flight, at the bottom of the left panel. */
 export function NextAction() {

@@ -14,24 +14,24 @@ import { MapSettings } from "../obstacles/MapSettings";
 import { MAPS, clearMaps, setPerception } from "../obstacles/obstacle_orders";
 
 const FIELDS = [
-  { key: "radar_depth_m", label: "Radar looks ahead", unit: "m", min: 2, max: 120, step: 1 },
-  { key: "vision_depth_m", label: "Camera looks ahead", unit: "m", min: 2, max: 40, step: 1 },
-  { key: "ranges_depth_m", label: "Range finder looks ahead", unit: "m", min: 2, max: 40, step: 1 },
-  { key: "fov_deg", label: "Width of the region", unit: "°", min: 4, max: 120, step: 2 },
-  { key: "height_m", label: "Height of the region", unit: "m", min: 0.5, max: 20, step: 0.5 },
-  { key: "safety_radius_m", label: "Clear of what moves", unit: "m", min: 0.5, max: 30, step: 0.5 },
-  { key: "approach_s", label: "Warn of it ahead by", unit: "s", min: 2, max: 30, step: 1 },
+  { key: "radar_depth_m", label: "Radar looks ahead", unit: "m", step: 1 },
+  { key: "vision_depth_m", label: "Camera looks ahead", unit: "m", step: 1 },
+  { key: "ranges_depth_m", label: "Range finder looks ahead", unit: "m", step: 1 },
+  { key: "fov_deg", label: "Width of the region", unit: "°", step: 2 },
+  { key: "height_m", label: "Height of the region", unit: "m", step: 0.5 },
+  { key: "safety_radius_m", label: "Clear of what moves", unit: "m", step: 0.5 },
+  { key: "approach_s", label: "Warn of it ahead by", unit: "s", step: 1 },
 ] as const;
 
 const GATE = [
-  { key: "radar_azimuth_deg", label: "To both sides", unit: "°", min: 5, max: 60, step: 5 },
-  { key: "radar_low_deg", label: "From elevation", unit: "°", min: -30, max: 0, step: 1 },
-  { key: "radar_high_deg", label: "Up to elevation", unit: "°", min: 5, max: 35, step: 1 },
+  { key: "radar_azimuth_deg", label: "To both sides", unit: "°", step: 5 },
+  { key: "radar_low_deg", label: "From elevation", unit: "°", step: 1 },
+  { key: "radar_high_deg", label: "Up to elevation", unit: "°", step: 1 },
 ] as const;
 
 const CLIMB = [
-  { key: "climb_m_s", label: "Climbs at", unit: "m/s", min: 0.3, max: 5, step: 0.1 },
-  { key: "climb_ceiling_m", label: "At most above plan", unit: "m", min: 2, max: 120, step: 1 },
+  { key: "climb_m_s", label: "Climbs at", unit: "m/s", step: 0.1 },
+  { key: "climb_ceiling_m", label: "At most above plan", unit: "m", step: 1 },
 ] as const;
 
 const VARIANTS: readonly { value: PerceptionSettings["radar_variant"]; label: string }[] = [
@@ -45,23 +45,21 @@ const change = (body: PerceptionSettingsBody) => void setPerception(body);
 type Key = (typeof FIELDS | typeof GATE | typeof CLIMB)[number]["key"];
 
 interface FieldsProps {
-  fields: readonly { key: Key; label: string; unit: string; min: number; max: number; step: number }[];
+  fields: readonly NumberSpec<Key>[];
   settings: PerceptionSettings;
 }
 
 function Fields({ fields, settings }: FieldsProps) {
   return (
     <div class="field-grid">
-      {fields.map(({ key, ...field }) => (
-        <NumberField
-          key={key}
-          {...field}
-          value={settings[key]}
-          disabled={!lease.value.mine}
-          testid={`perception-${key}`}
-          onChange={(value) => change({ [key]: value })}
-        />
-      ))}
+      <NumberFields
+        fields={fields}
+        limits={LIMITS.PerceptionSettingsBody}
+        values={settings}
+        disabled={!lease.value.mine}
+        group="perception"
+        onChange={(key, value) => change({ [key]: value })}
+      />
     </div>
   );
 }

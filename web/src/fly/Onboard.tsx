@@ -71,7 +71,7 @@ function NotThePlan({ onboard }: { onboard: OnboardDoc }) {
       <Icon name="warning" />
       <p>This is not the plan that is open ({document_.value?.name ?? "none"}, as it is now).</p>
       <Button
-        disabled={busy || obstacle() !== null}
+        disabled={busy || uploadRefusal() !== null}
         testid="upload-open-plan"
         onClick={() => void uploadPlan(NEXT)}
       >

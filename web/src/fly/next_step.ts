@@ -74,11 +74,3 @@ export function nextStep(facts: Facts): Step {
   }
   return inFlight(facts) ?? onGround(facts);
 }
-
-/** Why nothing can be uploaded, by the verdict on the open plan. */
-export function uploadObstacle(verdict: VerdictKind): string | null {
-  if (verdict === "none") return "Plan a path first";
-  if (verdict === "error") return "The plan has an error: see Plan";
-  if (verdict === "not_certified") return "The plan is NOT CERTIFIED: mend it in Plan";
-  return verdict === "computing" ? "Computing the plan…" : null;
-}

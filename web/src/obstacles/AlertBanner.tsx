@@ -18,12 +18,25 @@ import { alertTitle, bearingWord, distance, heightDifference, spoken } from "./o
 /** Further alerts, one line each. */
 const MOST_LINES = 2;
 
+/** Says each alert once when it begins and once when it is over; figures that go on changing are not read out. */
+function Announcer() {
+  const told = useRef({ key: "", text: "" });
+  const first = alerts.live.value[0];
+  const key = first ? `${first.alert.id} ${first.over}` : "";
+  if (key !== told.current.key) told.current = { key, text: first ? spoken(first) : "" };
+  return (
+    <p class="visually-hidden" role="alert" aria-live="assertive" data-testid="alert-spoken">
+      {told.current.text}
+    </p>
+  );
+}
+
 const stageOf = (entry: AlertDoc) => (entry.over ? "over" : entry.acknowledged ? "seen" : "calling");
 
 function Actions({ first, others }: { first: AlertDoc; others: readonly AlertDoc[] }) {
   const isBusy = pending.value.has(ALERTS);
   const unseen = [first, ...others].filter((entry) => !entry.acknowledged);
-  const leadsToFly = hasWays(first) && activeView.value.id !== "fly";
+  const leadsToFly = hasWays(first) && viewId.value !== "fly";
   return (
     <>
       {leadsToFly && (
@@ -123,7 +136,7 @@ function More({ others }: { others: readonly AlertDoc[] }) {
  */
 function shownAlerts(): { all: readonly AlertDoc[]; isReplay: boolean } {
   const live = alerts.live.value;
-  const reviews = isReplaying.value && activeView.value.id === "review";
+  const reviews = isReplaying.value && viewId.value === "review";
   if (!reviews || live.some((entry) => !entry.over)) return { all: live, isReplay: false };
   return { all: alerts.replay.value.filter((entry) => !entry.over), isReplay: true };
 }

@@ -10,15 +10,17 @@ import { type AnotherMap, BYTES_PER_MB, beginsAnew, differing } from "./another_
 import { MAP_SETTINGS, setPerception } from "./obstacle_orders";
 
 const AT_ONCE = [
-  { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", min: 0.1, max: 5, step: 0.1 },
-  { key: "position_error_m", label: "Position error", unit: "m", min: 0, max: 10, step: 0.1 },
-  { key: "cloud_voxel_m", label: "Camera's points: one per", unit: "m", min: 0, max: 2, step: 0.05 },
+  { key: "vehicle_radius_m", label: "Vehicle's radius", unit: "m", step: 0.1 },
+  { key: "position_error_m", label: "Position error", unit: "m", step: 0.1 },
+  { key: "cloud_voxel_m", label: "Camera's points: one per", unit: "m", step: 0.05 },
 ] as const;
 
 const VOXELS = [
-  { key: "radar_resolution_m", label: "Radar's voxels", unit: "m", min: 0.05, max: 5, step: 0.1 },
-  { key: "vision_resolution_m", label: "Camera's voxels", unit: "m", min: 0.05, max: 5, step: 0.05 },
+  { key: "radar_resolution_m", label: "Radar's voxels", unit: "m", step: 0.1 },
+  { key: "vision_resolution_m", label: "Camera's voxels", unit: "m", step: 0.05 },
 ] as const;
+
+const MEMORY = LIMITS.PerceptionSettingsBody.memory_limit_bytes;
 
 /** Nothing is asked for before it has been said which maps begin anew, and held for. */
 function Anew({ body, giveUp }: { body: PerceptionSettingsBody; giveUp: () => void }) {
@@ -61,31 +63,27 @@ export function MapSettings({ settings }: { settings: PerceptionSettings }) {
     <details class="details" data-testid="map-settings">
       <summary>Vehicle and maps</summary>
       <div class="field-grid">
-        {AT_ONCE.map(({ key, ...field }) => (
-          <NumberField
-            key={key}
-            {...field}
-            value={settings[key]}
-            disabled={disabled}
-            testid={`perception-${key}`}
-            onChange={(value) => void setPerception({ [key]: value }, MAP_SETTINGS)}
-          />
-        ))}
-        {VOXELS.map(({ key, ...field }) => (
-          <NumberField
-            key={key}
-            {...field}
-            value={wanted[key] ?? settings[key]}
-            disabled={disabled}
-            testid={`perception-${key}`}
-            onChange={(value) => want({ [key]: value })}
-          />
-        ))}
+        <NumberFields
+          fields={AT_ONCE}
+          limits={LIMITS.PerceptionSettingsBody}
+          values={settings}
+          disabled={disabled}
+          group="perception"
+          onChange={(key, value) => void setPerception({ [key]: value }, MAP_SETTINGS)}
+        />
+        <NumberFields
+          fields={VOXELS}
+          limits={LIMITS.PerceptionSettingsBody}
+          values={{ ...settings, ...wanted }}
+          disabled={disabled}
+          group="perception"
+          onChange={(key, value) => want({ [key]: value })}
+        />
         <NumberField
           label="Memory per map"
           unit="MB"
-          min={1}
-          max={100_000}
+          min={MEMORY.min / BYTES_PER_MB}
+          max={MEMORY.max / BYTES_PER_MB}
           step={100}
           value={memory_bytes / BYTES_PER_MB}
           disabled={disabled}

@@ -92,6 +92,13 @@ function drawSection(pen: Pen, doc: SectionDoc): void {
 }
 
 const EMPTY = { across: false, thickness_m: 4, reach_m: 25 };
+const SIZES = [
+  { key: "thickness_m", label: "Thickness", unit: "m", step: 0.5 },
+  { key: "reach_m", label: "To both sides", unit: "m", step: 10 },
+] as const;
+
+const SIZE_LIMITS = { thickness_m: { min: 0.5, max: 50 }, reach_m: { min: 10, max: 150 } };
+
 const cellsOf = (doc: SectionDoc | null) =>
   doc?.maps.reduce((sum, map) => sum + map.known_ground.filter((known) => !known).length, 0) ?? 0;
 
@@ -118,25 +125,12 @@ export function SectionPanel({ source }: { source: Source }) {
         />
       </div>
       <div class="field-grid">
-        <NumberField
-          label="Thickness"
-          unit="m"
-          min={0.5}
-          max={50}
-          step={0.5}
-          value={thickness_m}
-          testid="section-thickness"
-          onChange={(next) => setWanted({ ...wanted, thickness_m: next })}
-        />
-        <NumberField
-          label="To both sides"
-          unit="m"
-          min={10}
-          max={150}
-          step={10}
-          value={reach_m}
-          testid="section-reach"
-          onChange={(next) => setWanted({ ...wanted, reach_m: next })}
+        <NumberFields
+          fields={SIZES}
+          limits={SIZE_LIMITS}
+          values={wanted}
+          group="section"
+          onChange={(key, value) => setWanted({ ...wanted, [key]: value })}
         />
       </div>
       <Drawn

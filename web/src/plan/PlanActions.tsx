@@ -12,7 +12,7 @@ const PLACE = "upload";
 function refusal(): string | null {
   if (!lease.value.mine) return "You observe: take control to upload";
   if (isInAir.value) return "Not while the vehicle is in the air";
-  return uploadObstacle();
+  return uploadRefusal();
 }
 
 function Upload() {

@@ -63,18 +63,11 @@ function RowActions({ recording, isOpen }: { recording: RecordingDoc; isOpen: bo
   const [asks, setAsks] = useState(false);
   if (asks) {
     return (
-      <span class="row confirm">
-        <Button
-          kind="danger"
-          testid="recording-delete-confirm"
-          onClick={() => void deleteRecording(recording.id).then(() => setAsks(false))}
-        >
-          Delete for good
-        </Button>
-        <Button kind="quiet" onClick={() => setAsks(false)}>
-          Keep
-        </Button>
-      </span>
+      <DeleteForGood
+        testid="recording-delete-confirm"
+        onDelete={() => void deleteRecording(recording.id).then(() => setAsks(false))}
+        onKeep={() => setAsks(false)}
+      />
     );
   }
   return (

@@ -20,6 +20,15 @@ interface Made {
 /** Nothing is written above these charts. */
 const TOP_PX = 8;
 
+/** What the charts over a flight's time share: its length, and where the pointer is. */
+const overTime = (review: ReviewDoc, pointing: Pointing) => ({
+  onHover: pointing.hover,
+  onPick: pointing.pick,
+  xRange: [0, review.duration_s] as [number, number],
+  xText: axisTime,
+  top: TOP_PX,
+});
+
 const noPoints = { points: { show: false } };
 
 /** Altitude above home against time: ground, what was flown, the plan at the nearest place and by its own clock. */
@@ -46,11 +55,7 @@ export function altitudeOverTime(review: ReviewDoc, size: Size, palette: Palette
     ],
     drawUnder: (u) => drawUnknown(u, unknown, palette),
     draw: () => undefined,
-    onHover: pointing.hover,
-    onPick: pointing.pick,
-    xRange: [0, review.duration_s],
-    xText: axisTime,
-    top: TOP_PX,
+    ...overTime(review, pointing),
   });
   const curves = [ground_rel_home_m, alt_rel_home_m, reference_alt_rel_home_m, planned_alt_rel_home_m];
   return { options, data: [t_s, ...curves] };
@@ -74,11 +79,7 @@ export function crossTrackOverTime(
     series: [{ stroke: palette.replayed, width: 2, ...noPoints }],
     drawUnder: () => undefined,
     draw: () => undefined,
-    onHover: pointing.hover,
-    onPick: pointing.pick,
-    xRange: [0, review.duration_s],
-    xText: axisTime,
-    top: TOP_PX,
+    ...overTime(review, pointing),
   });
   return { options, data: [t_s, cross_track_m] };
 }

@@ -14,3 +14,10 @@ export function flownLevel(
   if (certified_m === null) return "neutral";
   return flown_m < certified_m ? "near" : "good";
 }
+
+/** Where avoidance went on above the plan; null where the flight kept to it. */
+export function higherWords(figures: ReviewFigures): string | null {
+  const { higher_m, higher_from_item } = figures;
+  if (higher_m === null || higher_from_item === null) return null;
+  return `by ${metres(higher_m, 0)} from item ${higher_from_item}`;
+}

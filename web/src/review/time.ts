@@ -69,11 +69,3 @@ export function columns({ edges_m, counts }: Histogram, reach_m: number): Column
 export function reachOf({ edges_m }: Histogram, max_m: number | null): number {
   return Math.max(edges_m.at(-1) ?? 0, max_m ?? 0, 0.01) * 1.04;
 }
-
-/** A round step that gives about `wanted` of them up to `reach`. */
-export function roundStep(reach: number, wanted = 4): number {
-  const rough = reach / wanted;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const factor = [1, 2, 5, 10].find((candidate) => candidate * power >= rough * 0.999) ?? 10;
-  return factor * power;
-}

@@ -47,11 +47,18 @@ function ToolHint() {
   );
 }
 
+interface SceneProps {
+  /** Keys that are pressed in the 3D view, which is a page of its own. */
+  onKey: (event: KeyboardEvent) => void;
+  /** Messages, below the alerts. */
+  children: ComponentChildren;
+}
+
 /** The 3D view with what lies on it. */
-export function Scene() {
+export function Scene({ onKey, children }: SceneProps) {
   const id = pageId.value;
   // Without a surface model a recording, and a vehicle that flies, stand on plain ground of their own.
-  const isFlown = review.value !== null || (activeView.value.id === "fly" && followed.value !== null);
+  const isFlown = review.value !== null || (viewId.value === "fly" && followed.value !== null);
   const hasTerrain = terrain.value !== null || isFlown;
   return (
     <section class={`scene tool-${selection.value.tool}`} aria-label="3D view" data-testid="scene">
@@ -60,7 +67,7 @@ export function Scene() {
           src={`/view/${encodeURIComponent(id)}/`}
           title="3D view of terrain, safe surface and path"
           data-testid="view-frame"
-          onLoad={(event) => listenInside(event.currentTarget)}
+          onLoad={(event) => listenInside(event.currentTarget, onKey)}
         />
       )}
       <Loading />
@@ -78,7 +85,7 @@ export function Scene() {
       </div>
       <div class="scene-messages">
         <AlertBanner />
-        <Toasts />
+        {children}
       </div>
     </section>
   );

@@ -14,7 +14,7 @@ const hasPlace = {
 
 /** Whom the camera would follow in the present view; null: nobody is there. Told once, values change all the time. */
 export const followed = computed(() => {
-  if (activeView.value.id === "review" && isReplaying.value) return hasPlace.replay.value ? "replay" : null;
+  if (viewId.value === "review" && isReplaying.value) return hasPlace.replay.value ? "replay" : null;
   return hasPlace.live.value ? "live" : null;
 });
 
@@ -25,7 +25,7 @@ export function chase(): void {
 /** On the way into Fly, and when its vehicle appears there; on the way out the plan is looked at again. */
 export function startFollowing(): void {
   effect(() => {
-    const flies = activeView.value.id === "fly" && pageId.value !== null && link.value === "open";
+    const flies = viewId.value === "fly" && pageId.value !== null && link.value === "open";
     if (flies && followed.value === "live") frame("chase", "live");
     else if (!flies && follows.peek()) frame("plan");
   });

@@ -5,22 +5,6 @@ import { throttled } from "../ui/throttle";
 
 const HOVER_PERIOD_MS = 1000 / 15;
 
-/** At most one call per period; the last one always arrives. */
-export function throttled<T>(period_ms: number, act: (value: T) => void): (value: T) => void {
-  let last_ms = -Infinity;
-  let timer: ReturnType<typeof setTimeout> | undefined;
-  return (value) => {
-    clearTimeout(timer);
-    const run = () => {
-      last_ms = performance.now();
-      act(value);
-    };
-    const wait_ms = last_ms + period_ms - performance.now();
-    if (wait_ms <= 0) run();
-    else timer = setTimeout(run, wait_ms);
-  };
-}
-
 const hover = throttled<{ x: number; y: number } | null>(HOVER_PERIOD_MS, (at) => {
   send({ type: "hover_view", x: at?.x ?? null, y: at?.y ?? null });
 });
@@ -51,7 +35,7 @@ function watchHand(inside: Window): void {
 }
 
 /** The 3D view is a page of its own within ours: its pointer, keys and dragged files are passed on to us. */
-export function listenInside(frame: HTMLIFrameElement): void {
+export function listenInside(frame: HTMLIFrameElement, onKey: (event: KeyboardEvent) => void): void {
   const inside = frame.contentWindow;
   if (!inside) return;
   const { document } = inside;

@@ -20,7 +20,9 @@ export function App() {
         <Left />
       </aside>
       <main class="centre">
-        <Scene />
+        <Scene onKey={onKey}>
+          <Toasts />
+        </Scene>
         <Below />
         {Over && <Over />}
       </main>

@@ -10,11 +10,9 @@ import { carriesFiles } from "../ui/choose_files";
 
 /** A .csv holds points, unless radar files are what is looked at. */
 function isSamples(file: File): boolean {
-  const looksAtThem = activeView.value.id === "review" && study.value === "radar";
+  const looksAtThem = viewId.value === "review" && study.value === "radar";
   return isRadarSamples(file) || (looksAtThem && /\.csv$/i.test(file.name));
 }
-
-export const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
 
 /** Files may be dropped anywhere. While one is dragged a veil covers the page, the 3D view included, and takes
  * the drop. */

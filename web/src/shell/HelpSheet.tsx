@@ -52,6 +52,7 @@ async function signOut(): Promise<void> {
 export function HelpSheet() {
   return (
     <Dialog title="Help" testid="help-sheet" onClose={() => (openDialog.value = null)}>
+      <HelpPages />
       <div class="help">
         <section>
           <h3>From terrain to flight</h3>

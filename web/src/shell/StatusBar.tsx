@@ -138,7 +138,7 @@ export function StatusBar() {
         <Button
           kind="quiet"
           icon="help"
-          title="Help and keys (?)"
+          title="Help and keys (?), pages (H)"
           testid="help"
           onClick={() => (openDialog.value = "help")}
         />

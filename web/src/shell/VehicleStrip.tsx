@@ -234,7 +234,7 @@ function Operator() {
 /** Vehicle, link, recording and operator, in every view: there as soon as there is anything of it to say. */
 export function VehicleStrip() {
   const hasVehicle = adopted.value !== null;
-  const isNeeded = hasVehicle || review.value !== null || activeView.value.id !== "plan";
+  const isNeeded = hasVehicle || review.value !== null || viewId.value !== "plan";
   if (!isNeeded) return <div class="no-strip" />;
   return (
     <section class="vehicle-strip" aria-label="Vehicle" data-testid="vehicle-strip">

@@ -16,15 +16,6 @@ import { activeView } from "./views";
 
 let pressedG_ms = -Infinity;
 
-/** Asks for files of this computer. */
-export function chooseFiles(accept = "", take: (files: File[]) => void = takeFiles): void {
-  const input = document.createElement("input");
-  input.type = "file";
-  input.accept = accept;
-  input.onchange = () => take([...(input.files ?? [])]);
-  input.click();
-}
-
 function toggleSection(number: number): void {
   const id = activeView.value.sections[number - 1];
   if (!id) return;
@@ -82,6 +73,8 @@ function act(hit: Hit): void {
       return seekBy(hit.by_s ?? 0);
     case "frame":
       return stepFrame(hit.by ?? 0);
+    case "pages":
+      return openHelpPages();
     case "help":
       openDialog.value = "help";
   }
@@ -110,7 +103,7 @@ export function onKey(event: KeyboardEvent): void {
   const follows = afterG(pressedG_ms, at_ms);
   pressedG_ms = event.key.toLowerCase() === "g" && !key.mod && !inInput ? at_ms : -Infinity;
   const hit = shortcutOf(key, inInput, {
-    view: activeView.value.id as ViewId,
+    view: viewId.value,
     study: study.value,
     afterG: follows,
   });

@@ -24,11 +24,10 @@ export const SHORTCUTS = [
   { id: "seek", keys: "← or →", text: "Review: 10 s back, 10 s forward" },
   { id: "frame", keys: "← or →", text: "Radar files: one frame back or on, with Shift ten" },
   { id: "help", keys: "?", text: "This sheet" },
+  { id: "pages", keys: "H", text: "The pages of Help, in a tab of their own" },
 ] as const;
 
 export type ShortcutId = (typeof SHORTCUTS)[number]["id"];
-
-export type ViewId = "plan" | "fly" | "review";
 
 export interface Key {
   key: string;
@@ -122,6 +121,7 @@ function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
     v: "chase",
     k: "acknowledge",
     m: "sound",
+    h: "pages",
     "?": "help",
   };
   if (/^[1-7]$/.test(key)) return { id: "section", section: Number(key) };

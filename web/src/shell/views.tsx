@@ -15,7 +15,7 @@ import { viewId } from "../store/view";
 
 /** A view of the console: what stands left ("what I do"), right ("what is true") and below the 3D view. */
 export interface View {
-  id: "plan" | "fly" | "review";
+  id: ViewId;
   label: string;
   Left: ComponentType;
   Right: ComponentType;
@@ -55,31 +55,4 @@ export const views: readonly [View, ...View[]] = [
   },
 ];
 
-const byId = (id: string) => views.find((view) => view.id === id);
-const inAddress = () => byId(location.hash.slice(1).split("/")[0] ?? "");
-
-/** The address tells the view, so that it can be linked and reloaded; without it, the last one of this browser. */
-export const activeView = signal<View>(inAddress() ?? byId(lastView.value) ?? views[0]);
-
-export function goTo(id: View["id"]): void {
-  const view = byId(id);
-  if (!view || view === activeView.value) return;
-  activeView.value = view;
-  drawer.value = null;
-  // What is selected in the plan can be dragged in 3D: not where nobody means to edit.
-  const { tool, poi_id } = selection.value;
-  if (id !== "plan" && (tool !== "select" || poi_id !== null)) setSelection({ tool: "select", poi_id: null });
-}
-
-effect(() => {
-  const { id } = activeView.value;
-  const address = id === "review" && study.value !== "flights" ? `#review/${study.value}` : `#${id}`;
-  lastView.value = id;
-  if (location.hash !== address) history.replaceState(null, "", address);
-});
-
-window.addEventListener("hashchange", () => {
-  const view = inAddress();
-  if (view?.id === "review") study.value = studyIn(location.hash) ?? "flights";
-  if (view) goTo(view.id);
-});
+export const activeView = computed<View>(() => views.find(({ id }) => id === viewId.value) ?? views[0]);

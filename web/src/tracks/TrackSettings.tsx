@@ -4,47 +4,41 @@ import { lease } from "../store/flying";
 import { NumberFields, type NumberSpec } from "../ui/NumberField";
 import { Check, SelectField } from "../ui/fields";
 
-interface Field<Key> {
-  key: Key;
-  label: string;
-  unit: string;
-  min: number;
-  max: number;
-  step: number;
-  whole?: boolean;
-}
-type Numbers<T> = { [K in keyof T]: T[K] extends number ? K : never }[keyof T];
+/** The numbers of settings whose limits are told. */
+type Numbers<T, Limits> = {
+  [K in keyof T & keyof Limits]: T[K] extends number ? K & string : never;
+}[keyof T & keyof Limits];
+type Velocity = Numbers<VelocitySettings, typeof LIMITS.VelocitySettingsBody>;
+type Tracker = Numbers<TrackerSettings, typeof LIMITS.TrackerSettingsBody>;
 
-const VELOCITIES: readonly Field<Numbers<VelocitySettings>>[] = [
-  { key: "stands_m", label: "Clear of what stands", unit: "m", min: 0.3, max: 30, step: 0.5 },
-  { key: "stands_s", label: "Mind it ahead by", unit: "s", min: 1, max: 30, step: 1 },
-  { key: "max_speed_m_s", label: "Fastest, 0: the vehicle's", unit: "m/s", min: 0, max: 50, step: 0.5 },
-  { key: "max_turn_deg", label: "Sharpest turn", unit: "°", min: 5, max: 180, step: 5 },
-  { key: "leave_m_s", label: "Leave what is too near at", unit: "m/s", min: 0, max: 5, step: 0.1 },
+const VELOCITIES: readonly NumberSpec<Velocity>[] = [
+  { key: "stands_m", label: "Clear of what stands", unit: "m", step: 0.5 },
+  { key: "stands_s", label: "Mind it ahead by", unit: "s", step: 1 },
+  { key: "max_speed_m_s", label: "Fastest, 0: the vehicle's", unit: "m/s", step: 0.5 },
+  { key: "max_turn_deg", label: "Sharpest turn", unit: "°", step: 5 },
+  { key: "leave_m_s", label: "Leave what is too near at", unit: "m/s", step: 0.1 },
 ];
 
-const TRACKER: readonly Field<Numbers<TrackerSettings>>[] = [
-  { key: "range_sigma_m", label: "Range error", unit: "m", min: 0.01, max: 10, step: 0.05 },
-  { key: "bearing_sigma_deg", label: "Bearing error", unit: "°", min: 0.05, max: 30, step: 0.5 },
-  { key: "bearing_edge_deg", label: "Up to, off the nose", unit: "°", min: 0, max: 180, step: 5 },
-  { key: "bearing_edge_sigma_deg", label: "Bearing error beyond", unit: "°", min: 0.05, max: 45, step: 0.5 },
-  { key: "radial_speed_sigma_m_s", label: "Radial speed error", unit: "m/s", min: 0.01, max: 10, step: 0.05 },
+const TRACKER: readonly NumberSpec<Tracker>[] = [
+  { key: "range_sigma_m", label: "Range error", unit: "m", step: 0.05 },
+  { key: "bearing_sigma_deg", label: "Bearing error", unit: "°", step: 0.5 },
+  { key: "bearing_edge_deg", label: "Up to, off the nose", unit: "°", step: 5 },
+  { key: "bearing_edge_sigma_deg", label: "Bearing error beyond", unit: "°", step: 0.5 },
+  { key: "radial_speed_sigma_m_s", label: "Radial speed error", unit: "m/s", step: 0.05 },
   {
     key: "radial_speed_folded_m_s",
     label: "Speeds fold at, 0: never",
     unit: "m/s",
-    min: 0,
-    max: 1000,
     step: 0.5,
   },
-  { key: "extent_m", label: "Echo wanders by", unit: "m", min: 0, max: 10, step: 0.1 },
-  { key: "acceleration_m_s2", label: "Objects accelerate by", unit: "m/s²", min: 0, max: 50, step: 0.5 },
-  { key: "speed_m_s", label: "Usual speed", unit: "m/s", min: 0.1, max: 100, step: 0.5 },
-  { key: "gate", label: "Gate, squared sigmas", unit: "", min: 0.1, max: 1000, step: 0.5 },
-  { key: "birth", label: "Object below", unit: "", min: 0.01, max: 100, step: 0.1 },
-  { key: "birth_updates", label: "Seen at least", unit: "times", min: 1, max: 100, step: 1, whole: true },
-  { key: "death", label: "Forgotten above", unit: "", min: 0.01, max: 1000, step: 0.5 },
-  { key: "apart_m", label: "Objects are apart by", unit: "m", min: 0, max: 20, step: 0.25 },
+  { key: "extent_m", label: "Echo wanders by", unit: "m", step: 0.1 },
+  { key: "acceleration_m_s2", label: "Objects accelerate by", unit: "m/s²", step: 0.5 },
+  { key: "speed_m_s", label: "Usual speed", unit: "m/s", step: 0.5 },
+  { key: "gate", label: "Gate, squared sigmas", unit: "", step: 0.5 },
+  { key: "birth", label: "Object below", unit: "", step: 0.1 },
+  { key: "birth_updates", label: "Seen at least", unit: "times", step: 1, whole: true },
+  { key: "death", label: "Forgotten above", unit: "", step: 0.5 },
+  { key: "apart_m", label: "Objects are apart by", unit: "m", step: 0.25 },
 ];
 
 const CHOICES: readonly { value: VelocitySettings["choice"]; label: string }[] = [
@@ -64,16 +58,14 @@ export function TrackSettings({ settings: { tracker, velocities } }: { settings:
     <>
       <h3>Velocities past objects</h3>
       <div class="field-grid">
-        {VELOCITIES.map(({ key, ...field }) => (
-          <NumberField
-            key={key}
-            {...field}
-            value={velocities[key]}
-            disabled={disabled}
-            testid={`velocities-${key}`}
-            onChange={(value) => void setPerception({ velocities: { [key]: value } })}
-          />
-        ))}
+        <NumberFields
+          fields={VELOCITIES}
+          limits={LIMITS.VelocitySettingsBody}
+          values={velocities}
+          disabled={disabled}
+          group="velocities"
+          onChange={(key, value) => void setPerception({ velocities: { [key]: value } })}
+        />
       </div>
       <SelectField
         label="Where it gets tight"
@@ -99,16 +91,14 @@ export function TrackSettings({ settings: { tracker, velocities } }: { settings:
           onChange={(coordinates) => void setPerception({ tracker: { coordinates } })}
         />
         <div class="field-grid">
-          {TRACKER.map(({ key, ...field }) => (
-            <NumberField
-              key={key}
-              {...field}
-              value={tracker[key]}
-              disabled={disabled}
-              testid={`tracker-${key}`}
-              onChange={(value) => void setPerception({ tracker: { [key]: value } })}
-            />
-          ))}
+          <NumberFields
+            fields={TRACKER}
+            limits={LIMITS.TrackerSettingsBody}
+            values={tracker}
+            disabled={disabled}
+            group="tracker"
+            onChange={(key, value) => void setPerception({ tracker: { [key]: value } })}
+          />
         </div>
         <p class="hint">Other figures begin afresh: what was followed is found again within a second.</p>
       </details>

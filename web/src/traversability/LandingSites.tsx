@@ -129,8 +129,7 @@ export function LandingSites({ plan }: { plan: PlanDoc }) {
         <NumberField
           label="Rotor span"
           unit="m"
-          min={SPAN_M.min}
-          max={SPAN_M.max}
+          {...LIMITS.LandingSitesBody.rotor_span_m}
           step={0.1}
           value={span_m()}
           testid="rotor-span"
@@ -139,8 +138,7 @@ export function LandingSites({ plan }: { plan: PlanDoc }) {
         <NumberField
           label="Search within"
           unit="m"
-          min={5}
-          max={2000}
+          {...LIMITS.LandingSitesBody.radius_m}
           step={10}
           value={searched_m.value}
           testid="search-radius"

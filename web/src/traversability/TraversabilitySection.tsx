@@ -98,8 +98,7 @@ function WorkOut({ plan, state, isBusy, hasMap }: Props & { hasMap: boolean }) {
         label="Own grid"
         auto="0.3 m, or the model's if coarser"
         unit="m"
-        min={0.1}
-        max={10}
+        {...LIMITS.TraversabilityBody.resolution_m}
         step={0.1}
         initial={DEFAULT_M}
         value={resolution_m.value}

@@ -67,7 +67,7 @@ export const putAway = () =>
 export const rotorSpan_m = signal<number | null>(null);
 export const searched_m = signal(150);
 
-export const SPAN_M = { min: 0.1, max: 10 } as const;
+const SPAN_M = LIMITS.LandingSitesBody.rotor_span_m;
 
 export function span_m(): number {
   const own_m = 2 * (document_.value?.profile.radius_m ?? 0.4);

@@ -12,33 +12,43 @@ const set = (label: string, fields: Partial<MissionDoc>) => editGroup("mission",
 const demand = (label: string, fields: Partial<ClearanceDoc>) =>
   editGroup("clearance", "mission", label, fields);
 
+const CAMERA = [
+  {
+    key: "gimbal_pitch_deg",
+    label: "Set the gimbal",
+    says: "Gimbal",
+    auto: "(left alone)",
+    unit: "°",
+    ...LIMITS.MissionDoc.gimbal_pitch_deg,
+    step: 5,
+    initial: -90,
+    testid: "gimbal",
+  },
+  {
+    key: "camera_trigger_m",
+    label: "Photo by distance",
+    says: "Camera trigger",
+    auto: "(none)",
+    unit: "m",
+    min: 0.1,
+    ...LIMITS.MissionDoc.camera_trigger_m,
+    step: 0.5,
+    initial: 5,
+    testid: "trigger",
+  },
+] as const;
+
 function Camera({ mission }: { mission: MissionDoc }) {
   return (
     <>
-      <AutoField
-        label="Set the gimbal"
-        auto="(left alone)"
-        unit="°"
-        min={-90}
-        max={30}
-        step={5}
-        value={mission.gimbal_pitch_deg}
-        initial={-90}
-        testid="gimbal"
-        onChange={(gimbal_pitch_deg) => set("Gimbal", { gimbal_pitch_deg })}
-      />
-      <AutoField
-        label="Photo by distance"
-        auto="(none)"
-        unit="m"
-        min={0.1}
-        max={1000}
-        step={0.5}
-        value={mission.camera_trigger_m}
-        initial={5}
-        testid="trigger"
-        onChange={(camera_trigger_m) => set("Camera trigger", { camera_trigger_m })}
-      />
+      {CAMERA.map(({ key, says, ...field }) => (
+        <AutoField
+          key={key}
+          {...field}
+          value={mission[key]}
+          onChange={(value) => set(says, { [key]: value })}
+        />
+      ))}
     </>
   );
 }

@@ -38,8 +38,7 @@ function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
         bare
         label={`Loiter at point ${number}`}
         unit="s"
-        min={0}
-        max={3600}
+        {...LIMITS.PoiDoc.loiter_s}
         step={1}
         value={poi.loiter_s}
         testid="poi-loiter"

@@ -14,9 +14,7 @@ const demand = (label: string, fields: Partial<ClearanceDoc>) =>
 
 const first = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** Demands are rounded up, as everywhere. */
-
-/** Every term with where it comes from, their sum, and what a smaller clearance leaves out. */
+/** Every term, rounded up, with where it comes from, their sum, and what a smaller clearance leaves out. */
 function Terms({ budget, isOld }: { budget: BudgetDoc; isOld: boolean }) {
   return (
     <div class={`terms ${isOld ? "stale" : ""}`} data-testid="clearance-terms">
@@ -57,7 +55,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
           min={0.05}
           max={500}
           step={0.1}
-          value={profile.mass_kg ?? 2}
+          value={profile.mass_kg}
           testid="mass-input"
           onChange={(mass_kg) => set("Mass", { mass_kg })}
         />
@@ -68,7 +66,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
           max={32}
           step={1}
           whole
-          value={profile.rotors ?? 4}
+          value={profile.rotors}
           testid="rotors-input"
           onChange={(rotors) => set("Rotors", { rotors })}
         />
@@ -78,7 +76,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
           min={0.03}
           max={10}
           step={0.01}
-          value={profile.rotor_diameter_m ?? 0.254}
+          value={profile.rotor_diameter_m}
           testid="rotor-diameter-input"
           onChange={(rotor_diameter_m) => set("Rotor diameter", { rotor_diameter_m })}
         />
@@ -90,7 +88,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
         min={0}
         max={50}
         step={0.1}
-        value={profile.downwash_m ?? null}
+        value={profile.downwash_m}
         initial={0.5}
         testid="downwash"
         onChange={(downwash_m) => set("Downwash", { downwash_m })}
@@ -122,7 +120,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
         <Segmented
           label="Flown as"
           testid="flown-as"
-          value={clearance.way ?? "auto"}
+          value={clearance.way}
           options={[
             { value: "auto", label: "AUTO", title: "The mission on board" },
             { value: "guided", label: "GUIDED", title: "Waypoints handed over one at a time" },
@@ -137,7 +135,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
         min={0}
         max={50}
         step={0.1}
-        value={profile.following_m ?? null}
+        value={profile.following_m}
         initial={1}
         testid="following"
         onChange={(following_m) => set("Following error", { following_m })}
@@ -148,7 +146,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
         min={0}
         max={20}
         step={0.01}
-        value={profile.dsm_rms_m ?? 0.023}
+        value={profile.dsm_rms_m}
         testid="dsm-rms-input"
         onChange={(dsm_rms_m) => set("Accuracy of the surface model", { dsm_rms_m })}
       />

@@ -15,11 +15,16 @@ const DEFAULT_CAMERA: CameraDoc = {
 };
 
 const CAMERA_FIELDS = [
-  { key: "image_width_px", label: "Image width", unit: "px", min: 1, max: 100_000, step: 1, whole: true },
-  { key: "image_height_px", label: "Image height", unit: "px", min: 1, max: 100_000, step: 1, whole: true },
-  { key: "focal_mm", label: "Focal length", unit: "mm", min: 0.1, max: 1000, step: 0.1 },
-  { key: "sensor_width_mm", label: "Sensor width", unit: "mm", min: 0.1, max: 200, step: 0.1 },
-  { key: "sensor_height_mm", label: "Sensor height", unit: "mm", min: 0.1, max: 200, step: 0.1 },
+  { key: "image_width_px", label: "Image width", unit: "px", min: 1, step: 1, whole: true },
+  { key: "image_height_px", label: "Image height", unit: "px", min: 1, step: 1, whole: true },
+  { key: "focal_mm", label: "Focal length", unit: "mm", min: 0.1, step: 0.1 },
+  { key: "sensor_width_mm", label: "Sensor width", unit: "mm", min: 0.1, step: 0.1 },
+  { key: "sensor_height_mm", label: "Sensor height", unit: "mm", min: 0.1, step: 0.1 },
+] as const;
+
+const OVERLAPS = [
+  { key: "side_overlap", label: "Side overlap", testid: "side-overlap-input" },
+  { key: "front_overlap", label: "Front overlap", testid: "front-overlap-input" },
 ] as const;
 
 const set = (label: string, fields: Partial<SurveyDoc>) => editGroup("survey", "points", label, fields);
@@ -75,6 +80,7 @@ function Camera({ camera }: { camera: CameraDoc | null }) {
           <NumberField
             key={key}
             {...field}
+            {...LIMITS.CameraDoc[key]}
             value={camera[key]}
             onChange={(value) => change({ ...camera, [key]: value })}
           />
@@ -94,32 +100,24 @@ export function SurveyFields({ plan }: { plan: PlanDoc }) {
           label="Ground sampling"
           unit="cm"
           min={0.05}
-          max={100}
+          {...LIMITS.SurveyDoc.gsd_cm}
           step={0.1}
           value={survey.gsd_cm}
           testid="gsd-input"
           onChange={(gsd_cm) => set("Ground sampling", { gsd_cm })}
         />
-        <NumberField
-          label="Side overlap"
-          unit="%"
-          min={0}
-          max={94}
-          step={1}
-          value={survey.side_overlap * 100}
-          testid="side-overlap-input"
-          onChange={(percent) => set("Side overlap", { side_overlap: percent / 100 })}
-        />
-        <NumberField
-          label="Front overlap"
-          unit="%"
-          min={0}
-          max={94}
-          step={1}
-          value={survey.front_overlap * 100}
-          testid="front-overlap-input"
-          onChange={(percent) => set("Front overlap", { front_overlap: percent / 100 })}
-        />
+        {OVERLAPS.map(({ key, ...field }) => (
+          <NumberField
+            key={key}
+            {...field}
+            unit="%"
+            min={0}
+            max={94}
+            step={1}
+            value={survey[key] * 100}
+            onChange={(percent) => set(field.label, { [key]: percent / 100 })}
+          />
+        ))}
       </div>
       <AutoField
         label="Own angle of the lines"
