@@ -5,6 +5,7 @@ import { helpPages } from "./src/help/build";
 const SERVER = "http://127.0.0.1:8000";
 
 export default defineConfig({
+  plugins: [helpPages()],
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
   build: {
     target: "es2022",
@@ -15,6 +16,7 @@ export default defineConfig({
   server: {
     proxy: {
       "/api": SERVER,
+      "/help": SERVER,
       "/login": SERVER,
       "/signin": SERVER,
       "/view": { target: SERVER, ws: true },

@@ -13,7 +13,7 @@ vi.stubGlobal("fetch", (path: string, init: RequestInit) => {
   return Promise.resolve(new Response("{}"));
 });
 
-const { aim, findSites, pointOut, rotorSpan_m, span_m } = await import("../src/traversability/commands");
+const { aim, findSites, pointOut, rotorSpan_m, span_m } = await import("../src/traversability/ground_orders");
 const { places } = await import("../src/traversability/places");
 
 const PLACE = { lat_deg: 37.73, lon_deg: 14.99 };

@@ -19,6 +19,7 @@ describe("keys", () => {
     [press("k"), "acknowledge"],
     [press("M"), "sound"],
     [press("?", false, true), "help"],
+    [press("h"), "pages"],
   ])("%j means %s", (key, id) => {
     expect(shortcutOf(key, false)?.id).toBe(id);
   });

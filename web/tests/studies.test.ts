@@ -127,4 +127,11 @@ describe("the address", () => {
   ])("%s tells what Review looks at", (hash, study) => {
     expect(studyIn(hash)).toBe(study);
   });
+
+  it("tells the view, and is made of what it tells", () => {
+    expect(["#plan", "#review/radar", "", "#elsewhere"].map(viewIn)).toEqual(["plan", "review", null, null]);
+    expect(addressOf("fly", "radar")).toBe("#fly");
+    expect(addressOf("review", "flights")).toBe("#review");
+    expect(addressOf("review", "radar")).toBe("#review/radar");
+  });
 });

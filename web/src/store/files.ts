@@ -177,15 +177,3 @@ function addJob(job: JobDoc): void {
 export async function cancelJob(id: string): Promise<void> {
   await act("POST", `/api/jobs/${id}/cancel`, "jobs");
 }
-
-/** A request without an answer to keep; its error appears at `place`. */
-export async function act(method: string, path: string, place: string): Promise<boolean> {
-  try {
-    await request(method, path);
-    setError(place, null);
-    return true;
-  } catch (error) {
-    setError(place, asErrorDoc(error));
-    return false;
-  }
-}

@@ -16,17 +16,13 @@ import { acknowledge, isLatched, withText, type TextEntry } from "./texts";
 import { emptyTrack, extend, trackFrom, type Track } from "./track";
 
 /** The vehicle, the link to it and what may be done with it, as the server last said. */
-export type FlyingMessage =
-  | VehicleMessage
-  | TrackMessage
-  | TextMessage
-  | LinkMessage
-  | TransferMessage
-  | FlightMessage
-  | FlyMessage
-  | LeaseMessage
-  | NodesMessage
-  | RecorderMessage;
+export type FlyingMessage = Extract<
+  ServerMessage,
+  {
+    type:
+      "vehicle" | "track" | "text" | "link" | "transfer" | "flight" | "fly" | "lease" | "nodes" | "recorder";
+  }
+>;
 
 /** Where values come from: the vehicle, or a recording. */
 export type Source = VehicleMessage["source"];

@@ -54,3 +54,15 @@ export async function order({ place, path, body, method = "POST", done }: Order)
     setPending(place, false);
   }
 }
+
+/** A request without an answer to keep; its error appears at `place`. */
+export async function act(method: string, path: string, place: string): Promise<boolean> {
+  try {
+    await request(method, path);
+    setError(place, null);
+    return true;
+  } catch (error) {
+    setError(place, asErrorDoc(error));
+    return false;
+  }
+}

@@ -1,5 +1,15 @@
 import { computed, signal } from "@preact/signals";
-import type { RadarFileDoc, RadarFrame, RadarOpened, RadarReading } from "../messages";
+import type {
+  RadarFileDoc,
+  RadarFrame,
+  RadarOpened,
+  RadarReading,
+  ScenarioDoc,
+  ScenarioResultDoc,
+  ScenarioRunDoc,
+} from "../messages";
+
+/** What Review looks at beside flights: files of raw radar samples, and scenarios. */
 
 /** Files of raw samples that the station keeps; null: not told yet. */
 export const radarFiles = signal<readonly RadarFileDoc[] | null>(null);
@@ -15,3 +25,16 @@ export const wantedFrame = signal(0);
 export const marked = signal<number | null>(null);
 
 export const chosen = computed(() => radarFiles.value?.find((file) => file.id === chosenId.value) ?? null);
+
+/** What can be run; null: not asked yet. */
+export const scenarios = signal<readonly ScenarioDoc[] | null>(null);
+/** The one that runs, and those that were run, newest first. */
+export const runs = signal<readonly ScenarioRunDoc[]>([]);
+/** The scenario that this page looks at, and the result that is open. */
+export const chosenName = signal<string | null>(null);
+export const shownResult = signal<ScenarioResultDoc | null>(null);
+
+export const running = computed(() => runs.value.find((run) => run.state === "running") ?? null);
+export const chosenScenario = computed(
+  () => scenarios.value?.find((one) => one.name === chosenName.value) ?? null,
+);

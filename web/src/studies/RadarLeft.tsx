@@ -27,14 +27,11 @@ function Delete({ file }: { file: RadarFileDoc }) {
     );
   }
   return (
-    <span class="row confirm">
-      <Button kind="danger" testid="radar-delete-confirm" onClick={() => void remove(file.id)}>
-        Delete for good
-      </Button>
-      <Button kind="quiet" onClick={() => setAsks(false)}>
-        Keep
-      </Button>
-    </span>
+    <DeleteForGood
+      testid="radar-delete-confirm"
+      onDelete={() => void remove(file.id)}
+      onKeep={() => setAsks(false)}
+    />
   );
 }
 

@@ -42,15 +42,6 @@ function DetectionTable({ detections }: { detections: readonly RadarDetectionDoc
   );
 }
 
-function Fact({ label, value }: { label: string; value: string }) {
-  return (
-    <div class="figure">
-      <dt>{label}</dt>
-      <dd>{value}</dd>
-    </div>
-  );
-}
-
 function Parameters({ of }: { of: RadarParametersDoc }) {
   return (
     <dl class="figures-list" data-testid="radar-parameters">

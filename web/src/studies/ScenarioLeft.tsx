@@ -146,8 +146,7 @@ function Start() {
         label="Seed of scene, noise and wind"
         unit=""
         value={seed}
-        min={0}
-        max={10_000}
+        {...LIMITS.RunScenario.seed}
         step={1}
         whole
         testid="scenario-seed"

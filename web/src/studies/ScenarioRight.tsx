@@ -1,14 +1,6 @@
 import { day, duration } from "../format";
-import { chosenScenario, scenarios, shownResult } from "../store/scenarios";
-
-function Fact({ label, value }: { label: string; value: string }) {
-  return (
-    <div class="figure">
-      <dt>{label}</dt>
-      <dd>{value}</dd>
-    </div>
-  );
-}
+import { chosenScenario, scenarios, shownResult } from "../store/studies";
+import { Fact } from "../ui/Fact";
 
 /** What is proved, by whom it was measured first, and what came of it. */
 export function ScenarioRight() {

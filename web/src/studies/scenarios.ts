@@ -6,6 +6,8 @@ import { order } from "../store/outcomes";
 import { chosenName, runs, scenarios, shownResult } from "../store/studies";
 import { setError } from "../store/state";
 
+/** Scenarios: what this page asks of the server, and what their figures say. */
+
 /** Where errors of this study appear. */
 export const SCENARIOS = "scenarios";
 export const RUNS = "scenario_runs";
@@ -55,3 +57,19 @@ effect(() => {
   if (mine.state === "done") void openResult(mine.id);
   else if (mine.error) setError(RUNS, mine.error);
 });
+
+/** Three digits that count, as the command line has it; small numbers keep theirs. */
+export function measuredText(value: number | null): string {
+  if (value === null) return DASH;
+  const decimals = value === 0 ? 0 : Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value)))));
+  return number(value, Number.isInteger(value) ? 0 : decimals);
+}
+
+export const textWithUnit = (text: string, unit: string) =>
+  unit && text !== DASH ? `${text} ${unit}` : text;
+
+export function limitText({ least, most, unit }: ScenarioFigureDoc): string {
+  if (least !== null && most !== null && least === most) return textWithUnit(measuredText(least), unit);
+  if (least !== null) return `≥ ${textWithUnit(measuredText(least), unit)}`;
+  return most === null ? "" : `≤ ${textWithUnit(measuredText(most), unit)}`;
+}

@@ -96,3 +96,48 @@ export function NumberField(props: Props) {
     </div>
   );
 }
+
+export interface NumberSpec<Key extends string> {
+  key: Key;
+  label: string;
+  unit: string;
+  step: number;
+  /** Whole numbers only. */
+  whole?: boolean;
+}
+
+interface FieldsProps<Key extends string> {
+  fields: readonly NumberSpec<Key>[];
+  limits: Readonly<Record<Key, { min: number; max: number }>>;
+  values: Readonly<Record<Key, number>>;
+  disabled?: boolean;
+  /** Their test ids begin so. */
+  group: string;
+  onChange: (key: Key, value: number) => void;
+}
+
+/** Numbers that belong together, one field for each. */
+export function NumberFields<Key extends string>({
+  fields,
+  limits,
+  values,
+  disabled = false,
+  group,
+  onChange,
+}: FieldsProps<Key>) {
+  return (
+    <>
+      {fields.map(({ key, ...field }) => (
+        <NumberField
+          key={key}
+          {...field}
+          {...limits[key]}
+          value={values[key]}
+          disabled={disabled}
+          testid={`${group}-${key}`}
+          onChange={(value) => onChange(key, value)}
+        />
+      ))}
+    </>
+  );
+}

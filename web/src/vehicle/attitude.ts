@@ -6,10 +6,6 @@ export const HALF_WIDTH = 130;
 export const HALF_HEIGHT = 70;
 export const PER_DEG = 2.4;
 
-const DEG = 180 / Math.PI;
-
-export const degreesOf = (rad: number) => rad * DEG;
-
 /**
  * What moves the world behind the aircraft: nose down moves the horizon up, a bank to the right turns it to the left.
  * The pitch is held where some of the horizon's side still shows which way is up.

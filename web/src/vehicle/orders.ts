@@ -65,6 +65,17 @@ async function takeFly(answer: Response | null): Promise<boolean> {
   return true;
 }
 
+/** Why nothing can be uploaded, by the verdict on the open plan. */
+export function uploadObstacle(verdict: VerdictKind): string | null {
+  if (verdict === "none") return "Plan a path first";
+  if (verdict === "error") return "The plan has an error: see Plan";
+  if (verdict === "not_certified") return "The plan is NOT CERTIFIED: mend it in Plan";
+  return verdict === "computing" ? "Computing the plan…" : null;
+}
+
+/** Why the open plan cannot be uploaded now. */
+export const uploadRefusal = () => uploadObstacle(verdictOf(plan.value, isFresh.value));
+
 export async function uploadPlan(place: string): Promise<void> {
   await allSent();
   const revision = plan.value?.revision;
