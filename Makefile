@@ -13,9 +13,11 @@ PIP := PIP_DISABLE_PIP_VERSION_CHECK=1 $(VENV_PYTHON) -m pip install --quiet --o
 WITH_NODE := PATH="$(CURDIR)/.venv/bin:$$PATH"
 NODE_IS_NEW_ENOUGH := node -e 'const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)' && npm --version
-KERNELS := $(shell grep -rl --include='*.py' njit mapping planning telemetry)
+# Floors with compiled kernels. What was compiled before a module moved cannot be loaded any more.
+FLOORS := mapping planning telemetry
+KERNELS := $(shell grep -rl --include='*.py' njit $(FLOORS))
 WEB_SOURCES := $(shell find web -mindepth 1 \( -name node_modules -o -name dist -o -name coverage \) -prune \
-  -o -print 2>/dev/null)
+  -o -print 2>/dev/null) mkdocs.yml $(wildcard docs/*)
 
 # $(call step,label,command): one line with the seconds it took; the command's output only if it fails.
 define step
@@ -27,12 +29,12 @@ else \
 fi
 endef
 
-.PHONY: help setup demo test check bench proof lock clean
+.PHONY: help setup demo test check docs screenshots coverage bench proof wheel lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
 help: ## list the tasks
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' Makefile
 
 setup: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## install everything that running Hedgehop needs
 	@echo 'Ready: make demo'
@@ -52,13 +54,32 @@ check: $(STAMPS)/test web/node_modules/.stamp ## lint, formatting, types and the
 	@.venv/bin/ruff format --check .
 	@$(WITH_NODE) PYRIGHT_PYTHON_IGNORE_WARNINGS=1 .venv/bin/pyright
 	@.venv/bin/lint-imports --no-cache --no-logo
+	@$(VENV_PYTHON) -m tests.rooms
 	@cd web && $(WITH_NODE) npm run --silent check
+
+docs: $(STAMPS)/test ## build the documents as a site, in build/docs
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
+	@echo 'Open build/docs/index.html'
+
+screenshots: $(STAMPS)/test web/dist/index.html ## take the pictures of the documents anew (about five minutes)
+	@$(VENV_PYTHON) -m tests.screenshots
+
+coverage: $(STAMPS)/test $(STAMPS)/kernels ## count the lines and branches that tests reach, at least 90 % of mapping's and of planning's
+	@for floor in mapping planning; do \
+	  $(VENV_PYTHON) -m coverage run --data-file=.coverage.$$floor -m pytest --quiet tests/$$floor && \
+	  $(VENV_PYTHON) -m coverage report --data-file=.coverage.$$floor --include="$$floor/*" || exit; \
+	done
 
 bench: $(STAMPS)/test ## measure the speed of the kernels and print it
 	@$(VENV_PYTHON) -m tests.bench
 
 proof: $(STAMPS)/test ## prove the certificates of over 200 missions by a slow independent measurement, print the table
 	@$(VENV_PYTHON) -m tests.proof
+
+wheel: $(STAMPS)/project web/dist/index.html ## build one wheel with the console inside, for machines without a checkout
+	$(call step,The wheel,rm -f dist/hedgehop-*.whl && $(VENV_PYTHON) -m pip wheel --disable-pip-version-check \
+	  --no-deps --no-build-isolation --wheel-dir dist .)
+	@ls dist/hedgehop-*.whl
 
 lock: ## resolve the requirements files anew (LOCK_ARGS=--upgrade for newer versions)
 	@command -v $(UV) >/dev/null || { echo 'make lock needs uv: python3 -m pip install uv'; exit 1; }
@@ -71,7 +92,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
   --custom-compile-command 'make lock' $(LOCK_ARGS)
 
 clean: ## remove all that setup, tests and builds have made
-	rm -rf .venv web/node_modules web/dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv build web/node_modules web/dist dist .pytest_cache .ruff_cache .hypothesis .coverage*
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMPS)/venv:
@@ -96,7 +117,7 @@ $(STAMPS)/runtime: requirements.txt | $(STAMPS)/venv
 	$(call step,Step 2 of 7: Python packages (about half a minute),$(PIP) -r requirements.txt)
 	@touch $@
 
-$(STAMPS)/project: pyproject.toml planning/__init__.py $(STAMPS)/runtime
+$(STAMPS)/project: pyproject.toml mapping/version.py $(STAMPS)/runtime
 	$(call step,Step 3 of 7: Hedgehop itself,$(VENV_PYTHON) -m pip install --quiet --disable-pip-version-check \
 	  --no-deps --no-build-isolation --editable .)
 	@touch $@
@@ -117,7 +138,8 @@ web/dist/index.html: $(WEB_SOURCES) web/node_modules/.stamp
 	@touch $@
 
 $(STAMPS)/kernels: $(KERNELS) $(STAMPS)/project
-	$(call step,Step 7 of 7: compiling the kernels (once; about 20 s),$(VENV_PYTHON) -m server.compile_kernels)
+	$(call step,Step 7 of 7: compiling the kernels (once; about 20 s),find $(FLOORS) -name '*.nb[ic]' -delete; \
+	  $(VENV_PYTHON) -m server.compile_kernels)
 	@touch $@
 
 $(STAMPS)/test: requirements-test.txt requirements-peers.txt $(STAMPS)/project
