@@ -71,5 +71,17 @@ def test_the_consoles_packages_are_hashed_and_name_no_place_to_download_from() -
     assert [name for name, entry in packages.items() if name and "integrity" not in entry] == []
 
 
+def test_what_the_consoles_packages_ask_for_is_locked_for_every_machine() -> None:
+    """Also what is built for other processors only: where it is missing, newer versions of npm refuse all."""
+    packages = json.loads((ROOT / "web" / "package-lock.json").read_text())["packages"]
+    locked = {name.rpartition("node_modules/")[2] for name in packages}
+    asked = {
+        name
+        for entry in packages.values()
+        for name in {**entry.get("dependencies", {}), **entry.get("optionalDependencies", {})}
+    }
+    assert sorted(asked - locked) == []
+
+
 def test_the_installed_version_is_the_one_that_certificates_name() -> None:
     assert importlib.metadata.version("hedgehop") == planning.__version__
