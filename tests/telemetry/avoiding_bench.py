@@ -82,7 +82,7 @@ class Craft:
         self.senses = [Sense("vision", 7.0, 0.2)] if senses is None else senses
         self.onboard = OnboardMission(items, HOME.lat_deg, HOME.lon_deg, HOME.alt_amsl_m, "digest")
         self.state = VehicleState(1, 1)
-        self.avoiding = Avoiding((1, 1), rest=self._rest)
+        self.avoiding = Avoiding((1, 1), remaining=self._remaining)
         self.trail: list[tuple[float, float, float]] = []
         self.orders: list[tuple[float, Any]] = []
         self.texts: list[str] = []
@@ -92,8 +92,8 @@ class Craft:
         for name, rate_hz in ((33, 20), (30, 20), (42, 4), (245, 4), (242, 0.5)):
             self.bench.stream(name, rate_hz)
 
-    def _rest(self, state: VehicleState) -> Rest | None:
-        return rest_of_flight(self.onboard, state)
+    def _remaining(self, state: VehicleState) -> RemainingMission | None:
+        return remaining_flight(self.onboard, state)
 
     @property
     def now_s(self) -> float:
@@ -240,7 +240,7 @@ def targets(*places: tuple[float, float, float]) -> tuple[GuidedTarget, ...]:
     )
 
 
-def rest_at(it: Craft, item: int) -> Rest:
-    rest = rest_from(it.onboard, item)
-    assert rest is not None
-    return rest
+def remaining_at(it: Craft, item: int) -> RemainingMission:
+    remaining = remaining_from(it.onboard, item)
+    assert remaining is not None
+    return remaining

@@ -11,7 +11,8 @@ from unittest import mock
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+
 SCALE = 100.0
 """BlueSky is for aircraft: nearer than 10 m two of them are head on to it. So all lengths are made as much larger."""
 AFAR_M = 1e6

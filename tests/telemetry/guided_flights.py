@@ -45,7 +45,7 @@ class ScriptedFlight:
         self.sent: list[Any] = []
         plan = guided_plan(replace(read_wpl(mission.read_bytes()), firmware="ardupilot"))
         home = read_wpl(mission.read_bytes()).home
-        self.frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
+        self.frame = NeuFrame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
         self.bench = Bench(
             SimulatedVehicle(
                 self.frame, gnss="perfect", boot_s=0.5, parameters=Parameters(BATT_CAPACITY=60000, **parameters)

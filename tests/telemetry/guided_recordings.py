@@ -47,7 +47,7 @@ def replayed_stretch(folder: Path, stretch: Stretch) -> Replay:
     """From hovering where the real vehicle was. Times are the vehicle's own: its simulator lost some of the wall's."""
     orders, flown = _read(folder / f"{stretch.recording}.mcap", stretch)
     start = flown[np.searchsorted(flown[:, 0], orders[0][0]) - 1]
-    frame = Frame(start[1], start[2], 100.0)
+    frame = NeuFrame(start[1], start[2], 100.0)
     real = np.array([(t_s, *frame.neu_from_geodetic(lat, lon, 0.0)[:2], up) for t_s, lat, lon, up in flown])
     ours = _simulated(frame, float(start[3]), orders, float(real[-1, 0]))
     line = _legs(frame, orders)
@@ -87,22 +87,22 @@ def _is_order(message: Any) -> bool:
     return _is_place(message) or (message.get_type() == "COMMAND_LONG" and message.command == CHANGE_SPEED)
 
 
-def _place(frame: Frame, message: Any) -> tuple[float, float, float]:
+def _place(frame: NeuFrame, message: Any) -> tuple[float, float, float]:
     north, east, _ = frame.neu_from_geodetic(message.lat_int / 1e7, message.lon_int / 1e7, 0.0)
     return north, east, message.alt
 
 
-def _leads_away(frame: Frame, message: Any) -> bool:
+def _leads_away(frame: NeuFrame, message: Any) -> bool:
     return float(np.hypot(*_place(frame, message)[:2])) > LEG_M
 
 
-def _legs(frame: Frame, orders: list[Order]) -> F64:
+def _legs(frame: NeuFrame, orders: list[Order]) -> F64:
     places = [_place(frame, message) for _, message in orders if _is_place(message)]
     first = next(k for k, place in enumerate(places) if np.hypot(*place[:2]) > LEG_M)
     return np.array(places[max(0, first - 1) :])
 
 
-def _simulated(frame: Frame, up_m: float, orders: list[Order], end_s: float) -> F64:
+def _simulated(frame: NeuFrame, up_m: float, orders: list[Order], end_s: float) -> F64:
     """(N, 4) time, north, east, up."""
     bench = Bench(SimulatedVehicle(frame, gnss="perfect", boot_s=0.5, parameters=Parameters(BATT_CAPACITY=60000)))
     bench.until(lambda: bench.vehicle.autopilot.position_ok)

@@ -35,6 +35,24 @@ async def until(condition: Callable[[], object], seconds: float = PATIENCE_S) ->
             await asyncio.sleep(0.01)
 
 
+@contextlib.asynccontextmanager
+async def again_and_again(look: Callable[[], None], every_s: float) -> AsyncIterator[None]:
+    """Frames come in real time, while the body runs."""
+
+    async def looking() -> None:
+        while True:
+            look()
+            await asyncio.sleep(every_s)
+
+    eye = asyncio.create_task(looking())
+    try:
+        yield
+    finally:
+        eye.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await eye
+
+
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
     with socket.socket(socket.AF_INET, kind) as sock:
         sock.bind(("127.0.0.1", 0))
@@ -47,6 +65,18 @@ class Console:
     def __init__(self) -> None:
         self.published: list[tuple[str, Published]] = []
         self.link: Link
+        self._right = OperatorRight()
+
+    async def handle(self, request: LinkRequest) -> Any:
+        return await Answering(self.link, self._right).answer(request)
+
+    @property
+    def vehicle(self) -> AdoptedVehicle | None:
+        return self.link.session and self.link.session.vehicle
+
+    @property
+    def pilot(self) -> Pilot | None:
+        return self.link.session and self.link.session.pilot
 
     def publish(self, topic: str, message: Published) -> None:
         self.published.append((topic, message))

@@ -73,11 +73,11 @@ class Flight:
     """Feeds a follower as its node would."""
 
     def __init__(self) -> None:
-        self.following = Following(run="test", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
+        self.following = ObjectTracking(run="test", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
         self.number = 0
-        self.told: list[Told] = []
+        self.told: list[Outcome[TracksStatus]] = []
 
-    def fly(self, from_s: float, to_s: float, *things: Thing, **changes: Any) -> Told:
+    def fly(self, from_s: float, to_s: float, *things: Thing, **changes: Any) -> Outcome[TracksStatus]:
         for k in range(round(from_s * 20), round(to_s * 20)):
             t_s = k / 20
             self.following.perceiver.on_state(flights.state_at(t_s, T0_MONO_S, T0_UTC_S, **changes))
@@ -85,7 +85,7 @@ class Flight:
                 self.frame(t_s, *things)
         return self.told[-1]
 
-    def frame(self, t_s: float, *things: Thing, made: Any = None) -> Told:
+    def frame(self, t_s: float, *things: Thing, made: Any = None) -> Outcome[TracksStatus]:
         self.number += 1
         made = made or frame(t_s, self.number, things)
         self.told.append(self.following.work(made, lambda: T0_MONO_S + t_s + 0.02))

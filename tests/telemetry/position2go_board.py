@@ -38,11 +38,12 @@ def frame(number: int, *, range_m: float = 8.0, azimuth_deg: float = 20.0, gain:
     return head + packed
 
 
-class Position2GoBoard:
+class Position2GoBoard(PseudoTerminals):
     """``device`` is the port's name; ``damage`` is what happens to the next answers, first one first."""
 
     def __init__(self, folder: Path) -> None:
         self.device = folder / "ttyACM0"
+        super().__init__(self.device)
         self.endpoints = list(ENDPOINTS)
         self.sweep_khz, self.chirp_ns, self.direction = (24_025_000, 24_225_000), 300_000, 0
         self.format = struct.pack("<BIIBB", 0x41, 128, 1, 1, 2)
@@ -54,49 +55,21 @@ class Position2GoBoard:
         self.frames = 0
         self.interval_us = 100_000
         """Of its own timer: on, as some other program left it."""
-        self._thread: threading.Thread | None = None
 
     def plug(self) -> None:
-        """A new pseudo-terminal under the same name, as USB does it; the board has started anew."""
+        """The board has started anew."""
         self.frames = 0
-        self._master, slave = pty.openpty()
-        tty.setraw(slave)
-        self.device.symlink_to(os.ttyname(slave))
-        os.close(slave)
-        stop_read, self._stop_write = os.pipe()
-        self._thread = threading.Thread(target=self._serve, args=(self._master, stop_read))
-        self._thread.start()
+        super().plug()
 
-    def unplug(self) -> None:
-        if self._thread is None:
-            return
-        os.close(self._stop_write)
-        self._thread.join()
-        self._thread = None
-        self.device.unlink()
-        os.close(self._master)
-
-    def _serve(self, master: int, stop_read: int) -> None:
-        heard = b""
-        try:
-            while True:
-                ready, _, _ = select.select([master, stop_read], [], [])
-                if stop_read in ready:
-                    return
-                try:
-                    heard += os.read(master, 4096)
-                except OSError:  # nobody has the port open
-                    heard = b""
-                    threading.Event().wait(0.01)
-                    continue
-                while len(heard) >= 4 and len(heard) >= 6 + int.from_bytes(heard[2:4], "little"):
-                    size = int.from_bytes(heard[2:4], "little")
-                    request, heard = heard[: 6 + size], heard[6 + size :]
-                    assert request[0] == 0x5A
-                    assert request.endswith(END)
-                    _write(master, stop_read, self._answer(request[1], request[4:-2]))
-        finally:
-            os.close(stop_read)
+    def answered(self, heard: bytes) -> tuple[list[bytes], bytes]:
+        answers = []
+        while len(heard) >= 4 and len(heard) >= 6 + int.from_bytes(heard[2:4], "little"):
+            size = int.from_bytes(heard[2:4], "little")
+            request, heard = heard[: 6 + size], heard[6 + size :]
+            assert request[0] == 0x5A
+            assert request.endswith(END)
+            answers.append(self._answer(request[1], request[4:-2]))
+        return answers, heard
 
     def _answer(self, endpoint: int, request: bytes) -> bytes:
         if self.is_mute:
@@ -146,20 +119,5 @@ class Position2GoBoard:
         return answer
 
 
-def _write(master: int, stop_read: int, data: bytes) -> None:
-    while data:
-        readable, writable, _ = select.select([stop_read], [master], [])
-        if readable:
-            return
-        if writable:
-            data = data[os.write(master, data) :]
-
-
-@contextmanager
-def plugged(folder: Path) -> Iterator[Position2GoBoard]:
-    board = Position2GoBoard(folder)
-    board.plug()
-    try:
-        yield board
-    finally:
-        board.unplug()
+def plugged(folder: Path) -> AbstractContextManager[Position2GoBoard]:
+    return plugged_in(Position2GoBoard(folder))

@@ -146,10 +146,10 @@ class ReplayedLink:
         self.now_s = max(self.now_s, t_utc_s)
         if self.now_s - self._ticked_s >= TICK_S:
             self._ticked_s = self.now_s
-            if self._avoids and self.link.pilot is not None:  # it had been switched on before the recording began
+            if self._avoids and self.link.session is not None:  # it had been switched on before the recording began
                 # The vehicle obeyed the avoidance of then: today's may take what it did for the pilot's doing.
                 with contextlib.suppress(NotAllowedError):
-                    self.link.pilot.avoidance.enable()
+                    self.link.session.pilot.avoidance.enable()
                 self._avoids = False
             self.link._on_tick()
             await self._turn()
@@ -189,8 +189,8 @@ class ReplayedLink:
         items = items_from_mission(self._mission)
         self.line.onboard = OnboardMission(items, None, None, None, digest(items))
         self.line.has_home_row = plan.firmware == "ardupilot"
-        assert self.link.vehicle is not None
-        self.link.vehicle.onboard.transfer_ends(self.line.onboard, self.now_s + self.mono_minus_utc_s)
+        assert self.link.session is not None
+        self.link.session.vehicle.onboard.transfer_ends(self.line.onboard, self.now_s + self.mono_minus_utc_s)
 
     def _command(self, words: str) -> None:
         if words.startswith("start mission"):
@@ -204,7 +204,7 @@ class ReplayedLink:
             self._ask(SetAvoidance(ME, enabled=True, consent=True))
 
     def _ask(self, request: Any) -> None:
-        task = asyncio.get_running_loop().create_task(self.link.handle(request))
+        task = asyncio.get_running_loop().create_task(Answering(self.link, OperatorRight()).answer(request))
         self._tasks.add(task)
         task.add_done_callback(self._note)
 

@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-FRAME = Frame(37.72902, 14.99262, 1712.0)
+from mapping.sensor_frames import RadarFrame, rows
+from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.scene import SceneTerrain, World
+from telemetry.topics.simulated import SimTruth
+
+FRAME = NeuFrame(37.72902, 14.99262, 1712.0)
 BELOW = -1000.0
 
 
@@ -48,3 +53,13 @@ def truth(
         heading_rad=math.radians(heading_deg),
         armed=True,
     )
+
+
+def polar(found: list[RadarFrame]) -> np.ndarray:
+    """(N, 5) range, azimuth deg, elevation deg, radial speed, SNR dB of all targets."""
+    xyz = np.concatenate([rows(f.xyz_m, 3) for f in found]).astype(float)
+    more = [np.concatenate([np.frombuffer(getattr(f, key), "<f4") for f in found]).astype(float)
+            for key in ("radial_speed_m_s", "snr_db")]  # fmt: skip
+    flat = np.hypot(xyz[:, 0], xyz[:, 1])
+    azimuth = np.degrees(np.arctan2(xyz[:, 0], xyz[:, 1]))
+    return np.column_stack([np.hypot(flat, xyz[:, 2]), azimuth, np.degrees(np.arctan2(xyz[:, 2], flat)), *more])

@@ -29,8 +29,6 @@ from telemetry.tracking.object_tracking import keep_of, track_of
 from telemetry.tracking.out_of_view import Remembered
 from tests.telemetry.bluesky_mvp import Mvp
 
-F64 = NDArray[np.float64]
-
 COUNT, SEED = 1000, 7
 KEEP_M, WITHIN_S = 3.0, 8.0
 MVP_RADIUS_M = 1.25 * KEEP_M
@@ -126,7 +124,7 @@ def modified_voltage_potential() -> Policy:
 def nearest_m(one: Encounter, policy: Policy) -> float:
     """Between middles, the least of the whole encounter."""
     random, tracker = np.random.default_rng(one.seed), Tracker(TrackerSettings().params())
-    memory, remembered = Memory(), Remembered()
+    memory, remembered = TrackMemory(), Remembered()
     place, velocity, least_m = np.zeros(2), NORTH.copy(), math.inf
     orders = deque([NORTH] * ORDER_STEPS)
     for k in range(round((one.meets_s + 6.0) / STEP_S)):
@@ -174,7 +172,7 @@ def _track(one: Followed, settings: PerceptionSettings) -> Track:
 
 def _lat_lon(place_enu_m: F64) -> tuple[float, float]:
     """At the equator, where both degrees are as long."""
-    return float(place_enu_m[1]) / METRES_PER_DEG, float(place_enu_m[0]) / METRES_PER_DEG
+    return moved_deg((0.0, 0.0), float(place_enu_m[0]), float(place_enu_m[1]))
 
 
 def _seen(offset: F64, rate: F64, random: np.random.Generator) -> F64:

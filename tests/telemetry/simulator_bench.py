@@ -15,7 +15,7 @@ from telemetry.simulation.simulator.protocol.mavlink import Endpoint
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from tests.telemetry.tlogs import tlog_messages
 
-HOME = Frame(-37.1244507, 175.6892878, 803.24)
+HOME = NeuFrame(-37.1244507, 175.6892878, 803.24)
 SLICE_S = 0.02
 BOOTED_S = 0.104
 """The recorded vehicle was this old when its log begins."""

@@ -18,14 +18,12 @@ from tests.mapping.radar.echoes import SMALL as SMALL_RADAR
 from tests.mapping.radar.echoes import Echo, frame
 from tests.telemetry.test_adc_files import I_FIRST, SHAPE, cube, cubes, dca1000_bytes, oda_line, save
 
-Words = NDArray[np.uint16]
 
-
-def signal(seed: int, spread: float, mean: float = 0.0, count: int = 20_000) -> NDArray[np.int64]:
+def signal(seed: int, spread: float, mean: float = 0.0, count: int = 20_000) -> I64:
     return np.round(np.random.default_rng(seed).normal(mean, spread, count)).astype(np.int64)
 
 
-def words(numbers: NDArray[np.int64], zero: int | None = None) -> Words:
+def words(numbers: I64, zero: int | None = None) -> U16:
     """As two's complement, or around ``zero``."""
     return ((numbers + (zero or 0)) % 65536).astype(np.uint16)
 
@@ -62,7 +60,7 @@ def test_a_large_tone_that_leaves_the_ends_free(height: float, zero: int | None)
      words(signal(4, 60.0)).byteswap()],
     ids=["noise of all bits", "clipped noise", "clipped tone", "bytes the other way round"],
 )  # fmt: skip
-def test_what_is_no_unclipped_signal_in_either_code_is_refused(stored: Words) -> None:
+def test_what_is_no_unclipped_signal_in_either_code_is_refused(stored: U16) -> None:
     with pytest.raises(RadarDataError, match="no unclipped signal") as caught:
         told(histogram(stored), "auto", "adc.bin")
     assert "--samples" in caught.value.advice

@@ -19,7 +19,6 @@ from telemetry.sensors.adc.oda import open_oda
 from telemetry.sensors.adc.opening import open_adc
 from tests.telemetry.test_ti_config import config
 
-C64 = NDArray[np.complex64]
 SMALL = config(frameCfg="frameCfg 0 2 4 0 100 1 0", adcbufCfg="adcbufCfg -1 0 0 1 1")
 I_FIRST, Q_FIRST = SMALL, config(frameCfg="frameCfg 0 2 4 0 100 1 0")
 SHAPE = (4, 12, 256)

@@ -37,12 +37,12 @@ def greeted() -> Intake:
     return intake
 
 
-def give(intake: Intake, message: Radar | Cloud | Slam | Ping | Notice, now_mono_s: float = 100.0):
+def give(intake: Intake, message: RadarMessage | Cloud | Slam | Ping | Notice, now_mono_s: float = 100.0):
     return intake.on_data(encode(message), now_mono_s=now_mono_s, now_utc_s=1000.0 + now_mono_s - 100.0)
 
 
-def radar(number: int, t_s: float = 99.9) -> Radar:
-    return Radar(number, t_s, TARGETS.tobytes())
+def radar(number: int, t_s: float = 99.9) -> RadarMessage:
+    return RadarMessage(number, t_s, TARGETS.tobytes())
 
 
 def test_a_radar_frame_becomes_one_for_the_bus() -> None:
@@ -143,10 +143,10 @@ def test_impossible_times_are_refused_and_told(t_s: float) -> None:
     assert intake.report(100.0).text == ""
 
 
-@pytest.mark.parametrize("message", [Radar(0, 99.0, b"123"), Cloud(0, 99.0, 0.2, 0.005, b"1"),
+@pytest.mark.parametrize("message", [RadarMessage(0, 99.0, b"123"), Cloud(0, 99.0, 0.2, 0.005, b"1"),
                                      Cloud(0, 99.0, 0.2, 0.0, b""), Cloud(0, 99.0, 0.2, 0.005, bytes(600_006)),
-                                     Radar(0, 99.0, bytes(20 * 1001))], ids=str)  # fmt: skip
-def test_bytes_that_are_no_rows_are_refused(message: Radar | Cloud) -> None:
+                                     RadarMessage(0, 99.0, bytes(20 * 1001))], ids=str)  # fmt: skip
+def test_bytes_that_are_no_rows_are_refused(message: RadarMessage | Cloud) -> None:
     intake = greeted()
     assert give(intake, message).frame is None
     assert intake.refused == 1

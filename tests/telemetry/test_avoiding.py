@@ -316,7 +316,7 @@ def test_an_order_to_stop_that_nobody_answered_is_given_again_when_the_vehicle_i
     it = craft()
     it.until(lambda: it.truth[0] > 8)
     detour, helm = it.avoiding.detour, it.avoiding._helm  # pyright: ignore[reportPrivateUsage]
-    detour.avoid(rest_at(it, 2), frozenset(), it.now_s)  # lost on its way
+    detour.avoid(remaining_at(it, 2), frozenset(), it.now_s)  # lost on its way
     detour._helm._on_failed(SilentError("Nothing was heard."), it.now_s)  # pyright: ignore[reportPrivateUsage]
     assert helm.failed
     silent = replace(it.state, heartbeat_t_mono_s=it.now_s - 5.0)

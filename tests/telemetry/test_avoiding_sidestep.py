@@ -13,7 +13,7 @@ def test_it_goes_aside_without_a_stop_and_on_with_the_mission() -> None:
     it.until(lambda: it.truth[0] > 8)
     begun = len(it.trail)
     request = FlyManoeuvre(ME, "sidestep", targets((22, 10, 8), (30, 0, 8)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     assert state(it) == "manoeuvre"
     it.until(lambda: it.bench.vehicle.truth.p_neu[1] > 8, 60)
     it.until(lambda: it.avoiding.detour.phase == "going" and not it.avoiding.detour.is_manoeuvre)
@@ -29,7 +29,7 @@ def test_a_second_one_replaces_the_first_and_a_pause_can_be_ended() -> None:
     it = craft()
     it.until(lambda: it.truth[0] > 8)
     for aside in (targets((22, 10, 8)), targets((22, -10, 8))):
-        it.perform(it.avoiding.fly(FlyManoeuvre(ME, "sidestep", aside, None), rest_at(it, 2), it.now_s))
+        it.perform(it.avoiding.fly(FlyManoeuvre(ME, "sidestep", aside, None), remaining_at(it, 2), it.now_s))
         it.until(lambda: it.avoiding.detour.phase == "going", 60)
     it.perform(it.avoiding.pause(it.now_s))
     it.until(lambda: math.hypot(it.state.ground_speed_m_s or 0.0, 0.0) < 0.3, 60)
@@ -42,6 +42,6 @@ def test_the_echoes_of_what_it_goes_aside_for_do_not_stop_it() -> None:
     it = craft(Wall(17, 20))
     it.perform(it.avoiding.disable(it.now_s))
     it.until(lambda: it.truth[0] > 6)
-    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "sidestep", targets((13, 2, 8)), None), rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "sidestep", targets((13, 2, 8)), None), remaining_at(it, 2), it.now_s))
     it.until(lambda: it.truth[0] > 12.5, 60)
     assert it.modes() == [GUIDED]

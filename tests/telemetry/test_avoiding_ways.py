@@ -30,7 +30,7 @@ def test_a_prepared_way_around_is_flown_and_the_mission_goes_on_at_its_height() 
     it.until(lambda: it.truth[0] > 8)
     way = targets((14, 10, 8), (26, 10, 8), (30, 0, 8))
     request = FlyManoeuvre(ME, "around", way, 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     assert state(it) == "manoeuvre"
     it.until(lambda: it.bench.vehicle.truth.p_neu[1] > 9, 60)
     it.until(lambda: it.avoiding.detour.phase == "going" and not it.avoiding.detour.is_manoeuvre)
@@ -44,7 +44,7 @@ def test_a_prepared_way_around_that_leads_into_something_unseen_is_stopped_short
     it.perform(it.avoiding.disable(it.now_s))
     it.until(lambda: it.truth[0] > 8)
     request = FlyManoeuvre(ME, "around", targets((12, 10, 8), (40, 10, 8), (44, 0, 8)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     it.until(lambda: state(it) == "holding", 60)
     it.advance(10.0)
     assert 15.0 < max(n for _, n, _ in it.trail) < 24.3
@@ -57,7 +57,7 @@ def test_from_the_ceiling_a_prepared_way_around_is_flown_and_the_mission_goes_on
     it.until(lambda: state(it) == "ceiling")
     high_m = it.truth[2]
     way = targets((it.truth[0], 12, high_m), (31, 12, high_m), (33, 0, high_m))
-    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "around", way, 1), rest_at(it, 1), it.now_s))
+    it.perform(it.avoiding.fly(FlyManoeuvre(ME, "around", way, 1), remaining_at(it, 1), it.now_s))
     it.until(lambda: it.state.mode == "RTL")
     assert max(n for _, n, _ in it.trail) > 59
     assert all(u > high_m - 0.6 for _, n, u in it.trail if 24 < n < 30)
@@ -68,7 +68,7 @@ def test_a_prepared_way_over_climbs_on_while_it_is_not_clear() -> None:
     it.avoiding.disable(it.now_s)
     it.until(lambda: it.truth[0] > 12)
     request = FlyManoeuvre(ME, "over", targets((16, 0, 10), (30, 0, 10)), None, 2.0)
-    it.perform(it.avoiding.fly(request, Rest((), "hold"), it.now_s))
+    it.perform(it.avoiding.fly(request, RemainingMission((), "hold"), it.now_s))
     it.until(lambda: it.truth[0] > 28)
     assert max(n for _, n, u in it.trail if u < 14.5) < 24.5
     it.until(lambda: state(it) == "holding")
@@ -78,14 +78,14 @@ def test_a_prepared_way_over_climbs_on_while_it_is_not_clear() -> None:
 def test_a_way_without_places_and_a_vehicle_on_the_ground_are_refused() -> None:
     it = Craft(FLIGHT, [])
     with pytest.raises(NotAllowedError, match="no places"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", (), None), Rest((), "hold"), 0.0)
+        it.avoiding.fly(FlyManoeuvre(ME, "over", (), None), RemainingMission((), "hold"), 0.0)
     nowhere = (replace(targets((1, 0, 5))[0], alt_rel_home_m=float("nan")),)
     with pytest.raises(NotAllowedError, match="no number"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", nowhere, None), Rest((), "hold"), 0.0)
+        it.avoiding.fly(FlyManoeuvre(ME, "over", nowhere, None), RemainingMission((), "hold"), 0.0)
     with pytest.raises(NotAllowedError, match="are the most"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None, 40.0), Rest((), "hold"), 0.0)
+        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None, 40.0), RemainingMission((), "hold"), 0.0)
     with pytest.raises(NotAllowedError, match="not in the air"):
-        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None), Rest((), "hold"), 0.0)
+        it.avoiding.fly(FlyManoeuvre(ME, "over", targets((1, 0, 5)), None), RemainingMission((), "hold"), 0.0)
 
 
 def test_what_somebody_did_before_a_prepared_way_is_ordered_does_not_end_it() -> None:
@@ -95,10 +95,10 @@ def test_what_somebody_did_before_a_prepared_way_is_ordered_does_not_end_it() ->
     it.until(lambda: it.state.mode == "LOITER")
     request = FlyManoeuvre(ME, "around", targets((14, 10, 8), (30, 0, 8)), 2)
     with pytest.raises(NotAllowedError, match="by hand"):
-        it.avoiding.fly(request, rest_at(it, 2), it.now_s)
+        it.avoiding.fly(request, remaining_at(it, 2), it.now_s)
     it.bench.command(176, 1, AUTO)
     it.until(lambda: it.state.mode == "AUTO" and it.truth[0] > 8)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     it.advance(2.0)
     assert state(it) == "manoeuvre"
 
@@ -109,7 +109,7 @@ def test_a_way_that_is_flown_after_a_pause_is_paused_no_more() -> None:
     it.perform(it.avoiding.pause(it.now_s))
     it.advance(4.0)
     request = FlyManoeuvre(ME, "around", targets((32, 10, 16), (40, 0, 16)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     it.until(lambda: it.avoiding.detour.phase == "going")
     assert it.avoiding.resume(it.now_s) == []
     assert it.avoiding.detour.phase == "going"
@@ -122,7 +122,7 @@ def on_a_way_around(*, enabled: bool) -> Craft:
     if not enabled:
         it.perform(it.avoiding.disable(it.now_s))
     request = FlyManoeuvre(ME, "around", targets((25, 15, 8), (52, 15, 8), (55, 0, 8)), 2)
-    it.perform(it.avoiding.fly(request, rest_at(it, 2), it.now_s))
+    it.perform(it.avoiding.fly(request, remaining_at(it, 2), it.now_s))
     it.until(lambda: it.avoiding.detour.phase == "going")
     it.advance(2.0)
     assert state(it) == "manoeuvre"

@@ -16,7 +16,7 @@ BODY = """
 import asyncio, sys
 from pathlib import Path
 from telemetry.bus import Bus
-from telemetry.messages import ServerAlive
+from telemetry.topics.messages import ServerAlive
 
 async def main(name, folder):
     async def answer(request):

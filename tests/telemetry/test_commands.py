@@ -254,7 +254,7 @@ def test_an_old_state_neither_confirms_nor_allows_another_sending() -> None:
     assert again[0].message.confirmation == 1
 
 
-@pytest.mark.parametrize("seed", range(200))
+@seeds(200)
 def test_at_30_percent_loss_arming_ends_in_an_answer_and_happens_once(seed: int) -> None:
     """Repetitions by the link itself are left out here: the vehicle cannot tell them from ours."""
     craft = Craft()
@@ -264,14 +264,14 @@ def test_at_30_percent_loss_arming_ends_in_an_answer_and_happens_once(seed: int)
     assert craft.armed or isinstance(run.end, Failed)
 
 
-@pytest.mark.parametrize("seed", range(200))
+@seeds(200)
 def test_at_30_percent_loss_other_commands_end_in_an_answer(seed: int) -> None:
     run = give(command(MODE, 1, 4), Craft(), LOSSY, seed=seed)
     assert run.end == Done(None)
     assert run.now_s < 12
 
 
-@pytest.mark.parametrize("seed", range(30))
+@seeds(30)
 def test_at_30_percent_loss_a_refusal_stays_a_refusal(seed: int) -> None:
     craft = Craft([4])
     run = give(command(ARM, 1), craft, LOSSY, once=True, confirm=is_armed, seed=seed)

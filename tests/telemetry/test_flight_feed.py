@@ -23,7 +23,7 @@ places = st.tuples(st.floats(-40, 40), st.floats(-40, 40), st.floats(5, 25))
 
 
 def place(north_m: float, east_m: float, up_m: float) -> Place:
-    return Place(LAT_DEG + north_m / METRES_PER_DEG, LON_DEG + east_m / METRES_PER_DEG, up_m, 100.0)
+    return Place(*moved_deg((LAT_DEG, LON_DEG), east_m, north_m), up_m, 100.0)
 
 
 def target(
@@ -34,7 +34,8 @@ def target(
 
 
 def neu(at: Place) -> tuple[float, float, float]:
-    return (at.lat_deg - LAT_DEG) * METRES_PER_DEG, (at.lon_deg - LON_DEG) * METRES_PER_DEG, at.alt_rel_home_m
+    east_m, north_m = offset_m((LAT_DEG, LON_DEG), at.lat_deg, at.lon_deg)
+    return north_m, east_m, at.alt_rel_home_m
 
 
 def led(points: list[tuple[float, float, float]]) -> F64:

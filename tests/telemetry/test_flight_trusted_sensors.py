@@ -15,12 +15,12 @@ NEW = VehicleState(1, 1, position_t_mono_s=20.0)
 OLD = VehicleState(1, 1, position_t_mono_s=19.0)
 
 
-def who_saw(sensor: Sensor, t_s: float) -> Witnesses:
+def who_saw(sensor: Sensor, t_s: float) -> TrustedSensors:
     regions = Regions(PerceptionSettings())
     regions.take(PerceptionStatus(sensor, "running", "", t_s, 0.0, t_s, region=OCCUPIED))
-    witnesses = Witnesses(regions)
-    witnesses.join(t_s)
-    return witnesses
+    trusted = TrustedSensors(regions)
+    trusted.join(t_s)
+    return trusted
 
 
 def test_while_all_is_new_there_is_nothing_to_say() -> None:
@@ -35,8 +35,8 @@ def test_a_sensor_that_is_missing_on_the_climb_is_named_with_what_follows(sensor
 
 def test_a_position_that_is_too_old_says_what_follows() -> None:
     said = "The vehicle's position is too old. It goes on by itself with a new one. Or return home."
-    witnesses = who_saw("radar", 20.0)
-    assert witnesses.blind(OLD, 20.0) == witnesses.silent(OLD, 20.0) == said
+    trusted = who_saw("radar", 20.0)
+    assert trusted.blind(OLD, 20.0) == trusted.silent(OLD, 20.0) == said
 
 
 def test_on_the_climb_only_new_frames_end_the_hold_and_not_resume() -> None:

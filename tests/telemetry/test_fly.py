@@ -162,7 +162,7 @@ def test_nobody_is_heard() -> None:
 
 
 def test_a_connection_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("telemetry.flight.prepare.FAILED_PATIENCE_S", 0.0)
+    monkeypatch.setattr("telemetry.flight.preflight.prepare.FAILED_PATIENCE_S", 0.0)
     pilot = Pilot(SmallBus())
     pilot.tells = False
     error = ErrorInfo("connection", "Port 14550 is in use by another program.", ADDRESS, "End it, or use another port.")

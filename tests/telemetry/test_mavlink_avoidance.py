@@ -64,20 +64,11 @@ def seen(simulator: Simulator, wall: Wall | None) -> PerceptionStatus:
 @contextlib.asynccontextmanager
 async def before_a_wall(wall: Wall | None = WALL) -> AsyncIterator[tuple[Console, Simulator]]:
     """A simulated vehicle whose camera sees this wall, and avoidance switched on."""
-    async with simulated(speedup=HURRIED) as (bench, simulator):
-
-        async def look() -> None:
-            while True:
-                bench.link.on_perception(seen(simulator, wall))
-                await asyncio.sleep(FRAME_S)
-
-        eye = asyncio.create_task(look())
-        try:
-            yield bench, simulator
-        finally:
-            eye.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await eye
+    async with (
+        simulated(speedup=HURRIED) as (bench, simulator),
+        again_and_again(lambda: bench.link.on_perception(seen(simulator, wall)), FRAME_S),
+    ):
+        yield bench, simulator
 
 
 async def taken_off(bench: Console, simulator: Simulator) -> None:
@@ -92,30 +83,30 @@ async def landed(bench: Console, simulator: Simulator) -> None:
 
 
 async def switch_on(bench: Console) -> None:
-    await bench.link.handle(SetAvoidance(ME, enabled=True))
+    await bench.handle(SetAvoidance(ME, enabled=True))
     await until(lambda: avoidance(bench).state == "watching")
 
 
 def test_a_real_vehicle_needs_consent_and_a_simulated_one_does_not() -> None:
     async def whole() -> None:
         async with simulated(speedup=1.0) as (bench, _):
-            vehicle = bench.link.vehicle
+            vehicle = bench.vehicle
             assert vehicle is not None
             await until(lambda: vehicle.capabilities is not None)
             vehicle.is_simulation = False
             with pytest.raises(NotAllowedError, match="consent"):
-                await bench.link.handle(SetAvoidance(ME, enabled=True))
+                await bench.handle(SetAvoidance(ME, enabled=True))
             await until(lambda: avoidance(bench).state == "off")
-            await bench.link.handle(SetAvoidance(ME, enabled=True, consent=True))
+            await bench.handle(SetAvoidance(ME, enabled=True, consent=True))
             await until(lambda: avoidance(bench).state in ("watching", "blind"))
             assert "avoidance on, with consent" in bench.commands
-            await bench.link.handle(SetAvoidance(ME, enabled=False))
+            await bench.handle(SetAvoidance(ME, enabled=False))
             await until(lambda: avoidance(bench).state == "off")
             vehicle.is_simulation = True
-            await bench.link.handle(SetAvoidance(ME, enabled=True))
+            await bench.handle(SetAvoidance(ME, enabled=True))
             await until(lambda: avoidance(bench).state in ("watching", "blind"))
             with pytest.raises(NotAllowedError, match="not in the air"):
-                await bench.link.handle(FlyManoeuvre(ME, "over", TARGETS, None))
+                await bench.handle(FlyManoeuvre(ME, "over", TARGETS, None))
             assert bench.status.state == "live"
 
     run(whole)
@@ -124,11 +115,11 @@ def test_a_real_vehicle_needs_consent_and_a_simulated_one_does_not() -> None:
 def test_other_autopilots_are_refused() -> None:
     async def whole() -> None:
         async with simulated(speedup=1.0) as (bench, _):
-            assert bench.link.pilot is not None
-            vehicle: Any = bench.link.vehicle
+            assert bench.pilot is not None
+            vehicle: Any = bench.vehicle
             vehicle.state = type(vehicle.state)(1, 1, autopilot="px4")
             with pytest.raises(NotAllowedError, match="ArduPilot only"):
-                bench.link.pilot.avoidance.check_autopilot()
+                bench.pilot.avoidance.check_autopilot()
 
     run(whole)
 
@@ -170,13 +161,13 @@ def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_
             await until(lambda: avoidance(bench).state in ("climbing", "holding"))
             assert bench.flight.way == "guided"
             await until(lambda: avoidance(bench).state == "offset")
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await until(lambda: bench.state.mode == "BRAKE")
             await phase(bench, "paused")
-            await bench.link.handle(Resume(ME))
+            await bench.handle(Resume(ME))
             await phase(bench, "flying")
             assert simulator.vehicle.truth.p_neu[2] > 17.0
-            await bench.link.handle(ReturnHome(ME))
+            await bench.handle(ReturnHome(ME))
             await phase(bench, "returning")
             await until(lambda: avoidance(bench).state == "watching")
             assert bench.flight.broke_off_at is not None
@@ -195,7 +186,7 @@ def test_a_prepared_way_is_flown_and_the_mission_goes_on() -> None:
                 GuidedTarget(k, LAT_DEG + north * STEP_DEG, LON_DEG + 1.3e-4, 14.0, 3.0)
                 for k, north in enumerate((1.0, 2.0), start=1)
             )
-            await bench.link.handle(FlyManoeuvre(ME, "around", aside, 4))
+            await bench.handle(FlyManoeuvre(ME, "around", aside, 4))
             await until(lambda: avoidance(bench).state == "manoeuvre")
             await until(lambda: simulator.vehicle.truth.p_neu[1] > 9)
             await landed(bench, simulator)

@@ -56,14 +56,14 @@ async def simulated(**options: Any) -> AsyncIterator[tuple[Console, Simulator]]:
     wanted: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 15.0, "boot_s": 0.5, "parameters": QUICKLY_DOWN}
     wanted |= options
     async with flying(SimOptions(LAT_DEG, LON_DEG, ALT_M, **wanted)) as simulator, console() as bench:
-        await bench.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
+        await bench.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
         await bench.live()
         yield bench, simulator
 
 
 async def upload(bench: Console, mission: tuple[Item, ...] | None = None) -> UploadReport:
     await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
-    report = await bench.link.handle(Upload(ME, mission or items(), LAT_DEG, LON_DEG, ALT_M))
+    report = await bench.handle(Upload(ME, mission or items(), LAT_DEG, LON_DEG, ALT_M))
     assert isinstance(report, UploadReport)
     return report
 
@@ -72,9 +72,9 @@ async def start(bench: Console, request: StartAuto | StartGuided) -> None:
     """A vehicle whose position estimate has just settled may refuse at first."""
     for _ in range(100):
         try:
-            await bench.link.handle(request)
+            await bench.handle(request)
         except RefusedError:
-            await until(lambda: not bench.link.pilot or bench.flight.phase in ("idle", "interrupted"))
+            await until(lambda: not bench.pilot or bench.flight.phase in ("idle", "interrupted"))
             continue
         return
     raise AssertionError("the vehicle never took off")
@@ -113,16 +113,16 @@ def test_a_mission_is_paused_resumed_broken_off_and_gone_on_with() -> None:
             report = await upload(bench, items(8))
             await start(bench, StartAuto(ME, report.onboard.digest))
             await phase(bench, "flying")
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await phase(bench, "paused")
             await until(lambda: bench.state.mode == "BRAKE")
             with pytest.raises(NotAllowedError, match="being flown"):
-                await bench.link.handle(Upload(ME, items(), LAT_DEG, LON_DEG, ALT_M))
+                await bench.handle(Upload(ME, items(), LAT_DEG, LON_DEG, ALT_M))
             with pytest.raises(NotAllowedError, match="already flying"):
-                await bench.link.handle(StartAuto(ME, report.onboard.digest))
-            await bench.link.handle(Resume(ME))
+                await bench.handle(StartAuto(ME, report.onboard.digest))
+            await bench.handle(Resume(ME))
             await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 3)
-            await bench.link.handle(ReturnHome(ME))
+            await bench.handle(ReturnHome(ME))
             await phase(bench, "interrupted")
             at = bench.flight.broke_off_at
             assert at is not None
@@ -147,18 +147,18 @@ def test_speeds_are_set_again_and_a_replaced_mission_is_not_resumed() -> None:
             report = await upload(bench, (first, slow, *rest))
             await start(bench, StartAuto(ME, report.onboard.digest))
             await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 3)
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await phase(bench, "paused")
             assert simulator.vehicle.autopilot.speed_m_s is None
-            await bench.link.handle(Resume(ME))
+            await bench.handle(Resume(ME))
             await until(lambda: simulator.vehicle.autopilot.speed_m_s == 2.5)
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await phase(bench, "paused")
-            assert bench.link.vehicle is not None
-            bench.link.vehicle.onboard.forget()
+            assert bench.vehicle is not None
+            bench.vehicle.onboard.forget()
             with pytest.raises(MissionUnknownError, match="not known any more"):
-                await bench.link.handle(Resume(ME))
-            await bench.link.handle(ReturnHome(ME))
+                await bench.handle(Resume(ME))
+            await bench.handle(ReturnHome(ME))
             await phase(bench, "returning")
 
     run(whole)
@@ -170,7 +170,7 @@ def test_the_way_home_of_the_script_can_be_paused() -> None:
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await start(bench, StartGuided(ME, TARGETS, 10.0))
             await phase(bench, "returning")
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await until(lambda: bench.state.mode == "BRAKE")
             await phase(bench, "interrupted")
 
@@ -194,10 +194,10 @@ def test_an_upload_that_waited_for_the_disk_does_not_meet_a_started_mission() ->
         disk = SlowDisk()
         options = SimOptions(LAT_DEG, LON_DEG, ALT_M, link="tcpin:127.0.0.1:0", speedup=15.0, boot_s=0.5)
         async with flying(options) as simulator, console(audit=disk) as bench:
-            await bench.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
+            await bench.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
             await bench.live()
             await upload(bench)
-            late = asyncio.create_task(bench.link.handle(Upload(ME, items(4), LAT_DEG, LON_DEG, ALT_M)))
+            late = asyncio.create_task(bench.handle(Upload(ME, items(4), LAT_DEG, LON_DEG, ALT_M)))
             try:
                 await until(lambda: "upload 6 items" in bench.commands)
                 bench.link.flight.begin(5, 1.7e9)
@@ -215,11 +215,11 @@ def test_the_navigation_script_is_paused_resumed_and_flown_to_its_end() -> None:
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await start(bench, StartGuided(ME, TARGETS, 10.0))
             await phase(bench, "flying")
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await phase(bench, "paused")
             with pytest.raises(NotAllowedError, match="being flown"):
-                await bench.link.handle(Upload(ME, items(), LAT_DEG, LON_DEG, ALT_M))
-            await bench.link.handle(Resume(ME))
+                await bench.handle(Upload(ME, items(), LAT_DEG, LON_DEG, ALT_M))
+            await bench.handle(Resume(ME))
             await phase(bench, "landed")
             assert phases(bench)[-3:] == ["flying", "returning", "landed"]
             assert bench.flight.way == "guided"
@@ -234,7 +234,7 @@ def test_a_vehicle_that_flies_curves_in_guided_is_told_with_the_setting_that_men
             await start(bench, StartGuided(ME, TARGETS, 10.0))
             await phase(bench, "taking_off")
             hint = bench.flight.hint
-            await bench.link.handle(ReturnHome(ME))
+            await bench.handle(ReturnHome(ME))
             return hint
 
     for options, words in ((0.0, "Set GUID_OPTIONS 64"), (1.0, "Set GUID_OPTIONS 65"), (64.0, "")):
@@ -254,7 +254,7 @@ def test_the_way_home_ends_the_script_and_tells_where() -> None:
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await start(bench, StartGuided(ME, TARGETS, 10.0))
             await phase(bench, "flying")
-            await bench.link.handle(ReturnHome(ME))
+            await bench.handle(ReturnHome(ME))
             await phase(bench, "returning")
             assert bench.flight.broke_off_at is not None
             await phase(bench, "interrupted")
@@ -270,7 +270,7 @@ def test_without_a_console_the_script_holds_its_position() -> None:
         ) as simulator:
             age_s = 0.0
             async with console(server_age_s=lambda: age_s) as bench:
-                await bench.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
+                await bench.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
                 await bench.live()
                 await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
                 await start(bench, StartGuided(ME, TARGETS, 10.0))
@@ -286,7 +286,7 @@ def test_a_vehicle_that_is_not_ready_says_why() -> None:
     async def whole() -> None:
         async with simulated(boot_s=500.0, speedup=1.0) as (bench, _):
             with pytest.raises(RefusedError, match="It says"):
-                await bench.link.handle(Arm(ME))
+                await bench.handle(Arm(ME))
 
     run(whole)
 
@@ -296,15 +296,15 @@ def test_what_was_not_read_back_is_not_flown() -> None:
         async with simulated() as (bench, _):
             await until(lambda: bench.status.mission_state == "none")
             with pytest.raises(MissionUnknownError, match="no mission on board"):
-                await bench.link.handle(StartAuto(ME, "digest"))
+                await bench.handle(StartAuto(ME, "digest"))
             report = await upload(bench)
             with pytest.raises(MissionUnknownError, match="another one"):
-                await bench.link.handle(StartAuto(ME, "digest"))
+                await bench.handle(StartAuto(ME, "digest"))
             with pytest.raises(NotAllowedError, match="no item 9"):
-                await bench.link.handle(StartAuto(ME, report.onboard.digest, from_item=9, climb_to_m=20.0))
+                await bench.handle(StartAuto(ME, report.onboard.digest, from_item=9, climb_to_m=20.0))
             with pytest.raises(NotAllowedError, match="a height"):
-                await bench.link.handle(StartAuto(ME, report.onboard.digest, from_item=3))
-            onboard = await bench.link.handle(Download(ME))
+                await bench.handle(StartAuto(ME, report.onboard.digest, from_item=3))
+            onboard = await bench.handle(Download(ME))
             assert onboard == report.onboard
 
     run(whole)
@@ -316,13 +316,13 @@ def test_a_mission_that_would_begin_again_is_not_resumed() -> None:
             report = await upload(bench, items(8))
             await start(bench, StartAuto(ME, report.onboard.digest))
             await phase(bench, "flying")
-            await bench.link.handle(Pause(ME))
+            await bench.handle(Pause(ME))
             await phase(bench, "paused")
             simulator.vehicle.autopilot.parameters.set("MIS_RESTART", 1.0)
             with pytest.raises(NotAllowedError, match="begin its mission again"):
-                await bench.link.handle(Resume(ME))
+                await bench.handle(Resume(ME))
             with pytest.raises(NotAllowedError, match="in the air"):
-                await bench.link.handle(Disarm(ME))
+                await bench.handle(Disarm(ME))
 
     run(whole)
 
@@ -330,7 +330,7 @@ def test_a_mission_that_would_begin_again_is_not_resumed() -> None:
 def test_parameters_are_read_by_name() -> None:
     async def whole() -> None:
         async with simulated() as (bench, _):
-            values = await bench.link.handle(ReadParameters(("RTL_ALT", "MIS_RESTART")))
+            values = await bench.handle(ReadParameters(("RTL_ALT", "MIS_RESTART")))
             assert values == {"RTL_ALT": 1500.0, "MIS_RESTART": 0.0}
 
     run(whole)
@@ -340,13 +340,13 @@ def test_another_ground_stations_upload_is_noticed_and_read_back() -> None:
     async def whole() -> None:
         async with simulated() as (bench, simulator), console() as other:
             report = await upload(bench)
-            await other.link.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
+            await other.handle(Connect(ME, simulator.address.replace("tcpin", "tcp"), True))
             await other.live()
             foreign = await upload(other, items(5))
             await until(lambda: bench.status.mission_digest == foreign.onboard.digest)
             told = [s.mission_state for s in bench.of(LinkStatus)]
             assert "unknown" in told[told.index("verified") :]
             with pytest.raises(MissionUnknownError):
-                await bench.link.handle(StartAuto(ME, report.onboard.digest))
+                await bench.handle(StartAuto(ME, report.onboard.digest))
 
     run(whole)

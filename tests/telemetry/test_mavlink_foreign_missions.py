@@ -58,24 +58,25 @@ async def alone(bench: Console, mission: tuple[Item, ...]) -> str:
     return report.onboard.digest
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.02, 0.05, 0.09])
-@pytest.mark.parametrize("count", [5, 7])
-def test_a_start_right_after_a_foreign_write_is_refused(after_s: float, count: int) -> None:
-    async def whole() -> None:
-        async with simulated(speedup=1.0) as (bench, simulator):
-            digest = await alone(bench, items(3))
-            stranger = await asyncio.to_thread(Stranger, simulator)
-            assert await asyncio.to_thread(stranger.write, elsewhere(count)) == 0
-            await asyncio.sleep(after_s)
-            assert bench.status.mission_digest == digest
-            with pytest.raises(MissionUnknownError):
-                await bench.link.handle(StartAuto(ME, digest))
-            await until(lambda: not simulator.vehicle.autopilot.armed)
-            assert simulator.vehicle.autopilot.mode.name != "AUTO"
-            await phase(bench, "idle")
-            stranger.close()
+async def refused_after(count: int, after_s: float) -> None:
+    async with simulated(speedup=1.0) as (bench, simulator):
+        digest = await alone(bench, items(3))
+        stranger = await asyncio.to_thread(Stranger, simulator)
+        assert await asyncio.to_thread(stranger.write, elsewhere(count)) == 0
+        await asyncio.sleep(after_s)
+        assert bench.status.mission_digest == digest
+        with pytest.raises(MissionUnknownError):
+            await bench.handle(StartAuto(ME, digest))
+        await until(lambda: not simulator.vehicle.autopilot.armed)
+        assert simulator.vehicle.autopilot.mode.name != "AUTO"
+        await phase(bench, "idle")
+        stranger.close()
 
-    run(whole)
+
+@pytest.mark.parametrize("count", [5, 7])
+def test_a_start_right_after_a_foreign_write_is_refused(count: int) -> None:
+    """At any moment between two looks of the link at what is on board, on as many vehicles at once."""
+    run(lambda: asyncio.gather(*(refused_after(count, after_s) for after_s in (0.0, 0.02, 0.05, 0.09))))
 
 
 def test_a_foreign_write_during_the_start_is_never_flown_away_with() -> None:
@@ -83,7 +84,7 @@ def test_a_foreign_write_during_the_start_is_never_flown_away_with() -> None:
         async with simulated(speedup=1.0) as (bench, simulator):
             digest = await alone(bench, items(3))
             stranger = await asyncio.to_thread(Stranger, simulator)
-            starting = asyncio.create_task(bench.link.handle(StartAuto(ME, digest)))
+            starting = asyncio.create_task(bench.handle(StartAuto(ME, digest)))
             assert await asyncio.to_thread(stranger.write, elsewhere(5)) == 0
             await asyncio.gather(starting, return_exceptions=True)
             await until(lambda: simulator.vehicle.autopilot.mode.name != "AUTO")
@@ -109,8 +110,8 @@ def test_in_flight_it_is_an_alarm_and_a_hold(count: int) -> None:
             await until(lambda: "another ground station" in bench.flight.hint)
             assert any(words.startswith("hold: The mission on board") for words in bench.commands)
             with pytest.raises(MissionUnknownError):
-                await bench.link.handle(Resume(ME))
-            await bench.link.handle(ReturnHome(ME))
+                await bench.handle(Resume(ME))
+            await bench.handle(ReturnHome(ME))
             await phase(bench, "returning")
             stranger.close()
 

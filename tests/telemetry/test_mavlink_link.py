@@ -56,7 +56,7 @@ async def radio(port: int, *, message: Any = None, **ids: int) -> AsyncIterator[
 async def listening(*, adopt: bool, **options: Any) -> AsyncIterator[tuple[Console, int]]:
     port = free_port()
     async with console(**options) as bench:
-        await bench.link.handle(Connect(ME, f"udpin:127.0.0.1:{port}", adopt))
+        await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", adopt))
         yield bench, port
 
 
@@ -69,7 +69,7 @@ def test_nothing_is_sent_to_a_stranger_until_it_is_adopted() -> None:
             assert vehicle.heard == []
             assert bench.frames(sent=True) == []
             (candidate,) = bench.status.candidates
-            await bench.link.handle(Adopt(ME, candidate.id))
+            await bench.handle(Adopt(ME, candidate.id))
             await until(lambda: {"HEARTBEAT", "COMMAND_LONG", "TIMESYNC"} <= vehicle.kinds())
             (own,) = {(m.get_srcSystem(), m.get_srcComponent()) for m in vehicle.heard}
             assert own == (255, 190)
@@ -84,7 +84,7 @@ def test_after_a_release_nothing_is_sent_any_more() -> None:
         async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
             await bench.live()
             await until(lambda: "HEARTBEAT" in vehicle.kinds())
-            await bench.link.handle(Release(ME))
+            await bench.handle(Release(ME))
             # What was sent before may still lie in the vehicle's socket.
             released = len(bench.of(LinkStatus))
             await until(lambda: len(bench.of(LinkStatus)) > released + 1)
@@ -102,7 +102,7 @@ def test_heartbeats_go_to_a_far_end_that_the_operator_named() -> None:
             sock.bind(("127.0.0.1", 0))
             sock.setblocking(False)
             async with console() as bench:
-                await bench.link.handle(Connect(ME, f"udpout:127.0.0.1:{sock.getsockname()[1]}"))
+                await bench.handle(Connect(ME, f"udpout:127.0.0.1:{sock.getsockname()[1]}"))
                 frame = await asyncio.get_running_loop().sock_recv(sock, 100)
                 message: Any = mavlink.MAVLink(None).decode(bytearray(frame))
                 assert (message.get_type(), message.type, message.autopilot) == ("HEARTBEAT", 6, 8)
@@ -181,7 +181,7 @@ def test_a_silent_vehicle_is_lost_and_a_command_says_so() -> None:
                 await bench.live()
             await until(lambda: bench.status.state == "lost")
             with pytest.raises(NoVehicleError, match="link to the vehicle is lost"):
-                await bench.link.handle(Arm(ME))
+                await bench.handle(Arm(ME))
             assert [s.state for s in bench.of(LinkStatus) if s.state == "stale"]
             async with radio(port):  # from another port of the same host
                 await bench.live()
@@ -194,13 +194,13 @@ def test_commands_without_a_vehicle_are_refused() -> None:
         async with console() as bench:
             for request in (Arm(ME), ReturnHome(ME), Download(ME), Upload(ME, (), 0.0, 0.0, 0.0)):
                 with pytest.raises(NoVehicleError, match="No vehicle is adopted"):
-                    await bench.link.handle(request)
+                    await bench.handle(request)
             with pytest.raises(NoVehicleError, match="not heard"):
-                await bench.link.handle(Adopt(ME, "somebody"))
+                await bench.handle(Adopt(ME, "somebody"))
             with pytest.raises(AddressError):
-                await bench.link.handle(Connect(ME, "/etc/passwd"))
+                await bench.handle(Connect(ME, "/etc/passwd"))
             with pytest.raises(NotAllowedError, match="no connection"):
-                await bench.link.handle(Disconnect(ME, "tcp:127.0.0.1:5760"))
+                await bench.handle(Disconnect(ME, "tcp:127.0.0.1:5760"))
 
     run(whole)
 
@@ -208,11 +208,11 @@ def test_commands_without_a_vehicle_are_refused() -> None:
 def test_connecting_twice_is_connecting_once_and_disconnecting_ends_it() -> None:
     async def whole() -> None:
         async with listening(adopt=True) as (bench, port):
-            await bench.link.handle(Connect(ME, f"udpin://127.0.0.1:{port}", True))
+            await bench.handle(Connect(ME, f"udpin://127.0.0.1:{port}", True))
             assert len(bench.status.connections) == 1
             async with radio(port):
                 await bench.live()
-                await bench.link.handle(Disconnect(ME, f"udpin:127.0.0.1:{port}"))
+                await bench.handle(Disconnect(ME, f"udpin:127.0.0.1:{port}"))
                 assert (bench.status.connections, bench.status.adopted) == ((), None)
 
             def is_free() -> bool:
@@ -230,10 +230,10 @@ def test_whoever_was_relieved_can_send_nothing() -> None:
     async def whole() -> None:
         async with listening(adopt=True) as (bench, port), radio(port) as vehicle:
             await bench.live()
-            await bench.link.handle(Connect(Operator("Bob", 2), "udpin:127.0.0.1:1", False))
+            await bench.handle(Connect(Operator("Bob", 2), "udpin:127.0.0.1:1", False))
             vehicle.heard.clear()
             with pytest.raises(NotAllowedError, match="not in charge"):
-                await bench.link.handle(ReturnHome(ME))
+                await bench.handle(ReturnHome(ME))
             assert bench.commands == []
             assert not any(m.get_type() == "COMMAND_LONG" and m.command == 176 for m in vehicle.heard)
 
@@ -285,7 +285,7 @@ async def commanded(results: dict[int, int], words: bytes = b"") -> AsyncIterato
 def test_a_command_is_written_down_before_it_is_sent() -> None:
     async def whole() -> None:
         async with commanded({400: 0}) as (bench, vehicle, disk):
-            await bench.link.handle(Arm(ME))
+            await bench.handle(Arm(ME))
             assert disk.written == [("arm", 0)]
             assert [m.param1 for m in vehicle.of("COMMAND_LONG") if m.command == 400] == [1.0]
             assert bench.commands == ["arm"]
@@ -297,7 +297,7 @@ def test_a_refused_arming_carries_the_vehicles_words() -> None:
     async def whole() -> None:
         async with commanded({400: 4}, b"Arm: Compass not calibrated") as (bench, _, _):
             with pytest.raises(RefusedError, match="Compass not calibrated"):
-                await bench.link.handle(Arm(ME))
+                await bench.handle(Arm(ME))
             await until(lambda: "Arm: Compass not calibrated" in bench.texts)
 
     run(whole)
@@ -308,9 +308,9 @@ def test_a_full_disk_forbids_arming_but_never_the_way_home() -> None:
         async with commanded({400: 0, 176: 0}) as (bench, vehicle, disk):
             disk.full = True
             with pytest.raises(RecordingFullError):
-                await bench.link.handle(Arm(ME))
+                await bench.handle(Arm(ME))
             assert not [m for m in vehicle.of("COMMAND_LONG") if m.command == 400]
-            await bench.link.handle(ReturnHome(ME))
+            await bench.handle(ReturnHome(ME))
             assert [m.param2 for m in vehicle.of("COMMAND_LONG") if m.command == 176] == [6.0]
             assert "No space" in bench.flight.hint
 
@@ -323,10 +323,10 @@ def test_motors_are_not_stopped_in_the_air() -> None:
             vehicle.send(mavlink.MAVLink_extended_sys_state_message(0, 2))
             await until(lambda: bench.state.landed == "in_air")
             with pytest.raises(NotAllowedError, match="in the air"):
-                await bench.link.handle(Disarm(ME))
+                await bench.handle(Disarm(ME))
             vehicle.send(mavlink.MAVLink_extended_sys_state_message(0, 1))
             await until(lambda: bench.state.landed == "on_ground")
-            await bench.link.handle(Disarm(ME))
+            await bench.handle(Disarm(ME))
             assert [m.param1 for m in vehicle.of("COMMAND_LONG") if m.command == 400] == [0.0]
 
     run(whole)
@@ -356,7 +356,7 @@ def test_a_wrong_baud_rate_is_said() -> None:
         name = os.ttyname(slave)
         try:
             async with console() as bench:
-                await bench.link.handle(Connect(ME, f"{name}:115200"))
+                await bench.handle(Connect(ME, f"{name}:115200"))
                 await until(lambda: bench.link.lines[f"{name}:115200"].connection.state == "open")
                 assert bench.status.connections[0].state == "waiting"
                 for k in range(20):

@@ -27,14 +27,14 @@ def test_a_start_order_that_is_lost_is_given_again_before_the_motors_are_off(mon
             received, lost = Endpoint.on_message, []
 
             def lossy(endpoint: Endpoint, message: Any, *rest: Any) -> Any:
-                is_start = message.get_type() == "COMMAND_LONG" and message.command == MISSION_START
+                is_start = message.get_type() == "COMMAND_LONG" and message.command == MavCmd.MISSION_START
                 if is_start and len(lost) < 2:
                     lost.append(message)
                     return []
                 return received(endpoint, message, *rest)
 
             monkeypatch.setattr(Endpoint, "on_message", lossy)
-            await bench.link.handle(StartAuto(ME, report.onboard.digest))
+            await bench.handle(StartAuto(ME, report.onboard.digest))
             assert len(lost) == 2
             await until(lambda: simulator.vehicle.truth.p_neu[2] > 2.0)
 
@@ -45,16 +45,16 @@ def test_motors_that_are_off_again_are_said_and_not_switched_on_a_second_time() 
     async def whole() -> None:
         async with simulated(speedup=1.0, parameters=(("DISARM_DELAY", 1.0),)) as (bench, simulator):
             report = await upload(bench)
-            assert bench.link.pilot is not None
-            read_mission = bench.link.pilot._read_mission
+            assert bench.pilot is not None
+            read_mission = bench.pilot._read_mission
 
             async def slowly() -> Any:
                 await asyncio.sleep(SLOW_S)
                 return await read_mission()
 
-            bench.link.pilot._read_mission = slowly
+            bench.pilot._read_mission = slowly
             with pytest.raises(SilentError, match="motors are off again") as caught:
-                await bench.link.handle(StartAuto(ME, report.onboard.digest))
+                await bench.handle(StartAuto(ME, report.onboard.digest))
             assert "DISARM_DELAY" in caught.value.advice
             await phase(bench, "idle")
             assert bench.texts.count("Arming motors") == 1

@@ -112,7 +112,7 @@ def test_a_return_ends_the_pause_before_it_for_good() -> None:
 
 
 def test_a_mode_that_was_acknowledged_but_does_not_show_is_commanded_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mode_change, "SHOWS_S", 0.05)
+    monkeypatch.setattr(procedures, "SHOWS_S", 0.05)
 
     async def whole() -> None:
         async with desk(heartbeat(custom_mode=AUTO, base_mode=ARMED), in_air()) as it:
@@ -132,11 +132,11 @@ def test_a_mode_that_was_acknowledged_but_does_not_show_is_commanded_again(monke
 
 
 def test_a_mode_that_never_shows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mode_change, "SHOWS_S", 0.0)
+    monkeypatch.setattr(procedures, "SHOWS_S", 0.0)
 
     async def whole() -> None:
         async with desk(heartbeat(custom_mode=AUTO, base_mode=ARMED)) as it:
-            changing = asyncio.create_task(mode_change.change_mode(it.bench.vehicle, ("RTL",), lambda: None))
+            changing = asyncio.create_task(procedures.change_mode(it.bench.vehicle, ("RTL",), lambda: None))
             for count in range(1, 4):
                 await until(lambda count=count: len(it.modes()) == count)
                 it.bench.hear(ack(SET_MODE, 0))

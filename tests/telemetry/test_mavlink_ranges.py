@@ -98,7 +98,7 @@ def test_ranges_of_the_adopted_vehicle_go_out_on_the_bus() -> None:
     async def whole() -> None:
         port = free_port()
         async with console() as bench:
-            await bench.link.handle(Connect(ME, f"udpin:127.0.0.1:{port}", True))
+            await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", True))
             vehicle = UdpVehicle(port)
             beating = asyncio.create_task(beat(vehicle))
             try:

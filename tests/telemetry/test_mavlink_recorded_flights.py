@@ -16,7 +16,6 @@ from telemetry.flight.preflight import checks
 from telemetry.topics.messages import FlightStatus
 from tests.telemetry.replayed_link import ReplayedLink, received, replayed
 
-METRES_PER_DEG = 111_195.0
 ARMED = 128
 RETURN_TO_LAUNCH = 20
 LATE_S = 0.4
@@ -131,6 +130,5 @@ def test_a_place_that_is_told_as_reached_was_reached(flown: Any, name: str) -> N
     assert len(flying) > 8
     for (_, reached), (t_s, _) in pairwise(flying):
         state, item = min(states, key=lambda one: abs(one[0] - t_s))[1], items[reached]
-        north_m = (state.lat_deg - item.lat_deg) * METRES_PER_DEG
-        east_m = (state.lon_deg - item.lon_deg) * METRES_PER_DEG * math.cos(math.radians(item.lat_deg))
-        assert math.hypot(north_m, east_m, state.alt_rel_home_m - item.alt_m) < NEAR_M
+        flat_m = apart_m((item.lat_deg, item.lon_deg), (state.lat_deg, state.lon_deg))
+        assert math.hypot(flat_m, state.alt_rel_home_m - item.alt_m) < NEAR_M

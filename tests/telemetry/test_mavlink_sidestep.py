@@ -67,23 +67,12 @@ class Watched:
 async def before_a_pole() -> AsyncIterator[tuple[Console, Watched]]:
     """A real vehicle as far as it tells, with a pole on its line."""
     async with simulated(speedup=HURRIED) as (bench, simulator):
-        vehicle, watched = bench.link.vehicle, Watched(simulator)
+        vehicle, watched = bench.vehicle, Watched(simulator)
         assert vehicle is not None
         await until(lambda: vehicle.capabilities is not None)
         vehicle.is_simulation = False
-
-        async def look() -> None:
-            while True:
-                bench.link.on_tracks(watched.look())
-                await asyncio.sleep(FRAME_S)
-
-        eye = asyncio.create_task(look())
-        try:
+        async with again_and_again(lambda: bench.link.on_tracks(watched.look()), FRAME_S):
             yield bench, watched
-        finally:
-            eye.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await eye
 
 
 async def fly(bench: Console, watched: Watched) -> None:
@@ -101,7 +90,7 @@ def test_without_consent_nothing_moves_it_from_its_line() -> None:
     async def whole() -> None:
         async with before_a_pole() as (bench, watched):
             with pytest.raises(NotAllowedError, match="consent"):
-                await bench.link.handle(SetAvoidance(ME, enabled=True, by="sidestep"))
+                await bench.handle(SetAvoidance(ME, enabled=True, by="sidestep"))
             await fly(bench, watched)
             await landed(bench, watched.simulator)
             assert watched.nearest_m < 1.0
@@ -116,7 +105,7 @@ def test_without_consent_nothing_moves_it_from_its_line() -> None:
 def test_with_consent_it_steps_aside_and_the_mission_goes_on() -> None:
     async def whole() -> None:
         async with before_a_pole() as (bench, watched):
-            await bench.link.handle(SetAvoidance(ME, enabled=True, consent=True, by="sidestep"))
+            await bench.handle(SetAvoidance(ME, enabled=True, consent=True, by="sidestep"))
             await fly(bench, watched)
             await landed(bench, watched.simulator)
             assert watched.nearest_m > 0.6 * STANDS_M  # frames in real time, a vehicle that is half as fast again
@@ -132,16 +121,16 @@ def test_with_consent_it_steps_aside_and_the_mission_goes_on() -> None:
 def test_consent_withdrawn_on_the_way_aside_ends_it_there(instead: SetAvoidance) -> None:
     async def whole() -> None:
         async with before_a_pole() as (bench, watched):
-            await bench.link.handle(SetAvoidance(ME, enabled=True, consent=True, by="sidestep"))
+            await bench.handle(SetAvoidance(ME, enabled=True, consent=True, by="sidestep"))
             await fly(bench, watched)
             await until(lambda: watched.asides_m and watched.asides_m[-1] > 0.7)
-            await bench.link.handle(instead)
+            await bench.handle(instead)
             await until(lambda: "switched off" in bench.flight.hint)
             await until(lambda: bench.state.mode == "BRAKE" and (bench.state.ground_speed_m_s or 0.0) < 0.2)
             stood_m = watched.simulator.vehicle.truth.p_neu[0]
             await asyncio.sleep(1.0)
             assert watched.simulator.vehicle.truth.p_neu[0] == pytest.approx(stood_m, abs=0.5)
-            await bench.link.handle(Resume(ME))
+            await bench.handle(Resume(ME))
             await landed(bench, watched.simulator)
 
     run(whole)

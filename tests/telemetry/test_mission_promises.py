@@ -19,7 +19,7 @@ from tests.telemetry.mission_vehicles import ArduCopter
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-@pytest.mark.parametrize("seed", range(50))
+@seeds(50)
 def test_at_30_percent_loss_every_upload_succeeds(vehicle: type, seed: int) -> None:
     items = mission(100, seed=seed)
     craft = vehicle()
@@ -73,7 +73,7 @@ def digest_of(craft: Any) -> str:
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-@pytest.mark.parametrize("seed", range(50))
+@seeds(50)
 def test_a_lost_last_acknowledgement_is_settled_by_reading_back(vehicle: type, seed: int) -> None:
     def lose(direction: str, message: Any, _: int) -> bool:
         return direction == "down" and message.get_type() == "MISSION_ACK" and message.type == 0

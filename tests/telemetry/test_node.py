@@ -23,7 +23,7 @@ BODY = """
 import asyncio, sys
 from pathlib import Path
 from telemetry.errors import ConnectionFailedError
-from telemetry.node import run_node
+from telemetry.bus.node import run_node
 
 async def main(bus, context):
     what = sys.argv[3]

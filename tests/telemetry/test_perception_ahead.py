@@ -20,7 +20,7 @@ def layer(sensor: Sensor) -> MapDelta:
 
 
 def flight(slope: float) -> Flight:
-    line = Line(np.array([[0.0, 0.0, 5.0], [0.0, 80.0, 5.0 + 80.0 * slope]]), (2,))
+    line = FlightLine(np.array([[0.0, 0.0, 5.0], [0.0, 80.0, 5.0 + 80.0 * slope]]), (2,))
     return Flight(line, ORIGIN, (0.0, 0.0, 5.0), 3.0, 0.8)
 
 
@@ -45,7 +45,7 @@ def test_a_camera_tells_heights() -> None:
 def test_it_ends_once_the_vehicle_has_looked_over_it() -> None:
     ahead = Ahead("radar", run="r")
     ahead.alerts(ahead.look([layer("radar")], flight(0.0)), 1.0, 1.0, 1.0)
-    higher = Line(np.array([[0.0, 0.0, 9.0], [0.0, 80.0, 9.0]]), (2,))
+    higher = FlightLine(np.array([[0.0, 0.0, 9.0], [0.0, 80.0, 9.0]]), (2,))
     above = flight(0.0)._replace(line=higher, position_enu_m=(0.0, 0.0, 9.0))
     assert ahead.look([], above) is None
     assert ahead.alerts(None, 2.0, 2.0, 2.0) == []

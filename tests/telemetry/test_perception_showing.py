@@ -22,7 +22,7 @@ def test_all_targets_are_shown_with_what_the_gate_made_of_them() -> None:
     assert look_of(perception, ORIGIN, utc_minus_mono_s=1000.0) is None
     flight.move()
     xyz = np.array([[0, 20, 1], [20, 20, 1], [0, 20, -5], [0, 1.0, 0.1], [math.nan, 5, 0], [0, 300, 10]], np.float64)
-    perception.on_frame(RadarScan(flight.t_s, 1, xyz, np.zeros(6), np.full(6, 30.0)), flight.t_s)
+    perception.on_frame(radar_frame(flight.t_s, 1, xyz, np.zeros(6), np.full(6, 30.0)), flight.t_s)
     look = look_of(perception, None, utc_minus_mono_s=1000.0)
     assert isinstance(look, RadarLook)
     shown = rows(look.xyz_m, 3)

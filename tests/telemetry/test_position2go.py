@@ -60,7 +60,7 @@ def test_its_samples_become_targets_on_board(board: Position2GoBoard) -> None:
 def test_a_damaged_frame_is_one_lost_frame(
     board: Position2GoBoard, damage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session, "ANSWER_WITHIN_S", 0.3)
+    monkeypatch.setattr(board_session, "ANSWER_WITHIN_S", 0.3)
     board.damage = ["", damage]
     radar = radar_at(board)
     readings = taken(radar, 4)
@@ -90,16 +90,16 @@ def test_a_pulled_cable_is_told_counted_and_recovered_from(board: Position2GoBoa
 
 
 def test_a_board_that_falls_silent_is_set_up_again(board: Position2GoBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session, "ANSWER_WITHIN_S", 0.05)
-    board.damage = ["", *session.LOST_MOST * ["nothing"]]
+    monkeypatch.setattr(board_session, "ANSWER_WITHIN_S", 0.5)
+    board.damage = ["", *board_session.LOST_MOST * ["nothing"]]
     radar = radar_at(board)
     readings = taken(radar, 2)
     assert [reading.lost for reading in readings] == [0, 0]
-    assert (radar.status.counts.lost_frames, radar.status.interruptions) == (session.LOST_MOST, 1)
+    assert (radar.status.counts.lost_frames, radar.status.interruptions) == (board_session.LOST_MOST, 1)
 
 
 def test_another_device_is_said(board: Position2GoBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session, "ANSWER_WITHIN_S", 0.1)
+    monkeypatch.setattr(board_session, "ANSWER_WITHIN_S", 0.5)
     board.is_mute = True
     with pytest.raises(SensorError, match="Nothing at this port answers as a Position2Go") as caught:
         taken(radar_at(board), 1)

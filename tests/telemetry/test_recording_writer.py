@@ -26,8 +26,8 @@ MOST_LOST_S = 0.3
 KILLED = """
 import sys, time
 from pathlib import Path
-from telemetry.messages import RawFrame, Topic
-from telemetry.recording.writer import RecordingWriter
+from telemetry.topics.messages import RawFrame, Topic
+from telemetry.recording.mcap_files.writer import RecordingWriter
 writer = RecordingWriter(Path(sys.argv[1]), t_utc_s=time.time(), t_mono_s=time.monotonic())
 begin, done = time.monotonic(), 0
 while True:
@@ -167,8 +167,8 @@ def test_a_file_size_limit_of_the_system_is_a_full_disk(tmp_path: Path) -> None:
 import resource
 from pathlib import Path
 from telemetry.errors import RecordingFullError
-from telemetry.messages import Topic
-from telemetry.recording.writer import RecordingWriter
+from telemetry.topics.messages import Topic
+from telemetry.recording.mcap_files.writer import RecordingWriter
 from tests.telemetry.recordings import T0_UTC_S, state_at
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 writer = RecordingWriter(Path({str(tmp_path / "a.mcap")!r}), t_utc_s=T0_UTC_S, t_mono_s=0.0)

@@ -43,7 +43,7 @@ def test_the_gap_is_between_hulls():
 
 
 def test_the_radar_sees_within_its_printed_limits_only():
-    radar = Position2Go(detection_probability=1.0, false_alarms=0.0)
+    radar = Position2GoModel(detection_probability=1.0, false_alarms=0.0)
     true = np.array(
         [[0.9, 0.0, 0.0], [12.1, 0.0, 0.0], [5.0, math.radians(39.0), 0.0], [5.0, math.radians(-39.0), 0.0]]
     )
@@ -52,7 +52,7 @@ def test_the_radar_sees_within_its_printed_limits_only():
 
 
 def test_the_radars_errors_are_the_printed_ones():
-    radar, random = Position2Go(detection_probability=1.0, false_alarms=0.0), np.random.default_rng(0)
+    radar, random = Position2GoModel(detection_probability=1.0, false_alarms=0.0), np.random.default_rng(0)
     for bearing_deg, sigma_deg in ((10.0, 2.0), (30.0, 8.0)):
         true = np.array([[6.0, math.radians(bearing_deg), -1.0]])
         off = np.concatenate([radar.frame(true, random) for _ in range(2000)]) - true
@@ -61,14 +61,16 @@ def test_the_radars_errors_are_the_printed_ones():
 
 
 def test_of_three_things_in_one_range_bin_two_are_seen():
-    exact = Position2Go(
-        detection_probability=1.0, false_alarms=0.0, errors=replace(Position2Go().errors, range_sigma_m=1e-6)
+    exact = Position2GoModel(
+        detection_probability=1.0, false_alarms=0.0, errors=replace(Position2GoModel().errors, range_sigma_m=1e-6)
     )
     true = np.array([[5.4, -0.2, 0.0], [5.5, 0.0, 0.0], [5.6, 0.2, 0.0], [8.0, 0.0, 0.0]])
     assert len(exact.frame(true, np.random.default_rng(0))) == 3
 
 
-def flown(*, nearest_only: bool = False, radar: RadarKind = "model", tracker: TrackerSettings | None = None) -> Flown:
+def flown(
+    *, nearest_only: bool = False, radar: RadarKind = "model", tracker: TrackerSettings | None = None
+) -> ArenaFlown:
     settings = arena_settings(nearest_only=nearest_only, tracker=tracker)
     return fly(AHEAD, np.random.default_rng(0), settings=settings, radar=radar)
 
@@ -83,7 +85,7 @@ def flown(*, nearest_only: bool = False, radar: RadarKind = "model", tracker: Tr
     ],
 )
 def test_a_pole_straight_ahead_is_passed_by_what_avoids_live(nearest_only, radar, coordinates):
-    tracker = replace(Position2Go().errors, coordinates=coordinates)
+    tracker = replace(Position2GoModel().errors, coordinates=coordinates)
     way = flown(nearest_only=nearest_only, radar=radar, tracker=tracker)
     assert way.arrived
     assert way.nearest_gap_m > 0.1
@@ -99,7 +101,7 @@ def test_while_its_present_velocity_is_free_and_the_wanted_is_not_it_flies_on_an
     assert way.arrived
 
 
-def one_of(seed: int, number: int, *, nearest_only: bool = False) -> Flown:
+def one_of(seed: int, number: int, *, nearest_only: bool = False) -> ArenaFlown:
     random = np.random.default_rng([seed, 6 if nearest_only else 5])
     ways = approaches(26 if nearest_only else 78, random)
     for _ in range(number):
@@ -123,7 +125,7 @@ def test_by_the_nearest_pole_alone_the_other_one_is_not_run_into(seed, number):
 
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
     """What shows that the poles are really in the way, and that nothing but the radar's tracks avoids them."""
-    monkeypatch.setattr(Position2Go, "frame", lambda self, true, random: np.empty((0, 3)))
+    monkeypatch.setattr(Position2GoModel, "frame", lambda self, true, random: np.empty((0, 3)))
     assert flown().nearest_gap_m < 0.0
 
 
@@ -147,8 +149,8 @@ def test_figures_that_are_set_are_the_ones_that_fly_and_wrong_ones_are_named():
         "tracker": {"coordinates": "polar", "birth_updates": "4"},
         "velocities": {"max_turn_deg": "60", "choice": "edge"},
     }
-    made = arena._settings(Wanted(settings=settings), nearest_only=True)
-    assert made.tracker == replace(Position2Go().errors, coordinates="polar", birth_updates=4)
+    made = arena._settings(ScenarioRequest(settings=settings), nearest_only=True)
+    assert made.tracker == replace(Position2GoModel().errors, coordinates="polar", birth_updates=4)
     assert made.velocities == replace(arena_settings(nearest_only=True).velocities, max_turn_deg=60.0, choice="edge")
     for part, name, value in (
         ("tracker", "gates", "9"),
@@ -160,15 +162,15 @@ def test_figures_that_are_set_are_the_ones_that_fly_and_wrong_ones_are_named():
         ("velocities", "max_turn_deg", "-1"),
     ):
         with pytest.raises(ParameterError):
-            arena._settings(Wanted(settings={part: {name: value}}), nearest_only=True)
+            arena._settings(ScenarioRequest(settings={part: {name: value}}), nearest_only=True)
 
 
 def test_the_arena_is_in_the_catalogue_and_takes_no_world():
     assert arena.NAME in NAMES
     with pytest.raises(PlanningError, match="--world"):
-        arena.run(Wanted(world=Path("my.json")))
+        arena.run(ScenarioRequest(world=Path("my.json")))
     with pytest.raises(PlanningError, match="--record"):
-        arena.run(Wanted(record=Path("my.mcap")))
+        arena.run(ScenarioRequest(record=Path("my.mcap")))
 
 
 def test_errors_are_drawn_by_the_distance_from_the_nose_and_from_zero_on():
@@ -182,6 +184,6 @@ def test_errors_are_drawn_by_the_distance_from_the_nose_and_from_zero_on():
 
 def test_ways_are_seen_from_the_pole_that_they_pass():
     way = Approach(np.array([[0.0, 0.0], [3.0, 3.0]]), np.array([-5.0, 0.0]), np.array([5.0, 0.0]))
-    flown = Flown(path_enu_m=[(-2.0, 0.0), (0.0, -1.0), (2.0, 0.0)])
+    flown = ArenaFlown(path_enu_m=[(-2.0, 0.0), (0.0, -1.0), (2.0, 0.0)])
     drawn = ways_chart("one", [way], [flown]).series[0]
     assert list(zip(drawn.x, drawn.y, strict=True)) == [(0.0, -2.0), (1.0, 0.0), (0.0, 2.0)]

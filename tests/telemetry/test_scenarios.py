@@ -33,7 +33,7 @@ from telemetry.simulation.scenarios.stage.world_objects import box, cylinder, re
 from telemetry.simulation.simulator.scene import SceneTerrain, World
 from telemetry.topics.simulated import SimTruth
 
-HOP = Scene(
+HOP = ScenarioScene(
     world_document("hop", [wall("fence", (-6.0, 14.0), (6.0, 14.0), 5.0, material="stone")]),
     Course((Waypoint((0.0, 3.0, 3.0), 2.0, 0.0),), takeoff_m=3.0, end="land"),
 )
@@ -59,8 +59,8 @@ def flight(**more: object) -> FlightResult:
 def test_a_seed_decides_everything_and_virtual_time_leaves_no_trace_of_the_clock(tmp_path: Path) -> None:
     first, second = (
         flown_of(
-            setup_of(HOP, Wanted(5, record=tmp_path / f"{number}.mcap"), "hop"),
-            Wanted(5, record=tmp_path / f"{number}.mcap"),
+            setup_of(HOP, ScenarioRequest(5, record=tmp_path / f"{number}.mcap"), "hop"),
+            ScenarioRequest(5, record=tmp_path / f"{number}.mcap"),
         )
         for number in (1, 2)
     )
@@ -70,7 +70,7 @@ def test_a_seed_decides_everything_and_virtual_time_leaves_no_trace_of_the_clock
     assert first.track == second.track
     assert np.array_equal(first.voxels("radar"), second.voxels("radar"))
     assert len(first.voxels("radar")) > 0
-    other = flown_of(setup_of(HOP, Wanted(6), "hop"), Wanted(6))
+    other = flown_of(setup_of(HOP, ScenarioRequest(6), "hop"), ScenarioRequest(6))
     assert other.track != first.track
     log = read_flight_log(tmp_path / "1.mcap")
     assert log.end_utc_s - log.start_utc_s > 15

@@ -22,7 +22,7 @@ def unreached(figures: tuple[Figure, ...]) -> list[str]:
 
 
 def test_a_corner_reflector_is_one_compact_cluster_where_it_stands() -> None:
-    result = run_scenario("corner-reflector", Wanted(21))
+    result = run_scenario("corner-reflector", ScenarioRequest(21))
     assert unreached(result.figures) == []
     assert not result.flights[0].contact
 
@@ -30,14 +30,14 @@ def test_a_corner_reflector_is_one_compact_cluster_where_it_stands() -> None:
 @pytest.mark.parametrize("number", range(len(CASES)), ids=[case.title.replace(" ", "-") for case in CASES])
 def test_each_sensor_alone_clears_a_building(number: int) -> None:
     """Many more seeds are flown by the scenario itself."""
-    result = fly_case(CASES[number], Wanted(31 + number % 2), ahead_m=26.0)
+    result = fly_case(CASES[number], ScenarioRequest(31 + number % 2), ahead_m=26.0)
     assert unreached(result.figures) == [], result.notes
     assert result.min_true_distance_m > 0.5
 
 
 @pytest.mark.parametrize("name", ["wood", "ruined-building"])
 def test_maps_of_what_stands_there_are_mostly_right_and_mostly_whole(name: str) -> None:
-    (flight,) = run_scenario(name, Wanted(41)).flights
+    (flight,) = run_scenario(name, ScenarioRequest(41)).flights
     assert not flight.contact
     for figures in (flight.radar, flight.vision):
         assert figures.precision is not None
@@ -55,18 +55,18 @@ def hugging_is_safe(result: ScenarioResult) -> None:
 
 
 def test_things_strewn_over_a_volcano_are_told_before_it_is_too_late() -> None:
-    result = terrain_hugging.run_over(terrain_hugging.etna(), Wanted(51), "etna-like", most_m=150.0)
+    result = terrain_hugging.run_over(terrain_hugging.etna(), ScenarioRequest(51), "etna-like", most_m=150.0)
     hugging_is_safe(result)
 
 
 def test_things_strewn_over_real_bush_are_told_before_it_is_too_late(shared_data: Path) -> None:
     dsm = read_dsm(shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
-    hugging_is_safe(terrain_hugging.run_over(dsm, Wanted(52), "coromandel", apart_m=60.0, most_m=150.0))
+    hugging_is_safe(terrain_hugging.run_over(dsm, ScenarioRequest(52), "coromandel", apart_m=60.0, most_m=150.0))
 
 
 def test_a_longer_flight_makes_its_map_grow_with_what_is_new_alone(tmp_path: Path) -> None:
     kept = tmp_path / "flight.mcap"
-    (flight,) = long_flight.run_for(Wanted(61, record=kept), 60.0, 5.0).flights
+    (flight,) = long_flight.run_for(ScenarioRequest(61, record=kept), 60.0, 5.0).flights
     assert 59.0 < flight.duration_s < 61.0
     values = {figure.words: figure.value for figure in flight.figures}
     assert 20.0 < values["bytes per new voxel at first"] < 2000.0

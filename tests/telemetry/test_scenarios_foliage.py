@@ -144,7 +144,7 @@ def test_the_whole_scenario_prints_all_that_the_paper_does(monkeypatch: pytest.M
     monkeypatch.setattr(foliage, "SWEEP_P_O", (0.8,))
     monkeypatch.setattr(foliage, "TRIAL_1", {letter: TRIAL_1[letter] for letter in "ac"})
     monkeypatch.setattr(foliage, "TRIAL_2", {letter: TRIAL_2[letter] for letter in "f"})
-    result = foliage.run(Wanted(1))
+    result = foliage.run(ScenarioRequest(1))
     text = "\n".join(result.lines())
     for words in ("Table II", "P(z|occ) of Stone: 0.461  (paper: 0.4606)", "5 layers:",
                   "trial 2 f, 4 layers", "paper: TNR 65.7 %",
@@ -157,9 +157,9 @@ def test_the_whole_scenario_prints_all_that_the_paper_does(monkeypatch: pytest.M
 
 def test_a_world_of_ones_own_and_a_recording_of_another_kind_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="brings its own sites"):
-        foliage.run(Wanted(0, world=tmp_path / "own.json"))
+        foliage.run(ScenarioRequest(0, world=tmp_path / "own.json"))
     with pytest.raises(ParameterError, match=r"ends with \.npz"):
-        foliage.run(Wanted(0, record=tmp_path / "drive.mcap"))
+        foliage.run(ScenarioRequest(0, record=tmp_path / "drive.mcap"))
 
 
 def test_the_roc_goes_through_the_rates_of_both_rules(sparse: Drive, cleared: Cleared) -> None:

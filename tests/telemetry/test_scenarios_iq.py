@@ -42,4 +42,4 @@ def test_it_is_in_the_catalogue_and_reads_without_a_flight() -> None:
 @pytest.mark.parametrize("name", ["world", "record"])
 def test_what_belongs_to_flights_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="Nothing is flown"):
-        iq_reflector.run(Wanted(**{name: tmp_path / "x"}))  # type: ignore[arg-type]
+        iq_reflector.run(ScenarioRequest(**{name: tmp_path / "x"}))  # type: ignore[arg-type]

@@ -51,7 +51,7 @@ def world_file(path: Path, *objects: Object, **more: object) -> Path:
 
 
 def strewn_with(seed: int, world: Path | None = None) -> World:
-    return world_of(plan(), Wanted(seed, world), "etna-like", np.random.default_rng(seed))
+    return world_of(plan(), ScenarioRequest(seed, world), "etna-like", np.random.default_rng(seed))
 
 
 def test_bare_ground_of_ones_own_is_strewn_as_the_scenarios_own_is(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_a_model_without_room_for_a_route_is_refused(side_m: float) -> None:
 @pytest.mark.slow
 def test_what_is_told_on_bare_ground_is_flown_through_and_said_so(tmp_path: Path) -> None:
     bare = world_file(tmp_path / "bare.json", dsm="hillside.tif")
-    flown = run_over(etna(), Wanted(51, bare), "etna-like", most_m=60.0)
+    flown = run_over(etna(), ScenarioRequest(51, bare), "etna-like", most_m=60.0)
     (flight,) = flown.flights
     assert flight.contact
     assert flight.min_true_distance_m < 0.5

@@ -38,7 +38,7 @@ SENSORS: tuple[Sensor, ...] = ("radar", "vision")
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Flown, Path]:
     path = tmp_path_factory.mktemp("recorded") / "wood.mcap"
-    wanted = Wanted(5, record=path)
+    wanted = ScenarioRequest(5, record=path)
     setup = setup_of(scenes.wood(5), wanted, "wood", settings=SETTINGS, most_armed_s=25.0)
     return setup, flown_of(setup, wanted), path
 

@@ -31,7 +31,7 @@ def scene(flight: Plan, tmp_path_factory: pytest.TempPathFactory) -> World:
     path = tmp_path_factory.mktemp("demo") / "world.json"
     write_demo_world(path)
     home = flight.mission.home
-    return World.load(path, frame=Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m), dsm=demo_dsm())
+    return World.load(path, frame=NeuFrame(home.lat_deg, home.lon_deg, home.alt_dsm_m), dsm=demo_dsm())
 
 
 @pytest.fixture(scope="module")

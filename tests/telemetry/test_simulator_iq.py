@@ -39,16 +39,6 @@ def looks(scene: World, count: int, model: IqModel | None = None, at: SimTruth |
     return [sensor.frame(at or truth()) for _ in range(count)]
 
 
-def polar(found: list[RadarFrame]) -> np.ndarray:
-    """(N, 5) range, azimuth deg, elevation deg, radial speed, SNR dB of all targets."""
-    xyz = np.concatenate([rows(f.xyz_m, 3) for f in found]).astype(float)
-    more = [np.concatenate([np.frombuffer(getattr(f, key), "<f4") for f in found]).astype(float)
-            for key in ("radial_speed_m_s", "snr_db")]  # fmt: skip
-    flat = np.hypot(xyz[:, 0], xyz[:, 1])
-    azimuth = np.degrees(np.arctan2(xyz[:, 0], xyz[:, 1]))
-    return np.column_stack([np.hypot(flat, xyz[:, 2]), azimuth, np.degrees(np.arctan2(xyz[:, 2], flat)), *more])
-
-
 def near(found: np.ndarray, range_m: float) -> np.ndarray:
     return found[np.abs(found[:, 0] - range_m) < 1.0]
 

@@ -42,7 +42,7 @@ def truth(t_s: float) -> SimTruth:
 
 
 def test_another_drone_is_followed_and_alerted_from_its_echoes() -> None:
-    world = World.parse({"format": "hedgehop-world", "version": 1, "objects": [DRONE]}, frame=Frame(*flights.HOME))
+    world = World.parse({"format": "hedgehop-world", "version": 1, "objects": [DRONE]}, frame=NeuFrame(*flights.HOME))
     radar = radar_sensor("iq", world, seed=0)
     flight = Flight()
     for k in range(round(7.0 * RADAR_HZ)):

@@ -41,7 +41,7 @@ def scene(plan: Plan) -> World:
     """What stands still of the demo's."""
     home, whole = plan.mission.home, demo_world()
     still = [item for item in whole["objects"] if "path" not in item]  # type: ignore[union-attr]
-    frame = Frame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
+    frame = NeuFrame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
     return World.parse({**whole, "objects": still}, frame=frame, dsm=demo_dsm())
 
 
@@ -82,11 +82,6 @@ def truths(scene: World, line: F64) -> list[SimTruth]:
     return out
 
 
-def scan(frame: RadarFrame) -> RadarScan:
-    speed, snr = rows(frame.radial_speed_m_s, 1)[:, 0], rows(frame.snr_db, 1)[:, 0]
-    return RadarScan(frame.t_mono_s, frame.number, rows(frame.xyz_m, 3), speed, snr, frame.source)
-
-
 def test_the_new_building_is_alerted_in_time_and_nothing_else(scene: World, line: F64, tmp_path: Path) -> None:
     perception = RadarPerception(Settings())
     perception.set_ground(
@@ -101,7 +96,7 @@ def test_the_new_building_is_alerted_in_time_and_nothing_else(scene: World, line
     for truth in truths(scene, line):
         perception.feed_position(truth.t_mono_s, truth.position_enu_m, truth.velocity_enu_m_s)
         perception.feed_attitude(truth.t_mono_s, truth.roll_rad, truth.pitch_rad, truth.heading_rad)
-        told = perception.on_frame(scan(radar.frame(truth)), truth.t_mono_s)
+        told = perception.on_frame(radar.frame(truth), truth.t_mono_s)
         alerts += [(alert, truth) for alert in told.alerts]
     first, then = next((alert, truth) for alert, truth in alerts if alert.obstacle is not None)
     assert first.phase == "begins"

@@ -18,7 +18,7 @@ places = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-20, 20))
 
 def flown(points: list[Vec3], *, joined: bool) -> tuple[np.ndarray, np.ndarray, list[float]]:
     """Positions and velocities (N, 3) of the target, and when each waypoint was passed."""
-    track, positions, velocities, passed = Track(points[0], 2.0), [], [], []
+    track, positions, velocities, passed = LegTrack(points[0], 2.0), [], [], []
     t_s = 0.0
     for k, goal in enumerate(points[1:], start=1):
         after = points[k + 1] if joined and k + 1 < len(points) else None
@@ -56,7 +56,7 @@ def test_a_cut_corner_stays_near_the_waypoint_and_saves_time() -> None:
 
 
 def test_a_leg_of_no_length_is_passed_at_once() -> None:
-    track = Track((1.0, 1.0, 1.0), 2.0)
+    track = LegTrack((1.0, 1.0, 1.0), 2.0)
     track.go_on((1.0, 1.0, 1.0), AXES, ((9.0, 1.0, 1.0), AXES))
     assert track.passed
     assert track.target()[0] == (1.0, 1.0, 1.0)

@@ -42,16 +42,6 @@ def frames(scene: World, count: int, model: RadarModel, at: SimTruth | None = No
     return [frame for frame in made if frame.snr_db]
 
 
-def polar(found: list[RadarFrame]) -> np.ndarray:
-    """(N, 5) range, azimuth deg, elevation deg, radial speed, SNR dB of all targets."""
-    xyz = np.concatenate([rows(f.xyz_m, 3) for f in found]).astype(float)
-    more = [np.concatenate([np.frombuffer(getattr(f, key), "<f4") for f in found]).astype(float)
-            for key in ("radial_speed_m_s", "snr_db")]  # fmt: skip
-    flat = np.hypot(xyz[:, 0], xyz[:, 1])
-    azimuth = np.degrees(np.arctan2(xyz[:, 0], xyz[:, 1]))
-    return np.column_stack([np.hypot(flat, xyz[:, 2]), azimuth, np.degrees(np.arctan2(xyz[:, 2], flat)), *more])
-
-
 def test_a_square_metre_at_the_rated_range_is_seen_eight_times_of_ten() -> None:
     seen = frames(in_the_air(reflector(119.9, 0.0, 1.0)), 1000, ALONE)
     assert len(seen) / 1000 == pytest.approx(0.8, abs=0.05)

@@ -130,7 +130,7 @@ def test_a_surface_model_lies_in_the_frame_as_its_coordinates_say(shared_data) -
     dsm = read_dsm(next((shared_data / "dsm" / "coromandel").glob("*.tif")))
     west, south, east, north = dsm.bounds_m
     lat, lon = dsm.lat_lon_from_xy(np.array([[(west + east) / 2, (south + north) / 2]]))[0]
-    frame = Frame(float(lat), float(lon), 800.0)
+    frame = NeuFrame(float(lat), float(lon), 800.0)
     terrain = SceneTerrain.from_dsm(dsm, frame)
     random = np.random.default_rng(0)
     places = random.uniform(-50, 50, (200, 2))
@@ -144,7 +144,7 @@ def test_a_surface_model_lies_in_the_frame_as_its_coordinates_say(shared_data) -
 def test_a_home_beside_the_surface_model_is_refused() -> None:
     dsm, _ = hill(0)
     with pytest.raises(ParameterError, match="knows no height at"):
-        SceneTerrain.from_dsm(dsm, Frame(10.0, 10.0, 0.0))
+        SceneTerrain.from_dsm(dsm, NeuFrame(10.0, 10.0, 0.0))
 
 
 @settings(max_examples=25)

@@ -14,12 +14,12 @@ CELL_M = 2.0
 HEIGHTS = np.arange(100 * 100, dtype=np.float32).reshape(100, 100) / 100
 
 
-def model(elevation_m: np.ndarray) -> tuple[Dsm, Frame]:
+def model(elevation_m: np.ndarray) -> tuple[Dsm, NeuFrame]:
     """A grid and a frame in its middle, on cell (50, 50)."""
     transform = Affine(CELL_M, 0, 1_800_000, 0, -CELL_M, 5_900_000)
     dsm = Dsm(elevation_m, transform, CRS.from_epsg(2193), None, "")
     lat, lon = dsm.lat_lon_from_xy(np.array([[1_800_000 + 50.5 * CELL_M, 5_900_000 - 50.5 * CELL_M]]))[0]
-    return dsm, Frame(float(lat), float(lon), 800.0)
+    return dsm, NeuFrame(float(lat), float(lon), 800.0)
 
 
 def test_flat_ground_is_at_the_origins_height_everywhere() -> None:

@@ -152,9 +152,9 @@ def test_a_radar_that_falls_silent_is_configured_again(tmp_path: Path, monkeypat
         until(configured(board))
         board.send(frame(1))
         listener.next()
-        monkeypatch.setattr(session, "SILENT_S", 0.1)
+        monkeypatch.setattr(ti_session, "SILENT_S", 0.1)
         until(lambda: told != [])
-        monkeypatch.setattr(session, "SILENT_S", PATIENCE_S)
+        monkeypatch.setattr(ti_session, "SILENT_S", PATIENCE_S)
         until(lambda: len(board.lines) >= 2 * len(CONFIG.commands))
         until(lambda: board.send(frame(1)) is None and listener.radar.status.trouble == "")
         listener.next()
@@ -198,7 +198,7 @@ def test_frames_that_have_waited_are_as_old_as_their_numbers_say() -> None:
         def read(self, _: int) -> bytes:
             return frame(5) + frame(6) + frame(9) + frame(90_000) + frame(90_001)
 
-    found = session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
+    found = ti_session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
     sent_s = [next(found)[0] for _ in range(5)]
     own_s = len(frame(1)) * 10 / 921_600
     assert sent_s == pytest.approx([100.0 - own_s - back for back in (0.6, 0.5, 0.2, 0.1, 0.0)], abs=1e-6)
@@ -211,7 +211,7 @@ def test_a_flipped_bit_in_a_number_makes_no_frame_older() -> None:
         def read(self, _: int) -> bytes:
             return frame(5) + frame(6 + 64) + frame(7)
 
-    found = session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
+    found = ti_session.frames(cast("Any", Port()), TiStream(), period_s=0.1, now=lambda: 100.0)
     own_s = len(frame(1)) * 10 / 921_600
     assert [next(found)[0] for _ in range(3)] == pytest.approx([100.0 - own_s - back for back in (0.2, 0.1, 0.0)])
 
@@ -228,14 +228,14 @@ def test_a_port_that_fails_while_it_is_emptied_is_one_that_has_gone(
         with contextlib.closing(open_port(str(board.data), 921_600)) as port:
             monkeypatch.setattr(serial.Serial, "reset_input_buffer", fails)
             with pytest.raises(SensorError, match="has gone"):
-                session.empty(port)
+                ti_session.empty(port)
         monkeypatch.setattr(serial.Serial, "_reset_input_buffer", fails)
         with pytest.raises(SensorError, match="cannot be opened"):
             open_port(str(board.data), 921_600)
 
 
 def test_garbage_alone_is_a_wrong_baud_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session, "GARBLED_S", 0.0)
+    monkeypatch.setattr(ti_session, "GARBLED_S", 0.0)
     with plugged(tmp_path) as board, listening(board, [], config=False) as listener:
         until(lambda: listener.radar.status.stream.bytes > 0 or board.send(b"\x81\x00\xfe" * 100) is not None)
         error = listener.error()
@@ -249,7 +249,7 @@ def test_garbage_after_frames_is_told_and_passes(tmp_path: Path, monkeypatch: py
         until(configured(board))
         board.send(frame(1))
         listener.next()
-        monkeypatch.setattr(session, "GARBLED_S", 0.0)
+        monkeypatch.setattr(ti_session, "GARBLED_S", 0.0)
         board.send(b"\x81\x00\xfe" * 100)
         until(lambda: listener.radar.status.trouble != "")
         board.send(frame(2))

@@ -22,7 +22,7 @@ def followed(
     seconds: float, place: Callable[[float], tuple[float, float]], velocity: Callable[[float], tuple[float, float]]
 ) -> list[Followed]:
     """Ten times a second, by a radar at the origin; after five seconds it sees nothing more."""
-    memory, out = Memory(), list[Followed]()
+    memory, out = TrackMemory(), list[Followed]()
     spread = np.diag([SIGMA_M**2, SIGMA_M**2, SIGMA_M_S**2, SIGMA_M_S**2])
     for k in range(round(10 * seconds)):
         t_s = k / 10

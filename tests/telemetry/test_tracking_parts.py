@@ -103,7 +103,7 @@ def test_what_is_seen_too_seldom_or_comes_too_late_or_passes_is_not_dangerous() 
 def test_it_moves_only_by_more_than_chance_and_when_its_echoes_bear_it_out(
     velocity: tuple[float, float], sigma_m_s: float, echo_moves: bool, moves: bool
 ) -> None:
-    memory, echo = Memory(), told((40.0, 0.0, -7.0, 40.0, echo_moves))
+    memory, echo = TrackMemory(), told((40.0, 0.0, -7.0, 40.0, echo_moves))
     seen = [memory.observe([state((0.0, 40.0), velocity, sigma_m_s=sigma_m_s)], echo, NORTHWARDS) for _ in range(5)]
     assert [one.moving for one in seen[-1]] == [moves]
 
