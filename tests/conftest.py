@@ -5,6 +5,12 @@ import re
 import shutil
 from pathlib import Path
 
+# Before any kernel is loaded: workers fill the processors by themselves, and threads of theirs, and of the servers that
+# they start, would only wait for each other. Whoever runs tests alone has all threads.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
 
@@ -24,10 +30,20 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share what their module makes once stay on one worker, which then makes it once."""
+    for item in items:
+        if isinstance(item, pytest.Function) and item.get_closest_marker("xdist_group") is None:
+            fixtures = item._fixtureinfo.name2fixturedefs.values()
+            if any(fixture.scope == "module" for named in fixtures for fixture in named):
+                item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """By the test's own name: workers add its group, and ``--last-failed`` would not find it again."""
     if "PYTEST_XDIST_WORKER" not in os.environ:
-        report.nodeid = re.sub(r"@[a-z-]+$", "", report.nodeid)
+        report.nodeid = re.sub(r"@[^@\[\]]+$", "", report.nodeid)
 
 
 @pytest.fixture(scope="session")

@@ -197,10 +197,10 @@ class _Client:
     """The link without a bus in between."""
 
     def __init__(self, link: Link) -> None:
-        self._link = link
+        self._answering = Answering(link, OperatorRight())
 
     async def call(self, request: Any) -> Any:
-        return await self._link.handle(request)
+        return await self._answering.answer(request)
 
 
 class _Quiet:

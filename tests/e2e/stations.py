@@ -22,27 +22,34 @@ Point = dict[str, Any]
 """A point of a plan document."""
 
 PASSWORD = "correct horse battery"
-_ENVIRONMENT = {**os.environ, "PYTHONUNBUFFERED": "1", "HEDGEHOP_PASSWORD": PASSWORD}
+_SETTINGS = {"PYTHONUNBUFFERED": "1", "HEDGEHOP_PASSWORD": PASSWORD}
 
 
 class Station:
     """A running server; ``kill()`` is the power cut, ``start()`` the next morning."""
 
-    def __init__(self, data_dir: Path, *arguments: str) -> None:
-        self.data_dir, self._arguments = data_dir, arguments
+    def __init__(
+        self,
+        data_dir: Path,
+        *arguments: str,
+        program: Sequence[str | Path] = (sys.executable, "-m", "server"),
+        environment: Mapping[str, str] = os.environ,
+    ) -> None:
+        self.data_dir, self._program, self._arguments = data_dir, program, arguments
+        self._environment = {**environment, **_SETTINGS}
         self.origin = self.link = ""
         self.start()
 
     def start(self) -> None:
         port = _free_port()
-        command = [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
+        command = [*self._program, "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
         # Flights of other tests meet no obstacles: a later option wins.
         command.append("--no-demo-world")
         # Into a file: a pipe that nobody empties fills up, and the server waits at it for ever.
         self._told = self.data_dir.with_name(f"{self.data_dir.name}-{port}.log")
         with self._told.open("w", encoding="utf-8") as told:
             self._process = subprocess.Popen(
-                [*command, *self._arguments], stdout=told, stderr=subprocess.STDOUT, env=_ENVIRONMENT
+                [*command, *self._arguments], stdout=told, stderr=subprocess.STDOUT, env=self._environment
             )
         self.origin = f"http://127.0.0.1:{port}"
         self.link = self._read_link()
@@ -146,7 +153,7 @@ class SimulatedVehicle:
         command = [sys.executable, "-m", "server", "sim", "--link", self.address.replace("tcp", "tcpin", 1)]
         command += ["--home", self.HOME, "--speedup", str(speedup), "--parameter", f"RTL_ALT={self.RTL_CM}"]
         self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=_ENVIRONMENT
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env={**os.environ, **_SETTINGS}
         )
         assert self._process.stdout is not None
         self.said = self._process.stdout.readline()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def car_clouds(shared_data: Path) -> list[tuple[F64, F64]]:

@@ -17,6 +17,10 @@ from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, packed
 DOWN_5_M = 5.0
 
 
+def radar_frame(t_s: float, number: int, xyz_m: ArrayLike, speed_m_s: ArrayLike, snr: ArrayLike) -> RadarFrame:
+    return RadarFrame.of(xyz_m, speed_m_s, snr, t_mono_s=t_s, t_utc_s=0.0, number=number, source="")
+
+
 def flat_ground(up_m: float = -DOWN_5_M) -> GroundGrid:
     """400 m x 400 m around the origin, 1 m cells."""
     return ground_grid(np.full((400, 400), up_m, np.float32), [[0.0, -1.0, 200.0], [1.0, 0.0, 200.0]])
@@ -56,19 +60,19 @@ class Flight:
         xyz = self.body(np.asarray(points_enu, np.float64).reshape(-1, 3))
         speed = -self.speed_m_s * xyz[:, 1] / np.maximum(np.linalg.norm(xyz, axis=1), 1e-9)
         self.number += 1
-        scan = RadarScan(self.t_s, self.number, xyz, speed, np.broadcast_to(snr_db, len(xyz)))
-        self.results.append(self.perception.on_frame(scan, self.t_s + 0.02))
+        frame = radar_frame(self.t_s, self.number, xyz, speed, np.broadcast_to(snr_db, len(xyz)))
+        self.results.append(self.perception.on_frame(frame, self.t_s + 0.02))
         return self.results[-1]
 
-    def camera(self, points_enu: np.ndarray, *, voxel_m: float = 0.1, slam: CameraPose | None = None) -> FrameResult:
+    def camera(self, points_enu: np.ndarray, *, voxel_m: float = 0.1, slam: SlamPose | None = None) -> FrameResult:
         """A cloud of these points, and where SLAM believes to be (right, in the map's frame, unless given)."""
         assert isinstance(self.perception, VisionPerception)
         half = self.heading_rad / 2
-        true = CameraPose(self.t_s, tuple(self.position.tolist()), (math.cos(half), 0.0, 0.0, -math.sin(half)))
+        true = SlamPose(self.t_s, tuple(self.position.tolist()), (math.cos(half), 0.0, 0.0, -math.sin(half)))
         self.perception.feed_camera(slam or true)
         xyz = self.body(np.asarray(points_enu, np.float64).reshape(-1, 3))
         self.number += 1
-        cloud = Cloud(self.t_s, self.number, xyz.astype(np.float32), voxel_m=voxel_m)
+        cloud = CloudFrame(self.t_s, 0.0, self.number, "", packed(xyz), voxel_m)
         self.results.append(self.perception.on_frame(cloud, self.t_s + 0.05))
         return self.results[-1]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64, Bools
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Frame:
     heading_rad: float
     truth: F64
     """(N, 4) places and velocities of all objects, seen or not."""
-    visible: NDArray[np.bool_]
+    visible: Bools
     """(N,)"""
 
 

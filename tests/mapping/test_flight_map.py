@@ -100,7 +100,7 @@ def test_a_flight_that_turns_brakes_and_drifts_is_one_part() -> None:
 def test_a_path_that_was_lost_begins_a_new_part() -> None:
     flight = flying()
     fly(flight, 10)
-    vision(flight).feed_camera(CameraPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost"))
+    vision(flight).feed_camera(SlamPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost"))
     fly(flight, 10)
     assert vision(flight).flight.part == 2
     assert "lost its way" in vision(flight).flight.why

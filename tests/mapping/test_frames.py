@@ -100,3 +100,21 @@ def test_the_printed_matrix_of_eq_3_is_no_rotation() -> None:
         ]
     ).T
     assert abs(np.linalg.det(printed) - 1.0) > 1e-5
+
+
+@given(latitudes, st.floats(-179.9, 179.9), near, near)
+def test_metres_between_two_places_are_those_of_the_ellipsoid_within_its_flattening(
+    lat: float, lon: float, east: float, north: float
+) -> None:
+    there = moved_deg((lat, lon), east, north)
+    assert offset_m((lat, lon), *there) == pytest.approx((east, north), abs=1e-6)
+    exact = LocalFrame(lat, lon, 0.0).to_enu(*there, 0.0)[0, :2]
+    assert math.hypot(*(exact - [east, north])) <= 0.0075 * math.hypot(east, north) + 0.03
+    assert apart_m((lat, lon), there) == pytest.approx(math.hypot(east, north), abs=1e-6)
+
+
+def test_metres_across_the_date_line_and_of_many_places_at_once() -> None:
+    assert apart_m((0.0, 179.9995), (0.0, -179.9995)) == pytest.approx(math.radians(0.001) * 6_371_008.8)
+    east_m, north_m = offset_m((45.0, 9.0), np.array([45.0, 45.001]), np.array([9.001, 9.0]))
+    np.testing.assert_allclose(east_m, [78.626, 0.0], atol=1e-3)
+    np.testing.assert_allclose(north_m, [0.0, 111.195], atol=1e-3)

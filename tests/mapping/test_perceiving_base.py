@@ -11,11 +11,12 @@ from mapping.perceiving.perception import Perception
 from mapping.sensor_frames import RadarFrame, RangeFrame
 from tests.mapping.flights import Flight, flat_ground
 
-MAST = np.array([[0.0, 30.0, 0.5]])
+MAST = np.array([[0.2, 30.2, 0.5]])
 
 
-def scan(t: float, number: int, source: str = "a") -> RadarScan:
-    return RadarScan(t, number, np.array([[0.0, 20.0, 1.0]]), np.array([0.0]), np.array([40.0]), source)
+def scan(t: float, number: int, source: str = "a") -> RadarFrame:
+    columns = ([[0.0, 20.0, 1.0]], [0.0], [40.0])
+    return RadarFrame.of(*columns, t_mono_s=t, t_utc_s=0.0, number=number, source=source)
 
 
 def flown() -> RadarPerception:
@@ -227,9 +228,9 @@ def test_ranges_become_voxels_in_their_directions() -> None:
     ranges.set_ground(flat_ground())
     flight.move()
     p = flight.position
-    bearing, elevation = np.array([0.0, math.pi / 2, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -math.pi / 2, 0.0, 0.0])
-    away = np.array([5.0, 6.0, 5.0, math.nan, 1e6])
-    scan = RangeScan(flight.t_s, 1, bearing, elevation, away, "", np.array([0.0, 0.1]), 0.1, 0.2, 30.0)
+    bearing, elevation = (0.0, math.pi / 2, 0.0, 0.0, 0.0), (0.0, 0.0, -math.pi / 2, 0.0, 0.0)
+    away = (5.0, 6.0, 5.0, math.nan, 1e6)
+    scan = RangeFrame(flight.t_s, 0.0, 1, "", bearing, elevation, away, (0.0, 0.1), 0.1, 0.2, 30.0)
     result = ranges.on_frame(scan, flight.t_s)
     probability = ranges.map.probability(p + np.array([[5.0, 0, 0], [0, -6.0, 0], [0, 0, -5.0]]))
     assert (probability > 0.5).all()

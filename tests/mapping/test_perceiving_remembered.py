@@ -15,7 +15,6 @@ from mapping.perceiving.remembered import LOOKS, MOST_COLUMNS, Field, Remembered
 from mapping.sensor_frames import RangeFrame
 from tests.mapping.flights import radar_frame
 
-F64 = NDArray[np.float64]
 WAY = Way(depth_m=10.0, half_angle_rad=math.radians(12.0), half_width_m=0.8, height_m=2.0)
 FIELD = Field(nearest_m=1.5, aside_rad=math.radians(45.0))
 NORTH_M, TOP_M = 20.5, 15.0
@@ -26,12 +25,12 @@ def pose(north_m: float, up_m: float, heading_rad: float = 0.0) -> Pose:
     return Pose(0.0, place, np.zeros(3), quaternions.from_attitude(heading_rad, 0.0, 0.0))
 
 
-def stands(places: F64) -> NDArray[np.bool_]:
+def stands(places: F64) -> Bools:
     """The wall, as a map that has seen all of it."""
     return (np.abs(places[:, 1] - NORTH_M) <= 0.5) & (places[:, 2] <= TOP_M)
 
 
-def nothing(places: F64) -> NDArray[np.bool_]:
+def nothing(places: F64) -> Bools:
     return np.zeros(len(places), np.bool_)
 
 
@@ -104,7 +103,7 @@ def radar_before_a_wall(nearest_m: float) -> float | None:
         seen = away_m >= 1.5 and up_m < 8.0
         xyz = np.array([[east, away_m, 0.1] for east in (-1.0, 0.0, 1.0)]) if seen else np.empty((0, 3))
         flat = np.zeros(len(xyz))
-        result = radar.on_frame(RadarScan(t_s, number, xyz, flat, flat + 30.0), t_s)
+        result = radar.on_frame(radar_frame(t_s, number, xyz, flat, flat + 30.0), t_s)
         assert result.region is not None
         hidden_m = result.region.hidden_m
     return hidden_m
@@ -117,9 +116,8 @@ def test_a_radar_says_what_it_is_too_near_to_see() -> None:
     assert hidden_m < 2.0
 
 
-def looking(bearing_rad: float, t_s: float, number: int) -> RangeScan:
-    none = np.empty(0)
-    return RangeScan(t_s, number, none, none, none, "", np.array([bearing_rad]), 0.1, 0.2, 4.0)
+def looking(bearing_rad: float, t_s: float, number: int) -> RangeFrame:
+    return RangeFrame(t_s, 0.0, number, "", (), (), (), (bearing_rad,), 0.1, 0.2, 4.0)
 
 
 def test_a_range_finder_that_looks_elsewhere_says_nothing_of_the_way_and_none_sees_farther_than_it_measures() -> None:

@@ -96,7 +96,7 @@ def frame(flight: Flight, east_m: float, north_m: float, over_ground_m_s: float)
     away = float(np.linalg.norm(xyz))
     speed = -flight.speed_m_s * xyz[:, 1] / away + over_ground_m_s
     flight.number += 1
-    scan = RadarScan(flight.t_s, flight.number, xyz, speed, np.array([snr_db(3.0, away)]))
+    scan = radar_frame(flight.t_s, flight.number, xyz, speed, np.array([snr_db(3.0, away)]))
     assert isinstance(flight.perception, RadarPerception)
     flight.results.append(flight.perception.on_frame(scan, flight.t_s + 0.02))
 
@@ -173,7 +173,7 @@ def past_a_mast(
         measured_m = away + 0.15 * random.normal()
         place = measured_m * np.array([[math.sin(azimuth), math.cos(azimuth), 0.05]])
         radial = 0.31 * round(math.remainder(-speed_m_s(t_s) * north / away, folded_m_s) / 0.31)
-        scan = RadarScan(100 + t_s, k, place[:seen], np.array([radial])[:seen], np.array([45.0])[:seen])
+        scan = radar_frame(100 + t_s, k, place[:seen], np.array([radial])[:seen], np.array([45.0])[:seen])
         perception.on_frame(scan, 100.02 + t_s)
         most = max(most, len(perception.map.occupied(explained=False)))
     return most, len(perception.map.occupied(explained=False))

@@ -111,7 +111,7 @@ def test_a_target_that_moves_unlike_a_fixed_thing_needs_more_frames() -> None:
     for k in range(6):
         flight.move()
         xyz = flight.body(np.array([[0.0, 20.0, 0.5]]))
-        scan = RadarScan(flight.t_s, k, xyz, np.array([3.0]), np.array([40.0]))
+        scan = radar_frame(flight.t_s, k, xyz, np.array([3.0]), np.array([40.0]))
         told.append(flight.perception.on_frame(scan, flight.t_s).obstacles)  # type: ignore[attr-defined]
     assert not told[1]
     assert told[4]
@@ -130,7 +130,7 @@ def test_a_thousand_targets_are_looked_at_in_time_for_the_next_frame(over_ground
         azimuth, away = rng.uniform(-0.75, 0.75, 1000), rng.uniform(5.0, 70.0, 1000)
         xyz = np.column_stack([away * np.sin(azimuth), away * np.cos(azimuth), 0.1 * away])
         speed = over_ground_m_s - 2.0 * np.cos(azimuth)
-        scan = RadarScan(flight.t_s, k, xyz, speed, 35.0 - 40 * np.log10(away / 120.0))
+        scan = radar_frame(flight.t_s, k, xyz, speed, 35.0 - 40 * np.log10(away / 120.0))
         began_s = time.thread_time()
         result = flight.perception.on_frame(scan, flight.t_s)  # type: ignore[attr-defined]
         took_s.append(time.thread_time() - began_s)
@@ -174,7 +174,7 @@ def test_broken_targets_are_counted_and_the_rest_is_used() -> None:
     flight = hovering(None)
     flight.move()
     xyz = np.array([[0.0, 10, 1], [math.nan, 10, 1], [0, 1e9, 1], [0, 10, -5], [0, 12, 1]])
-    scan = RadarScan(flight.t_s, 1, xyz, np.array([0, 0, 0, 0, 1e9]), np.full(5, 30.0))
+    scan = radar_frame(flight.t_s, 1, xyz, np.array([0, 0, 0, 0, 1e9]), np.full(5, 30.0))
     result = flight.perception.on_frame(scan, flight.t_s)  # type: ignore[attr-defined]
     assert result.points == 1
     assert flight.perception.dropped == {
@@ -187,7 +187,7 @@ def test_broken_targets_are_counted_and_the_rest_is_used() -> None:
 def test_columns_of_different_length_are_refused() -> None:
     flight = hovering(None)
     flight.move()
-    scan = RadarScan(flight.t_s, 1, np.zeros((3, 3)), np.zeros(2), np.zeros(3))
+    scan = radar_frame(flight.t_s, 1, np.zeros((3, 3)), np.zeros(2), np.zeros(3))
     result = flight.perception.on_frame(scan, flight.t_s)  # type: ignore[attr-defined]
     assert result.dropped_because == "columns of different length"
 
@@ -202,7 +202,7 @@ def test_garbage_never_raises_and_never_leaves_the_radar_s_reach(rows: list[tupl
     data = np.array(rows, np.float64).reshape(-1, 5)
     for k in range(3):
         flight.move()
-        scan = RadarScan(flight.t_s, k, data[:, :3], data[:, 3], data[:, 4])
+        scan = radar_frame(flight.t_s, k, data[:, :3], data[:, 3], data[:, 4])
         assert flight.perception.on_frame(scan, flight.t_s).accepted  # type: ignore[attr-defined]
     assert (np.abs(flight.perception.map.occupied()) <= 126).all()
 

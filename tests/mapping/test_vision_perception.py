@@ -33,12 +33,12 @@ def flying(**settings: Any) -> Flight:
     return flight
 
 
-def slam_of(flight: Flight, *, turn: float, drift: np.ndarray) -> CameraPose:
+def slam_of(flight: Flight, *, turn: float, drift: np.ndarray) -> SlamPose:
     """SLAM in a frame of its own: turned by ``turn``, its origin elsewhere, wrong by ``drift``."""
     q = quaternions.from_attitude(turn, 0.0, 0.0)
     p = heading_rotation(turn) @ (flight.position + drift) + np.array([500.0, -70.0, 3.0])
     own = quaternions.product(q, quaternions.from_attitude(flight.heading_rad, flight.pitch_rad, 0.0))
-    return CameraPose(flight.t_s, tuple(p.tolist()), tuple(own.tolist()))
+    return SlamPose(flight.t_s, tuple(p.tolist()), tuple(own.tolist()))
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, -2.5])
@@ -153,7 +153,7 @@ def test_a_lost_path_is_said_and_goes_on_without_gnss_where_it_ended() -> None:
         flight.move()
         flight.camera(floor(flight.north_m))
     flight.move(has_fix=False)
-    lost = CameraPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost")
+    lost = SlamPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost")
     result = flight.camera(floor(flight.north_m), slam=lost)
     assert (result.state, result.dropped_because) == ("blind", "the camera lost its way")
     flight.move(has_fix=False)
@@ -175,7 +175,7 @@ def test_darkness_is_said() -> None:
 
 def test_before_any_path_of_the_camera_the_map_waits() -> None:
     vision = VisionPerception(Settings(depth_m=7.0, resolution_m=0.5))
-    result = vision.on_frame(Cloud(1.0, 1, pole(5.0)), 1.0)
+    result = vision.on_frame(CloudFrame(1.0, 0.0, 1, "", packed(pole(5.0))), 1.0)
     assert (result.state, result.dropped_because) == ("frozen", "camera: no position")
 
 
@@ -225,7 +225,7 @@ def test_a_path_lost_before_the_first_fix_goes_on_where_it_ended() -> None:
         flight.camera(pole(18.0), slam=slam_of(flight, turn=0.4, drift=np.zeros(3)))
     before = flight.results[-1]
     flight.move(has_fix=False)
-    flight.camera(pole(18.0), slam=CameraPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost"))
+    flight.camera(pole(18.0), slam=SlamPose(flight.t_s, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "lost"))
     flight.move(has_fix=False)
     after = flight.camera(pole(18.0), slam=slam_of(flight, turn=-2.0, drift=np.zeros(3)))
     assert before.pose is not None
@@ -283,8 +283,8 @@ def test_garbage_never_raises(points: list[tuple[float, ...]], place: tuple, tur
     flight = flying()
     for k in range(3):
         flight.move()
-        flight.perception.feed_camera(CameraPose(flight.t_s, place, turn))  # type: ignore[attr-defined]
-        cloud = Cloud(flight.t_s, k, np.array(points, np.float64).reshape(-1, 3))
+        flight.perception.feed_camera(SlamPose(flight.t_s, place, turn))  # type: ignore[attr-defined]
+        cloud = CloudFrame(flight.t_s, 0.0, k, "", packed(np.array(points, np.float64)))
         result = flight.perception.on_frame(cloud, flight.t_s)  # type: ignore[attr-defined]
         assert result.accepted or result.dropped_because
     assert flight.perception.map.occupied_count <= len(points)

@@ -13,8 +13,6 @@ from mapping.tracking import Tracker, TrackerParams
 from tests.mapping.radar_scenes import Frame, frames, movers
 from tests.reference.stonesoup_gnn import follow
 
-F64 = NDArray[np.float64]
-
 FOUND_M = 5.0
 """A track this near to an object is its own."""
 PARAMS = TrackerParams(apart_m=0.0)

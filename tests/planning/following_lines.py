@@ -8,8 +8,6 @@ from mapping.geometry.arrays import F64
 from planning.certificate.places import distance_flown
 from planning.following.reference import Reference
 
-F64 = NDArray[np.float64]
-
 
 def line(points: object, *, speed_m_s: float = 2.0, hold_s: float = 0.0, takeoff_s: float = 5.0) -> Reference:
     """A reference over points (K, 3), passed at a steady speed, holding at every inner one."""

@@ -40,7 +40,7 @@ def write_raster(
     return path
 
 
-def hill(rows: int = 40, columns: int = 50) -> NDArray[np.float32]:
+def hill(rows: int = 40, columns: int = 50) -> F32:
     """A smooth hill around 100 m."""
     y, x = np.mgrid[:rows, :columns]
     return (100.0 + 8.0 * np.exp(-((x - columns / 2) ** 2 + (y - rows / 2) ** 2) / 90.0)).astype(np.float32)

@@ -14,7 +14,6 @@ from mapping.geometry.arrays import F32, F64
 from planning.evading.manoeuvres import AvoidanceParams, Manoeuvre, NoWay, Seen, around, over
 from tests.reference.box_distance import polyline_boxes_m
 
-F64 = NDArray[np.float64]
 HERE = np.array([0.0, 0.0, 10.0])
 LINE = np.array([[0.0, 0.0, 10.0], [0.0, 45.0, 12.0], [30.0, 80.0, 8.0]])
 
@@ -33,7 +32,7 @@ def block(east_m: float, north_m: float, width_m: float, top_m: float, *, edge_m
 class Slope:
     """Ground that rises to the east; 1 m cells around the origin."""
 
-    up_m: NDArray[np.float32]
+    up_m: F32
     enu_to_cell: F64
     cell_m: float = 1.0
 

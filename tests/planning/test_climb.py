@@ -15,7 +15,6 @@ from planning.evading.manoeuvres import AvoidanceParams, Manoeuvre, NoWay, Seen,
 from tests.reference.box_distance import polyline_boxes_m
 from tests.telemetry.avoiding_bench import Wall, craft, state
 
-F64 = NDArray[np.float64]
 HERE = np.array([0.0, 0.0, 8.0])
 NORTH, EAST = 0.0, math.pi / 2
 

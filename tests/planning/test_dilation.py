@@ -1,4 +1,4 @@
-"""`planning.dilation`: the kernels behind eq. 2 of Melita 2020."""
+"""`planning.safe_surface`: the kernels behind eq. 2 of Melita 2020."""
 
 import numpy as np
 import pytest

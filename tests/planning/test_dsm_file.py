@@ -38,7 +38,7 @@ KINDS = {
         Affine.translation(5e5, 4.17e6) @ Affine.rotation(-40.0) @ Affine.scale(-0.4, -0.5),
     ),
 }
-ROWS, COLUMNS = 150, 190
+ROWS, COLUMNS = 90, 110
 
 
 @pytest.fixture(scope="module")

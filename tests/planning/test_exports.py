@@ -72,6 +72,16 @@ def test_certificate(plan: Plan, dsm: Dsm) -> None:
     assert certificate["min_distance_m"] == plan.certificate.min_distance_m
 
 
+def test_neither_title_nor_time_need_be_given(plan: Plan, dsm: Dsm) -> None:
+    before = datetime.now(UTC)
+    certificate = json.loads(export_file("certificate.json", plan, dsm))
+    assert before - timedelta(milliseconds=1) < datetime.fromisoformat(certificate["created_utc"]) <= datetime.now(UTC)
+    assert certificate["seconds"] == {}
+    page = export_file("report.html", plan, dsm)
+    assert "<h1>Mission</h1>" in page
+    assert "Computed in" not in page
+
+
 def test_report_tells_the_worst_ground_sampling_distance(plan: Plan, dsm: Dsm) -> None:
     camera = Camera(4000, 3000, 8.8, 13.2, 8.8)
     seen = replace(plan, request=replace(plan.request, profile=replace(QUAD, camera=camera)))

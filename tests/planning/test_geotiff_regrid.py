@@ -20,13 +20,13 @@ UTM = CRS.from_epsg(32633)
 WGS84 = CRS.from_epsg(4326)
 
 
-def height_at(target: NDArray[np.float32], transform: Affine, x: float, y: float) -> float:
+def height_at(target: F32, transform: Affine, x: float, y: float) -> float:
     column, row = ~transform @ (x, y)
     inside = 0 <= row < target.shape[0] and 0 <= column < target.shape[1]
     return float(target[int(row), int(column)]) if inside else np.nan
 
 
-def squared(source: NDArray[np.float32], affine: Affine, crs: CRS) -> tuple[NDArray[np.float32], Affine, Mapping]:
+def squared(source: F32, affine: Affine, crs: CRS) -> tuple[F32, Affine, Mapping]:
     """The squares over a raster, their transform, and where its pixels lie."""
     forward, to_source = source_mapping(affine, crs, UTM)
     cells = place_cells(source.shape, forward).cells(source)
@@ -34,7 +34,7 @@ def squared(source: NDArray[np.float32], affine: Affine, crs: CRS) -> tuple[NDAr
     return squares(cells, transform, shape), transform, to_source
 
 
-def assert_nothing_lost(source: NDArray[np.float32], affine: Affine, crs: CRS, seed: int) -> None:
+def assert_nothing_lost(source: F32, affine: Affine, crs: CRS, seed: int) -> None:
     """Slow check of every source cell: its area is nowhere lower, or unknown, and no height is invented."""
     target, transform, to_source = squared(source, affine, crs)
     to_utm = Transformer.from_crs(crs, UTM, always_xy=True)

@@ -189,7 +189,7 @@ def test_a_full_disk_is_named_and_leaves_nothing(
 ) -> None:
     path = write_raster(tmp_path / "x.tif", hill())
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
-    run = "import runpy; runpy.run_module('planning.rasters.worker', run_name='__main__')"
+    run = "import runpy; runpy.run_module('planning.terrain.rasters.worker', run_name='__main__')"
     monkeypatch.setattr(sandbox, "_COMMAND", [sys.executable, "-P", "-c", full + run])
     with pytest.raises(RasterError, match=r"no room for the heights.*TMPDIR"):
         read_dsm(path)

@@ -1,4 +1,4 @@
-"""`planning.holes`: small holes take the maximum of their rim."""
+"""`planning.terrain.holes`: small holes take the maximum of their rim."""
 
 import numpy as np
 import pytest

@@ -76,7 +76,7 @@ def test_every_box_of_the_pyramid_holds_its_cells(shear_m: float, first: tuple[i
 
 
 @pytest.mark.parametrize("shear_m", [0.0, 0.4])
-@pytest.mark.parametrize("seed", range(3))
+@seeds(3)
 def test_skipping_by_boxes_loses_no_cell(seed: int, shear_m: float) -> None:
     random = np.random.default_rng(seed)
     lattice, shape = bent(seed, shear_m=shear_m, first=(3, 5)), (ROWS, COLUMNS)
@@ -180,7 +180,7 @@ def odd_cells(random: np.random.Generator) -> Cells:
     return Cells(inner, Layout(lattice, (0.0, 0.0), np.eye(2), inner.shape))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@seeds(60)
 def test_odd_models_are_judged_as_by_brute_force(seed: int) -> None:
     random = np.random.default_rng(seed)
     cells = odd_cells(random)

@@ -16,7 +16,7 @@ CRS_UTM = CRS.from_user_input(UTM)
 BOUNDS = (500_000.0, 4_169_980.0, 500_025.0, 4_170_000.0)
 
 
-def colours(rows: int = 40, columns: int = 50) -> NDArray[np.uint8]:
+def colours(rows: int = 40, columns: int = 50) -> U8:
     """(3, rows, columns): red grows eastward, green southward."""
     y, x = np.mgrid[:rows, :columns]
     return np.stack([50 + x * 4, 50 + y * 4, np.full_like(x, 7)]).astype(np.uint8)

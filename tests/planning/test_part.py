@@ -67,7 +67,7 @@ def test_the_part_grows_until_nothing_that_was_found_is_as_far_as_its_border(mon
     margins_m: list[float] = []
     box_of = part._needed_box
 
-    def noted(model: SurfaceModel, xy_m: part.F64, margin_m: float) -> tuple[int, int, int, int]:
+    def noted(model: SurfaceModel, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:
         margins_m.append(margin_m)
         return box_of(model, xy_m, margin_m)
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from planning.flight_time.scurve import INPUT_TIME_CONSTANT_S, Axes, LegLimits, leg, overlap_s, speed_up
 
 AXES = Axes(3.0, 2.0, 1.5, 2.5, 1.0, 5.0, 1.0)
-limits = st.builds(Limits, st.floats(0.2, 20), st.floats(0.2, 6), st.floats(0.2, 10))
+limits = st.builds(LegLimits, st.floats(0.2, 20), st.floats(0.2, 6), st.floats(0.2, 10))
 
 
 @settings(deadline=None)
 @given(limits, st.floats(0.05, 500))
-def test_the_rise_keeps_its_limits_and_its_half_of_the_leg(within: Limits, half_m: float) -> None:
+def test_the_rise_keeps_its_limits_and_its_half_of_the_leg(within: LegLimits, half_m: float) -> None:
     rise = speed_up(half_m, within)
     times = np.linspace(0, rise.duration_s, 400)
     x, v, a = np.array([rise.at(float(t)) for t in times]).T
@@ -30,7 +30,7 @@ def test_the_rise_keeps_its_limits_and_its_half_of_the_leg(within: Limits, half_
 
 @settings(deadline=None)
 @given(limits, st.floats(0.1, 100))
-def test_distance_speed_and_acceleration_are_integrals_of_each_other(within: Limits, half_m: float) -> None:
+def test_distance_speed_and_acceleration_are_integrals_of_each_other(within: LegLimits, half_m: float) -> None:
     rise = speed_up(half_m, within)
     times = np.linspace(0, rise.duration_s, 4001)
     x, v, a = np.array([rise.at(float(t)) for t in times]).T
@@ -40,7 +40,7 @@ def test_distance_speed_and_acceleration_are_integrals_of_each_other(within: Lim
 
 
 def test_a_weak_pulse_has_less_jerk_for_the_same_snap() -> None:
-    rise = speed_up(1e-3, Limits(3.0, 2.5, 1.0))
+    rise = speed_up(1e-3, LegLimits(3.0, 2.5, 1.0))
     assert rise.ramp_s < 2 * INPUT_TIME_CONSTANT_S
     assert rise.jerk_m_s3 / rise.ramp_s == pytest.approx(1.0 / (2 * INPUT_TIME_CONSTANT_S))
 

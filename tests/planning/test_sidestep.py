@@ -18,7 +18,6 @@ from planning.evading.sidestep import AFTER_S, Mover, Proposed, Sidestep, sidest
 from tests.planning.test_avoidance import slope
 from tests.reference.box_distance import polyline_boxes_m
 
-F64 = NDArray[np.float64]
 HERE = np.array([0.0, 0.0, 10.0])
 LINE = np.array([[0.0, 0.0, 10.0], [0.0, 60.0, 12.0], [40.0, 90.0, 8.0]])
 HEAD_ON = Mover((0.0, 30.0), (0.0, -3.0))

@@ -26,7 +26,7 @@ TURNED = Affine.translation(5e5, 4.17e6) @ Affine.rotation(31.0) @ Affine.scale(
 DEGREES = Affine(1e-5, 0, 14.99, 0, -1e-5, 37.73)
 
 
-def rough(seed: int, holes: int = 0) -> NDArray[np.float32]:
+def rough(seed: int, holes: int = 0) -> F32:
     random = np.random.default_rng(seed)
     elevation_m = random.normal(0.0, 2.0, (45, 38))
     elevation_m[random.random(elevation_m.shape) < 0.02] += 12.0
@@ -34,7 +34,7 @@ def rough(seed: int, holes: int = 0) -> NDArray[np.float32]:
     return elevation_m.astype(np.float32)
 
 
-def rectangles(elevation_m: NDArray[np.float32]) -> tuple[MaxPyramid, MaxPyramid]:
+def rectangles(elevation_m: F32) -> tuple[MaxPyramid, MaxPyramid]:
     """The pyramid over squares of 0.7 m, and over the same squares as quadrilaterals of a lattice bent by nothing."""
     squares = square_cells(ringed(elevation_m), 0.7, (0.0, 0.0))
     layout = squares.layout
@@ -80,7 +80,7 @@ def test_heights_are_those_of_the_files_cells(tmp_path: Path, crs: str, transfor
     assert np.isnan(dsm.elevation_at(place(dsm, crs, transform, -0.2, 25.0)))[0]
 
 
-def place(dsm: Dsm, crs: str, transform: Affine, row: float, column: float) -> NDArray[np.float64]:
+def place(dsm: Dsm, crs: str, transform: Affine, row: float, column: float) -> F64:
     """Projected place of a row and column of the file."""
     x, y = transform @ (column, row)
     return np.array([[x, y]]) if crs != "EPSG:4326" else dsm.xy_from_lat_lon(np.array([[y, x]]))

@@ -15,11 +15,11 @@ from planning.terrain.spikes import find_spikes, remove_spikes
 UTM = CRS.from_epsg(32633)
 
 
-def model(elevation: NDArray[np.float32], cell_m: float = 0.5) -> Dsm:
+def model(elevation: F32, cell_m: float = 0.5) -> Dsm:
     return Dsm(elevation, Affine(cell_m, 0, 5e5, 0, -cell_m, 4.17e6), UTM, None, "")
 
 
-def slope(rows: int = 120, columns: int = 140, gradient: float = 0.2) -> NDArray[np.float32]:
+def slope(rows: int = 120, columns: int = 140, gradient: float = 0.2) -> F32:
     y, x = np.mgrid[:rows, :columns]
     return (100.0 + gradient * 0.5 * x + np.sin(y / 9.0)).astype(np.float32)
 
@@ -116,7 +116,7 @@ def test_bands_of_rows_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     for row in range(5, 400, 13):
         heights[row : row + 2, 30] += 50.0
     whole = find_spikes(model(heights))
-    monkeypatch.setattr("planning.spikes._BAND_ROWS", 19)
+    monkeypatch.setattr("planning.terrain.spikes._BAND_ROWS", 19)
     assert find_spikes(model(heights)) == whole
     assert len(whole) == len(range(5, 400, 13))
 

@@ -16,7 +16,6 @@ from planning.evading.manoeuvres import Manoeuvre, NoWay, Seen, around, over
 from planning.evading.seen import conflicts
 from tests.reference.box_distance import polyline_boxes_m
 
-F64 = NDArray[np.float64]
 HERE = np.array([0.0, 0.0, 8.0])
 SLOPES = (-0.4, -0.25, -0.1, 0.0, 0.1, 0.25, 0.36)
 UP_20_DEG = math.tan(math.radians(20))

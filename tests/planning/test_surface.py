@@ -1,4 +1,4 @@
-"""`planning.surface`: from the surface model to the safe surface."""
+"""`planning.safe_surface.surface`: from the surface model to the safe surface."""
 
 import math
 

@@ -86,7 +86,7 @@ def seeded(folder: Path, kind: str, seed: int) -> Model:
     return Model(kind, path, 6.0, 30.0)
 
 
-def rough_hills(seed: int) -> NDArray[np.float32]:
+def rough_hills(seed: int) -> F32:
     random = np.random.default_rng(seed)
     y, x = np.mgrid[:130, :150]
     phase = random.uniform(0, 6, 2)

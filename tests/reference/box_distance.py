@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+
 STEP_M = 0.1
 
 

@@ -19,7 +19,7 @@ def caso_false_alarm(cells: int, factor: float) -> float:
 
 
 def caso(ring: Row, guard: int, training: int, stride: int, factor: float) -> list[bool]:
-    """Which cells of a ring exceed their threshold; a side that meets the cells around zero starts beyond them."""
+    """Which cells of a ring exceed their threshold; a side that meets or passes the cells around zero starts beyond."""
     n = len(ring)
     around_zero = {k % n for k in range(-guard * stride, guard * stride + 1)}
     found = []
@@ -27,7 +27,8 @@ def caso(ring: Row, guard: int, training: int, stride: int, factor: float) -> li
         means = []
         for sign in (-1, 1):
             reached = {(c + sign * k) % n for k in range((guard + 1) * stride, (guard + training) * stride + 1)}
-            start = 0 if reached & around_zero else c
+            passed = {(c + sign * k) % n for k in range(1, (guard + 1) * stride)}
+            start = 0 if reached & around_zero or 0 in passed else c
             side = [(start + sign * stride * k) % n for k in range(guard + 1, guard + training + 1)]
             means.append(sum(ring[i] for i in side) / training)
         found.append(here > factor * min(means))

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F32, F64
 
 
 def sampled_segment(start_m: F64, end_m: F64, step_m: float) -> F64:
@@ -18,7 +18,7 @@ def sampled_segment(start_m: F64, end_m: F64, step_m: float) -> F64:
     return start_m + np.linspace(0.0, 1.0, max(2, count))[:, None] * (end_m - start_m)
 
 
-def point_distance(elevation_m: NDArray[np.float32], res_m: float, point_m: F64) -> float:
+def point_distance(elevation_m: F32, res_m: float, point_m: F64) -> float:
     """Distance of one place to the union of all columns and the outside of the model."""
     height_px, width_px = elevation_m.shape
     x, y, z = point_m
@@ -28,12 +28,12 @@ def point_distance(elevation_m: NDArray[np.float32], res_m: float, point_m: F64)
     return min(to_outside, float(np.sqrt(_flat_distance_sq(elevation_m.shape, res_m, x, y) + above**2).min()))
 
 
-def sampled_distance(elevation_m: NDArray[np.float32], res_m: float, places_m: F64) -> float:
+def sampled_distance(elevation_m: F32, res_m: float, places_m: F64) -> float:
     """Smallest of the places' distances: at most half their spacing above the segment's."""
     return min(point_distance(elevation_m, res_m, place) for place in places_m)
 
 
-def height_range(elevation_m: NDArray[np.float32], res_m: float, start_m: F64, end_m: F64) -> tuple[float, float]:
+def height_range(elevation_m: F32, res_m: float, start_m: F64, end_m: F64) -> tuple[float, float]:
     """Smallest and largest height above the cells below, between all crossings of grid lines."""
     crossings = [0.0, 1.0]
     for axis, count in ((0, elevation_m.shape[1]), (1, elevation_m.shape[0])):
@@ -53,7 +53,7 @@ def _altitudes(start_m: F64, end_m: F64, t0: float, t1: float) -> tuple[float, f
     return start_m[2] + t0 * (end_m[2] - start_m[2]), start_m[2] + t1 * (end_m[2] - start_m[2])
 
 
-def _height_above(elevation_m: NDArray[np.float32], res_m: float, point_m: F64) -> float:
+def _height_above(elevation_m: F32, res_m: float, point_m: F64) -> float:
     row, col = int(np.floor(point_m[1] / res_m)), int(np.floor(point_m[0] / res_m))
     if not (0 <= row < elevation_m.shape[0] and 0 <= col < elevation_m.shape[1]):
         return -np.inf
@@ -61,7 +61,7 @@ def _height_above(elevation_m: NDArray[np.float32], res_m: float, point_m: F64) 
     return float(point_m[2]) - ground_m if np.isfinite(ground_m) else -np.inf
 
 
-def segment_distance(elevation_m: NDArray[np.float32], res_m: float, start_m: F64, end_m: F64) -> float:
+def segment_distance(elevation_m: F32, res_m: float, start_m: F64, end_m: F64) -> float:
     """The segment's distance by ternary search over each column's convex distance function."""
     height_px, width_px = elevation_m.shape
     ends = [point_to_outside(p, width_px * res_m, height_px * res_m) for p in (start_m, end_m)]
@@ -81,7 +81,7 @@ def point_to_outside(point_m: F64, width_m: float, height_m: float) -> float:
 
 
 def return_altitude(
-    elevation_m: NDArray[np.float32], res_m: float, place_m: F64, home_xy_m: F64, clearance_m: float, step_m: float
+    elevation_m: F32, res_m: float, place_m: F64, home_xy_m: F64, clearance_m: float, step_m: float
 ) -> float:
     """Altitude that a level flight from a place to home needs, from places every ``step_m``: never too much."""
     home_m = np.array([*home_xy_m, place_m[2]])

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F32, F64, Bools
 
 
-def dilate_slowly(elevation_m: NDArray[np.float32], *, radius_px: float, height_m: float) -> F64:
+def dilate_slowly(elevation_m: F32, *, radius_px: float, height_m: float) -> F64:
     """``max{A(x - x', y - y') + B(x', y')}`` cell by cell in float64; NaN where no known cell is within R."""
     rows, cols = elevation_m.shape
     reach = math.floor(radius_px)
@@ -23,7 +23,7 @@ def dilate_slowly(elevation_m: NDArray[np.float32], *, radius_px: float, height_
     return np.where(np.isinf(out_m), math.nan, out_m)
 
 
-def ball_structure(radius_px: float, height_m: float) -> tuple[NDArray[np.bool_], F64]:
+def ball_structure(radius_px: float, height_m: float) -> tuple[Bools, F64]:
     """Footprint and heights of the ball as ``scipy.ndimage.grey_dilation`` takes them."""
     reach = math.floor(radius_px)
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]

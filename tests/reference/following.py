@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def sampled_line(points_m: F64, step_m: float) -> F64:

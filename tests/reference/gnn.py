@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def matrix(distances: F64, *, gate: float, detection_probability: float) -> F64:

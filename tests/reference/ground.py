@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def shell_distance(up_m: F64, enu_to_cell: F64, cell_m: float, point_enu: F64) -> float:

@@ -17,9 +17,7 @@ def nearest_m(row: int, col: int, x: float, y: float, res: float) -> float:
     return math.hypot(dx, dy)
 
 
-def stand(
-    cells: NDArray[np.float32], res: float, x: float, y: float, centre_m: float, radius_m: float
-) -> tuple[bool, float, float]:
+def stand(cells: F32, res: float, x: float, y: float, centre_m: float, radius_m: float) -> tuple[bool, float, float]:
     """(whether a vehicle can start there, lowest, highest cell in reach); (False, nan, nan) where unknown."""
     reach_m = centre_m + radius_m
     height, width = cells.shape

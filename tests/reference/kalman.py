@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
+
 Measure = Callable[[F64], F64]
 STEP = 1e-6
 

@@ -17,7 +17,7 @@ from numba import njit, prange
 from pyproj import CRS, Geod, Transformer
 from scipy import ndimage
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 TAKEOFF, WAYPOINT = 22, 16
 SMALL_HOLE_M2 = 4.0

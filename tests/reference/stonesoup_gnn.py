@@ -14,7 +14,6 @@ from mapping.geometry.arrays import F64
 from mapping.tracking import TrackerParams
 from tests.mapping.radar_scenes import Frame
 
-F64 = NDArray[np.float64]
 START = datetime.datetime(2026, 1, 1)
 FORGOTTEN_M2 = 12.0
 """Variance of the place, both axes together: some three seconds without a detection."""

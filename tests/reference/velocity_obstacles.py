@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-F64 = NDArray[np.float64]
+from mapping.geometry.arrays import F64
 
 
 def closest_m(offset: F64, relative: F64, *, until_s: float, step_s: float) -> float:

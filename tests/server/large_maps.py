@@ -22,7 +22,6 @@ from tests.server.obstacle_messages import delta
 from tests.server.test_obstacles_drawing import made
 from tests.server.test_scene_obstacles import placed
 
-I32 = NDArray[np.int32]
 PART_VOXELS = 20_000
 QUIET_TURNS = 50
 

@@ -50,3 +50,20 @@ def test_nothing_outside_the_console_is_served(tmp_path: Path) -> None:
             response = server.http.get(f"/assets/{path}")
             assert response.status_code == 404, path
             assert "secret" not in response.text
+
+
+def test_help_is_served_to_those_who_are_signed_in(tmp_path: Path) -> None:
+    pages = tmp_path / "console" / "help"
+    pages.mkdir(parents=True)
+    (pages / "index.html").write_text("<!doctype html>contents")
+    (pages / "fly.webp").write_bytes(b"RIFF")
+    (tmp_path / "console" / "secret.txt").write_text("secret")
+    with running(tmp_path / "data", console_dir=tmp_path / "console") as server:
+        assert server.http.get("/help", follow_redirects=True).text == "<!doctype html>contents"
+        assert server.http.get("/help/index.html").headers["content-type"].startswith("text/html")
+        assert server.http.get("/help/fly.webp").headers["content-type"] == "image/webp"
+        for path in OUTSIDE:
+            assert server.http.get(f"/help/{path}").status_code == 404, path
+        with server.stranger() as client:
+            answer = client.get("/help/index.html")
+            assert (answer.status_code, answer.headers["location"]) == (303, "/signin")

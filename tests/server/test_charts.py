@@ -33,12 +33,6 @@ def test_peaks_gorges_ends_and_marks_survive(seed: int, count: int, unknown: flo
         assert np.nanmax(curve[keep]) == np.nanmax(curve)
 
 
-def test_distance_is_horizontal() -> None:
-    points = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 100.0], [3.0, 4.0, 0.0]])
-    assert along(points).tolist() == [0.0, 5.0, 5.0]
-    assert along(points[:1]).tolist() == [0.0]
-
-
 def test_the_chart_of_the_demo() -> None:
     plan = plan_mission(demo_dsm(), PlanRequest(pois=demo_pois(), profile=VehicleProfile("x")))
     drawn = chart(plan)

@@ -40,7 +40,7 @@ def full_at(call: int, monkeypatch: pytest.MonkeyPatch) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")
         real(handle)
 
-    monkeypatch.setattr("server.cli.files.os.fsync", fsync)
+    monkeypatch.setattr("server.cli.shared.files_in_out.os.fsync", fsync)
 
 
 @pytest.mark.parametrize("call", [1, 2])
@@ -71,7 +71,7 @@ def test_file_in_the_place_of_the_directory(tmp_path: Path) -> None:
 
 
 def test_directory_that_may_not_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.cli.files.os.access", lambda *_: False)
+    monkeypatch.setattr("server.cli.shared.files_in_out.os.access", lambda *_: False)
     with pytest.raises(StorageError, match="cannot be written"):
         check_directory(tmp_path / "out")
     assert list(tmp_path.iterdir()) == []

@@ -279,7 +279,7 @@ def test_fly_ends_with_1_when_the_flight_was_too_low(
     async def flown(_: object) -> tuple[object, ReviewDoc]:
         return SimpleNamespace(completed=True, text="The mission was flown and the vehicle has landed."), done
 
-    monkeypatch.setattr(sys.modules["server.cli.fly"]._Conductor, "run", flown)
+    monkeypatch.setattr(sys.modules["server.cli.fly_command"]._Conductor, "run", flown)
     run = hedgehop("fly", ground.mission, "--link", ground.link, "--json")
     assert run.code == 1
     assert run.json["completed"] is True

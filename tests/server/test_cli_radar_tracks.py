@@ -54,7 +54,7 @@ def data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
         {"type": "cylinder", "at_m": list(place), "radius_m": 0.15, "height_m": 4.0, "material": "plaster"}
         for place in POLES_EN_M
     ]
-    world = World.parse({"format": "hedgehop-world", "version": 1, "objects": poles}, frame=Frame(*HOME))
+    world = World.parse({"format": "hedgehop-world", "version": 1, "objects": poles}, frame=NeuFrame(*HOME))
     radar = IqRadarSensor(world, seed=3, model=POSITION2GO_IQ)
     times_s = LATE_S + np.arange(round(SECONDS * 15.7)) / 15.7
     lines = [oda_line(RADAR_ZERO_NS + round((t - LATE_S) * 1e9), 100 * radar.cube(truth(t))) for t in times_s.tolist()]

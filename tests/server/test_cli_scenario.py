@@ -25,11 +25,11 @@ from tests.server.cli_runs import hedgehop
 
 
 @pytest.fixture
-def flights(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Wanted]]:
+def flights(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ScenarioRequest]]:
     """What would be flown; the figure is reached for even seeds."""
-    asked: list[tuple[str, Wanted]] = []
+    asked: list[tuple[str, ScenarioRequest]] = []
 
-    def run(name: str, wanted: Wanted) -> ScenarioResult:
+    def run(name: str, wanted: ScenarioRequest) -> ScenarioResult:
         asked.append((name, wanted))
         share = 0.95 if wanted.seed % 2 == 0 else 0.5
         flight = FlightResult(
@@ -44,20 +44,20 @@ def flights(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Wanted]]:
         )
         return ScenarioResult(name, wanted.seed, (flight,))
 
-    monkeypatch.setattr(import_module("server.cli.scenario"), "run_scenario", run)
+    monkeypatch.setattr(import_module("server.cli.scenario_command"), "run_scenario", run)
     return asked
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_scenario_has_its_name(name: str, flights: list[tuple[str, Wanted]]) -> None:
+def test_every_scenario_has_its_name(name: str, flights: list[tuple[str, ScenarioRequest]]) -> None:
     run = hedgehop("scenario", name, "--seed", 4)
     assert run.code == 0
     assert f"{name}, seed 4" in run.out
     assert "share found: 0.95  (at least 0.9: reached)" in run.out
-    assert flights == [(name, Wanted(4))]
+    assert flights == [(name, ScenarioRequest(4))]
 
 
-def test_a_figure_that_is_not_reached_ends_it_with_1(flights: list[tuple[str, Wanted]]) -> None:
+def test_a_figure_that_is_not_reached_ends_it_with_1(flights: list[tuple[str, ScenarioRequest]]) -> None:
     run = hedgehop("scenario", "wood", "--seed", 3, "--json")
     assert run.code == 1
     assert run.json["name"] == "wood"
@@ -68,7 +68,7 @@ def test_a_figure_that_is_not_reached_ends_it_with_1(flights: list[tuple[str, Wa
     assert not run.json["passed"]
 
 
-def test_many_seeds_are_flown_and_counted(flights: list[tuple[str, Wanted]]) -> None:
+def test_many_seeds_are_flown_and_counted(flights: list[tuple[str, ScenarioRequest]]) -> None:
     run = hedgehop("scenario", "castle-building", "--seed", 2, "--seeds", 3)
     assert run.code == 1
     assert [wanted.seed for _, wanted in flights] == [2, 3, 4]
@@ -78,7 +78,7 @@ def test_many_seeds_are_flown_and_counted(flights: list[tuple[str, Wanted]]) -> 
 
 
 def test_what_cannot_be_flown_is_refused_before_anything_flies(
-    flights: list[tuple[str, Wanted]], tmp_path: Path
+    flights: list[tuple[str, ScenarioRequest]], tmp_path: Path
 ) -> None:
     there = tmp_path / "there.mcap"
     there.write_bytes(b"")
@@ -99,15 +99,15 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
 
 
 def test_curves_are_asked_for_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    asked: list[Wanted] = []
+    asked: list[ScenarioRequest] = []
     line = series("measured", [0.0, 1.0], [0.0, 2.0])
     chart = Chart("errors", "m", "%", (line, series("paper", [0.5], [1.0], drawn="points", printed=True)))
 
-    def run(name: str, wanted: Wanted) -> ScenarioResult:
+    def run(name: str, wanted: ScenarioRequest) -> ScenarioResult:
         asked.append(wanted)
         return ScenarioResult(name, wanted.seed, (measured("Errors, AWR1843", (), charts=(chart, chart)),))
 
-    monkeypatch.setattr(import_module("server.cli.scenario"), "run_scenario", run)
+    monkeypatch.setattr(import_module("server.cli.scenario_command"), "run_scenario", run)
     assert hedgehop("scenario", "iq-reflector", "--plots", tmp_path / "new").code == 0
     assert hedgehop("scenario", "iq-reflector").code == 0
     assert [wanted.charts for wanted in asked] == [True, False]
@@ -116,17 +116,17 @@ def test_curves_are_asked_for_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_pat
         assert len(set(image.convert("L").get_flattened_data())) > 20
 
 
-def test_of_the_arena_radar_and_figures_can_be_chosen(flights: list[tuple[str, Wanted]]) -> None:
+def test_of_the_arena_radar_and_figures_can_be_chosen(flights: list[tuple[str, ScenarioRequest]]) -> None:
     sets = ("tracker.coordinates=polar", "tracker.gate=9", "velocities.max_turn_deg=60", "tracker.gate=8.5")
     run = hedgehop("scenario", "arena", "--radar", "iq", *(word for one in sets for word in ("--set", one)))
     assert run.code == 0
     settings = {"tracker": {"coordinates": "polar", "gate": "8.5"}, "velocities": {"max_turn_deg": "60"}}
-    assert flights == [("arena", Wanted(0, radar="iq", settings=settings))]
+    assert flights == [("arena", ScenarioRequest(0, radar="iq", settings=settings))]
     hedgehop("scenario", "arena", "--set", "velocities.choice=edge")
-    assert flights[-1] == ("arena", Wanted(0, settings={"velocities": {"choice": "edge"}}))
+    assert flights[-1] == ("arena", ScenarioRequest(0, settings={"velocities": {"choice": "edge"}}))
 
 
-def test_what_cannot_be_chosen_is_refused_by_its_name(flights: list[tuple[str, Wanted]]) -> None:
+def test_what_cannot_be_chosen_is_refused_by_its_name(flights: list[tuple[str, ScenarioRequest]]) -> None:
     wrong = {
         ("arena", "--set", "tracker.gate"): '"tracker.gate" sets nothing',
         ("arena", "--set", "gate=9"): '"gate=9" sets nothing',

@@ -202,7 +202,7 @@ def test_unforeseen_failure_is_told_without_a_traceback(
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("of the test")
 
-    monkeypatch.setattr("server.cli.planning_run.plan_mission", burst)
+    monkeypatch.setattr("server.cli.shared.planning_run.plan_mission", burst)
     run = hedgehop("plan", demo.model, demo.points, "--out", earlier, "--json")
     assert run.code == 1
     assert run.json["error"]["code"] == "internal"

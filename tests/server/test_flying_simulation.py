@@ -87,7 +87,7 @@ class Station:
 
 @pytest.fixture(autouse=True)
 def _no_demo(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.demo.terrain", lambda _library: None)
+    monkeypatch.setattr("server.plan.demo.terrain", lambda _library: None)
 
 
 def port_of(address: str) -> int:

@@ -85,36 +85,55 @@ def test_a_rebound_name_opens_no_socket(served: Running) -> None:
 
 
 def test_an_announced_huge_body_is_refused_unread(served: Running) -> None:
-    request = (
-        f"POST /api/terrains?filename=x.tif HTTP/1.1\r\nHost: 127.0.0.1:{served.settings.port}\r\n"
-        f"Origin: {served.origin}\r\nCookie: {served.cookie}\r\nContent-Type: application/octet-stream\r\n"
-        "Content-Length: 99999999999\r\n\r\n"
-    )
-    assert b" 413 " in _answer(served, request.encode())
+    assert b" 413 " in _answer(served, _announced(served, 99999999999))
 
 
-def test_an_unannounced_huge_body_is_cut_off(served: Running) -> None:
-    sent = 0
+class Upload:
+    """A body of unknown length, which counts what is taken of it."""
 
-    def endless():
-        nonlocal sent
-        for _ in range(400):
-            sent += 65536
+    def __init__(self, mebibytes: int) -> None:
+        self.size, self.sent = mebibytes * 1024**2, 0
+
+    def __iter__(self) -> Iterator[bytes]:
+        while self.sent < self.size:
+            self.sent += 65536
             yield b"x" * 65536
 
-    try:
-        status = served.http.post(
-            "/api/terrains",
-            params={"filename": "x.tif"},
-            content=endless(),
-            headers={"Content-Type": "application/octet-stream"},
-        ).status_code
-    except (httpx.WriteError, httpx.ReadError, httpx.RemoteProtocolError):
-        status = 413
+    def to(self, served: Running) -> httpx.Response:
+        query, kind = {"filename": "x.tif"}, {"Content-Type": "application/octet-stream"}
+        return served.http.post("/api/terrains", params=query, content=self, headers=kind)
+
+
+def test_who_sends_too_much_hears_why(served: Running) -> None:
+    upload = Upload(25)
+    answer = upload.to(served)
+    assert (answer.status_code, upload.sent) == (413, upload.size)
+    assert answer.json()["what"] == "The body is larger than 1 MiB."
+    assert nothing_is_kept(served)
+
+
+def test_an_endless_body_is_cut_off(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who goes on after all that is read of it gets the sentence or a broken connection."""
+    monkeypatch.setattr(guard, "DRAIN_LIMIT_BYTES", 1024**2)
+    upload, status = Upload(400), 413
+    with contextlib.suppress(httpx.WriteError, httpx.ReadError, httpx.RemoteProtocolError):
+        status = upload.to(served).status_code
     assert status == 413
-    assert sent < 400 * 65536
-    assert "x.tif" not in served.workspace.uploads
-    assert list((served.parts.library.root / "uploads").iterdir()) == []
+    assert upload.sent < upload.size / 4
+    assert nothing_is_kept(served)
+
+
+def nothing_is_kept(served: Running) -> bool:
+    return "x.tif" not in served.workspace.uploads and not any((served.parts.library.root / "uploads").iterdir())
+
+
+def test_who_stops_sending_what_is_too_much_is_not_waited_for(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "DRAIN_TIMEOUT_S", 0.2)
+    with socket.create_connection(("127.0.0.1", served.settings.port), timeout=10) as raw:
+        raw.sendall(_announced(served, 99999999999))
+        heard = b"".join(iter(lambda: raw.recv(65536), b""))
+    assert b" 413 " in heard
+    assert heard.endswith(b"}")
 
 
 def test_huge_json_is_refused(served: Running) -> None:
@@ -175,6 +194,14 @@ def test_a_configured_origin_may_differ_from_the_host() -> None:
 
 def _http_records(caplog: pytest.LogCaptureFixture) -> list[logging.LogRecord]:
     return [record for record in caplog.records if record.name == "hedgehop.http"]
+
+
+def _announced(served: Running, length: int) -> bytes:
+    return (
+        f"POST /api/terrains?filename=x.tif HTTP/1.1\r\nHost: 127.0.0.1:{served.settings.port}\r\n"
+        f"Origin: {served.origin}\r\nCookie: {served.cookie}\r\nContent-Type: application/octet-stream\r\n"
+        f"Content-Length: {length}\r\n\r\n"
+    ).encode()
 
 
 def _answer(served: Running, request: bytes) -> bytes:

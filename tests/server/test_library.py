@@ -205,7 +205,7 @@ def test_own_profiles_join_the_shipped_ones(library: Library) -> None:
 WRITER = """
 import sys
 from pathlib import Path
-from server.history import History
+from server.library.history import History
 from server.library import Library
 from server.schemas import PlanDoc, PoiDoc
 library = Library(Path(sys.argv[1]))

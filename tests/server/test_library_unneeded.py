@@ -121,9 +121,9 @@ def test_plans_that_cannot_be_read_leave_everything_and_are_no_reason_not_to_sta
     with monkeypatch.context() as patch:
         patch.setattr(Path, "read_bytes", torn)
         with pytest.raises(StorageError, match="Input/output error"):
-            unneeded.remove_unneeded(data.root)
+            whole_library.remove_unneeded(data.root)
     assert data.files == {kept}
     with monkeypatch.context() as patch:
-        patch.setattr(unneeded, "_not_named", lambda files, texts: [data.root / "not there"])
+        patch.setattr(whole_library, "_not_named", lambda files, texts: [data.root / "not there"])
         library = data.start()
     assert [notice.code for notice in library.notices] == [StorageError.code]

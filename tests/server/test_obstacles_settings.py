@@ -46,7 +46,7 @@ class Desk:
 
 @pytest.fixture
 def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
-    monkeypatch.setattr(limits, "computer_bytes", lambda: 8 * GB)
+    monkeypatch.setattr(sensor_kinds, "computer_bytes", lambda: 8 * GB)
     made = Desk(tmp_path)
     asyncio.run(made.desk.start())
     return made
@@ -98,7 +98,7 @@ def test_what_would_do_does(desk: Desk) -> None:
 
 def test_a_small_computer_refuses_only_what_is_about_memory(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     """The usual limit is more than it has, and the maps seldom need it."""
-    monkeypatch.setattr(limits, "computer_bytes", lambda: GB)
+    monkeypatch.setattr(sensor_kinds, "computer_bytes", lambda: GB)
     assert desk.change(radar_depth_m=12.0).settings.radar_depth_m == 12.0
     with pytest.raises(CapacityError, match="this computer has 1,000 MB"):
         desk.change(memory_limit_bytes=GB)

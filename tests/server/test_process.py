@@ -79,11 +79,10 @@ def serving(data_dir: Path, *more: str) -> Iterator[Serving]:
 
 
 def refused(data_dir: Path, port: int) -> str:
-    done = subprocess.run(command(data_dir, port), capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-    assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
-    return done.stderr
+    run = hedgehop(*command(data_dir, port)[3:])
+    assert (run.code, run.out) == (2, ""), run.err
+    assert "Traceback" not in run.err
+    return run.err
 
 
 def test_a_second_one_is_refused_and_the_first_goes_on(tmp_path: Path) -> None:

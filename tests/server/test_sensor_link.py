@@ -137,8 +137,8 @@ def test_a_bad_frame_is_counted_and_the_next_one_passes(server: Running, token: 
         socket.send(encode(Ping(5.0)))
         pong = decode_from_server(_received(socket))
         assert isinstance(pong, Pong)
-        socket.send(encode(Radar(0, pong.server_s + 99.0, b"")))
-        socket.send(encode(Radar(1, pong.server_s, b"")))
+        socket.send(encode(RadarMessage(0, pong.server_s + 99.0, b"")))
+        socket.send(encode(RadarMessage(1, pong.server_s, b"")))
         while (report := decode_from_server(_received(socket))) and not getattr(report, "received", 0):
             pass
     assert (getattr(report, "received", 0), getattr(report, "refused", 0)) == (1, 1)

@@ -81,9 +81,9 @@ def test_the_table_lists_every_setting() -> None:
 
 
 def test_the_documentation_is_the_present_one() -> None:
-    document = Path(__file__).resolve().parents[2] / "SETTINGS.md"
+    document = Path(__file__).resolve().parents[2] / "docs" / "settings.md"
     assert document.read_text(encoding="utf-8") == settings_document(), (
-        "run: python -c \"from server.settings import settings_document as d; print(d(), end='')\" > SETTINGS.md"
+        "run: python -c \"from server.settings import settings_document as d; print(d(), end='')\" > docs/settings.md"
     )
     for name in Settings.model_fields:
         assert f"`HEDGEHOP_{name.upper()}`" in settings_document()

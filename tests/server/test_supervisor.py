@@ -21,7 +21,7 @@ PATIENCE_S = 90.0
 NODE = """
 import asyncio, signal, sys
 from pathlib import Path
-from telemetry.node import run_node
+from telemetry.bus.node import run_node
 
 async def main(bus, context):
     if "--fail" in sys.argv:

@@ -8,7 +8,7 @@ from server.schemas.typescript import TARGET, _type, generate
 
 
 def test_the_console_has_the_present_types() -> None:
-    assert TARGET.read_text(encoding="utf-8") == generate(), "run: python -m server.typescript"
+    assert TARGET.read_text(encoding="utf-8") == generate(), "run: python -m server.schemas.typescript"
 
 
 def test_names_options_and_unions() -> None:
@@ -19,6 +19,13 @@ def test_names_options_and_unions() -> None:
     assert "  surface_rel_home_m: (number | null)[];" in text
     assert '  shading: "height" | "hillshade" | "orthophoto";' in text
     assert "export type ServerMessage =\n  | Snapshot\n" in text
+
+
+def test_the_console_asks_for_no_other_numbers_than_the_server_takes() -> None:
+    text = generate()
+    assert "    radar_depth_m: { min: 2, max: 120 },\n" in text
+    assert "    camera_trigger_m: { max: 1_000 },\n" in text, "above zero: the least has no number"
+    assert "    paper_bare" not in text
 
 
 def test_a_type_that_has_no_counterpart_is_refused() -> None:

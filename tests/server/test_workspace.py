@@ -28,14 +28,6 @@ from tests.server.station import PATIENCE_S, Station, ok
 pytestmark = pytest.mark.xdist_group("workspace")
 
 
-@pytest.fixture(scope="module")
-def demo_station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
-    with station(tmp_path_factory.mktemp("data"), demo=True) as running:
-        if running.state.document.name != PLAN_NAME:
-            running.until(lambda m: isinstance(m, PlanMessage) and m.plan.document.name == PLAN_NAME)
-        yield running
-
-
 @pytest.fixture
 def demo(demo_station: Station) -> Station:
     """The demo plan, open and as it was made."""

@@ -27,14 +27,6 @@ pytestmark = pytest.mark.xdist_group("wrong-input")
 BOMB_REFUSED_WITHIN_S = 15.0
 
 
-@pytest.fixture(scope="module")
-def demo_station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
-    with station(tmp_path_factory.mktemp("data"), demo=True) as running:
-        if running.state.document.name != PLAN_NAME:
-            running.until(lambda m: isinstance(m, PlanMessage) and m.plan.document.name == PLAN_NAME)
-        yield running
-
-
 @pytest.fixture
 def demo(demo_station: Station) -> Iterator[Station]:
     """The demo plan as it was made; afterwards no upload may be left, nor a model that was refused."""

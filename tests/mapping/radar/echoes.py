@@ -27,7 +27,7 @@ class Echo:
     phase_rad: float = 0.0
 
 
-def frame(params: FmcwParams, *echoes: Echo, seed: int | None = 1) -> NDArray[np.complex64]:
+def frame(params: FmcwParams, *echoes: Echo, seed: int | None = 1) -> C64:
     """A cube of far echoes in noise of power 1; ``seed`` None: without noise."""
     cube = np.zeros(params.shape, np.complex128) if seed is None else noise(params.shape, seed)
     for e in echoes:
@@ -35,12 +35,12 @@ def frame(params: FmcwParams, *echoes: Echo, seed: int | None = 1) -> NDArray[np
     return cube.astype(np.complex64)
 
 
-def noise(shape: tuple[int, ...], seed: int) -> NDArray[np.complex128]:
+def noise(shape: tuple[int, ...], seed: int) -> C128:
     rng = np.random.default_rng(seed)
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / math.sqrt(2)
 
 
-def _echo(p: FmcwParams, e: Echo) -> NDArray[np.complex128]:
+def _echo(p: FmcwParams, e: Echo) -> C128:
     sample_s = np.arange(p.samples) / p.sample_rate_hz
     sent_s = (np.arange(p.chirps)[:, None] - p.chirps / 2) * p.chirp_interval_s + p.offset_s[None, :]
     towards = np.array([math.cos(e.elevation_rad) * math.sin(e.azimuth_rad), math.sin(e.elevation_rad)])

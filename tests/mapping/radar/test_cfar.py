@@ -26,8 +26,16 @@ def maps(rows: int, cols: int) -> st.SearchStrategy[np.ndarray]:
     return arrays.arrays(np.float32, (rows, cols), elements=st.floats(0.0, 100.0, width=32))
 
 
+def ones_but(cell: int) -> np.ndarray:
+    power = np.ones((1, 40), np.float32)
+    power[0, cell] = 0.0
+    return power
+
+
 @settings(max_examples=40, deadline=None)
 @given(maps(3, 40), st.integers(0, 2), st.integers(1, 3), st.integers(1, 2))
+@example(ones_but(1), 0, 1, 2)
+@example(ones_but(2), 0, 1, 2)
 def test_smallest_of_is_the_slow_rule(power: np.ndarray, guard: int, training: int, stride: int) -> None:
     stage = Stage(guard, training, stride, 2.0)
 

@@ -12,18 +12,18 @@ from mapping.radar import AWR1843, ChainSettings, Detections, RadarChain, Spectr
 NAMES = ["simple_frame_1", "doppler_example", "doppler_example_1"]
 
 
-def cube(folder: Path, name: str) -> NDArray[np.complex128]:
+def cube(folder: Path, name: str) -> C128:
     """(chirps, antennas, samples) as stored: two's complement taken for unsigned."""
-    raw: NDArray[np.complex128] = np.load(folder / "radar" / "openradar" / f"{name}.npy")
+    raw: C128 = np.load(folder / "radar" / "openradar" / f"{name}.npy")
     return raw if raw.ndim == 3 else raw[:, None, :]
 
 
-def signed(raw: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def signed(raw: C128) -> C128:
     real, imaginary = (np.where(part > 32767, part - 65536, part) for part in (raw.real, raw.imag))
     return real + 1j * imaginary
 
 
-def processed(samples: NDArray[np.complex128]) -> tuple[RadarChain, Spectra, Detections]:
+def processed(samples: C128) -> tuple[RadarChain, Spectra, Detections]:
     """With the AWR1843's cells: the files do not say what their radar was set to."""
     chirps, antennas, count = samples.shape
     row = tuple((0.5 * k, 0.0) for k in range(antennas))
