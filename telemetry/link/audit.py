@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,9 +64,9 @@ class AuditLog:
             os.close(self._file)
             self._file = -1
 
-    def write(self, record: CommandRecord, **details: Any) -> str:
+    def write(self, record: CommandRecord) -> str:
         """Returns the line's hash when it is on the disk. Raises RecordingFullError; then do not send the command."""
-        entry = {"t_utc_s": record.t_utc_s, "operator": record.operator, "words": record.words, **details}
+        entry = {"t_utc_s": record.t_utc_s, "operator": record.operator, "words": record.words}
         line, hashed = _chained(entry, self._last)
         self._append((b"\n" if self._torn else b"") + line)
         self._last, self._torn = hashed, False
@@ -101,11 +101,6 @@ def check_chain(content: bytes) -> Broken | None:
             return Broken(number, "The line was changed.")
         before = entry["hash"]
     return None
-
-
-def read_entries(path: Path) -> Iterator[dict[str, Any]]:
-    """Every readable entry, with its ``before`` and ``hash``."""
-    return (entry for entry in map(_parsed, path.read_bytes().splitlines()) if entry is not None)
 
 
 def _chained(entry: dict[str, Any], before: str) -> tuple[bytes, str]:

@@ -41,10 +41,6 @@ class Avoidance:
         return self._avoiding.is_engaged
 
     @property
-    def is_enabled(self) -> bool:
-        return self._avoiding.enabled
-
-    @property
     def status(self) -> AvoidanceStatus:
         return self._avoiding.status
 

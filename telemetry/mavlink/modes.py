@@ -9,8 +9,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.topics.vehicle import Autopilot
 
-MULTIROTOR_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35, 43, 45})
-"""MAV_TYPE of quad, coaxial, helicopter, hexa, octo, tri, dodeca, deca, generic multirotor and spacecraft frames."""
 _ARDUPILOT_TABLES = {1: "PLANE_MODE", 10: "ROVER_MODE", 11: "ROVER_MODE", 12: "SUB_MODE"}
 _ARDUPILOT_TABLES |= dict.fromkeys(range(19, 26), "PLANE_MODE")
 _PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED", 8: "RATTITUDE"}

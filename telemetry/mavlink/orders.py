@@ -18,7 +18,6 @@ Seen = Callable[[VehicleState], bool]
 MISSION_MODES: dict[Autopilot, str] = {"ardupilot": "AUTO", "px4": "MISSION"}
 HOLD_MODES: dict[Autopilot, tuple[str, ...]] = {"ardupilot": ("BRAKE", "GUIDED"), "px4": ("HOLD",)}
 """In order of preference. LOITER is not among them: without a remote control its throttle reads as "down"."""
-GUIDED_MODES: dict[Autopilot, str] = {"ardupilot": "GUIDED", "px4": "OFFBOARD"}
 RETURN_MODES = frozenset({"RTL", "SMART_RTL", "AUTO_RTL"})
 LAND_MODES = frozenset({"LAND", "PRECLAND"})
 ANY_THROTTLE = -1

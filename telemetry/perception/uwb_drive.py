@@ -38,7 +38,6 @@ class UwbDrive:
         """Scans without a place: no position or attitude was known then, or they came out of order."""
         self.other_geometry = 0
         """Left out: they lie otherwise in range than the first one."""
-        self.left_out_full = 0
         self._most_bytes, self._bytes = most_bytes, 0
         self._geometry: UwbGeometry | None = None
         self._frame: LocalFrame | None = None
@@ -110,7 +109,6 @@ class UwbDrive:
             self.unplaced += 1
             return
         if self.is_full:
-            self.left_out_full += 1
             return
         lat_deg, lon_deg, _ = self._frame.to_geodetic(pose.position_enu_m)[0]
         self._t_s.append(scan.t_mono_s)

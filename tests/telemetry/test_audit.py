@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.link.audit import AuditLog, check_chain, read_entries
+from telemetry.link.audit import AuditLog, check_chain
 from telemetry.topics.messages import CommandRecord
 
 
@@ -28,14 +29,22 @@ def written(path: Path, *words: str) -> bytes:
     return path.read_bytes()
 
 
+def entries_of(path: Path) -> list[dict[str, Any]]:
+    """Those that can be read."""
+    entries = []
+    for line in path.read_bytes().splitlines():
+        with contextlib.suppress(ValueError):
+            entries.append(json.loads(line))
+    return entries
+
+
 def test_each_command_is_one_line_that_names_the_one_before(tmp_path: Path) -> None:
     path = tmp_path / "audit.jsonl"
     with AuditLog(path) as log:
-        first = log.write(record("arm"), message="COMMAND_LONG 400")
+        first = log.write(record("arm"))
         second = log.write(record("upload 88 items"))
-    entries = list(read_entries(path))
+    entries = entries_of(path)
     assert [entry["words"] for entry in entries] == ["arm", "upload 88 items"]
-    assert entries[0]["message"] == "COMMAND_LONG 400"
     assert entries[0]["hash"] == first == entries[1]["before"]
     assert entries[1]["hash"] == second
     assert check_chain(path.read_bytes()) is None
@@ -104,8 +113,8 @@ def test_a_line_that_was_cut_short_is_told_and_the_next_one_is_whole(tmp_path: P
         assert log.broken is not None
         assert log.broken.line == 2
         log.write(record("land"))
-    assert [entry["words"] for entry in read_entries(path)] == ["arm", "land"]
-    assert [entry["before"] for entry in read_entries(path)][1] == next(read_entries(path))["hash"]
+    assert [entry["words"] for entry in entries_of(path)] == ["arm", "land"]
+    assert [entry["before"] for entry in entries_of(path)][1] == entries_of(path)[0]["hash"]
 
 
 def test_line_breaks_in_a_name_stay_in_their_line(tmp_path: Path) -> None:
@@ -134,7 +143,7 @@ def test_a_full_disk_is_told_and_leaves_no_half_line(tmp_path: Path, monkeypatch
         log.write(record("land"))
     content = path.read_bytes()
     assert check_chain(content) is None
-    assert [entry["words"] for entry in read_entries(path)] == ["arm", "land"]
+    assert [entry["words"] for entry in entries_of(path)] == ["arm", "land"]
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from planning.errors import MissionError
 from planning.formats.trajectory_csv import Trajectory
 from planning.formats.wpl import read_wpl
 from planning.model import Home, Mission, MissionItem
-from telemetry.flight.guided.targets import guided_plan, targets_from_mission, with_timing
+from telemetry.flight.guided.targets import guided_plan, with_timing
 
 HOME = Home(-37.0, 175.0, 100.0, "NZVD2016")
 NAN = math.nan
@@ -48,17 +48,17 @@ def test_waypoints_become_targets_with_their_numbers_in_the_mission() -> None:
 
 def test_speed_comes_from_the_items_else_from_the_caller_else_from_the_mission() -> None:
     mission = plan(TAKEOFF, at(0), item(178, 1, 1.5, -1, frame=2), at(1), RTL, cruise_speed_m_s=4.0)
-    assert [target.speed_m_s for target in targets_from_mission(mission)] == [4.0, 1.5]
-    assert [target.speed_m_s for target in targets_from_mission(mission, speed_m_s=2.0)] == [2.0, 1.5]
+    assert [target.speed_m_s for target in guided_plan(mission).targets] == [4.0, 1.5]
+    assert [target.speed_m_s for target in guided_plan(mission, speed_m_s=2.0).targets] == [2.0, 1.5]
 
 
 def test_loiter_items_are_targets_too() -> None:
-    target = targets_from_mission(plan(TAKEOFF, item(19, 7.0, lat=-37.001, lon=175.0, alt=9.0), RTL))[0]
+    target = guided_plan(plan(TAKEOFF, item(19, 7.0, lat=-37.001, lon=175.0, alt=9.0), RTL)).targets[0]
     assert (target.lat_deg, target.loiter_s, target.alt_rel_home_m) == (-37.001, 7.0, 9.0)
 
 
 def test_heading_comes_from_condition_yaw_or_px4s_waypoints_or_the_point_to_look_at() -> None:
-    ardupilot = targets_from_mission(plan(TAKEOFF, at(0), item(115, 90.0, frame=2), at(1), RTL))
+    ardupilot = guided_plan(plan(TAKEOFF, at(0), item(115, 90.0, frame=2), at(1), RTL)).targets
     assert ardupilot[0].heading_rad is None
     assert ardupilot[1].heading_rad == pytest.approx(math.pi / 2)
     px4 = plan(
@@ -67,9 +67,9 @@ def test_heading_comes_from_condition_yaw_or_px4s_waypoints_or_the_point_to_look
         item(16, 0, 0, 0, NAN, lat=-37.0, lon=175.1, alt=5.0),
         firmware="px4",
     )
-    assert [target.heading_rad for target in targets_from_mission(px4)] == [pytest.approx(math.pi), None]
+    assert [target.heading_rad for target in guided_plan(px4).targets] == [pytest.approx(math.pi), None]
     looking = plan(TAKEOFF, item(195, lat=-37.0, lon=175.1), at(0), item(197), at(1), RTL)
-    assert [target.heading_rad for target in targets_from_mission(looking)] == [pytest.approx(math.pi / 2), None]
+    assert [target.heading_rad for target in guided_plan(looking).targets] == [pytest.approx(math.pi / 2), None]
 
 
 def test_a_landing_at_home_is_flown_over_home_first() -> None:
@@ -84,34 +84,34 @@ def test_a_landing_at_home_is_flown_over_home_first() -> None:
 
 def test_a_place_or_height_of_zero_keeps_the_present_one() -> None:
     mission = plan(TAKEOFF, at(2, alt=20.0), item(16, alt=25.0), at(4, alt=0.0), RTL)
-    second, third = targets_from_mission(mission)[1:]
+    second, third = guided_plan(mission).targets[1:]
     assert (second.lat_deg, second.alt_rel_home_m) == (pytest.approx(-36.9998), 25.0)
     assert third.alt_rel_home_m == 25.0
 
 
 def test_heights_above_sea_level_are_counted_from_home_when_its_datum_is_known() -> None:
     mission = plan(TAKEOFF, at(0, alt=130.0, frame=0), RTL)
-    assert targets_from_mission(mission)[0].alt_rel_home_m == pytest.approx(30.0)
+    assert guided_plan(mission).targets[0].alt_rel_home_m == pytest.approx(30.0)
     unknown = Mission(Home(-37.0, 175.0, 100.0), mission.items)
     with pytest.raises(MissionError, match="height above home is not known"):
-        targets_from_mission(unknown)
+        guided_plan(unknown)
     with pytest.raises(MissionError, match="item 2"):
-        targets_from_mission(plan(TAKEOFF, at(0, frame=10), RTL))
+        guided_plan(plan(TAKEOFF, at(0, frame=10), RTL))
 
 
 @pytest.mark.parametrize("command", [17, 18, 82, 177, 92])
 def test_what_the_script_cannot_fly_is_refused_by_name(command: int) -> None:
     with pytest.raises(MissionError, match=f"item 3.*command {command}"):
-        targets_from_mission(plan(TAKEOFF, at(0), item(command, lat=-37.0, lon=175.0, alt=5.0), RTL))
+        guided_plan(plan(TAKEOFF, at(0), item(command, lat=-37.0, lon=175.0, alt=5.0), RTL))
 
 
 def test_a_mission_without_waypoints_has_no_targets() -> None:
     with pytest.raises(MissionError, match="no waypoint"):
-        targets_from_mission(plan(TAKEOFF, RTL))
+        guided_plan(plan(TAKEOFF, RTL))
 
 
 def test_what_follows_the_return_is_left_out() -> None:
-    assert len(targets_from_mission(plan(TAKEOFF, at(0), RTL, at(1)))) == 1
+    assert len(guided_plan(plan(TAKEOFF, at(0), RTL, at(1))).targets) == 1
 
 
 def test_the_recorded_mission_gives_85_targets(shared_data: Path) -> None:
@@ -133,7 +133,7 @@ def trajectory(lat_lon: list[tuple[float, float]], step_s: float, loiter_s: list
 def test_timing_is_that_of_the_papers_law_counted_from_the_first_target() -> None:
     lat_lon = [(-37.0 + k * 1e-5, 175.0) for k in range(0, 31)]
     loiter_s = [4.0 if k == 10 else 0.0 for k in range(31)]
-    targets = targets_from_mission(plan(TAKEOFF, at(1), at(2), at(3), RTL))
+    targets = guided_plan(plan(TAKEOFF, at(1), at(2), at(3), RTL)).targets
     timed = with_timing(targets, trajectory(lat_lon, 0.5, loiter_s))
     # Target 1 is sample 10 (5 s), where it waits 4 s; targets 2 and 3 are samples 20 and 30.
     assert [target.t_s for target in timed] == pytest.approx([0.0, 9.0, 14.0])
@@ -141,6 +141,6 @@ def test_timing_is_that_of_the_papers_law_counted_from_the_first_target() -> Non
 
 def test_a_route_that_comes_back_is_timed_at_the_first_pass() -> None:
     there = [(-37.0 + k * 1e-5, 175.0) for k in range(0, 31)]
-    targets = targets_from_mission(plan(TAKEOFF, at(1), at(3), at(1), RTL))
+    targets = guided_plan(plan(TAKEOFF, at(1), at(3), at(1), RTL)).targets
     timed = with_timing(targets, trajectory(there + there[-2::-1], 1.0, [0.0] * 61))
     assert [target.t_s for target in timed] == pytest.approx([0.0, 20.0, 40.0])

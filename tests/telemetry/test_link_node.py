@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.bus.node_lock import running_node
 from telemetry.errors import AddressError, MissionUnknownError, NoVehicleError
-from telemetry.link.audit import check_chain, read_entries
+from telemetry.link.audit import check_chain
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic
 from telemetry.topics.requests import Arm, Connect, Operator, ReadParameters, StartAuto, Upload
@@ -137,7 +138,7 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
 
             audit = tmp_path / "audit.jsonl"
             assert check_chain(audit.read_bytes()) is None
-            words = [entry["words"] for entry in read_entries(audit)]
+            words = [json.loads(line)["words"] for line in audit.read_bytes().splitlines()]
             assert words[0] == "upload 8 items"
             assert words[-1] == f"start mission {report.onboard.digest[:12]} at item 1"
 

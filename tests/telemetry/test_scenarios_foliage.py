@@ -168,9 +168,8 @@ def test_the_roc_goes_through_the_rates_of_both_rules(sparse: Drive, cleared: Cl
     for values in (ours.tnr, ours.fnr):
         assert (values[0], values[-1]) == (0.0, 1.0)
         assert np.all(np.diff(values) >= 0.0)
-    assert ours.usual[1] - 0.03 <= ours.fnr_at(ours.usual[0]) <= ours.usual[1]
+    assert ours.usual[1] - 0.03 <= ours.fnr[np.searchsorted(ours.tnr, ours.usual[0])] <= ours.usual[1]
     paper = curve(sparse, "the paper's rule", PAPERS_RULE)
-    assert paper.fnr_at(0.9) >= 0.0
     assert paper.usual[0] < ours.usual[0]
 
 

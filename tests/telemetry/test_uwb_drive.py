@@ -79,7 +79,7 @@ def test_a_drive_takes_so_much_and_no_more() -> None:
     drive.on_state(state_of(10.0, *HERE, 0.0))
     for k in range(5):
         drive.on_scan(scan_of(k, 9.9 + 0.01 * k, np.ones(16)))
-    assert (len(drive), drive.left_out_full, drive.is_full) == (3, 2, True)
+    assert (len(drive), drive.is_full) == (3, True)
 
 
 def test_a_recording_gives_the_same_scans_back(tmp_path: Path) -> None:

@@ -37,16 +37,11 @@ class GuidedPlan:
     end: Literal["rtl", "land"]
 
 
-def targets_from_mission(mission: Mission, *, speed_m_s: float | None = None) -> tuple[GuidedTarget, ...]:
-    """The places of a mission, take-off and return left out. ``speed_m_s``: where no item sets one.
-
-    Raises MissionError for items that the script cannot fly.
-    """
-    return guided_plan(mission, speed_m_s=speed_m_s).targets
-
-
 def guided_plan(mission: Mission, *, speed_m_s: float | None = None) -> GuidedPlan:
-    """A mission for the navigation script. Raises MissionError for items that it cannot fly."""
+    """A mission for the navigation script; ``speed_m_s``: where no item sets one.
+
+    Raises MissionError for items that it cannot fly.
+    """
     reader = _Reader(mission, speed_m_s or mission.cruise_speed_m_s or DEFAULT_SPEED_M_S)
     for number, item in enumerate(mission.items, start=1):
         if reader.end is None:

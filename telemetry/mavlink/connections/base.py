@@ -43,7 +43,6 @@ class Connection(ABC):
         self.receiver = receiver
         self.state: Literal["open", "failed"] = "failed"
         self.error: TelemetryError | None = None
-        self.dropped_frames = 0
         self.times_opened = 0
 
     @abstractmethod

@@ -80,7 +80,6 @@ class SerialLine(Connection):
 
     def send(self, data: bytes, peer: Peer | None = None) -> bool:
         if self._port is None or len(self._waiting) > WAITING_LIMIT_BYTES:
-            self.dropped_frames += 1
             return False
         self._waiting += data
         self._write()

@@ -37,7 +37,6 @@ class _Tcp(Connection):
 
     def _send_to(self, data: bytes, writer: asyncio.StreamWriter | None) -> bool:
         if writer is None or writer.is_closing() or writer.transport.get_write_buffer_size() > SEND_LIMIT_BYTES:
-            self.dropped_frames += 1
             return False
         writer.write(data)
         return True

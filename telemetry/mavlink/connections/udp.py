@@ -61,7 +61,6 @@ class _Udp(Connection):
     def _send_to(self, data: bytes, addr: Any) -> bool:
         transport = self._transport
         if transport is None or transport.get_write_buffer_size() > SEND_LIMIT_BYTES:
-            self.dropped_frames += 1
             return False
         transport.sendto(data, addr)
         return True

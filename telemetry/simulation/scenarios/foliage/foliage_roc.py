@@ -40,10 +40,6 @@ class Curve:
     usual: tuple[float, float]
     """TNR and FNR at the limit in use, 0.5."""
 
-    def fnr_at(self, tnr: float) -> float:
-        """The share of those things that must be cleared, too, for so much of the foliage."""
-        return float(self.fnr[min(int(np.searchsorted(self.tnr, tnr)), len(self.fnr) - 1)])
-
 
 @dataclass(frozen=True, slots=True)
 class Roc:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -29,13 +29,6 @@ VEHICLE = (1, 1)
 PEER = "scenario"
 LINK = "scenario:virtual"
 HEARTBEAT_EVERY = 50
-
-
-class LinkMachine(Protocol):
-    """A sans-IO machine that talks to the vehicle, such as ``GuidedScript`` or ``MissionUpload``."""
-
-    def on_message(self, message: Message, now_s: float) -> list[Action]: ...
-    def on_tick(self, now_s: float) -> list[Action]: ...
 
 
 class Wire:

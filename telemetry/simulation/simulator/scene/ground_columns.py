@@ -16,6 +16,7 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 
 _BLOCK = 16
 _FIT_M = 500.0
+_STEP_M = 0.5
 
 
 class SceneTerrain:
@@ -61,6 +62,14 @@ class SceneTerrain:
         out = np.empty(len(places))
         _ups_at(self.up, self.to_cells, self.floor_up_m, places, out)
         return out
+
+    def distance_m(self, points_enu: F64) -> F64:
+        """(N,) to the nearest of the columns under and one step around each point; heights between columns count."""
+        steps = [(x * _STEP_M, y * _STEP_M) for x in (-1, 0, 1) for y in (-1, 0, 1)]
+        ups = np.stack([self.ups_m(points_enu[:, :2] + step) for step in steps])
+        up = points_enu[:, 2]
+        beside = np.maximum(0.0, np.maximum(ups.min(axis=0) - up, up - ups.max(axis=0)))
+        return np.minimum(np.abs(up - ups[4]), np.hypot(beside, _STEP_M))
 
 
 def _xy(dsm: Dsm, frame: NeuFrame, east_north_m: list[tuple[float, float]]) -> F64:

@@ -13,7 +13,6 @@ from mapping.geometry.arrays import F64, I32
 from planning.errors import ParameterError
 from planning.terrain.dsm import Dsm
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
-from telemetry.simulation.simulator.scene import surfaces
 from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
 from telemetry.simulation.simulator.scene.materials import GROUND as GROUND_MATERIAL
 from telemetry.simulation.simulator.scene.placed_shapes import moved, place
@@ -125,12 +124,7 @@ class World:
         The ground is looked at straight down and within one step of 0.5 m to all sides.
         """
         points = np.asarray(points_enu, dtype=np.float64).reshape(-1, 3)
-        return np.minimum(np.abs(self._nearest(points)[0]), surfaces.ground_distance(self.terrain, points))
-
-    def surface_points(self, spacing_m: float, *, seed: int = 0) -> F64:
-        """(N, 3) places on all shapes' surfaces, one per ``spacing_m`` squared, but for what is inside of another."""
-        points = surfaces.sample(self.placed.rows, spacing_m, np.random.default_rng(seed))
-        return points[self._nearest(points)[0] > -1e-3] if len(points) else points
+        return np.minimum(np.abs(self._nearest(points)[0]), self.terrain.distance_m(points))
 
     def touching(self, p_enu: Vec3, radius_m: float) -> str | None:
         """The shape that a ball of this radius touches."""

@@ -1,4 +1,4 @@
-"""Places on the surfaces of a world, and how far points are from its ground: what maps are judged by."""
+"""Places on the surfaces of simulated shapes, drawn at random: what distances to them are held to."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
 from telemetry.simulation.simulator.scene.primitives import BOX, CYLINDER
-
-_STEP_M = 0.5
 
 
 def sample(rows: F64, spacing_m: float, random: np.random.Generator) -> F64:
@@ -66,12 +63,3 @@ def _on_ellipsoid(row: F64, spacing_m: float, random: np.random.Generator) -> F6
     direction = random.standard_normal((_count(area, spacing_m), 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     return direction * [radius, radius, half] + [0.0, 0.0, half]
-
-
-def ground_distance(terrain: SceneTerrain, points_enu: F64) -> F64:
-    """(N,) to the nearest of the columns under and one step around each point; heights between columns count too."""
-    steps = [(x * _STEP_M, y * _STEP_M) for x in (-1, 0, 1) for y in (-1, 0, 1)]
-    ups = np.stack([terrain.ups_m(points_enu[:, :2] + step) for step in steps])
-    up = points_enu[:, 2]
-    beside = np.maximum(0.0, np.maximum(ups.min(axis=0) - up, up - ups.max(axis=0)))
-    return np.minimum(np.abs(up - ups[4]), np.hypot(beside, _STEP_M))
