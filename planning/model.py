@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from mapping.geometry.arrays import F64, I64
 from planning.margins.budget import ClearanceBudget
 from planning.margins.following_error import Firmware, Way
-from planning.terrain.dsm import Dsm
-from planning.terrain.holes import SMALL_HOLE_M2
+from planning.terrain import SMALL_HOLE_M2
+
+if TYPE_CHECKING:
+    from planning.terrain.dsm import Dsm
 
 SET_DOWN_M = 0.1
 """What is planned holds for a vehicle that stands up to so far beside the planned home."""

@@ -14,6 +14,7 @@ from mapping.geometry.poses import Pose
 from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.ground_beams import BeamShape
 from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
+from mapping.radar.params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
 from mapping.radar.targets import Gate, Polar
 
 BESIDE_RAD = math.radians(3.0)
@@ -55,10 +56,10 @@ class EvidenceParams:
     side_lobe_width_sine: float = 0.07
     side_lobe_range_m: float = 1.5
     side_lobe_below_db: float = 2.0
-    speed_cell_m_s: float = 0.31
+    speed_cell_m_s: float = OBJECT_SPEED_CELL_M_S
     speed_error: float = 0.05
     """Share of the vehicle's speed: its direction and the target's are not known any better."""
-    folded_m_s: float = 67 * 0.31
+    folded_m_s: float = OBJECT_SPEED_CELLS * OBJECT_SPEED_CELL_M_S
     moves_m_s: float = 1.0
     """Over ground, along the line of sight: slower ones are not told from what stands still."""
     below_share: float = 1.0 - math.cos(math.radians(35.0))

@@ -10,6 +10,8 @@ from mapping.errors import ParameterError
 from mapping.geometry.arrays import F64
 
 LIGHT_M_S = 299_792_458.0
+OBJECT_SPEED_CELLS, OBJECT_SPEED_CELL_M_S = 67, 0.31
+"""Of an AWR1843's own object list: speeds that differ by all of its cells look the same."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F64, Bools
 from mapping.geometry.poses import Pose
-from mapping.perceiving import FrameResult, RadarPerception, Settings
-from mapping.perceiving.frame_result import State
+from mapping.perceiving.frame_result import FrameResult, Settings, State
 from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.radar_evidence import EvidenceParams
+from mapping.perceiving.radar_perception import RadarPerception
 from mapping.radar.targets import polar, to_enu
 from mapping.sensor_frames import RadarFrame
-from mapping.tracking import Tracker, TrackState
 from mapping.tracking.blobs import Blobs, blobs
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackState
 
 LEVEL_RAD = math.radians(-10.0)
 """Elevations are measured to 7 degrees: from 0 on, half of the echoes of what comes at the same height were lost."""

@@ -9,8 +9,9 @@ from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.threads import threads_for
 from planning.certificate.true_metres import true_cells
+from planning.terrain import SMALL_HOLE_M2
 from planning.terrain.dsm import Dsm
-from planning.terrain.holes import SMALL_HOLE_M2, fill_holes
+from planning.terrain.holes import fill_holes
 
 ALONE = 256
 """Positions up to which waking a second thread costs more than it brings."""

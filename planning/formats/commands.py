@@ -7,7 +7,7 @@ import math
 from planning.formats.safe_text import clean_name
 from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Home, MissionItem
-from planning.terrain.dsm import is_amsl
+from planning.terrain.vertical_datum import is_amsl
 
 POSITIONED = frozenset(
     {

@@ -15,7 +15,8 @@ from planning.formats.commands import home_altitude_note
 from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.safe_text import clean_name, finite
 from planning.model import Home, Mission, Poi, SampledPath
-from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.dsm import Dsm
+from planning.terrain.vertical_datum import is_amsl
 
 _STYLES = """<Style id="track"><LineStyle><color>ffdc7a1e</color><width>3</width></LineStyle>\
 <PolyStyle><color>40dc7a1e</color></PolyStyle></Style>"""

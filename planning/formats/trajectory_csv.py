@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,10 @@ from mapping.version import __version__
 from planning.errors import FormatError
 from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite
 from planning.model import Home, SampledPath, Timing
-from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.vertical_datum import is_amsl
+
+if TYPE_CHECKING:
+    from planning.terrain.dsm import Dsm
 
 COLUMNS = ("lat_deg", "lon_deg", "alt_rel_home_m", "alt_amsl_m", "speed_m_s", "time_to_next_s", "loiter_s")
 _OPTIONAL = "alt_amsl_m"

@@ -17,7 +17,8 @@ from planning.certificate.commands import BENT, OTHER_UNJUDGED, STRAIGHT, TAKEOF
 from planning.errors import MissionError
 from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES, MavCmd
 from planning.model import FlownLine, Mission, MissionItem, Unjudged
-from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.dsm import Dsm
+from planning.terrain.vertical_datum import is_amsl
 
 STORED_ALTITUDE_M = 0.01
 """ArduPilot keeps whole centimetres and cuts the rest off."""

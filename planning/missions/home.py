@@ -13,7 +13,8 @@ from planning.errors import DatumError, MissionError, PoiError
 from planning.mav_cmd import MavFrame
 from planning.missions.mission_items import Heights
 from planning.model import BetterHome, ClearanceParams, Home, MissionParams, SampledPath
-from planning.terrain.dsm import Dsm, SurfaceModel, is_amsl
+from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.terrain.vertical_datum import is_amsl
 
 START_TOLERANCE_M = 0.5
 HOME_DECIMALS = 9

@@ -1,1 +1,4 @@
 """The surface model: reading it, its datum, its holes and spikes, and how it is shown."""
+
+SMALL_HOLE_M2 = 4.0
+"""Holes below it are taken for gaps of the survey."""

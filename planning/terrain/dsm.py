@@ -15,7 +15,6 @@ from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
 from planning.terrain.cells.cells import Cells, square_cells
 from planning.terrain.cells.squares import squares
-from planning.terrain.vertical_datum import is_above_sea_level
 
 LARGE_PX = 4_000_000
 """A model with more cells is read and looked at in part; a smaller one whole."""
@@ -194,8 +193,3 @@ def _transformer(wkt: str, *, inverse: bool) -> Transformer:
     wgs84, projected = CRS.from_epsg(4326), CRS.from_wkt(wkt)
     pair = (projected, wgs84) if inverse else (wgs84, projected)
     return Transformer.from_crs(*pair, always_xy=True)
-
-
-def is_amsl(vertical_datum: str | None) -> bool:
-    """Whether heights in this datum are known to be above mean sea level: a geoid or a levelling network."""
-    return vertical_datum is not None and is_above_sea_level(vertical_datum)

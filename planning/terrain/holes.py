@@ -13,10 +13,8 @@ import numpy as np
 from numba import njit, prange
 
 from mapping.geometry.arrays import F32, I32, I64
+from planning.terrain import SMALL_HOLE_M2
 from planning.terrain.dsm import Dsm
-
-SMALL_HOLE_M2 = 4.0
-"""Holes below it are taken for gaps of the survey."""
 
 
 @dataclass(frozen=True, slots=True)

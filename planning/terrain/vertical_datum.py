@@ -10,9 +10,6 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from pyproj import CRS
-from pyproj.exceptions import CRSError
-
 _NOT_SEA_LEVEL = re.compile(
     r"ellipsoid|ellipsoïd|\bhae\b|\bdepths?\b|undulation|\bgeoid(al)? (height|separation)\b.*\babove\b"
     r"|\b(unknown|undefined|unnamed|unspecified|local|arbitrary|assumed|relative|custom|site|not|no|non)\b"
@@ -27,8 +24,13 @@ _SEA_LEVEL = re.compile(
 
 
 @lru_cache(maxsize=64)
-def is_above_sea_level(vertical_datum: str) -> bool:
-    """Whether a datum of this name is a geoid or a levelling network, e.g. "EGM96 height", "NAVD88 height (ftUS)"."""
+def is_amsl(vertical_datum: str | None) -> bool:
+    """Whether heights in this datum are known to be above mean sea level: a geoid or a levelling network.
+
+    E.g. "EGM96 height", "NAVD88 height (ftUS)".
+    """
+    if vertical_datum is None:
+        return False
     words = re.sub(r"[_\s]+", " ", vertical_datum.strip().lower())
     if _NOT_SEA_LEVEL.search(words):
         return False
@@ -37,6 +39,10 @@ def is_above_sea_level(vertical_datum: str) -> bool:
 
 def _registered(name: str) -> bool:
     """Whether PROJ's registry knows a vertical system of this name whose heights grow upwards, no chart datum."""
+    # Only here: the link node must be up in a moment, and most names are known above.
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
     try:
         system = CRS.from_user_input(name)
     except CRSError:

@@ -17,7 +17,8 @@ from server.cli.shared import options as o
 from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
 
 if TYPE_CHECKING:
-    from mapping.radar import Detections, Spectra
+    from mapping.radar.chain import Spectra
+    from mapping.radar.detections import Detections
     from telemetry.sensors.adc.read_adc import Reading
 
 SHOWN = 10

@@ -14,7 +14,7 @@ from server.cli.shared.output import DONE, end_progress, print_json, progress, r
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from mapping.radar import Detections
+    from mapping.radar.detections import Detections
     from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison
 
 
@@ -64,7 +64,8 @@ def _place(words: str) -> tuple[float, float]:
 
 
 def _frames(file: Path) -> Iterator[tuple[float, Detections]]:
-    from mapping.radar import POSITION2GO, POSITION2GO_SETTINGS, RadarChain
+    from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
+    from mapping.radar.params import POSITION2GO
     from telemetry.sensors.adc.oda import open_oda
 
     chain = RadarChain(POSITION2GO, POSITION2GO_SETTINGS)

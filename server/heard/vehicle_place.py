@@ -10,7 +10,8 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import offset_m
-from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.dsm import Dsm
+from planning.terrain.vertical_datum import is_amsl
 from telemetry.topics.vehicle import VehicleState
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from mapping.radar import Detections, FmcwParams
+    from mapping.radar.detections import Detections
+    from mapping.radar.params import FmcwParams
     from telemetry.sensors.adc.adc_file import AdcFile
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
-from mapping.radar import RadarChain, Spectra
+from mapping.radar.chain import RadarChain, Spectra
 from planning.errors import DescribedError
 from server.errors import BadRequestError
 from server.schemas import (

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from mapping.geometry.frames import LocalFrame
-from mapping.perceiving import SearchedRegion
 from mapping.perceiving.alerts import AlertEvent
+from mapping.perceiving.frame_result import SearchedRegion
 from mapping.perceiving.obstacles import Found
 from telemetry.topics.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Region, Sensor
 

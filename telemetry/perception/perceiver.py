@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from mapping.errors import MappingError
-from mapping.perceiving import FrameResult
+from mapping.perceiving.frame_result import FrameResult
 from mapping.perceiving.ground import GroundGrid
 from mapping.sensor_frames import SensorFrame, SlamPose
 from mapping.voxels.checks import checked_size

@@ -8,9 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from mapping.errors import CapacityError, MappingError
-from mapping.perceiving import RadarPerception, RangePerception, Settings, VisionPerception
 from mapping.perceiving.braking import Braking
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.range_perception import RangePerception
 from mapping.perceiving.settings_limits import check_settings
+from mapping.perceiving.vision_perception import VisionPerception
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import PerceptionSettings, Sensor
 

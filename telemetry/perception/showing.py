@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from mapping.perceiving import RadarPerception, RangePerception, VisionPerception
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.range_perception import RangePerception
+from mapping.perceiving.vision_perception import VisionPerception
 from mapping.sensor_frames import packed
 from telemetry.topics.looks import CloudLook, RadarLook, packed_cm
 from telemetry.topics.obstacles import MapOrigin

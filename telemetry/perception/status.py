@@ -7,9 +7,9 @@ from statistics import median
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from mapping.geometry.frames import LocalFrame
-from mapping.perceiving import FrameResult
 from mapping.perceiving.alerts import AlertEvent
 from mapping.perceiving.flight_map import FlightMap
+from mapping.perceiving.frame_result import FrameResult
 from telemetry.perception.convert import alert_of, counts, obstacle_of, region_of
 from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.whereabouts import Whereabouts

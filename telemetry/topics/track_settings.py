@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
 from mapping.errors import ParameterError
-from mapping.perceiving.radar_evidence import EvidenceParams
-from mapping.tracking import TrackerParams
-from planning.evading.velocity_obstacles import Limits
+from mapping.radar.params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
+from mapping.tracking.tracker_params import TrackerParams
+from planning.evading.velocity_choice import Limits
 
 Choice = Literal["room", "edge"]
 MOST_TRACKS = 400
@@ -30,7 +30,7 @@ class TrackerSettings:
     """Farther off the nose the bearing's error is the next one."""
     bearing_edge_sigma_deg: float = 2.0
     radial_speed_sigma_m_s: float = 0.2
-    radial_speed_folded_m_s: float = round(EvidenceParams().folded_m_s, 2)
+    radial_speed_folded_m_s: float = round(OBJECT_SPEED_CELLS * OBJECT_SPEED_CELL_M_S, 2)
     """Radial speeds that differ by this look the same; 0: none do."""
     extent_m: float = 0.6
     acceleration_m_s2: float = 2.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.poses import Pose
-from mapping.tracking import TrackState
 from mapping.tracking.blobs import Blobs
+from mapping.tracking.tracker_params import TrackState
 from planning.evading.velocity_obstacles import Obstacles, approaches
 
 SIGNIFICANT = 13.8

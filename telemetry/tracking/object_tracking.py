@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.perceiving import Settings
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.perception import SILENT_S
 from mapping.sensor_frames import RadarFrame
-from mapping.tracking import Tracker
 from mapping.tracking.movers import Movers
+from mapping.tracking.tracker import Tracker
 from planning.errors import DescribedError
 from planning.evading.velocity_obstacles import Limits
 from planning.missions.vehicle_profile import parse_profile

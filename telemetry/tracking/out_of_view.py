@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.poses import Pose
-from mapping.tracking import TrackState
+from mapping.tracking.tracker_params import TrackState
 from planning.evading.velocity_obstacles import Obstacles, approaches
 from telemetry.tracking.followed import ENOUGH_UPDATES, Followed
 

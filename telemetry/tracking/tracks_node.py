@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mapping.sensor_frames import RadarFrame
-from mapping.tracking import Tracker
+from mapping.tracking.tracker import Tracker
 from telemetry.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.perception.frame_worker import PLAN, SETTINGS, FrameWorker, Give

@@ -11,7 +11,8 @@ import time
 
 import numpy as np
 
-from mapping.perceiving import Settings, VisionPerception
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.vision_perception import VisionPerception
 from tests.mapping.flights import Flight, flat_ground
 
 

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from mapping.tracking import Tracker
+from mapping.tracking.tracker import Tracker
 from tests.mapping.tracks_compared import compared
 
 ENOUGH, NO_WORSE = 30.0, 1.05

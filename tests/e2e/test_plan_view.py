@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from planning.formats import read_mission
+from planning.formats.detect import read_mission
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, visit, wait_until
 

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping.geometry.frames import attitude_rotation
-from mapping.perceiving import FrameResult, RadarPerception, VisionPerception
+from mapping.perceiving.frame_result import FrameResult
 from mapping.perceiving.ground import GroundGrid, ground_grid
 from mapping.perceiving.perception import Perception
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.vision_perception import VisionPerception
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, packed
 
 DOWN_5_M = 5.0

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from mapping.geometry import quaternions
-from mapping.perceiving import Settings, VisionPerception
 from mapping.perceiving.camera_path import PathWatch
 from mapping.perceiving.flight_map import FlightMap
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.vision_perception import VisionPerception
 from mapping.sensor_frames import SlamPose
 from tests.mapping.flights import Flight
 from tests.mapping.test_vision_perception import floor, flying, pole, slam_of

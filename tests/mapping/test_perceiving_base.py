@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from mapping.perceiving import RadarPerception, RangePerception, Settings, VisionPerception
 from mapping.perceiving.braking import Braking
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.perception import Perception
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.range_perception import RangePerception
+from mapping.perceiving.vision_perception import VisionPerception
 from mapping.sensor_frames import RadarFrame, RangeFrame
 from tests.mapping.flights import Flight, flat_ground
 

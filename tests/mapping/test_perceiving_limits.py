@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mapping.errors import CapacityError, ParameterError
-from mapping.perceiving import RadarPerception, Settings
 from mapping.perceiving.corridor import tube_points
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.perception import LONGEST_CORRIDOR_M
+from mapping.perceiving.radar_perception import RadarPerception
 from mapping.perceiving.settings_limits import check_settings, corridor_points
 
 LONGEST = np.array([[0.0, 0.0, 0.0], [0.0, LONGEST_CORRIDOR_M, 0.0]])

@@ -10,7 +10,9 @@ import pytest
 from mapping.geometry import quaternions
 from mapping.geometry.arrays import F64, Bools
 from mapping.geometry.poses import Pose
-from mapping.perceiving import RadarPerception, RangePerception, Settings
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.range_perception import RangePerception
 from mapping.perceiving.remembered import LOOKS, MOST_COLUMNS, Field, Remembered, Way
 from mapping.sensor_frames import RangeFrame
 from tests.mapping.flights import radar_frame

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapping.geometry.poses import Pose
-from mapping.perceiving import RadarPerception, Settings
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.radar_passing import Passing, PassingParams
+from mapping.perceiving.radar_perception import RadarPerception
 from tests.mapping.flights import Flight, flat_ground, radar_frame, snr_db
 
 NONE = (np.empty((0, 3)), np.empty(0, np.bool_))

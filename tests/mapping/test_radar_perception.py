@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.perceiving import RadarPerception, Settings
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.ground import GroundGrid, ground_grid
+from mapping.perceiving.radar_perception import RadarPerception
 from tests.mapping.flights import Flight, flat_ground, radar_frame, snr_db
 
 AWAY_M = 14.0

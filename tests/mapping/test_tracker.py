@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.tracking import Tracker, TrackerParams, TrackState
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackerParams, TrackState
 from tests.mapping.radar_scenes import Frame, Radar, frames, movers
 
 COORDINATES = ("cartesian", "polar")

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mapping.tracking import TrackerParams, cartesian, polar
+from mapping.tracking import cartesian, polar
 from mapping.tracking.kalman import distances, spreads, update, variances
 from mapping.tracking.tracker import assign
+from mapping.tracking.tracker_params import TrackerParams
 from tests.reference import gnn, kalman
 
 FOREVER = math.inf

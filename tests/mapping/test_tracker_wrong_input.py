@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mapping.errors import ParameterError
-from mapping.tracking import Tracker, TrackerParams
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackerParams
 
 HERE = {"position_enu_m": (0.0, 0.0), "velocity_enu_m_s": (0.0, 0.0), "heading_rad": 0.0}
 

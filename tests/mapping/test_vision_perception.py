@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from mapping.geometry import quaternions
 from mapping.geometry.frames import heading_rotation
-from mapping.perceiving import Settings, VisionPerception
+from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.ground import ground_grid
-from mapping.perceiving.vision_perception import voxel_centres
+from mapping.perceiving.vision_perception import VisionPerception, voxel_centres
 from mapping.sensor_frames import CloudFrame, SlamPose, packed
 from tests.mapping.flights import Flight, flat_ground
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.tracking import Tracker, TrackerParams
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackerParams
 from tests.mapping.radar_scenes import Frame, frames, movers
 from tests.reference.stonesoup_gnn import follow
 

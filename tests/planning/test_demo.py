@@ -5,8 +5,9 @@ import pytest
 from scipy import ndimage
 
 from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polygon, small_hill
-from planning.terrain.dsm import Dsm, is_amsl
+from planning.terrain.dsm import Dsm
 from planning.terrain.spikes import find_spikes
+from planning.terrain.vertical_datum import is_amsl
 
 
 @pytest.fixture(scope="module")

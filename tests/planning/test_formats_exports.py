@@ -6,15 +6,10 @@ import numpy as np
 import pytest
 
 from planning.errors import FormatError
-from planning.formats import (
-    read_geojson,
-    read_kml_track,
-    read_trajectory,
-    write_geojson,
-    write_kml,
-    write_trajectory,
-)
+from planning.formats.geojson import read_geojson, write_geojson
+from planning.formats.kml import read_kml_track, write_kml
 from planning.formats.kml_reader import read_placemarks
+from planning.formats.trajectory_csv import read_trajectory, write_trajectory
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing
 
 DATUMS = [None, "WGS 84 ellipsoid", "EGM96 height"]

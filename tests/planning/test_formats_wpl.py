@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.errors import FormatError
-from planning.formats import read_mission, read_wpl, write_wpl
+from planning.formats.detect import read_mission
+from planning.formats.wpl import read_wpl, write_wpl
 from planning.model import Home, Mission, MissionItem
 from tests.planning.format_examples import make_dsm, make_mission, make_path
 

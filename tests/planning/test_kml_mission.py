@@ -11,7 +11,8 @@ import pytest
 
 from planning.certificate.clearance import certify
 from planning.errors import FormatError
-from planning.formats import read_flight, read_mission, write_kml
+from planning.formats.detect import read_flight, read_mission
+from planning.formats.kml import write_kml
 from planning.formats.safe_text import said_once
 from planning.missions.flown import flown_line
 from planning.plan import plan_mission

@@ -7,8 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.errors import FormatError
-from planning.formats import safe_text, write_geojson, write_kml, write_plan, write_wpl
+from planning.formats import safe_text
+from planning.formats.geojson import write_geojson
+from planning.formats.kml import write_kml
 from planning.formats.poi_files import looks_swapped, read_pois, warn_swapped, write_pois_csv
+from planning.formats.qgc_plan import write_plan
+from planning.formats.wpl import write_wpl
 from planning.model import Poi
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path
 

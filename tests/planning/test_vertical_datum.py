@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from planning.terrain.dsm import is_amsl
+from planning.terrain.vertical_datum import is_amsl
 
 GEOIDS = (
     "EGM96 height", "EGM96", "egm2008", "EGM2008 geoid height", "EGM 2008", "EPSG:5773", "EPSG:5703", "NAVD88 height",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.tracking import TrackerParams
+from mapping.tracking.tracker_params import TrackerParams
 from tests.mapping.radar_scenes import Frame
 
 START = datetime.datetime(2026, 1, 1)

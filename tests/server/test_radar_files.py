@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mapping.radar import AWR1843, POSITION2GO
+from mapping.radar.params import AWR1843, POSITION2GO
 from server.door.guard import UPLOADS
 from server.schemas import RadarFileDoc, RadarFrame, RadarMap, RadarOpened
 from telemetry.sensors.ti_mmwave.ti_config import fmcw_params

@@ -16,8 +16,8 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import moved_deg
 from mapping.geometry.poses import Pose
-from mapping.tracking import Tracker
 from mapping.tracking.blobs import Blobs
+from mapping.tracking.tracker import Tracker
 from planning.evading.velocity_obstacles import Obstacles, approaches
 from telemetry.flight.avoidance.passing import scene_of, velocity_past
 from telemetry.topics.obstacles import PerceptionSettings

@@ -168,3 +168,11 @@ def test_it_knows_that_a_server_lives(nodes: Nodes) -> None:
 
     asyncio.run(whole())
     assert process.poll() is None
+
+
+@pytest.mark.parametrize("name", ["link", "recorder"])
+def test_what_is_started_anew_in_flight_loads_nothing_that_takes_long(name: str) -> None:
+    heavy = "{'numba', 'scipy', 'pyproj', 'rasterio', 'skimage', 'fastapi'}"
+    code = f"import sys, telemetry.nodes.{name}; print(*sorted({heavy} & set(sys.modules)))"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert loaded.strip() == ""

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from mapping.perceiving import RadarPerception, Settings, VisionPerception
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.vision_perception import VisionPerception
 from mapping.sensor_frames import rows
 from telemetry.perception.showing import MOST_POINTS, MOST_TARGETS, Showing, look_of
 from telemetry.topics.looks import CloudLook, RadarLook, points_enu_m

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapping.errors import RadarDataError
-from mapping.radar import Detections
+from mapping.radar.detections import Detections
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import recorded_readings
 from telemetry.errors import RecordingError

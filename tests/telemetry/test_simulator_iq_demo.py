@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from mapping.geometry.arrays import F64
-from mapping.perceiving import RadarPerception, Settings
 from mapping.perceiving.alerts import AlertEvent
+from mapping.perceiving.frame_result import Settings
+from mapping.perceiving.radar_perception import RadarPerception
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.missions.vehicle_profile import load_profile
 from planning.plan import Plan, plan_mission

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mapping.geometry.poses import Pose
-from mapping.tracking import TrackState
 from mapping.tracking.blobs import Blobs
+from mapping.tracking.tracker_params import TrackState
 from telemetry.tracking.followed import DRIFT_S, Followed, TrackMemory
 
 HOVERING = np.array([1.0, 0.0, 0.0, 0.0])

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from mapping.geometry.poses import Pose
 from mapping.radar.targets import Polar
-from mapping.tracking import TrackState
 from mapping.tracking.blobs import MOST_BLOBS, SAME_M, Blobs, blobs
+from mapping.tracking.tracker_params import TrackState
 from planning.evading.velocity_obstacles import Limits, Obstacles, approaches
 from planning.missions.vehicle_profile import dump_profile, load_profile
 from telemetry.topics.obstacles import ObstacleAlert

@@ -10,7 +10,7 @@ import pytest
 
 from mapping.geometry.poses import Pose
 from mapping.perceiving.ground import ground_grid
-from mapping.tracking import TrackState
+from mapping.tracking.tracker_params import TrackState
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 from telemetry.tracking.followed import Followed

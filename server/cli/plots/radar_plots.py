@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mapping.radar import Detections, RadarChain, Spectra
+from mapping.radar.chain import RadarChain, Spectra
+from mapping.radar.detections import Detections
 
 NAMES = ("range-profile.png", "range-doppler.png", "azimuth-spectrum.png")
 SHOWN_DB = 60.0

@@ -17,7 +17,7 @@ from planning.formats.commands import plain_frame
 from planning.formats.trajectory_csv import Trajectory
 from planning.mav_cmd import MavCmd, MavFrame
 from planning.model import Mission, MissionItem
-from planning.terrain.dsm import is_amsl
+from planning.terrain.vertical_datum import is_amsl
 from telemetry.topics.messages import GuidedTarget
 
 GROUND_SPEEDS = (0, 1)

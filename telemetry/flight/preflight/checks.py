@@ -10,7 +10,7 @@ from planning.formats.commands import has_position
 from planning.margins.words import rounded_down, rounded_up
 from planning.missions.flown import AMSL_FRAMES
 from planning.model import Certificate, ClearanceParams, Home, HomeStand, Mission, VehicleProfile
-from planning.terrain.dsm import is_amsl
+from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.preflight.parameters import ReturnSettings
 from telemetry.topics.messages import OnboardMission
 from telemetry.topics.vehicle import GnssFix, VehicleState

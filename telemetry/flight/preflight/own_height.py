@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from planning.certificate.home_ground import HomeGround
-from planning.terrain.dsm import is_amsl
+from planning.terrain.vertical_datum import is_amsl
 from telemetry.topics.vehicle import VehicleState
 
 ANTENNA_M = 0.5

@@ -7,15 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from mapping.errors import RadarDataError
-from mapping.radar import (
-    AWR1843,
-    AWR1843_SETTINGS,
-    POSITION2GO,
-    POSITION2GO_SETTINGS,
-    Detections,
-    RadarChain,
-    Spectra,
-)
+from mapping.radar.chain import AWR1843_SETTINGS, POSITION2GO_SETTINGS, RadarChain, Spectra
+from mapping.radar.detections import Detections
+from mapping.radar.params import AWR1843, POSITION2GO
 from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame
 from telemetry.sensors.adc.codes import SampleCode
 from telemetry.sensors.adc.opening import open_adc

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.radar import Detections
-from mapping.radar.detections import between_cells
+from mapping.radar.detections import Detections, between_cells
 from mapping.radar.targets import polar
 
 

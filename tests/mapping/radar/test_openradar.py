@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from mapping.geometry.arrays import C128
-from mapping.radar import AWR1843, ChainSettings, Detections, RadarChain, Spectra, doa
+from mapping.radar import doa
+from mapping.radar.chain import ChainSettings, RadarChain, Spectra
+from mapping.radar.detections import Detections
+from mapping.radar.params import AWR1843
 
 NAMES = ["simple_frame_1", "doppler_example", "doppler_example_1"]
 

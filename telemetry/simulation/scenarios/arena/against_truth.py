@@ -12,7 +12,8 @@ import numpy as np
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import F64
 from mapping.radar.detections import Detections
-from mapping.tracking import Tracker, TrackState
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackState
 from telemetry.sensors.optitrack import Capture
 from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
 

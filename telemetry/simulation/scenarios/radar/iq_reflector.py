@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.radar import Detections, RadarChain
+from mapping.radar.chain import RadarChain
+from mapping.radar.detections import Detections
 from mapping.radar.fft import Window
 from planning.errors import ParameterError
 from telemetry.simulation.scenarios.stage.curves import Chart, Series, series

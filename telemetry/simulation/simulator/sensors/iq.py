@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import C64
-from mapping.radar import Detections, RadarChain
+from mapping.radar.chain import RadarChain
+from mapping.radar.detections import Detections
 from mapping.sensor_frames import RadarFrame, packed
 from telemetry.simulation.simulator.scene.world import World
 from telemetry.simulation.simulator.sensors.body import of_truth, rotation_enu_body

@@ -5,15 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from mapping.radar import (
-    AWR1843,
-    AWR1843_SETTINGS,
-    POSITION2GO,
-    POSITION2GO_SETTINGS,
-    ChainSettings,
-    FmcwParams,
-)
+from mapping.radar.chain import AWR1843_SETTINGS, POSITION2GO_SETTINGS, ChainSettings
 from mapping.radar.fft import window
+from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from mapping.radar.params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +31,8 @@ class RadarModel:
     azimuth_sigma_rad: float = math.radians(1.0)
     """Straight ahead; beside it grows as 1 / cos."""
     elevation_sigma_rad: float = math.radians(7.0)
-    speed_cell_m_s: float = 0.31
-    speed_cells: int = 67
+    speed_cell_m_s: float = OBJECT_SPEED_CELL_M_S
+    speed_cells: int = OBJECT_SPEED_CELLS
     """+-10.4 m/s; faster ones fold back."""
     half_width_rad: float = math.radians(60.0)
     lowest_rad: float = math.radians(-35.0)
