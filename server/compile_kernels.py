@@ -23,7 +23,7 @@ from telemetry.perception.warm_up import warm_up
 from telemetry.simulation.simulator.demo_world import demo_world
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors import StereoSensor, radar_sensor
-from telemetry.topics.simulated import RadarKind, SimTruth
+from telemetry.topics.vehicle import RadarKind, SimTruth
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from pydantic_settings import (
 )
 
 from server.errors import StartError, error_doc
-from telemetry.topics.simulated import RadarKind
+from telemetry.topics.vehicle import RadarKind
 
 GIB = 1024**3
 _SCRYPT = {"n": 2**14, "r": 8, "p": 1, "maxmem": 64 * 1024**2}

@@ -13,9 +13,8 @@ from server.cli.shared.files_in_out import check_directory
 from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
 from server.errors import StorageError
 from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
-from telemetry.simulation.scenarios.stage.result import ScenarioResult, tally, tally_json
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
-from telemetry.topics.simulated import RadarKind
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, tally, tally_json
+from telemetry.topics.vehicle import RadarKind
 
 
 def scenario(

@@ -10,7 +10,7 @@ import typer
 from server.app import run
 from server.cli.shared.output import refusing
 from server.settings import load_settings
-from telemetry.topics.simulated import RadarKind
+from telemetry.topics.vehicle import RadarKind
 
 
 def serve(

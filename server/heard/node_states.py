@@ -11,7 +11,7 @@ from server.schemas import NodeDoc, NodesMessage, ServerMessage
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.node_lock import running_node
 from telemetry.topics.obstacles import SENSORS, Sensor
-from telemetry.topics.simulated import RadarKind
+from telemetry.topics.vehicle import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
 TRACKS = "tracks"

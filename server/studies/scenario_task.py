@@ -8,8 +8,7 @@ from server.schemas import ChartDoc, ScenarioFigureDoc, ScenarioPartDoc, SeriesD
 from server.work.jobs import Progress
 from telemetry.simulation.scenarios.catalogue import run_scenario, scenario_named
 from telemetry.simulation.scenarios.stage.curves import Chart, ends
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest
 
 
 def fly(name: str, seed: int, *, report: Progress) -> tuple[list[ScenarioPartDoc], bool]:

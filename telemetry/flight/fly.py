@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from planning.certificate.clearance import certificate_json
+from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
-from planning.model import Mission
+from planning.model import Certificate, Mission, finite_or_none
+from planning.terrain.dsm import Dsm
 from telemetry.errors import RefusedError, TelemetryError
 from telemetry.flight.guided.targets import guided_plan
 from telemetry.flight.preflight.preflight import Preflight
 from telemetry.flight.preflight.prepare import FlyOptions, Prepared, Report, connect, prepare
-from telemetry.flight.records import plan_record
 from telemetry.flight.watch import Asks, Subscribes, Watch, watching
 from telemetry.topics.messages import FlightStatus, PlanRecord, Topic, UploadReport, VehicleText
 from telemetry.topics.requests import ReturnHome, StartAuto, StartGuided
@@ -206,11 +209,40 @@ def _tell_text(text: VehicleText, report: Report) -> None:
 
 
 def _record(prepared: Prepared, options: FlyOptions) -> PlanRecord:
-    return plan_record(
+    return _plan_record(
         prepared.mission,
         digest=prepared.upload.onboard.digest,
         name=options.name,
         dsm=options.dsm,
         certificate=prepared.preflight.certificate,
         profile_toml=dump_profile(options.profile),
+    )
+
+
+def _plan_record(
+    mission: Mission,
+    *,
+    digest: str,
+    name: str,
+    dsm: Dsm | None,
+    certificate: Certificate | None,
+    profile_toml: str,
+) -> PlanRecord:
+    """For recordings, complete enough to judge the flight later without the plan's files.
+
+    Of a mission as it is on board; ``certificate`` is of what was read back.
+    """
+    return PlanRecord(
+        t_utc_s=time.time(),
+        name=name,
+        mission_wpl=write_wpl(mission),
+        digest=digest,
+        firmware=mission.firmware,
+        terrain_id="",
+        terrain_name="",
+        terrain_sha256=dsm.sha256 if dsm is not None else "",
+        home_alt_dsm_m=finite_or_none(mission.home.alt_dsm_m),
+        vertical_datum=mission.home.vertical_datum,
+        profile_toml=profile_toml,
+        certificate_json="" if certificate is None else json.dumps(certificate_json(certificate), allow_nan=False),
     )

@@ -25,7 +25,7 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors import SlamDrift, StereoModel, StereoSensor, radar_sensor
 from telemetry.topics.messages import Topic
-from telemetry.topics.simulated import RadarKind, SimTruth
+from telemetry.topics.vehicle import RadarKind, SimTruth
 
 _log = logging.getLogger(__name__)
 

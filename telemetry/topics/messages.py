@@ -19,9 +19,8 @@ from telemetry.topics.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
-from telemetry.topics.simulated import SimTruth
 from telemetry.topics.tracks import TracksStatus
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import SimTruth, VehicleState
 
 
 class Topic(StrEnum):

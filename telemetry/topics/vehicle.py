@@ -1,4 +1,4 @@
-"""What is known of one vehicle, and how each MAVLink message changes it.
+"""What is known of one vehicle, and where a simulated one really is.
 
 Missing values are None, never NaN. Clocks: ``t_mono_s`` is this machine's monotonic clock, the same in all its
 processes; ``t_utc_s`` counts seconds since 1970. Angles are radians but for latitude and longitude.
@@ -12,6 +12,9 @@ from typing import Literal
 Autopilot = Literal["ardupilot", "px4", "other"]
 Landed = Literal["on_ground", "taking_off", "in_air", "landing"]
 GnssFix = Literal["none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed"]
+RadarKind = Literal["model", "iq"]
+"""Of a simulated radar. model: targets, with errors drawn to the table of the real one's; iq: samples of its
+converters, and the whole chain of processing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +97,22 @@ class VehicleState:
     """Direction that the wind comes from, clockwise from north."""
     estimator_ok: bool | None = None
     """The autopilot's position estimate is usable."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimTruth:
+    """Where the simulated vehicle really is: for simulated sensors and for tests, for nobody else."""
+
+    t_mono_s: float
+    t_utc_s: float
+    t_sim_s: float
+    home_lat_deg: float
+    home_lon_deg: float
+    home_alt_amsl_m: float
+    position_enu_m: tuple[float, float, float]
+    """From the simulation's origin, z = 0 on the ground there."""
+    velocity_enu_m_s: tuple[float, float, float]
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
+    armed: bool

@@ -14,7 +14,7 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
 from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 from tests.server.cli_runs import Run, hedgehop
 from tests.telemetry.test_adc_files import oda_line
 

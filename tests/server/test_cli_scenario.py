@@ -17,10 +17,10 @@ from telemetry.simulation.scenarios.stage.result import (
     Figure,
     FlightResult,
     MapFigures,
+    ScenarioRequest,
     ScenarioResult,
     measured,
 )
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from tests.server.cli_runs import hedgehop
 
 

@@ -12,7 +12,7 @@ from server.errors import StartError
 from server.heard.ground_task import Ground
 from server.heard.node_states import SIMULATED_SENSORS, Nodes
 from server.settings import load_settings
-from telemetry.topics.simulated import RadarKind
+from telemetry.topics.vehicle import RadarKind
 
 
 @pytest.mark.parametrize("kind", ["model", "iq"])

@@ -10,7 +10,7 @@ import numpy as np
 from mapping.sensor_frames import RadarFrame, rows
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import SceneTerrain, World
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 FRAME = NeuFrame(37.72902, 14.99262, 1712.0)
 BELOW = -1000.0

@@ -13,7 +13,7 @@ from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided.guided import GuidedEnd, GuidedScript
 from telemetry.flight.guided.handover import Handover
 from telemetry.flight.guided.orders import Place
-from telemetry.flight.guided.standstill import Standstill
+from telemetry.flight.guided.script_watches import Standstill
 from telemetry.mavlink.actions import Action, Done, Failed, Progress
 from telemetry.mavlink.reduce import reduce
 from telemetry.topics.requests import StartGuided

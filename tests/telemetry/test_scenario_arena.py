@@ -18,9 +18,9 @@ from telemetry.simulation.scenarios.arena.arena_course import Approach, approach
 from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
 from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
 from telemetry.simulation.scenarios.catalogue import NAMES
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
-from telemetry.topics.simulated import RadarKind
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest
 from telemetry.topics.track_settings import TrackerSettings
+from telemetry.topics.vehicle import RadarKind
 
 AHEAD = Approach(np.array([[0.0, 0.5], [0.0, 3.0]]), np.array([0.0, -5.0]), np.array([0.0, 5.0]))
 

@@ -22,16 +22,16 @@ from telemetry.simulation.scenarios.stage.result import (
     Figure,
     FlightResult,
     MapFigures,
+    ScenarioRequest,
     ScenarioResult,
     tally,
     tally_json,
 )
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.scenes import VALLEY, ScenarioScene
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.simulation.scenarios.stage.world_objects import box, cylinder, reflector, tree, wall, world_document
 from telemetry.simulation.simulator.scene import SceneTerrain, World
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 HOP = ScenarioScene(
     world_document("hop", [wall("fence", (-6.0, 14.0), (6.0, 14.0), 5.0, material="stone")]),

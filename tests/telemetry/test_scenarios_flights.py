@@ -11,8 +11,7 @@ from planning.terrain.geotiff import read_dsm
 from telemetry.simulation.scenarios.castle import CASES, fly_case
 from telemetry.simulation.scenarios.catalogue import run_scenario
 from telemetry.simulation.scenarios.hugging import long_flight, terrain_hugging
-from telemetry.simulation.scenarios.stage.result import Figure, ScenarioResult
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import Figure, ScenarioRequest, ScenarioResult
 
 pytestmark = pytest.mark.slow
 

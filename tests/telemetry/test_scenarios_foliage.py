@@ -37,8 +37,7 @@ from telemetry.simulation.scenarios.foliage.foliage_roc import Roc, curve, echoe
 from telemetry.simulation.scenarios.foliage.foliage_rural import connected, route
 from telemetry.simulation.scenarios.foliage.foliage_trials import TRIAL_1, TRIAL_2, trial_site
 from telemetry.simulation.scenarios.stage.curves import MOST_POINTS
-from telemetry.simulation.scenarios.stage.result import ScenarioResult, measured
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, measured
 from telemetry.simulation.simulator.sensors.uwb import UwbModel
 
 # On one worker: two would each drive for themselves.

@@ -11,8 +11,7 @@ from planning.errors import ParameterError
 from telemetry.simulation.scenarios.catalogue import NAMES
 from telemetry.simulation.scenarios.radar import iq_reflector
 from telemetry.simulation.scenarios.radar.iq_reflector import SENSORS, measure, resolved
-from telemetry.simulation.scenarios.stage.result import ScenarioResult
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ
 
 AWR1843, POSITION2GO = SENSORS

@@ -24,17 +24,17 @@ from telemetry.simulation.scenarios.stage.result import (
     Figure,
     FlightResult,
     MapFigures,
+    ScenarioRequest,
     ScenarioResult,
     tally,
     tally_json,
 )
 from telemetry.simulation.scenarios.stage.scenes import VALLEY
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.simulation.scenarios.stage.world_objects import Object, cylinder, world_document
 from telemetry.simulation.simulator.scene import World
 from telemetry.topics.obstacles import PerceptionSettings
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 LINE = np.array([[0.0, 0.0, 6.0], [0.0, 120.0, 6.0]])
 SHARE = "share of unknown objects alarmed in time"

@@ -22,10 +22,10 @@ from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.mcap_files.mend import mend
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.simulation.scenarios.stage import scenes
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
 from telemetry.simulation.scenarios.stage.setup import Setup
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.topics.deltas import FoldedMap
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapDelta, PerceptionSettings, Sensor

@@ -15,7 +15,7 @@ from telemetry.simulation.simulator.scene.world_shapes import WAVELENGTH_M
 from telemetry.simulation.simulator.sensors import RadarSensor, radar_sensor
 from telemetry.simulation.simulator.sensors.iq import IqRadarSensor, noise
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 from tests.telemetry.scenes import in_the_air, polar, truth, world
 
 COARSE_RAD = math.radians(20.0)

@@ -9,7 +9,7 @@ import pytest
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors import radar_sensor
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.moving_flights import T0_MONO_S, T0_UTC_S, Flight, heading_rad
 

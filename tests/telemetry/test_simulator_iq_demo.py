@@ -24,7 +24,7 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors import radar_sensor
 from telemetry.topics.obstacles import MapOrigin
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 SPEED_M_S, RADAR_S = 4.0, 0.1
 FROM_M, TO_M = 4.0, 22.0

@@ -15,7 +15,7 @@ from telemetry.simulation.simulator.scene.world_shapes import WAVELENGTH_M
 from telemetry.simulation.simulator.sensors import RadarModel, RadarSensor
 from telemetry.simulation.simulator.sensors.body import of_truth
 from telemetry.simulation.simulator.sensors.radar_cells import Scatterers, detect
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 from tests.telemetry.scenes import in_the_air, polar, truth, world
 
 FINE = RadarModel(false_alarms=0.0, side_lobe_db=-200.0, mount_m=0.0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mapping.sensor_frames import SlamPose
 from telemetry.simulation.simulator.sensors import SlamDrift
 from telemetry.simulation.simulator.sensors.body import of_truth
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 from tests.telemetry.scenes import truth
 
 

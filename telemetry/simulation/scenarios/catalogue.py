@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 
-from telemetry.simulation.scenarios.stage.result import ScenarioResult
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parame
 from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S, Sensed
 from telemetry.simulation.simulator.ground_below import FlatGround, Ground, Obstacles
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 STEP_S = 0.005
 STEPS_PER_LOOK = 4

@@ -12,8 +12,14 @@ from planning.errors import ParameterError
 from telemetry.simulation.scenarios.arena.arena_charts import error_charts, errors_by_angle, ways_chart
 from telemetry.simulation.scenarios.arena.arena_course import Approach, approaches
 from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
-from telemetry.simulation.scenarios.stage.result import AlertSeen, Figure, FlightResult, MapFigures, ScenarioResult
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import (
+    AlertSeen,
+    Figure,
+    FlightResult,
+    MapFigures,
+    ScenarioRequest,
+    ScenarioResult,
+)
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import with_figures
 

@@ -28,9 +28,9 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.sensors.radar_sensor import Radar
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from telemetry.topics.obstacles import PerceptionSettings
-from telemetry.topics.simulated import RadarKind, SimTruth
 from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.vehicle import RadarKind, SimTruth
 from telemetry.tracking.object_tracking import ObjectTracking
 
 FRAME = NeuFrame(51.9906, 4.3754, 0.0)

@@ -14,8 +14,8 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
 from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
-from telemetry.topics.simulated import SimTruth
 from telemetry.topics.track_settings import TrackerSettings
+from telemetry.topics.vehicle import SimTruth
 
 POLES_M = 6.0
 """High."""

@@ -38,8 +38,7 @@ from telemetry.simulation.scenarios.foliage.foliage_trials import (
     Printed,
     trial_site,
 )
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult, measured
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult, measured
 from telemetry.simulation.simulator.sensors.uwb import UwbModel
 
 NAME, ROC = "foliage", "ROC"

@@ -14,12 +14,16 @@ from telemetry.simulation.scenarios.hugging.hugging import hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.hugging.terrain_hugging import APART_M, etna
 from telemetry.simulation.scenarios.stage.map_figures import radar_figures
-from telemetry.simulation.scenarios.stage.record import FlightRecording
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, MapFigures, ScenarioResult
-from telemetry.simulation.scenarios.stage.running import surveyed
+from telemetry.simulation.scenarios.stage.result import (
+    Figure,
+    FlightResult,
+    MapFigures,
+    ScenarioRequest,
+    ScenarioResult,
+)
+from telemetry.simulation.scenarios.stage.running import FlightRecording, surveyed
 from telemetry.simulation.scenarios.stage.setup import Setup, Tell
 from telemetry.simulation.scenarios.stage.virtual_flight import fly
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.simulation.scenarios.stage.world_objects import world_document
 from telemetry.simulation.simulator.scene import SceneTerrain, World
 from telemetry.topics.messages import Published, Topic

@@ -14,10 +14,9 @@ from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import Hugging, hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
-from telemetry.simulation.scenarios.stage.result import FlightResult, ScenarioResult
+from telemetry.simulation.scenarios.stage.result import FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, own_ground, surveyed
 from telemetry.simulation.scenarios.stage.setup import Setup
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.simulation.scenarios.stage.world_objects import world_document
 from telemetry.simulation.simulator.scene import SceneTerrain, World
 from telemetry.simulation.simulator.scene.world_file import read_world

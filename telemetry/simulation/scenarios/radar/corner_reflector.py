@@ -13,10 +13,15 @@ from mapping.sensor_frames import rows
 from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import clusters_of, spread, within
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, MapFigures, ScenarioResult
+from telemetry.simulation.scenarios.stage.result import (
+    Figure,
+    FlightResult,
+    MapFigures,
+    ScenarioRequest,
+    ScenarioResult,
+)
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 from telemetry.simulation.simulator.sensors.body import of_truth
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 from telemetry.topics.obstacles import PerceptionSettings

@@ -13,8 +13,7 @@ from mapping.radar.detections import Detections
 from mapping.radar.fft import Window
 from planning.errors import ParameterError
 from telemetry.simulation.scenarios.stage.curves import Chart, Series, series
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult, measured
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult, measured
 from telemetry.simulation.simulator.sensors.iq import noise
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled

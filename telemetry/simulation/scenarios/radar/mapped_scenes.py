@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioResult
+from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
 
 WOOD, RUIN = "wood", "ruined-building"
 

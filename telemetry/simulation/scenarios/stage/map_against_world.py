@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from mapping.geometry.arrays import F64, I64
 from telemetry.simulation.scenarios.stage.result import WITHIN_M
 from telemetry.simulation.simulator.scene import World
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 LOOK_EVERY_S = 0.5
 SLICE_RAYS = 361

@@ -1,14 +1,43 @@
-"""What a scenario came to: its figures, each with the limit that it is held to, as JSON and as lines to read."""
+"""What is wanted of a scenario, and what it came to: figures with the limits that they are held to, to be read."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from telemetry.simulation.scenarios.stage.curves import Chart
 from telemetry.topics.obstacles import Sensor
+from telemetry.topics.vehicle import RadarKind
+
+Report = Callable[[str, float | None], None]
+
+
+def _to_nobody(step: str, share: float | None) -> None:
+    """Where nobody waits for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioRequest:
+    """What is wanted of a scenario."""
+
+    seed: int = 0
+    """Of the scene, the sensors' noise and the wind."""
+    world: Path | None = None
+    """A file that takes the place of the scenario's own objects, and of its ground if it names one."""
+    radar: RadarKind | None = None
+    """Simulated by what it would report, or from its samples on; None: as the scenario has it."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Other perception settings than the scenario's, of those that it takes: "tracker" and "velocities"."""
+    record: Path | None = None
+    """Where the flight is kept; of several flights each beside it, under its own name."""
+    charts: bool = False
+    """Whether curves are wanted that cost extra time."""
+    report: Report = field(default=_to_nobody, compare=False)
+    """How far it is: what is being done, and what share of the whole, if that is known."""
+
 
 WITHIN_M = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0)
 

@@ -1,4 +1,4 @@
-"""What all scenarios share: what is wanted of one, and the ground and objects that it is flown among."""
+"""What all scenarios share: the ground and objects that one is flown among, the flight, and its recording."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ import numpy as np
 
 from planning.errors import FormatError
 from planning.terrain.dsm import Dsm
+from telemetry.recording.carried_ground import MEDIA_TYPE, NAME, packed
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.recorded_topics import RECORDED
 from telemetry.simulation.scenarios.stage.course import course_mission
 from telemetry.simulation.scenarios.stage.paper_fields import field, known
-from telemetry.simulation.scenarios.stage.record import FlightRecording
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest
 from telemetry.simulation.scenarios.stage.scenes import VALLEY, ScenarioScene
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.simulation.scenarios.stage.virtual_flight import fly
-from telemetry.simulation.scenarios.stage.wanted import ScenarioRequest
+from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.scene.world_file import read_world
+from telemetry.topics.messages import Published
 
 
 def setup_of(
@@ -59,6 +63,31 @@ def flown_of(setup: Setup, wanted: ScenarioRequest, *, part: str = "") -> Flown:
         return fly(setup, recording.tell)
     finally:
         recording.close()
+
+
+class FlightRecording:
+    """One file that Review opens: ground, states, frames, maps, alerts.
+
+    Nothing reads a clock: the same flight gives the same file.
+    """
+
+    def __init__(self, path: Path, name: str, ground: Dsm) -> None:
+        """``ground``: what is known of it. Raises RecordingError when the file cannot be created."""
+        carried = packed(ground)
+        self._virtual_s = 0.0
+        self._writer = RecordingWriter(path, t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name=name, now=self._now)
+        self._writer.attach(NAME, MEDIA_TYPE, carried, T0_UTC_S)
+
+    def tell(self, topic: str, message: Published, t_utc_s: float) -> None:
+        if topic in RECORDED:
+            self._virtual_s = t_utc_s - T0_UTC_S
+            self._writer.write(topic, message, t_utc_s)
+
+    def close(self) -> None:
+        self._writer.close()
+
+    def _now(self) -> float:
+        return self._virtual_s
 
 
 def own_ground(path: Path) -> Dsm | None:

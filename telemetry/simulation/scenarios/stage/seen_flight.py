@@ -14,7 +14,7 @@ from telemetry.perception.perceiver import Perceiver
 from telemetry.simulation.scenarios.stage.result import AlertSeen
 from telemetry.simulation.scenarios.stage.watching import RegionWatch
 from telemetry.topics.obstacles import ObstacleAlert, Sensor
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 
 @dataclass(frozen=True, slots=True)

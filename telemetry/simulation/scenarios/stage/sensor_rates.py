@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.simulation.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 

@@ -12,7 +12,7 @@ from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
 from telemetry.simulation.simulator.scene import World
 from telemetry.topics.messages import Published
 from telemetry.topics.obstacles import PerceptionSettings, Sensor
-from telemetry.topics.simulated import RadarKind
+from telemetry.topics.vehicle import RadarKind
 
 Tell = Callable[[str, Published, float], None]
 """Topic, message, UTC: as on the bus."""

@@ -29,8 +29,7 @@ from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
 from telemetry.simulation.scenarios.stage.watching import RegionWatch
 from telemetry.topics.messages import FlightStatus, Published, Topic
 from telemetry.topics.obstacles import GroundNotice, Sensor
-from telemetry.topics.simulated import SimTruth
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import SimTruth, VehicleState
 
 NOT_READY_S = 60.0
 TRACK_S = 0.1

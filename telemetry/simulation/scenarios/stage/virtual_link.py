@@ -18,8 +18,7 @@ from telemetry.mavlink.reduce import reduce
 from telemetry.simulation.simulator.protocol.mavlink import Endpoint
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from telemetry.topics.messages import RawFrame, VehicleText
-from telemetry.topics.simulated import SimTruth
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import SimTruth, VehicleState
 
 SLICE_S = 0.02
 T0_MONO_S = 1000.0

@@ -13,8 +13,13 @@ from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
 from telemetry.simulation.simulator.autopilot.mission_steps import Step
 from telemetry.simulation.simulator.autopilot.pilot import Answer
 from telemetry.simulation.simulator.neu_frame import Vec3
-from telemetry.simulation.simulator.protocol.mode_numbers import MODE_NAMES
 
+MODE_NUMBERS = {
+    "STABILIZE": 0, "ACRO": 1, "ALT_HOLD": 2, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "CIRCLE": 7, "LAND": 9,
+    "DRIFT": 11, "SPORT": 13, "POSHOLD": 16, "BRAKE": 17, "SMART_RTL": 21,
+}  # fmt: skip
+MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
+"""ArduCopter's flight modes, and the numbers that stand for them on the wire."""
 RESULTS: dict[Answer, int] = {"accepted": 0, "denied": 2, "unsupported": 3, "failed": 4}
 FORCE = 21196
 ABOVE_SEA, ABOVE_HOME, LOCAL, LOCAL_OFFSET = (0, 5), (3, 6), (1,), (7, 9)

@@ -11,8 +11,8 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, quaternion
 from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S
+from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS
 from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
-from telemetry.simulation.simulator.protocol.mode_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 CAPABILITIES = (

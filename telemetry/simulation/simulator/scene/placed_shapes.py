@@ -9,9 +9,16 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, I32
 from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
-from telemetry.simulation.simulator.scene.materials import MATERIALS, Material
 from telemetry.simulation.simulator.scene.primitives import COLUMNS, box_row, cylinder_row, ellipsoid_row
-from telemetry.simulation.simulator.scene.world_shapes import AnyShape, Box, CornerReflector, Cylinder, Tree
+from telemetry.simulation.simulator.scene.world_shapes import (
+    MATERIALS,
+    AnyShape,
+    Box,
+    CornerReflector,
+    Cylinder,
+    Material,
+    Tree,
+)
 
 
 @dataclass(frozen=True, slots=True)

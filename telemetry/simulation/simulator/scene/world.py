@@ -14,11 +14,11 @@ from planning.errors import ParameterError
 from planning.terrain.dsm import Dsm
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 from telemetry.simulation.simulator.scene.ground_columns import SceneTerrain
-from telemetry.simulation.simulator.scene.materials import GROUND as GROUND_MATERIAL
 from telemetry.simulation.simulator.scene.placed_shapes import moved, place
 from telemetry.simulation.simulator.scene.primitives import bounding_spheres, distances, top_under
 from telemetry.simulation.simulator.scene.ray_bundle import Hits, cast
 from telemetry.simulation.simulator.scene.world_file import WorldFile, parse_world, read_world
+from telemetry.simulation.simulator.scene.world_shapes import GROUND as GROUND_MATERIAL
 
 MOST_AWAY_M = 50_000.0
 """Between the file's origin and the frame's: the frame is a plane."""

@@ -12,9 +12,9 @@ from typing import Literal, cast
 from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES, check_lat_lon, clean_name, decode_text, load_json
 from telemetry.simulation.simulator.scene.fields import Fields
-from telemetry.simulation.simulator.scene.materials import MATERIALS
 from telemetry.simulation.simulator.scene.motion import REPEATS, Motion, Pair, Repeat
 from telemetry.simulation.simulator.scene.world_shapes import (
+    MATERIALS,
     Above,
     AnyShape,
     Box,

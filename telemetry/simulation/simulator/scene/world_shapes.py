@@ -1,4 +1,4 @@
-"""The shapes that worlds are made of, as a world file gives them: placed over the ground, not yet in the frame."""
+"""The shapes that worlds are made of, as a world file gives them, and what they consist of."""
 
 from __future__ import annotations
 
@@ -13,6 +13,29 @@ WAVELENGTH_M = 299_792_458.0 / 77.5e9
 
 Above = Literal["ground", "origin"]
 """What a base is counted from: the ground under the shape's middle, or the height of the world's origin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a surface is made of, as radar and cameras see it."""
+
+    reflectivity_db: float
+    """Radar cross section over the area seen, at 77 GHz: rough surfaces scatter as much whatever their slant."""
+    texture: float
+    """Share of its patches on which stereo vision finds something to match."""
+
+
+MATERIALS: dict[str, Material] = {
+    "concrete": Material(-8.0, 0.85),
+    "stone": Material(-7.0, 0.97),
+    "plaster": Material(-9.0, 0.3),
+    "glass": Material(-12.0, 0.1),
+    "metal": Material(0.0, 0.7),
+    "wood": Material(-10.0, 0.95),
+    "leaves": Material(-11.0, 0.97),
+    "earth": Material(-16.0, 0.98),
+}
+GROUND = MATERIALS["earth"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 
 def rotation_enu_body(roll_rad: float, pitch_rad: float, heading_rad: float) -> F64:

@@ -19,7 +19,7 @@ from telemetry.simulation.simulator.sensors.body import of_truth, rotation_enu_b
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, IqModel
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled, strongest
 from telemetry.simulation.simulator.sensors.radar_echoes import echoes
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 
 class IqRadarSensor:

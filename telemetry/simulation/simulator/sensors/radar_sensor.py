@@ -16,7 +16,7 @@ from telemetry.simulation.simulator.sensors.radar_cells import Scatterers, detec
 from telemetry.simulation.simulator.sensors.radar_echoes import NEAREST_M, echoes
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 from telemetry.simulation.simulator.sensors.radar_rays import unit
-from telemetry.topics.simulated import RadarKind, SimTruth
+from telemetry.topics.vehicle import RadarKind, SimTruth
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping.sensor_frames import SlamPose
 from telemetry.simulation.simulator.sensors.body import of_truth, quaternion_wxyz, rotation_enu_body
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 DRIFT = 0.01
 """Of the way flown."""

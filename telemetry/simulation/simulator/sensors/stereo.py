@@ -11,7 +11,7 @@ from mapping.geometry.arrays import F64, Bools
 from mapping.sensor_frames import CloudFrame, packed
 from telemetry.simulation.simulator.scene.world import World
 from telemetry.simulation.simulator.sensors.body import of_truth
-from telemetry.topics.simulated import SimTruth
+from telemetry.topics.vehicle import SimTruth
 
 _PRIMES = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
