@@ -5,13 +5,14 @@ Exit codes: 0 done, 1 not certified, not feasible or failed, 2 wrong input.
 
 from __future__ import annotations
 
+import importlib
 import sys
+from pathlib import Path
 
 import typer
 
 from planning import __version__
 from server.cli.agent_command import agent
-from server.cli.bench_command import bench
 from server.cli.certify_command import certify
 from server.cli.fly_command import fly
 from server.cli.map_command import build_map
@@ -22,7 +23,8 @@ from server.cli.review_command import review
 from server.cli.scenario_command import scenario
 from server.cli.serve_command import serve
 from server.cli.shared import examples
-from server.cli.shared.usage import run_command
+from server.cli.shared.command import FAILED, run_command
+from server.cli.shared.output import say
 from server.cli.sim_command import sim
 from server.cli.survey_command import survey
 from server.cli.traversability_command import traversability
@@ -60,7 +62,17 @@ app.command(epilog=examples.TRAVERSABILITY)(traversability)
 app.command(epilog=examples.AGENT)(agent)
 radar.command("tracks", epilog=examples.RADAR_TRACKS)(tracks)
 app.add_typer(radar)
-app.command(epilog=examples.BENCH)(bench)
+
+
+@app.command(epilog=examples.BENCH)
+def bench() -> None:
+    """Measure the kernels against scipy, OpenCV and others, and print the ratios."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "tests" / "bench").is_dir():
+        say("Error: the benchmarks lie in the source tree. Clone the project and run: make bench")
+        raise typer.Exit(FAILED)
+    sys.path.insert(0, str(root))
+    importlib.import_module("tests.bench.__main__").main()
 
 
 def main() -> None:

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from server.cli.agent_source import Source, SourceOptions, source_of
-from server.cli.shared.output import print_json, refusing, say
+from server.cli.shared.command import command
+from server.cli.shared.output import print_json, say
 from server.errors import BadRequestError
 from telemetry.agent.client import Agent, AgentCounts, Reading, sensor_url
 from telemetry.agent.link_messages import REACH_M, Report
-from telemetry.sensors.ti_mmwave.ti_session import DATA_BAUD
 
 TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
 TELL_EVERY_S = 5.0
@@ -28,66 +28,32 @@ LAST_FRAMES_S = 1.5
 CONNECT_WITHIN_S = 10.0
 
 
+@command
 def agent(
-    address: Annotated[
-        str, typer.Argument(metavar="URL", help="The ground station: http://HOST:PORT or https://HOST.")
-    ],
-    recording: Annotated[
-        Path | None, typer.Option("--recording", metavar="FILE", help="Send the frames of a recorded flight.")
-    ] = None,
-    ti_config: Annotated[
-        Path | None, typer.Option("--ti-config", metavar="CFG", help="The configuration that a TI radar is sent.")
-    ] = None,
-    ti_data: Annotated[
-        str | None, typer.Option("--ti-data", metavar="PORT", help="Data port of a TI radar (often /dev/ttyACM1).")
-    ] = None,
-    ti_config_port: Annotated[
-        str | None,
-        typer.Option(
-            "--ti-config-port",
-            metavar="PORT",
-            help='Its config port; default: the one before; "none": it runs already.',
-        ),
-    ] = None,
-    ti_baud: Annotated[
-        int | None, typer.Option("--ti-baud", help=f"Baud rate of the data port; default: {DATA_BAUD}.")
-    ] = None,
-    ti_capture: Annotated[
-        Path | None, typer.Option("--ti-capture", metavar="FILE", help="Send what a TI radar's data port once sent.")
-    ] = None,
-    position2go: Annotated[
-        str | None, typer.Option("--position2go", metavar="PORT", help="Port of an Infineon Position2Go.")
-    ] = None,
+    address: Annotated[str, Argument(metavar="URL", help="The ground station: http://HOST:PORT or https://HOST.")],
+    *,
+    taken_from: SourceOptions,
     token_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--token-file", metavar="FILE", help=f"Holds the ground station's token; default: {TOKEN_VARIABLE}."
-        ),
+        Path | None, Option(metavar="FILE", help=f"Holds the ground station's token; default: {TOKEN_VARIABLE}.")
     ] = None,
-    name: Annotated[str, typer.Option("--name", help="Of this agent; default: the computer's.")] = "",
-    voxel_m: Annotated[
-        float, typer.Option("--voxel-m", help="One point per voxel of this edge; 0: all points.")
-    ] = 0.25,
-    limit_kb_s: Annotated[
-        float, typer.Option("--limit-kb-s", help="Bandwidth; clouds beyond it are left out.")
-    ] = 1000.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was sent as JSON at the end.")] = False,
+    name: Annotated[str, Option(help="Of this agent; default: the computer's.")] = "",
+    voxel_m: Annotated[float, Option(help="One point per voxel of this edge; 0: all points.")] = 0.25,
+    limit_kb_s: Annotated[float, Option(help="Bandwidth; clouds beyond it are left out.")] = 1000.0,
+    as_json: Annotated[bool, Option("--json", help="Print what was sent as JSON at the end.")] = False,
 ) -> None:
     """Send radar frames and point clouds to a ground station: from stdin, a radar on a port, or a recording."""
-    with refusing(as_json=as_json):
-        sensor_url(address)
-        _check(voxel_m, limit_kb_s)
-        made = Agent(
-            address,
-            token=_token(token_file),
-            name=(name or socket.gethostname())[:40],
-            voxel_m=voxel_m,
-            limit_bytes_per_s=1000.0 * limit_kb_s,
-        )
-        options = SourceOptions(recording, ti_config, ti_data, ti_config_port, ti_baud, ti_capture, position2go)
-        source = source_of(options)
-        asyncio.run(_run(made, source))
-        _answer(made, source, as_json=as_json)
+    sensor_url(address)
+    _check(voxel_m, limit_kb_s)
+    made = Agent(
+        address,
+        token=_token(token_file),
+        name=(name or socket.gethostname())[:40],
+        voxel_m=voxel_m,
+        limit_bytes_per_s=1000.0 * limit_kb_s,
+    )
+    source = source_of(taken_from)
+    asyncio.run(_run(made, source))
+    _answer(made, source, as_json=as_json)
 
 
 def _check(voxel_m: float, limit_kb_s: float) -> None:

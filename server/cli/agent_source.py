@@ -7,8 +7,11 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from server.cli.shared.output import say
+from typer import Option
+
+from server.cli.shared.output import say, say_notes
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading
 from telemetry.agent.driver_lines import DriverLines, LineCounts
@@ -29,17 +32,20 @@ NO_PORT = "none"
 
 @dataclass(frozen=True, slots=True)
 class SourceOptions:
-    """As given on the command line."""
+    """As given on the command line; at most one source of them."""
 
-    recording: Path | None = None
-    ti_config: Path | None = None
-    ti_data: str | None = None
-    ti_config_port: str | None = None
-    ti_baud: int | None = None
-    """By default that of the radars' data ports."""
-    ti_capture: Path | None = None
-    position2go: str | None = None
-    """Its port."""
+    recording: Annotated[Path | None, Option(metavar="FILE", help="Send the frames of a recorded flight.")] = None
+    ti_config: Annotated[Path | None, Option(metavar="CFG", help="The configuration that a TI radar is sent.")] = None
+    ti_data: Annotated[str | None, Option(metavar="PORT", help="Data port of a TI radar (often /dev/ttyACM1).")] = None
+    ti_config_port: Annotated[
+        str | None,
+        Option(metavar="PORT", help=f'Its config port; default: the one before; "{NO_PORT}": it runs already.'),
+    ] = None
+    ti_baud: Annotated[int | None, Option(help=f"Baud rate of the data port; default: {DATA_BAUD}.")] = None
+    ti_capture: Annotated[Path | None, Option(metavar="FILE", help="Send what a TI radar's data port once sent.")] = (
+        None
+    )
+    position2go: Annotated[str | None, Option(metavar="PORT", help="Port of an Infineon Position2Go.")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +117,7 @@ def _config(path: Path | None) -> TiConfig | None:
             where=path.name,
             advice="Set guiMonitor -1 1 0 0 0 0 0.",
         )
-    for note in differences(config):
-        say(f"Note: {note}")
+    say_notes(*differences(config))
     return config
 
 

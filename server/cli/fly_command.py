@@ -12,24 +12,27 @@ import signal
 import tempfile
 from dataclasses import replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+from typer import Option
 
 from planning.formats.detect import read_mission
 from planning.formats.other_surface import other_surface
 from planning.model import Mission
 from planning.part import mission_places
 from planning.terrain.dsm import Dsm
-from server.cli.review_command import answer, say_below
+from server.cli.review_command import tell
 from server.cli.shared import options as o
-from server.cli.shared.files_in_out import check_directory, read_small
+from server.cli.shared.command import DONE, FAILED, Without, command
+from server.cli.shared.files_in_out import check_new, read_small
 from server.cli.shared.flight_progress import FlightProgress
-from server.cli.shared.mission_vehicle import Given, judged_by
-from server.cli.shared.output import DONE, FAILED, end_progress, progress, refusing, say
+from server.cli.shared.mission_vehicle import judged_by
+from server.cli.shared.output import end_progress, progress, say, say_notes
 from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
-from server.cli.shared.terrain_given import ModelOptions, read_around
+from server.cli.shared.terrain_given import read_around
 from server.errors import StorageError
 from server.flying.review import recording_of, review
 from server.schemas.review_docs import ReviewDoc
@@ -52,85 +55,58 @@ class Acceptable(StrEnum):
     RTL_HEIGHT = "rtl_height"
 
 
+@command
 def fly(
     mission: o.MissionFile,
+    *,
     link: o.Link,
     mode: Annotated[
-        Literal["auto", "guided"],
-        typer.Option("--mode", help="The mission on board, or waypoints handed over one at a time."),
+        Literal["auto", "guided"], Option(help="The mission on board, or waypoints handed over one at a time.")
     ] = "auto",
     dsm: o.FlightDsm = None,
-    from_item: Annotated[
-        int,
-        typer.Option("--from-item", min=1, help="Go on at this item with a mission that broke off; needs --dsm."),
-    ] = 1,
+    from_item: Annotated[int, Option(min=1, help="Go on at this item with a mission that broke off; needs --dsm.")] = 1,
     accept: Annotated[
-        list[Acceptable] | None,
-        typer.Option("--accept", help="Fly although this row of the check is only acceptable; several times."),
+        list[Acceptable] | None, Option(help="Fly although this row of the check is only acceptable; several times.")
     ] = None,
-    record: Annotated[
-        Path | None, typer.Option("--record", metavar="FILE", help="Keep the recording (.mcap) here.")
-    ] = None,
+    record: Annotated[Path | None, Option(metavar="FILE", help="Keep the recording (.mcap) here.")] = None,
     as_json: o.AsJson = False,
-    profile: o.MissionProfile = None,
-    position_error_m: o.PositionError = None,
-    vehicle_radius_m: o.VehicleRadius = None,
-    following_m: o.FollowingError = None,
-    dsm_rms_m: o.DsmRms = None,
-    downwash_m: o.Downwash = None,
-    rtl_height_m: o.RtlHeight = None,
-    required_clearance_m: o.RequiredClearance = None,
-    crs: o.Crs = None,
-    z_scale: o.ZScale = None,
-    vertical_datum: o.VerticalDatum = None,
+    given: Annotated[o.VehicleOptions, Without("max_items")],
+    demands: Annotated[o.ClearanceOptions, Without("flown_as", "max_height_above_ground_m")],
+    how: Annotated[o.ModelOptions, Without("max_hole_m2", "remove_spikes")],
 ) -> None:
     """Upload a mission, check the start, fly it, and judge the flight.
 
     Without --dsm neither the ground at home nor the clearance is checked.
     """
-    with refusing(as_json=as_json):
-        flight = read_mission(mission.name, read_small(mission))
-        parse_address(link)
-        _check_record(record)
-        given = Given(profile, position_error_m, vehicle_radius_m, following_m, dsm_rms_m, downwash_m, rtl_height_m)
-        request = judged_by(flight, given, mode, required_clearance_m)
-        model_options = ModelOptions(crs, z_scale, vertical_datum)
-        model = None
-        if dsm is not None:
-            model = read_around(dsm, StepTimer(progress), model_options, lambda whole: mission_places(whole, flight))
-        other = None if model is None else other_surface(flight, model)
-        for warning in (*([other] if other is not None else []), *flight.warnings):
-            say(f"Note: {warning}")
-        if model is None:
-            say("Note: without --dsm neither the ground at home nor the clearance is checked.")
-        options = FlyOptions(
-            address=link,
-            operator=OPERATOR,
-            profile=request.profile,
-            clearance=request.clearance(),
-            way=mode,
-            dsm=model,
-            from_item=from_item,
-            accept=frozenset(accept or ()),
-            name=mission.stem,
-        )
-        result, doc = asyncio.run(_Conductor(flight, options, record).run())
-        say(result.text)
-        completed = result.completed and (doc.figures is None or doc.figures.completed)
-        if doc.figures is not None:
-            doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
-        say_below(doc)
-        answer(doc if other is None else doc.model_copy(update={"other_surface": other}), as_json=as_json)
-        kept = doc.figures is None or doc.figures.below_required is None
-        raise typer.Exit(DONE if completed and kept else FAILED)
-
-
-def _check_record(record: Path | None) -> None:
-    if record is None:
-        return
-    check_directory(record.parent)
-    if record.exists():
-        raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")
+    flight = read_mission(mission.name, read_small(mission))
+    parse_address(link)
+    if record is not None:
+        check_new(record)
+    request = judged_by(flight, given, demands, mode)
+    model = None if dsm is None else read_around(dsm, StepTimer(progress), how, partial(mission_places, mission=flight))
+    other = None if model is None else other_surface(flight, model)
+    say_notes(other, *flight.warnings)
+    if model is None:
+        say_notes("without --dsm neither the ground at home nor the clearance is checked.")
+    options = FlyOptions(
+        address=link,
+        operator=OPERATOR,
+        profile=request.profile,
+        clearance=request.clearance(),
+        way=mode,
+        dsm=model,
+        from_item=from_item,
+        accept=frozenset(accept or ()),
+        name=mission.stem,
+    )
+    result, doc = asyncio.run(_Conductor(flight, options, record).run())
+    say(result.text)
+    completed = result.completed and (doc.figures is None or doc.figures.completed)
+    if doc.figures is not None:
+        doc = doc.model_copy(update={"figures": doc.figures.model_copy(update={"completed": completed})})
+    tell(doc if other is None else doc.model_copy(update={"other_surface": other}), as_json=as_json)
+    kept = doc.figures is None or doc.figures.below_required is None
+    raise typer.Exit(DONE if completed and kept else FAILED)
 
 
 class _Conductor:
@@ -161,12 +137,7 @@ class _Conductor:
         recording = station.recordings / name
         try:
             result = await conduct(
-                station.link,
-                station.bus,
-                self._mission,
-                options,
-                self._progress,
-                go_home=self._go_home,
+                station.link, station.bus, self._mission, options, self._progress, go_home=self._go_home
             )
         finally:
             end_progress()
@@ -178,7 +149,7 @@ class _Conductor:
         try:
             await station.bus.call("recorder", StopRecording(), result=type(None), timeout_s=NODE_TIMEOUT_S)
         except TelemetryError as error:
-            say(f"Note: {error}")
+            say_notes(str(error))
         if self._record is not None and self._progress.has_flown:
             await asyncio.to_thread(keep_recording, recording, self._record)
 

@@ -7,12 +7,13 @@ import time
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import typer
+from typer import Argument, Option
 
 from mapping.errors import ParameterError
 from planning.errors import DescribedError
 from server.cli.shared import options as o
-from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
+from server.cli.shared.command import command
+from server.cli.shared.output import answer, end_progress, progress, say_notes
 from telemetry.perception.sensor_kinds import KINDS, check_memory
 from telemetry.rebuilding.export import KINDS as FORMATS
 from telemetry.rebuilding.export import ExportError, Kind, exported
@@ -25,80 +26,63 @@ class MapFileError(DescribedError):
     code = "map_file"
 
 
+@command
 def build_map(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap).")],
-    sensor: Annotated[
-        Literal["radar", "vision", "ranges"], typer.Option("--sensor", help="Whose map.", show_default=False)
-    ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.", show_default=False),
-    ],
-    resolution_m: Annotated[
-        float | None,
-        typer.Option("--resolution-m", metavar="M", help="Edge of a voxel; default: as in flight."),
-    ] = None,
+    recording: Annotated[Path, Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap).")],
+    sensor: Annotated[Literal["radar", "vision", "ranges"], Option(help="Whose map.")],
+    out: Annotated[Path, Option(metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.")],
+    resolution_m: Annotated[float | None, Option(metavar="M", help="Edge of a voxel; default: as in flight.")] = None,
     memory_mb: Annotated[
-        float | None,
-        typer.Option("--memory-mb", metavar="MB", help="The map's memory limit; default: as in flight."),
+        float | None, Option(metavar="MB", help="The map's memory limit; default: as in flight.")
     ] = None,
     radar_variant: Annotated[
         Literal["heading-only", "full-attitude", "full-attitude-flat"] | None,
-        typer.Option("--radar-variant", help="How radar targets are put into the map; default: as in flight."),
+        Option(help="How radar targets are put into the map; default: as in flight."),
     ] = None,
     azimuth_deg: Annotated[
-        float | None,
-        typer.Option("--radar-azimuth-deg", help="Radar targets to both sides up to; default: as in flight."),
+        float | None, Option("--radar-azimuth-deg", help="Radar targets to both sides up to; default: as in flight.")
     ] = None,
     low_deg: Annotated[
-        float | None, typer.Option("--radar-low-deg", help="And from this elevation; default: as in flight.")
+        float | None, Option("--radar-low-deg", help="And from this elevation; default: as in flight.")
     ] = None,
-    high_deg: Annotated[
-        float | None, typer.Option("--radar-high-deg", help="Up to this one; default: as in flight.")
-    ] = None,
+    high_deg: Annotated[float | None, Option("--radar-high-deg", help="Up to this one; default: as in flight.")] = None,
     cloud_voxel_m: Annotated[
         float | None,
-        typer.Option(
-            "--cloud-voxel-m",
-            metavar="M",
-            help="Of the camera's clouds one point per voxel of this edge, 0: all; default: as in flight.",
+        Option(
+            metavar="M", help="Of the camera's clouds one point per voxel of this edge, 0: all; default: as in flight."
         ),
     ] = None,
     whole_flight: Annotated[
-        bool,
-        typer.Option("--whole-flight", help="Of the camera: all that it saw on its way, not its last frame alone."),
+        bool, Option("--whole-flight", help="Of the camera: all that it saw on its way, not its last frame alone.")
     ] = False,
     as_json: o.AsJson = False,
 ) -> None:
     """Build a recording's map of obstacles again: exactly as it was in flight, or otherwise."""
-    with refusing(as_json=as_json):
-        kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
-        if kind is None:
-            what = f"{out.suffix or 'No ending'} is no format of maps."
-            raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
-        began_s = time.monotonic()
-        built = rebuild(
-            recording,
-            KINDS[sensor],
-            other=OtherMap(
-                resolution_m,
-                _limit_bytes(memory_mb),
-                _variant(radar_variant),
-                azimuth_deg,
-                low_deg,
-                high_deg,
-                cloud_voxel_m,
-                whole_flight,
-            ),
-            progress=lambda share: progress("Building the map", share),
-        )
-        end_progress()
-        for note in built.notes:
-            say(f"Note: {note}")
-        _check_not_empty(built, recording)
-        out.write_bytes(exported(kind, built.folded))
-        answer(built, out, time.monotonic() - began_s, as_json=as_json)
-        raise typer.Exit(DONE)
+    kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
+    if kind is None:
+        what = f"{out.suffix or 'No ending'} is no format of maps."
+        raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
+    began_s = time.monotonic()
+    built = rebuild(
+        recording,
+        KINDS[sensor],
+        other=OtherMap(
+            resolution_m,
+            _limit_bytes(memory_mb),
+            _variant(radar_variant),
+            azimuth_deg,
+            low_deg,
+            high_deg,
+            cloud_voxel_m,
+            whole_flight,
+        ),
+        progress=lambda share: progress("Building the map", share),
+    )
+    end_progress()
+    say_notes(*built.notes)
+    _check_not_empty(built, recording)
+    out.write_bytes(exported(kind, built.folded))
+    answer(_summary(built, time.monotonic() - began_s), _lines(built, out), as_json=as_json)
 
 
 def _check_not_empty(built: Rebuilt, recording: Path) -> None:
@@ -126,18 +110,16 @@ def _limit_bytes(memory_mb: float | None) -> int | None:
     return limit_bytes
 
 
-def answer(built: Rebuilt, out: Path, seconds: float, *, as_json: bool) -> None:
-    """One JSON object, or a few lines."""
-    if as_json:
-        print_json(summary(built, seconds))
-        return
+def _lines(built: Rebuilt, out: Path) -> list[str]:
     east_m, north_m, up_m = built.extent_m
     size = f"{east_m:.0f} x {north_m:.0f} x {up_m:.0f} m"
-    typer.echo(f"{out.name}: {built.voxels_occupied:,} occupied voxels of {built.resolution_m:g} m in {size}")
-    typer.echo(f"  of {built.frames:,} frames with {built.points:,} points; {built.dropped:,} frames were not taken")
+    return [
+        f"{out.name}: {built.voxels_occupied:,} occupied voxels of {built.resolution_m:g} m in {size}",
+        f"  of {built.frames:,} frames with {built.points:,} points; {built.dropped:,} frames were not taken",
+    ]
 
 
-def summary(built: Rebuilt, seconds: float) -> dict[str, Any]:
+def _summary(built: Rebuilt, seconds: float) -> dict[str, Any]:
     return {
         "frames": built.frames,
         "dropped": built.dropped,

@@ -7,26 +7,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
+import numpy as np
 import typer
+from typer import Argument, Option
 
+from mapping.radar.chain import Spectra
+from mapping.radar.detections import Detections
 from planning.errors import DescribedError
 from server.cli.shared import examples
 from server.cli.shared import options as o
-from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
-
-if TYPE_CHECKING:
-    from mapping.radar.chain import Spectra
-    from mapping.radar.detections import Detections
-    from telemetry.sensors.adc.read_adc import Reading
+from server.cli.shared.command import command
+from server.cli.shared.output import answer, end_progress, progress, say_notes
+from server.studies.radar_facts import detection_rows, parameters
+from telemetry.sensors.adc.codes import SampleCode
+from telemetry.sensors.adc.read_adc import AdcSensor, HowRead, Reading, read_adc
+from telemetry.sensors.target_recording import write_targets
 
 SHOWN = 10
 """Detections of the first frame, in the answer for people."""
-
-Sensor = Literal["awr1843", "position2go"]
-SamplesAs = Literal["auto", "twos-complement", "offset-binary"]
-"""Of ``telemetry.sensors.adc.codes``, which the help need not load."""
 
 radar = typer.Typer(name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich")
 
@@ -49,56 +49,46 @@ class Processed:
     kept: list[tuple[int, float, Detections]] = field(default_factory=list)
     """Number and time of each kept frame, and what was detected in it."""
 
+    @property
+    def per_frame_s(self) -> float:
+        return self.seconds / max(self.frames, 1)
+
     def take(self, t_s: float, found: Detections) -> None:
         if self.keeps or not self.frames:
             self.kept.append((self.frames, t_s, found))
         self.frames, self.detections = self.frames + 1, self.detections + len(found)
 
 
+@command
 def process(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Raw samples: .npy, .bin (DCA1000) or .csv (ODA).")],
+    file: Annotated[Path, Argument(metavar="FILE", help="Raw samples: .npy, .bin (DCA1000) or .csv (ODA).")],
     sensor: Annotated[
-        Sensor | None, typer.Option("--sensor", help="Which radar; default: position2go for .csv, else awr1843.")
+        AdcSensor | None, Option(help="Which radar; default: position2go for .csv, else awr1843.")
     ] = None,
-    cfg: Annotated[
-        Path | None, typer.Option("--cfg", metavar="CFG", help="The configuration that a TI radar ran with.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write the detections as a recording (.mcap).")
-    ] = None,
-    plots: Annotated[Path | None, typer.Option("--plots", metavar="DIR", help="Write figures of one frame.")] = None,
-    plot_frame: Annotated[int, typer.Option("--plot-frame", min=0, help="Of which frame, counted from 0.")] = 0,
-    most: Annotated[
-        int | None, typer.Option("--frames", metavar="N", min=1, help="Only the first N frames.", show_default=False)
-    ] = None,
+    cfg: Annotated[Path | None, Option(metavar="CFG", help="The configuration that a TI radar ran with.")] = None,
+    out: Annotated[Path | None, Option(metavar="FILE", help="Write the detections as a recording (.mcap).")] = None,
+    plots: Annotated[Path | None, Option(metavar="DIR", help="Write figures of one frame.")] = None,
+    plot_frame: Annotated[int, Option(min=0, help="Of which frame, counted from 0.")] = 0,
+    most: Annotated[int | None, Option("--frames", metavar="N", min=1, help="Only the first N frames.")] = None,
     samples_as: Annotated[
-        SamplesAs, typer.Option("--samples", help="How 16-bit samples stand for numbers; auto: by how they fill them.")
+        SampleCode, Option("--samples", help="How 16-bit samples stand for numbers; auto: by how they fill them.")
     ] = "auto",
     as_json: o.AsJson = False,
 ) -> None:
     """Turn raw samples into detections: range and Doppler FFT, CFAR, direction of arrival."""
-    with refusing(as_json=as_json):
-        if out is not None and out.suffix.lower() != ".mcap":
-            what = f"{out.suffix or 'No ending'} is no format of recordings."
-            raise RadarOptionsError(what, where=out.name, advice="Choose .mcap.")
-        reading = _read(file, sensor, cfg, most, samples_as)
-        for note in reading.notes:
-            say(f"Note: {note}")
-        done = Processed(keeps=as_json)
-        _run(_detections(reading, done, most, plots, plot_frame), out, file, reading.sensor)
-        end_progress()
-        _answer(file, done, _parameters(reading), as_json=as_json)
-        raise typer.Exit(DONE)
+    if out is not None and out.suffix.lower() != ".mcap":
+        what = f"{out.suffix or 'No ending'} is no format of recordings."
+        raise RadarOptionsError(what, where=out.name, advice="Choose .mcap.")
+    reading = read_adc(file, HowRead(sensor, samples_as, most), cfg)
+    say_notes(*reading.notes)
+    done = Processed(keeps=as_json)
+    _run(_detections(reading, done, most, plots, plot_frame), out, file, reading.sensor)
+    end_progress()
+    used = parameters(reading.sensor, reading.file)
+    answer(_summary(done, used), _lines(file, done, used), as_json=as_json)
 
 
 radar.command("process", epilog=examples.RADAR_PROCESS)(process)
-
-
-def _read(file: Path, sensor: Sensor | None, cfg: Path | None, most: int | None, samples_as: SamplesAs) -> Reading:
-    """Loaded only now: the help must not wait for compilers."""
-    from telemetry.sensors.adc.read_adc import HowRead, read_adc
-
-    return read_adc(file, HowRead(sensor, samples_as, most), cfg)
 
 
 def _detections(
@@ -126,65 +116,48 @@ def _draw(plots: Path, reading: Reading, chosen: tuple[Spectra, Detections] | No
     if chosen is None:
         what = f"Frame {number} is not in the file, which has {frames}."
         raise RadarOptionsError(what, where="--plot-frame", advice="Frames count from 0.")
+    # Loaded only now: drawing is rarely asked for.
     from server.cli.plots.radar_plots import write_figures
 
     write_figures(plots, reading.chain, *chosen, f"{reading.file.name}, frame {number}")
 
 
-def _run(frames: Iterator[tuple[float, Detections]], out: Path | None, file: Path, sensor: Sensor) -> None:
+def _run(frames: Iterator[tuple[float, Detections]], out: Path | None, file: Path, sensor: AdcSensor) -> None:
     if out is None:
         for _ in frames:
             continue
     else:
-        from telemetry.sensors.target_recording import write_targets
-
         write_targets(out, frames, t_utc_s=file.stat().st_mtime, source=sensor)
 
 
-def _parameters(reading: Reading) -> dict[str, Any]:
-    from server.studies.radar_facts import parameters
+def _summary(done: Processed, used: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "frames": done.frames,
+        "detections": [
+            {"frame": frame, "t_s": round(t_s, 6), **row}
+            for frame, t_s, found in done.kept
+            for row in detection_rows(found)
+        ],
+        "seconds_per_frame": round(done.per_frame_s, 6),
+        "parameters": used,
+    }
 
-    return parameters(reading.sensor, reading.file)
 
-
-def _answer(file: Path, done: Processed, used: dict[str, Any], *, as_json: bool) -> None:
-    """One JSON object, or a few lines."""
-    per_frame_s = done.seconds / max(done.frames, 1)
-    if as_json:
-        print_json(
-            {
-                "frames": done.frames,
-                "detections": [row for kept in done.kept for row in _rows(*kept)],
-                "seconds_per_frame": round(per_frame_s, 6),
-                "parameters": used,
-            }
-        )
-        return
+def _lines(file: Path, done: Processed, used: dict[str, Any]) -> list[str]:
     frames = "1 frame" if done.frames == 1 else f"{done.frames:,} frames"
-    typer.echo(f"{file.name}: {done.detections:,} detections in {frames}, {1e3 * per_frame_s:.2f} ms per frame")
-    typer.echo(
-        f"  range cells {used['range_resolution_m']:.3g} m to {used['max_range_m']:.4g} m, speed cells "
-        f"{used['velocity_resolution_m_s']:.3g} m/s to {used['max_velocity_m_s']:.3g} m/s"
-    )
     first = done.kept[0][2] if done.kept else None
-    if first is not None and len(first):
-        typer.echo("  the strongest of the first frame:")
-        for line in _table(first):
-            typer.echo(f"    {line}")
-
-
-def _rows(frame: int, t_s: float, found: Detections) -> list[dict[str, Any]]:
-    from server.studies.radar_facts import detection_rows
-
-    return [{"frame": frame, "t_s": round(t_s, 6), **row} for row in detection_rows(found)]
+    return [
+        f"{file.name}: {done.detections:,} detections in {frames}, {1e3 * done.per_frame_s:.2f} ms per frame",
+        f"  range cells {used['range_resolution_m']:.3g} m to {used['max_range_m']:.4g} m, speed cells "
+        f"{used['velocity_resolution_m_s']:.3g} m/s to {used['max_velocity_m_s']:.3g} m/s",
+        *(["  the strongest of the first frame:", *_table(first)] if first is not None and len(first) else []),
+    ]
 
 
 def _table(found: Detections) -> list[str]:
-    import numpy as np
-
     order = np.argsort(-found.snr_db, kind="stable")[:SHOWN]
     return [
-        f"{found.range_m[k]:8.2f} m  {found.radial_speed_m_s[k]:+7.2f} m/s  azimuth "
+        f"    {found.range_m[k]:8.2f} m  {found.radial_speed_m_s[k]:+7.2f} m/s  azimuth "
         f"{np.degrees(found.azimuth_rad[k]):+6.1f} deg  {found.snr_db[k]:5.1f} dB"
         for k in order
     ]

@@ -2,55 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-import typer
+import numpy as np
+from typer import Argument, Option
 
+from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
+from mapping.radar.detections import Detections
+from mapping.radar.params import POSITION2GO
 from server.cli.radar_command import RadarOptionsError
 from server.cli.shared import options as o
-from server.cli.shared.output import DONE, end_progress, print_json, progress, refusing, say
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from mapping.radar.detections import Detections
-    from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison
+from server.cli.shared.command import command
+from server.cli.shared.output import answer, end_progress, progress, say
+from telemetry.sensors.adc.oda import open_oda
+from telemetry.sensors.optitrack import read_optitrack
+from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison, compared
 
 
+@command
 def tracks(
-    file: Annotated[Path, typer.Argument(metavar="RADAR", help="The data set's radar.csv.")],
-    optitrack: Annotated[Path, typer.Argument(metavar="OPTITRACK", help="The optitrack.csv beside it.")],
+    file: Annotated[Path, Argument(metavar="RADAR", help="The data set's radar.csv.")],
+    optitrack: Annotated[Path, Argument(metavar="OPTITRACK", help="The optitrack.csv beside it.")],
     pole: Annotated[
-        list[str],
-        typer.Option("--pole", metavar="X,Z", help="Where a pole stood, in the capture's metres. May be repeated."),
+        list[str], Option(metavar="X,Z", help="Where a pole stood, in the capture's metres. May be repeated.")
     ],
-    offset_s: Annotated[
-        float, typer.Option("--offset-s", help="The radar's first frame was so long after the capture's first row.")
-    ] = 0.0,
+    offset_s: Annotated[float, Option(help="The radar's first frame was so long after the capture's first row.")] = 0.0,
     forward: Annotated[
-        Literal["x", "z", "-x", "-z"], typer.Option("--forward", help="Which of the captured body's axes is its nose.")
+        Literal["x", "z", "-x", "-z"], Option(help="Which of the captured body's axes is its nose.")
     ] = "x",
-    plots: Annotated[Path | None, typer.Option("--plots", metavar="DIR", help="Draw both there (tracks.png).")] = None,
+    plots: Annotated[Path | None, Option(metavar="DIR", help="Draw both there (tracks.png).")] = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Follow what a Position2Go's samples show and hold it against where the poles truly were."""
-    with refusing(as_json=as_json):
-        import numpy as np
+    places = np.array([_place(words) for words in pole])
+    capture = read_optitrack(optitrack, forward=forward)
+    found = compared(_frames(file), capture, places, offset_s=offset_s)
+    end_progress()
+    if plots is not None:
+        from server.cli.plots.radar_tracks_plot import write_tracks
 
-        from telemetry.sensors.optitrack import read_optitrack
-        from telemetry.simulation.scenarios.arena.against_truth import compared
-
-        places = np.array([_place(words) for words in pole])
-        capture = read_optitrack(optitrack, forward=forward)
-        found = compared(_frames(file), capture, places, offset_s=offset_s)
-        end_progress()
-        if plots is not None:
-            from server.cli.plots.radar_tracks_plot import write_tracks
-
-            say(f"Drawn: {write_tracks(plots, found, f'{file.name}, {found.frames} frames')}")
-        _answer(file, found, as_json=as_json)
-        raise typer.Exit(DONE)
+        say(f"Drawn: {write_tracks(plots, found, f'{file.name}, {found.frames} frames')}")
+    poles = [_figures(pole) for pole in found.poles]
+    counts = {"frames": found.frames, "left_out": found.left_out, "others": len(found.others)}
+    answer({**counts, "poles": poles}, _lines(file, found, poles), as_json=as_json)
 
 
 def _place(words: str) -> tuple[float, float]:
@@ -64,35 +60,23 @@ def _place(words: str) -> tuple[float, float]:
 
 
 def _frames(file: Path) -> Iterator[tuple[float, Detections]]:
-    from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
-    from mapping.radar.params import POSITION2GO
-    from telemetry.sensors.adc.oda import open_oda
-
     chain = RadarChain(POSITION2GO, POSITION2GO_SETTINGS)
     for number, frame in enumerate(open_oda(file, POSITION2GO).frames()):
         progress(f"Frame {number}", None)
         yield frame.t_s, chain.process(frame.cube)
 
 
-def _answer(file: Path, found: TruthComparison, *, as_json: bool) -> None:
-    """One JSON object, or a few lines."""
-    poles = [_figures(pole) for pole in found.poles]
-    if as_json:
-        counts = {"frames": found.frames, "left_out": found.left_out, "others": len(found.others)}
-        print_json({**counts, "poles": poles})
-        return
-    typer.echo(f"{file.name}: {found.frames:,} frames; {found.left_out:,} outside the capture's time")
+def _lines(file: Path, found: TruthComparison, poles: list[dict[str, Any]]) -> Iterator[str]:
+    yield f"{file.name}: {found.frames:,} frames; {found.left_out:,} outside the capture's time"
     for number, one in enumerate(poles, start=1):
         words = f"  pole {number}: in view in {one['in_view']} frames, followed in {one['followed']}"
         if one["followed"]:
             words += f"; off by {one['range_rms_m']:.2f} m in range, {one['bearing_rms_deg']:.1f} deg in bearing (RMS)"
-        typer.echo(words)
-    typer.echo(f"  where no pole is: {len(found.others)} times an object in a frame")
+        yield words
+    yield f"  where no pole is: {len(found.others)} times an object in a frame"
 
 
 def _figures(pole: Pole) -> dict[str, Any]:
-    import numpy as np
-
     def rms(errors: list[float]) -> float | None:
         return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from typer import Argument, Option
 
 from mapping.geometry.arrays import F64
 from planning.formats.detect import read_mission
@@ -14,9 +16,10 @@ from planning.model import Mission
 from planning.part import mission_places
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
+from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.files_in_out import read_small
-from server.cli.shared.output import DONE, FAILED, end_progress, harmless, print_json, progress, refusing, say
-from server.cli.shared.terrain_given import ModelOptions, read_around
+from server.cli.shared.output import answer, end_progress, harmless, progress, say, say_notes
+from server.cli.shared.terrain_given import read_around
 from server.flying.review import recording_of
 from server.flying.review import review as judge
 from server.flying.review_flight import flown_mission
@@ -37,44 +40,35 @@ FIRST_KEYS = (
 """What ``fly`` and ``review`` print first, in this order."""
 
 
+@command
 def review(
-    recording: Annotated[
-        Path, typer.Argument(metavar="RECORDING|TLOG", help="A recording, or any ground station's .tlog.")
-    ],
+    recording: Annotated[Path, Argument(metavar="RECORDING|TLOG", help="A recording, or any ground station's .tlog.")],
+    *,
     dsm: o.FlightDsm = None,
     mission: Annotated[
-        Path | None,
-        typer.Option("--mission", metavar="FILE", help="Mission to judge it against; default: the recorded one."),
+        Path | None, Option(metavar="FILE", help="Mission to judge it against; default: the recorded one.")
     ] = None,
     truth: Annotated[
-        bool, typer.Option("--truth", help="Take a simulator's true positions instead of the vehicle's estimate.")
+        bool, Option("--truth", help="Take a simulator's true positions instead of the vehicle's estimate.")
     ] = False,
     as_json: o.AsJson = False,
-    crs: o.Crs = None,
-    z_scale: o.ZScale = None,
-    vertical_datum: o.VerticalDatum = None,
+    how: Annotated[o.ModelOptions, Without("max_hole_m2", "remove_spikes")],
 ) -> None:
     """Judge a recorded flight: errors against its mission, distances to the surface model, lag.
 
     Ends with 1 when it went below its required clearance.
     """
-    with refusing(as_json=as_json):
-        flown = read_mission(mission.name, read_small(mission)) if mission else None
-        timer = StepTimer(progress)
-        timer("Reading the recording", None)
-        log = read_flight_log(recording)
-        model = None
-        if dsm is not None:
-            options = ModelOptions(crs, z_scale, vertical_datum)
-            model = read_around(dsm, timer, options, lambda whole: _places(whole, log, flown))
-        timer("Judging the flight", None)
-        doc = judge(log, recording_of(log, recording), dsm=model or log.ground, mission=flown, truth=truth)
-        end_progress()
-        for note in doc.notes:
-            say(f"Note: {note}")
-        say_below(doc)
-        answer(doc, as_json=as_json)
-        raise typer.Exit(DONE if doc.figures is not None and doc.figures.below_required is None else FAILED)
+    flown = read_mission(mission.name, read_small(mission)) if mission else None
+    timer = StepTimer(progress)
+    timer("Reading the recording", None)
+    log = read_flight_log(recording)
+    model = None if dsm is None else read_around(dsm, timer, how, partial(_places, log=log, mission=flown))
+    timer("Judging the flight", None)
+    doc = judge(log, recording_of(log, recording), dsm=model or log.ground, mission=flown, truth=truth)
+    end_progress()
+    say_notes(*doc.notes)
+    tell(doc, as_json=as_json)
+    raise typer.Exit(DONE if doc.figures is not None and doc.figures.below_required is None else FAILED)
 
 
 def _places(model: SurfaceModel, log: FlightLog, mission: Mission | None) -> F64:
@@ -87,18 +81,11 @@ def _places(model: SurfaceModel, log: FlightLog, mission: Mission | None) -> F64
     return xy_m if planned is None else np.vstack([xy_m, mission_places(model, planned)])
 
 
-def say_below(doc: ReviewDoc) -> None:
-    """Last and on its own, so that nobody overlooks it."""
+def tell(doc: ReviewDoc, *, as_json: bool) -> None:
+    """What it came to; a clearance that was not kept stands on its own as well, so that nobody overlooks it."""
     if doc.figures is not None and doc.figures.below_required is not None:
         say(f"WARNING: {doc.figures.below_required}")
-
-
-def answer(doc: ReviewDoc, *, as_json: bool) -> None:
-    """One JSON object, or a few lines."""
-    if as_json:
-        print_json(summary(doc))
-    else:
-        typer.echo("\n".join(figure_lines(doc)))
+    answer(summary(doc), figure_lines(doc), as_json=as_json)
 
 
 def summary(doc: ReviewDoc) -> dict[str, Any]:

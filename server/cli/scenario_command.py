@@ -6,31 +6,30 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from planning.errors import ParameterError
 from server.cli.shared import options as o
-from server.cli.shared.files_in_out import check_directory
-from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing, say
-from server.errors import StorageError
+from server.cli.shared.command import DONE, FAILED, command
+from server.cli.shared.files_in_out import check_directory, check_new
+from server.cli.shared.output import end_progress, print_json, progress, say
 from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, tally, tally_json
 from telemetry.topics.vehicle import RadarKind
 
 
+@command
 def scenario(
-    name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of {', '.join(NAMES)}.", show_default=False)],
+    name: Annotated[str, Argument(metavar="NAME", help=f"One of {', '.join(NAMES)}.")],
     world: Annotated[
-        Path | None,
-        typer.Option("--world", metavar="FILE", help="Objects of your own (JSON) instead of the scenario's."),
+        Path | None, Option(metavar="FILE", help="Objects of your own (JSON) instead of the scenario's.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the scene, the sensors' noise and the wind.")] = 0,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
-    radar: Annotated[
-        RadarKind | None, typer.Option("--radar", help="arena: by what it would report, or from its samples on.")
-    ] = None,
+    seed: Annotated[int, Option(min=0, help="Of the scene, the sensors' noise and the wind.")] = 0,
+    seeds: Annotated[int, Option(min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
+    radar: Annotated[RadarKind | None, Option(help="arena: by what it would report, or from its samples on.")] = None,
     figures: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--set",
             metavar="NAME=VALUE",
             help="arena: a figure of the tracker or of velocities, such as tracker.coordinates=polar or "
@@ -39,15 +38,13 @@ def scenario(
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(
-            "--record",
+        Option(
             metavar="FILE",
             help="Keep the flight (.mcap) with frames, maps and alerts here; of foliage the radar log (.npz).",
         ),
     ] = None,
     plots: Annotated[
-        Path | None,
-        typer.Option("--plots", metavar="DIR", help="Draw what of it is a curve, such as the ROC of foliage."),
+        Path | None, Option(metavar="DIR", help="Draw what of it is a curve, such as the ROC of foliage.")
     ] = None,
     as_json: o.AsJson = False,
 ) -> None:
@@ -55,25 +52,24 @@ def scenario(
 
     Virtual time: the same seed gives the same flight. The exit code is 1 when a figure is not reached.
     """
-    with refusing(as_json=as_json):
-        _check(name, record, seeds)
-        own = _own(name, radar, figures or [])
-        _check_plots(name, plots, seeds)
-        results: list[ScenarioResult] = []
-        for number in range(seed, seed + seeds):
-            progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
-            wanted = ScenarioRequest(number, o.existing(world), radar, own, record, charts=plots is not None)
-            results.append(run_scenario(name, wanted))
-            end_progress()
-            if not as_json:
-                typer.echo("\n".join(results[-1].lines()))
-        if plots is not None:
-            _draw(plots, results[0])
-        if as_json:
-            print_json(results[0].as_json() if seeds == 1 else tally_json(results))
-        elif seeds > 1:
-            typer.echo("\n".join(tally(results)))
-        raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
+    _check(name, record, seeds)
+    own = _own(name, radar, figures or [])
+    _check_plots(name, plots, seeds)
+    results: list[ScenarioResult] = []
+    for number in range(seed, seed + seeds):
+        progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
+        wanted = ScenarioRequest(number, o.existing(world), radar, own, record, charts=plots is not None)
+        results.append(run_scenario(name, wanted))
+        end_progress()
+        if not as_json:
+            typer.echo("\n".join(results[-1].lines()))
+    if plots is not None:
+        _draw(plots, results[0])
+    if as_json:
+        print_json(results[0].as_json() if seeds == 1 else tally_json(results))
+    elif seeds > 1:
+        typer.echo("\n".join(tally(results)))
+    raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
 
 
 def _draw(plots: Path, result: ScenarioResult) -> None:
@@ -110,9 +106,7 @@ def _check(name: str, record: Path | None, seeds: int) -> None:
         raise ParameterError(
             f"A recording holds one seed, not {seeds}.", where="--record", advice="Leave --seeds away, or --record."
         )
-    check_directory(record.parent)
-    if record.exists():
-        raise StorageError("There is such a file already.", where=str(record), advice="Give another --record.")
+    check_new(record)
     record.parent.mkdir(parents=True, exist_ok=True)
 
 

@@ -5,47 +5,43 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from server.app import run
-from server.cli.shared.output import refusing
+from server.cli.shared.command import command
 from server.settings import load_settings
 from telemetry.topics.vehicle import RadarKind
 
 
+@command
 def serve(
-    demo: Annotated[bool, typer.Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
-    host: Annotated[str | None, typer.Option("--host", help="Address to listen on; default 127.0.0.1.")] = None,
-    port: Annotated[int | None, typer.Option("--port", help="Port; default 8000.")] = None,
+    *,
+    demo: Annotated[bool, Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
+    host: Annotated[str | None, Option(help="Address to listen on; default 127.0.0.1.")] = None,
+    port: Annotated[int | None, Option(help="Port; default 8000.")] = None,
     demo_world: Annotated[
         bool | None,
-        typer.Option(
-            "--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."
-        ),
+        Option("--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."),
     ] = None,
     radar: Annotated[
         RadarKind | None,
-        typer.Option(
-            "--radar",
+        Option(
             help="How the demo's radar, an AWR1843, is simulated: its targets (model, the default) or its samples, "
-            "processed (iq).",
+            "processed (iq)."
         ),
     ] = None,
     link: Annotated[
         list[str] | None,
-        typer.Option(
-            "--link",
-            metavar="ADDRESS",
-            help="Connection to a vehicle, such as udpin:0.0.0.0:14550; may be given several times.",
+        Option(
+            metavar="ADDRESS", help="Connection to a vehicle, such as udpin:0.0.0.0:14550; may be given several times."
         ),
     ] = None,
     data_dir: Annotated[
-        Path | None, typer.Option("--data-dir", help="Where models and plans are kept; default: the user's data home.")
+        Path | None, Option(help="Where models and plans are kept; default: the user's data home.")
     ] = None,
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
-    with refusing(as_json=False):
-        settings = load_settings(
-            host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world, demo_radar=radar
-        )
-        run(settings, demo=demo)
+    settings = load_settings(
+        host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world, demo_radar=radar
+    )
+    run(settings, demo=demo)

@@ -5,70 +5,61 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Option
 
 from server.cli.shared import options as o
-from server.cli.shared.output import refusing, say
+from server.cli.shared.command import command
+from server.cli.shared.output import say
 from telemetry.nodes.simulator import read_home, read_parameter
 from telemetry.simulation.simulator.airframe.gnss_script import read_event
 from telemetry.simulation.simulator.run import SimOptions, run
 
 
+@command
 def sim(
+    *,
     link: Annotated[
         str,
-        typer.Option(
-            "--link",
-            metavar="URL",
-            help="Where ground stations find it: udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT.",
-            show_default=False,
+        Option(
+            metavar="URL", help="Where ground stations find it: udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT."
         ),
     ],
-    home: Annotated[
-        str,
-        typer.Option(
-            "--home", metavar="LAT,LON,ALT", help="Where it stands; metres above sea level.", show_default=False
-        ),
-    ],
-    speedup: Annotated[float, typer.Option("--speedup", help="Simulated seconds per second.")] = 1.0,
-    seed: Annotated[int, typer.Option("--seed", help="Of wind gusts and GNSS errors.")] = 0,
-    gnss: Annotated[Literal["standalone", "rtk", "perfect"], typer.Option("--gnss", help="Its receiver.")] = "rtk",
-    wind_m_s: Annotated[float, typer.Option("--wind-m-s", help="Mean wind speed.")] = 0.0,
+    home: Annotated[str, Option(metavar="LAT,LON,ALT", help="Where it stands; metres above sea level.")],
+    speedup: Annotated[float, Option(help="Simulated seconds per second.")] = 1.0,
+    seed: Annotated[int, Option(help="Of wind gusts and GNSS errors.")] = 0,
+    gnss: Annotated[Literal["standalone", "rtk", "perfect"], Option(help="Its receiver.")] = "rtk",
+    wind_m_s: Annotated[float, Option(help="Mean wind speed.")] = 0.0,
     dsm: Annotated[
-        Path | None, typer.Option("--dsm", metavar="FILE", help="Surface model that it can hit; default: level ground.")
+        Path | None, Option(metavar="FILE", help="Surface model that it can hit; default: level ground.")
     ] = None,
     world: Annotated[
-        Path | None,
-        typer.Option("--world", metavar="FILE", help="World file: what else it can hit (docs/worlds.md)."),
+        Path | None, Option(metavar="FILE", help="World file: what else it can hit (docs/worlds.md).")
     ] = None,
     gnss_event: Annotated[
         list[str] | None,
-        typer.Option(
-            "--gnss-event",
+        Option(
             metavar="EVENT",
             help="loss:START:SECONDS or glitch:START:SECONDS:METRES[:BEARING]; may be given several times.",
         ),
     ] = None,
     parameter: Annotated[
-        list[str] | None,
-        typer.Option("--parameter", metavar="NAME=VALUE", help="Of the autopilot; may be given several times."),
+        list[str] | None, Option(metavar="NAME=VALUE", help="Of the autopilot; may be given several times.")
     ] = None,
 ) -> None:
     """Simulate a vehicle on a MAVLink connection until Ctrl+C."""
-    with refusing(as_json=False):
-        lat_deg, lon_deg, alt_m = read_home(home)
-        options = SimOptions(
-            home_lat_deg=lat_deg,
-            home_lon_deg=lon_deg,
-            home_alt_amsl_m=alt_m,
-            link=link,
-            speedup=speedup,
-            seed=seed,
-            gnss=gnss,
-            wind_m_s=wind_m_s,
-            dsm=o.existing(dsm),
-            world=o.existing(world),
-            gnss_script=tuple(read_event(text) for text in gnss_event or ()),
-            parameters=tuple(read_parameter(text) for text in parameter or ()),
-        )
-        run(options, announce=say)
+    lat_deg, lon_deg, alt_m = read_home(home)
+    options = SimOptions(
+        home_lat_deg=lat_deg,
+        home_lon_deg=lon_deg,
+        home_alt_amsl_m=alt_m,
+        link=link,
+        speedup=speedup,
+        seed=seed,
+        gnss=gnss,
+        wind_m_s=wind_m_s,
+        dsm=o.existing(dsm),
+        world=o.existing(world),
+        gnss_script=tuple(read_event(text) for text in gnss_event or ()),
+        parameters=tuple(read_parameter(text) for text in parameter or ()),
+    )
+    run(options, announce=say)

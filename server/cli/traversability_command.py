@@ -9,9 +9,10 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from typer import Option
 
 from mapping.geometry.arrays import F32
-from mapping.uwb import Cleared, Rule, in_words, of_rule
+from mapping.uwb import Cleared, Rule, UwbParams, in_words, of_rule
 from planning.errors import ParameterError
 from planning.ground.landing_sites import CAUTION, LandingSites
 from planning.ground.traversable import (
@@ -24,95 +25,89 @@ from planning.ground.traversable import (
 )
 from planning.terrain.geotiff import write_dsm
 from server.cli.shared import options as o
+from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.files_in_out import check_directory, write_files
-from server.cli.shared.output import DONE, FAILED, end_progress, print_json, progress, refusing
-from server.cli.shared.places_given import parse_place
-from server.cli.shared.terrain_given import ModelOptions, read_model
+from server.cli.shared.output import answer, end_progress, progress
+from server.cli.shared.terrain_given import read_model
 from server.work.clocks import StepTimer
 from telemetry.perception.uwb_drive import read_scans
 
 Layers = dict[str, F32]
+_UWB = UwbParams()
 
 WORK_STEP, RADAR_STEP = "Working out slope and roughness", "Clearing foliage"
 
 
+@command
 def traversability(
     dsm: o.DsmFile,
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="DIR|FILE", help="A directory for all layers, or one .tif.", show_default=False),
-    ],
+    *,
+    out: Annotated[Path, Option(metavar="DIR|FILE", help="A directory for all layers, or one .tif.")],
     uwb: Annotated[
-        Path | None,
-        typer.Option("--uwb", metavar="LOG", help="UWB radar log (.npz), or a recording (.mcap), that clears foliage."),
+        Path | None, Option(metavar="LOG", help="UWB radar log (.npz), or a recording (.mcap), that clears foliage.")
     ] = None,
     uwb_rule: Annotated[
-        Rule,
-        typer.Option("--uwb-rule", help="paper: every cell at an echo's range is to blame for it; explained: ours."),
+        Rule, Option(help="paper: every cell at an echo's range is to blame for it; explained: ours.")
     ] = "explained",
-    p_o: Annotated[float | None, typer.Option("--p-o", help="Most that an echo says; default: 0.8.")] = None,
+    p_o: Annotated[float | None, Option(help=f"Most that an echo says; default: {_UWB.most_occupied:g}.")] = None,
     p_c2: Annotated[
-        float | None, typer.Option("--p-c2", help="1 minus the most that free space says; default: 0.2.")
+        float | None, Option(help=f"1 minus the most that free space says; default: {_UWB.free_before:g}.")
     ] = None,
-    p_c3: Annotated[
-        float | None, typer.Option("--p-c3", help="The same behind an echo; default: 0.1 above --p-c2.")
+    p_c3: Annotated[float | None, Option(help="The same behind an echo; default: 0.1 above --p-c2.")] = None,
+    c_th: Annotated[
+        float | None, Option(help=f"Least of T_max - T_d (eq. 1); default: {_UWB.least_headroom:g}.")
     ] = None,
-    c_th: Annotated[float | None, typer.Option("--c-th", help="Least of T_max - T_d (eq. 1); default: 3.")] = None,
-    nearest_m: Annotated[float | None, typer.Option("--nearest-m", help="R_min; default: 3.5.")] = None,
-    farthest_m: Annotated[float | None, typer.Option("--farthest-m", help="R_max; default: 10.")] = None,
+    nearest_m: Annotated[float | None, Option(help=f"R_min; default: {_UWB.nearest_m:g}.")] = None,
+    farthest_m: Annotated[float | None, Option(help=f"R_max; default: {_UWB.farthest_m:g}.")] = None,
     prior: Annotated[
-        float | None, typer.Option("--prior", help="That an untraversable cell is an obstacle; default: 0.9.")
+        float | None, Option(help=f"That an untraversable cell is an obstacle; default: {_UWB.prior:g}.")
     ] = None,
     near: Annotated[
-        str | None, typer.Option("--near", metavar="LAT,LON", help="Find the five best landing sites near this point.")
+        str | None, Option(metavar="LAT,LON", help="Find the five best landing sites near this point.")
     ] = None,
     rotor_span_m: Annotated[
-        float, typer.Option("--rotor-span-m", "--rotor-span", help="Across all rotors; sites keep twice as much away.")
+        float, Option("--rotor-span-m", "--rotor-span", help="Across all rotors; sites keep twice as much away.")
     ] = 0.8,
-    radius_m: Annotated[float, typer.Option("--radius-m", help="So far from the point sites are looked for.")] = 150.0,
+    radius_m: Annotated[float, Option(help="So far from the point sites are looked for.")] = 150.0,
     resolution_m: Annotated[
-        float | None, typer.Option("--resolution-m", help="Of the map; default: 0.3, or the model's own if coarser.")
+        float | None, Option(help="Of the map; default: 0.3, or the model's own if coarser.")
     ] = None,
     as_json: o.AsJson = False,
-    crs: o.Crs = None,
-    z_scale: o.ZScale = None,
-    vertical_datum: o.VerticalDatum = None,
-    remove_spikes: o.RemoveSpikes = False,
+    how: Annotated[o.ModelOptions, Without("max_hole_m2")],
 ) -> None:
     """Work out where a surface model can be driven on, clear foliage with a radar log, and find landing sites.
 
     Sites come from the map before clearing: what a rover may drive through, a rotor may not touch. The exit code is 1
     when sites were asked for and there are none.
     """
-    with refusing(as_json=as_json):
-        place = parse_place(near, "--near")
-        params = of_rule(
-            uwb_rule,
-            most_occupied=p_o,
-            free_before=p_c2,
-            free_behind=p_c3,
-            least_headroom=c_th,
-            nearest_m=nearest_m,
-            farthest_m=farthest_m,
-            prior=prior,
-        )
-        _check_out(out)
-        scans = None if uwb is None else read_scans(o.existing(uwb) or uwb, uwb.name)
-        timer = StepTimer(progress)
-        source, _ = read_model(dsm, timer, ModelOptions(crs, z_scale, vertical_datum, remove_spikes))
-        timer(WORK_STEP, None)
-        ground = traversable_ground(source, resolution_m)
-        timer(RADAR_STEP, None)
-        cleared = None if scans is None else cleared_ground(ground, scans, params)
-        found = None if place is None else sites_near(ground, place, rotor_span_m, radius_m)
-        _write(out, ground, cleared, found)
-        end_progress()
-        summary = _summary(ground, scans, cleared, found)
-        if cleared is not None:
-            summary["uwb_rule"] = in_words(params)
-        summary |= {"seconds": round(timer.seconds()["total"], 3)}
-        _answer(summary, out, as_json=as_json)
-        raise typer.Exit(FAILED if found is not None and not found.sites else DONE)
+    place = o.parse_place(near, "--near")
+    params = of_rule(
+        uwb_rule,
+        most_occupied=p_o,
+        free_before=p_c2,
+        free_behind=p_c3,
+        least_headroom=c_th,
+        nearest_m=nearest_m,
+        farthest_m=farthest_m,
+        prior=prior,
+    )
+    _check_out(out)
+    scans = None if uwb is None else read_scans(o.existing(uwb) or uwb, uwb.name)
+    timer = StepTimer(progress)
+    source, _ = read_model(dsm, timer, how)
+    timer(WORK_STEP, None)
+    ground = traversable_ground(source, resolution_m)
+    timer(RADAR_STEP, None)
+    cleared = None if scans is None else cleared_ground(ground, scans, params)
+    found = None if place is None else sites_near(ground, place, rotor_span_m, radius_m)
+    _write(out, ground, cleared, found)
+    end_progress()
+    summary = _summary(ground, scans, cleared, found)
+    if cleared is not None:
+        summary["uwb_rule"] = in_words(params)
+    summary |= {"seconds": round(timer.seconds()["total"], 3)}
+    answer(summary, _lines(summary, out), as_json=as_json)
+    raise typer.Exit(FAILED if found is not None and not found.sites else DONE)
 
 
 def _check_out(out: Path) -> None:
@@ -198,10 +193,7 @@ def _summary(
     return summary
 
 
-def _answer(summary: dict[str, Any], out: Path, *, as_json: bool) -> None:
-    if as_json:
-        print_json(summary)
-        return
+def _lines(summary: dict[str, Any], out: Path) -> list[str]:
     share = 100 * summary["untraversable"] / max(1, summary["cells"])
     lines = [f"{out.name}: {summary['cells']:,} cells of {summary['resolution_m']:.2f} m, {share:.1f} % untraversable"]
     if "scans" in summary:
@@ -216,4 +208,4 @@ def _answer(summary: dict[str, Any], out: Path, *, as_json: bool) -> None:
         lines.append(f"  {summary['caution']}")
     if summary.get("no_site"):
         lines.append(f"  No landing site: {summary['no_site']}")
-    typer.echo("\n".join(lines))
+    return lines

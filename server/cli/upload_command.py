@@ -11,8 +11,9 @@ import typer
 from planning.formats.detect import read_mission
 from planning.model import Mission
 from server.cli.shared import options as o
+from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import read_small
-from server.cli.shared.output import DONE, FAILED, print_json, refusing, say
+from server.cli.shared.output import answer, say, say_notes
 from server.cli.shared.own_nodes import OPERATOR, own_nodes
 from telemetry.flight.preflight.prepare import connect, transfer
 from telemetry.flight.watch import watching
@@ -20,19 +21,15 @@ from telemetry.mavlink.address import parse_address
 from telemetry.topics.messages import UploadReport
 
 
-def upload(mission: o.MissionFile, link: o.Link, as_json: o.AsJson = False) -> None:
+@command
+def upload(mission: o.MissionFile, *, link: o.Link, as_json: o.AsJson = False) -> None:
     """Replace the mission on board, read it back, and say what the vehicle rounded."""
-    with refusing(as_json=as_json):
-        flight = read_mission(mission.name, read_small(mission))
-        parse_address(link)
-        for warning in flight.warnings:
-            say(f"Note: {warning}")
-        report = asyncio.run(_upload(flight, link))
-        if as_json:
-            print_json(_summary(report))
-        else:
-            typer.echo("\n".join(upload_lines(report)))
-        raise typer.Exit(DONE if report.verified else FAILED)
+    flight = read_mission(mission.name, read_small(mission))
+    parse_address(link)
+    say_notes(*flight.warnings)
+    report = asyncio.run(_upload(flight, link))
+    answer(_summary(report), upload_lines(report), as_json=as_json)
+    raise typer.Exit(DONE if report.verified else FAILED)
 
 
 async def _upload(flight: Mission, link: str) -> UploadReport:

@@ -13,7 +13,7 @@ from planning.formats.poi_files import write_pois_csv
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.terrain.geotiff import write_dsm
 from server.cli import app
-from server.cli.shared.usage import run_command
+from server.cli.shared.command import run_command
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES
 from server.errors import StorageError, StorageFullError
+from server.library.whole_files import TEMPORARY, new_id, write_durably
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _ORDER = "The surface model comes first, the points, area or mission second."
@@ -45,48 +46,36 @@ def check_directory(directory: Path) -> None:
         raise StorageError("The directory cannot be written.", where=str(nearest), advice="Give another --out.")
 
 
+def check_new(recording: Path) -> None:
+    """Raises StorageError when there is such a file already, or it cannot be written."""
+    check_directory(recording.parent)
+    if recording.exists():
+        raise StorageError("There is such a file already.", where=str(recording), advice="Give another --record.")
+
+
 def write_files(directory: Path, files: dict[str, str]) -> None:
     """Writes all files beside their places, then renames them: a full disk leaves the old ones, all of them, whole."""
     with _storage_errors(directory):
-        made = _make(directory)
-        written: dict[str, str] = {}
+        made = [path for path in (directory, *directory.parents) if not path.exists()]
+        directory.mkdir(parents=True, exist_ok=True)
+        asides = {name: directory / f"{TEMPORARY}{name}-{new_id()}" for name in files}
         try:
-            for name, text in files.items():
-                written[name] = _write_beside(directory, name, text)
-            for name, temporary in written.items():
-                os.replace(temporary, directory / name)
+            for name, aside in asides.items():
+                write_durably(aside, _writer(files[name]))
+                aside.chmod(0o644)
+            for name, aside in asides.items():
+                os.replace(aside, directory / name)
         except BaseException:
-            _tidy(written, made)
+            for aside in asides.values():
+                aside.unlink(missing_ok=True)
+            for folder in made:
+                if not any(folder.iterdir()):
+                    folder.rmdir()
             raise
 
 
-def _make(directory: Path) -> list[Path]:
-    """Makes the directory and returns those that were made, innermost first."""
-    missing = [path for path in (directory, *directory.parents) if not path.exists()]
-    directory.mkdir(parents=True, exist_ok=True)
-    return missing
-
-
-def _write_beside(directory: Path, name: str, text: str) -> str:
-    handle, temporary = tempfile.mkstemp(dir=directory, prefix=f".{name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return temporary
-
-
-def _tidy(written: dict[str, str], made: list[Path]) -> None:
-    for temporary in written.values():
-        Path(temporary).unlink(missing_ok=True)
-    for directory in made:
-        if not any(directory.iterdir()):
-            directory.rmdir()
+def _writer(text: str) -> Callable[[BinaryIO], object]:
+    return lambda file: file.write(text.encode())
 
 
 @contextmanager

@@ -2,52 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from planning.margins.following_error import WAY_NAMES, Way
 from planning.missions.feasibility import commanded_speed_m_s
 from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
 from planning.model import Mission, PathParams, PlannedFor, VehicleProfile
 from planning.request import PlanRequest, check_demands
-from server.cli.shared.output import harmless, say
+from server.cli.shared.options import ClearanceOptions, VehicleOptions, of_vehicle
+from server.cli.shared.output import harmless, say_notes
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
-    """As on the command line; None: as the mission's own file says, or the profile."""
-
-    profile: str | None
-    position_error_m: float | None
-    vehicle_radius_m: float | None
-    following_m: float | None
-    dsm_rms_m: float | None
-    downwash_m: float | None
-    rtl_height_m: float | None
-
-    @property
-    def overrides(self) -> dict[str, float]:
-        """Fields of the vehicle that win over its profile's."""
-        values = {
-            "position_error_m": self.position_error_m,
-            "rtl_height_m": self.rtl_height_m,
-            "radius_m": self.vehicle_radius_m,
-            "following_m": self.following_m,
-            "dsm_rms_m": self.dsm_rms_m,
-            "downwash_m": self.downwash_m,
-        }
-        return {name: value for name, value in values.items() if value is not None}
-
-
-def judged_by(
-    flight: Mission, given: Given, way: Way | None, required_m: float | None, highest_m: float | None = None
-) -> PlanRequest:
+def judged_by(flight: Mission, given: VehicleOptions, demands: ClearanceOptions, way: Way | None) -> PlanRequest:
     """Vehicle (its ``profile``) and demands of a mission that was planned before; ``way`` None: as it was planned."""
-    vehicle = _vehicle(flight, given.profile, given.overrides)
+    vehicle = _vehicle(flight, given.profile, of_vehicle(given, demands))
+    required_m, highest_m = demands.required_clearance_m, demands.max_height_above_ground_m
     own = flight.planned_for or PlannedFor(vehicle)
     if required_m is not None and own.required_clearance_m not in (None, required_m):
-        say(f"Note: {required_m:g} m are required instead of the mission's own {own.required_clearance_m:g} m.")
+        say_notes(f"{required_m:g} m are required instead of the mission's own {own.required_clearance_m:g} m.")
     if way is not None and flight.planned_for is not None and way != own.way:
-        say(f"Note: planned for {WAY_NAMES[own.way]}, judged as flown in {WAY_NAMES[way]}.")
+        say_notes(f"planned for {WAY_NAMES[own.way]}, judged as flown in {WAY_NAMES[way]}.")
     request = PlanRequest(
         pois=(),
         profile=vehicle,
@@ -66,20 +40,20 @@ def _vehicle(flight: Mission, profile: str | None, overrides: dict[str, float]) 
     if profile is not None:
         vehicle = load_profile(profile)
         if own is not None and own != vehicle:
-            say(f"Note: --profile {harmless(profile)} is taken instead of the mission's own {harmless(own.name)}.")
+            say_notes(f"--profile {harmless(profile)} is taken instead of the mission's own {harmless(own.name)}.")
     elif own is not None:
         vehicle = own
-        say(
-            f"Note: vehicle as in the mission's file: {harmless(own.name)}, position error {own.position_error_m:g} m,"
+        say_notes(
+            f"vehicle as in the mission's file: {harmless(own.name)}, position error {own.position_error_m:g} m,"
             f" return height {own.rtl_height_m:g} m."
         )
     else:
         vehicle = load_profile(DEFAULT_PROFILE)
-        say(f"Note: the mission's file names no vehicle: {vehicle.name} is taken. Give --profile for another.")
+        say_notes(f"the mission's file names no vehicle: {vehicle.name} is taken. Give --profile for another.")
     for key, value in overrides.items():
         if own is not None and (planned := getattr(own, key)) != value:
             words = "what follows from the mission's own" if planned is None else f"the mission's own {planned:g}"
-            say(f"Note: {key.removesuffix('_m').replace('_', ' ')} of {value:g} m is taken instead of {words}.")
+            say_notes(f"{key.removesuffix('_m').replace('_', ' ')} of {value:g} m is taken instead of {words}.")
     return replace(vehicle, **overrides)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mapping.geometry.arrays import F64
 from planning.errors import RasterFormatError
@@ -12,18 +13,9 @@ from planning.part import FLIGHT_MARGIN_M, needed_part
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm_reported
 from planning.terrain.spikes import Spike, find_spikes
-from server.cli.shared.output import end_progress, say
+from server.cli.shared.options import ModelOptions
+from server.cli.shared.output import end_progress, say_notes
 from server.work.clocks import READ_STEP, StepTimer
-
-
-@dataclass(frozen=True, slots=True)
-class ModelOptions:
-    """How the file is to be understood."""
-
-    crs: str | None = None
-    z_scale: float | None = None
-    vertical_datum: str | None = None
-    remove_spikes: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,15 +40,9 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
         return OpenedModel(dsm, made, spikes_told=True)
     _check_file(path)
     timer(READ_STEP, 0.0)
-    model = open_dsm(
-        path,
-        crs=options.crs,
-        z_scale=options.z_scale,
-        vertical_datum=options.vertical_datum,
-        progress=lambda stage, share: timer(READ_STEP, share),
-    )
+    model = open_dsm(path, **_how(options, timer))
     end_progress()
-    _say_warnings(model.warnings)
+    say_notes(*model.warnings)
     if model.report is not None:
         _say_spikes(find_spikes(model.whole()), removed=False)
     return OpenedModel(model, {}, spikes_told=model.report is not None)
@@ -75,18 +61,20 @@ def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm
     """All of a surface model, and what was done to its heights, for the certificate's assumptions."""
     _check_file(path)
     timer(READ_STEP, 0.0)
-    dsm, report = read_dsm_reported(
-        path,
-        crs=options.crs,
-        z_scale=options.z_scale,
-        vertical_datum=options.vertical_datum,
-        remove_spikes=options.remove_spikes,
-        progress=lambda stage, share: timer(READ_STEP, share),
-    )
+    dsm, report = read_dsm_reported(path, remove_spikes=options.remove_spikes, **_how(options, timer))
     end_progress()
-    _say_warnings(report.warnings)
+    say_notes(*report.warnings)
     _say_spikes(report.spikes, removed=report.spikes_removed)
     return dsm, {"spikes_removed": len(report.spikes)} if report.spikes_removed else {}
+
+
+def _how(options: ModelOptions, timer: StepTimer) -> dict[str, Any]:
+    return {
+        "crs": options.crs,
+        "z_scale": options.z_scale,
+        "vertical_datum": options.vertical_datum,
+        "progress": lambda stage, share: timer(READ_STEP, share),
+    }
 
 
 def _check_file(path: Path) -> None:
@@ -94,15 +82,10 @@ def _check_file(path: Path) -> None:
         raise RasterFormatError("This is a directory.", where=str(path), advice="Give the file of the model itself.")
 
 
-def _say_warnings(warnings: Sequence[str]) -> None:
-    for warning in warnings:
-        say(f"Note: {warning}")
-
-
 def _say_spikes(spikes: Sequence[Spike], *, removed: bool) -> None:
     fate = "removed" if removed else "kept as terrain, unless you --remove-spikes"
     for spike in spikes:
-        say(
-            f"Note: isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
+        say_notes(
+            f"isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
             f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: {fate}."
         )
