@@ -82,6 +82,11 @@ class VehicleProfile:
     """Kept below the rotors; None: by momentum theory (``planning.margins.downwash``)."""
     camera: Camera | None = None
 
+    @property
+    def usable_endurance_s(self) -> float:
+        """Flying time that leaves the reserve in the battery."""
+        return self.endurance_s * (1 - self.reserve_share)
+
 
 @dataclass(frozen=True, slots=True)
 class SurfaceParams:
@@ -392,8 +397,6 @@ class Surfaces:
 
     safe: Dsm
     """Dilated and smoothed; may cover only the part asked for, and be coarser than the DSM."""
-    holes_filled: int
-    holes_filled_area_m2: float
     method: Literal["exact", "fast"]
     floor: Dsm | None = None
     """The DSM dilated with (R, 0.8 H) on the same grid as ``safe``, never above it; None in the paper's pipeline."""

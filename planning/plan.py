@@ -63,6 +63,8 @@ class Plan:
     """The surface model, or the part of a large one that the plan needs."""
     dsm: Dsm
     """The same with its small holes filled."""
+    holes: HoleReport
+    """What was filled."""
     surfaces: Surfaces
     path: SampledPath
     timing: Timing
@@ -145,7 +147,6 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
     vertices_xy_m, vertex_poi = _vertices(filled, request, home)
     # Melita 2020, fig. 7
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
-    surfaces = replace(surfaces, holes_filled=holes.count, holes_filled_area_m2=holes.area_m2)
     job.report(PATH_STEP, 0.5)
     path = sampled_path(filled, lambda xy_m: safe_surface_at(surfaces, xy_m), vertices_xy_m, vertex_poi, request.path)
     timing = path_timing(path, request.path, loiter_s=_loiter_s(request, vertex_poi))
@@ -162,6 +163,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
         request=request,
         ground=ground.dsm,
         dsm=filled,
+        holes=holes,
         surfaces=surfaces,
         path=path,
         timing=timing,

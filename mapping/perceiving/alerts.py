@@ -60,10 +60,6 @@ class AlertBook:
         self._open: list[_Open] = []
         self._count = 0
 
-    @property
-    def open_ids(self) -> tuple[str, ...]:
-        return tuple(entry.id for entry in self._open)
-
     def observe(self, found: list[Found], t_mono_s: float) -> list[AlertEvent]:
         """All obstacles that are in a region at ``t_mono_s``, the nearest first -> what is to be told."""
         events: list[AlertEvent] = []

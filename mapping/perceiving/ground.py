@@ -65,23 +65,6 @@ class GroundGrid:
             self.up_m, self.enu_to_cell, self.cell_m, origin, R_enu_body, farthest_m, shape or BeamShape()
         )
 
-    def explains_beams(
-        self,
-        origin_enu: ArrayLike,
-        R_enu_body: F64,
-        azimuth_rad: NDArray[np.floating],
-        range_m: NDArray[np.floating],
-        *,
-        shape: BeamShape | None = None,
-    ) -> Bools:
-        """(N,) Whether each target's beam cell meets the surface: its azimuth, the elevation gate, its range.
-
-        ``azimuth_rad`` (N,) in the radar's own frame, clockwise from its axis; the gate is tilted by the attitude.
-        """
-        azimuth, away = np.asarray(azimuth_rad, np.float64), np.asarray(range_m, np.float64)
-        fan = self.fan(origin_enu, R_enu_body, farthest_m=float(away.max(initial=0.0)), shape=shape)
-        return fan.look(azimuth, away)[0] <= 0.0
-
     def _cells(self, xy: F64) -> tuple[F64, F64]:
         xy = xy.reshape(-1, xy.shape[-1])
         row, col = self.enu_to_cell[:, :2] @ xy[:, :2].T + self.enu_to_cell[:, 2:]

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from mapping.errors import ParameterError
-from mapping.geometry.arrays import F32, I64, Bools
+from mapping.geometry.arrays import F32, I64
 from mapping.radar.cfar_factors import ca_factor, caso_factor, weights
 from mapping.radar.fft import Window, noise_correlation
 
@@ -56,20 +56,6 @@ def doppler_stage(cfar: Cfar, *, name: Window, chirps: int, padding: int, looks:
     return Stage(cfar.guard, cfar.training, padding, ca_factor(both, cfar.false_alarm, looks))
 
 
-def caso_along_range(power: F32, stage: Stage) -> Bools:
-    """(Doppler, range) -> which cells exceed the threshold that their neighbours in range set."""
-    above = np.empty(power.shape, np.bool_)
-    _caso_all(np.ascontiguousarray(power, np.float32), *_numbers(stage), above)
-    return above
-
-
-def ca_along_doppler(power: F32, stage: Stage) -> Bools:
-    """(Doppler, range) -> which cells exceed the threshold that their neighbours in speed set."""
-    above = np.empty(power.shape, np.bool_)
-    _ca_all(np.ascontiguousarray(power, np.float32), *_numbers(stage), above)
-    return above
-
-
 def peaks(power: F32, along_range: Stage, along_doppler: Stage, first: int, last: int) -> tuple[I64, F32]:
     """(Doppler, range) -> (N, 2) cells that are the highest of their 3 x 3 and exceed both thresholds, (N,) the noise.
 
@@ -78,16 +64,16 @@ def peaks(power: F32, along_range: Stage, along_doppler: Stage, first: int, last
     """
     most = power.size // 2 + 1  # a peak's neighbours are none
     cells, noise = np.empty((most, 2), np.int64), np.empty(most, np.float32)
-    found = _peaks(power, *_numbers(along_range), *_numbers(along_doppler), first, last, cells, noise)
+    found = _peaks(power, *stage_numbers(along_range), *stage_numbers(along_doppler), first, last, cells, noise)
     return cells[:found], noise[:found]
 
 
-def _numbers(stage: Stage) -> tuple[int, int, int, float]:
+def stage_numbers(stage: Stage) -> tuple[int, int, int, float]:
     return stage.guard, stage.training, stage.stride, stage.factor
 
 
 @njit(cache=True, nogil=True)
-def _caso(row, c, guard, training, stride):
+def caso_mean(row, c, guard, training, stride):
     """The smaller mean of the cells on either side in range, around the ring and past the direct coupling."""
     size, near, far, coupling = row.shape[0], (guard + 1) * stride, (guard + training) * stride, guard * stride
     left = c - near if c - far > coupling else -near
@@ -100,27 +86,13 @@ def _caso(row, c, guard, training, stride):
 
 
 @njit(cache=True, nogil=True)
-def _ca(power, d, c, guard, training, stride):
+def ca_mean(power, d, c, guard, training, stride):
     """The mean of the cells on both sides in speed, around the ring."""
     size = power.shape[0]
     total = np.float32(0.0)
     for k in range(guard + 1, guard + training + 1):
         total += power[(d - k * stride) % size, c] + power[(d + k * stride) % size, c]
     return total / (2 * training)
-
-
-@njit(cache=True, nogil=True)
-def _caso_all(power, guard, training, stride, factor, above):
-    for d in range(power.shape[0]):
-        for c in range(power.shape[1]):
-            above[d, c] = power[d, c] > factor * _caso(power[d], c, guard, training, stride)
-
-
-@njit(cache=True, nogil=True)
-def _ca_all(power, guard, training, stride, factor, above):
-    for d in range(power.shape[0]):
-        for c in range(power.shape[1]):
-            above[d, c] = power[d, c] > factor * _ca(power, d, c, guard, training, stride)
 
 
 @njit(cache=True, nogil=True)
@@ -149,8 +121,8 @@ def _peaks(power, guard, training, stride, factor, d_guard, d_training, d_stride
                 continue
             if not _highest(power, d, c):
                 continue
-            beside = _caso(row, c, guard, training, stride)
-            if here > factor * beside and here > d_factor * _ca(power, d, c, d_guard, d_training, d_stride):
+            beside = caso_mean(row, c, guard, training, stride)
+            if here > factor * beside and here > d_factor * ca_mean(power, d, c, d_guard, d_training, d_stride):
                 cells[found, 0], cells[found, 1], noise[found] = d, c, beside
                 found += 1
     return found

@@ -24,10 +24,6 @@ Weights = tuple[float, ...]
 _GRID = 1 << 15
 
 
-def independent(cells: int) -> Weights:
-    return (1.0,) * cells
-
-
 def weights(correlation: NDArray[np.complexfloating], cells: range | list[int]) -> Weights:
     """Of cells at these places; ``correlation`` (lags,) of the complex amplitudes 0, 1, ... cells apart."""
     lags = np.subtract.outer(np.array(cells), np.array(cells))
@@ -67,11 +63,6 @@ def caso_false_alarm(weights: Weights, factor: float, looks: int = 1) -> float:
     """
     y, mass, above = _sum_of_powers(weights, looks)
     return float(np.sum(2.0 * mass * above * gammaincc(looks, factor / len(weights) * y)))
-
-
-def ca_detection(cells: float, factor: float, snr: float) -> float:
-    """Probability that CA-CFAR sees a fluctuating target (Swerling 1) of mean ``snr`` (a ratio), with one look."""
-    return (1.0 + factor / (cells * (1.0 + snr))) ** -cells
 
 
 def _solved(false_alarms: Any, weights: Weights, wanted: float, looks: int) -> float:

@@ -28,10 +28,6 @@ class Tracker:
 
     def __init__(self, params: TrackerParams | None = None) -> None:
         self.params = params or TrackerParams()
-        self.refused = 0
-        """Detections so far that were no numbers, or absurd ones."""
-        self.crowded_out = 0
-        """Detections so far that began no candidate because there were too many."""
         self._noise = self.params.noise()
         self._last_id = 0
         self.clear()
@@ -105,7 +101,6 @@ class Tracker:
         range_m, bearing_rad, speed_m_s = given.T
         good = (range_m > 0.0) & (range_m < FARTHEST_M) & np.isfinite(bearing_rad)
         good &= np.isnan(speed_m_s) | (np.abs(speed_m_s) < FASTEST_M_S)
-        self.refused += int(len(given) - good.sum())
         found = given[good]
         found[:, 1] = np.remainder(found[:, 1] + heading_rad + math.pi, FULL_TURN) - math.pi
         return found
@@ -166,7 +161,6 @@ class Tracker:
         found = self._unfolded(found[self._stands_alone(found)])
         room = self.params.most - len(self._x)
         if len(found) > room:
-            self.crowded_out += len(found) - room
             found = found[np.argsort(found[:, 0], kind="stable")[:room]]
         n = len(found)
         if n == 0:

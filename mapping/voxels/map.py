@@ -88,7 +88,7 @@ class VoxelMap:
         Beyond ``max_range_m`` a ray is carved up to there and hits nothing. ``explained`` (N,) is each point's verdict,
         None: all unexplained. ``discretize`` sends one ray per voxel, to its centre, and judges the range there
         (OctoMap's option of that name); without it every point has a ray of its own. Points that are not finite or
-        more than 2^30 voxels from the map's origin are left out and counted. Raises ParameterError.
+        more than 2^30 voxels from the map's origin are left out. Raises ParameterError.
         """
         points = checked_points(points_enu)
         origin = checked_origin(origin_enu, self._resolution_m)
@@ -183,10 +183,6 @@ class VoxelMap:
         return self._resolution_m
 
     @property
-    def clamp_log_odds(self) -> tuple[float, float]:
-        return float(self._model.lowest), float(self._model.highest)
-
-    @property
     def revision(self) -> int:
         """Grows with every change of a voxel; the same as before: nothing has changed."""
         return int(self._store.counts[store.REVISION])
@@ -219,11 +215,6 @@ class VoxelMap:
     def refused_updates(self) -> int:
         """Hits and misses of voxels that found no room, since the map was last emptied."""
         return int(self._store.counts[store.N_REFUSED])
-
-    @property
-    def rejected_points(self) -> int:
-        """Points that were not finite, or too far out for a key."""
-        return int(self._store.counts[store.N_REJECTED])
 
     @property
     def blocks(self) -> store.Store:

@@ -13,7 +13,6 @@ from mapping.voxels.store import (
     HIT,
     IN_BLOCK,
     N_REFUSED,
-    N_REJECTED,
     SIDE_BITS,
     UNEXPLAINED_HIT,
     touch,
@@ -50,7 +49,7 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
 
     ``ends`` (M, 3) receives where rays end: with ``discretize`` the centre of every voxel that holds points, once,
     else every point. M = 0: no rays are wanted. ``unexplained`` has one truth per point, or one for all. Points that
-    are not finite or too far out for a key are counted and left out; so are voxels that no memory is left for.
+    are not finite or too far out for a key are left out; so are voxels that no memory is left for.
     """
     scale = 1.0 / resolution
     ox, oy, oz = origin[0], origin[1], origin[2]
@@ -63,7 +62,6 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
         fx, fy, fz = px * scale, py * scale, pz * scale
         if not (abs(fx) < LARGEST_KEY and abs(fy) < LARGEST_KEY and abs(fz) < LARGEST_KEY):
-            store.counts[N_REJECTED] += 1
             continue
         x, y, z = math.floor(fx), math.floor(fy), math.floor(fz)
         if discretize:

@@ -22,7 +22,7 @@ ANY_MARK = 0x70707070_70707070
 """MISS, HIT or UNEXPLAINED_HIT in eight voxels at once."""
 
 # Places in ``Store.counts``.
-N_BLOCKS, N_KNOWN, N_OCCUPIED, N_EXPLAINED, REVISION, N_TOUCHED, SCAN, N_REFUSED, N_EVER_USED, N_REJECTED = range(10)
+N_BLOCKS, N_KNOWN, N_OCCUPIED, N_EXPLAINED, REVISION, N_TOUCHED, SCAN, N_REFUSED, N_EVER_USED = range(9)
 
 MAX_BLOCKS = 1 << 23
 """A voxel's number in the log of changes has 32 bits."""
@@ -81,7 +81,7 @@ def make_store(memory_limit_bytes: int) -> Store:
             np.zeros(blocks, np.int32),
             np.zeros(blocks, np.int32),
             np.zeros(log_length(memory_limit_bytes), np.uint32),
-            np.zeros(10, np.int64),
+            np.zeros(9, np.int64),
         )
     except MemoryError:
         raise CapacityError(

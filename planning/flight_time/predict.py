@@ -182,8 +182,3 @@ def _descent(from_m: float, axes: Axes) -> float:
     slow_m = min(max(from_m, 0.0), LAND_SLOW_BELOW_M)
     fast_m = max(0.0, from_m - slow_m)
     return slow_m / LAND_SPEED_M_S + (fast_m / axes.descent_m_s + axes.descent_m_s / VERTICAL_ACCEL_M_S2 / 2)
-
-
-def usable_endurance_s(profile: VehicleProfile) -> float:
-    """Flying time that leaves the reserve in the battery."""
-    return profile.endurance_s * (1 - profile.reserve_share)

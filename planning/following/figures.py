@@ -72,7 +72,6 @@ class TrackFigures:
     nearest: Nearest | None
     min_vertical_m: float | None
     nearest_on_way_home: Nearest | None
-    min_vertical_on_way_home_m: float | None
     came_home: bool
     """Whether the way home led to home."""
     unknown_positions: int
@@ -109,11 +108,6 @@ def judge(reference: Reference, track: Track, surface: SurfaceDistance | None) -
     return Judged(found, window, distance_m, height_m, figures)
 
 
-def track_figures(reference: Reference, track: Track, surface: SurfaceDistance | None) -> TrackFigures | None:
-    """The figures alone; None when the track never came to the line."""
-    return judge(reference, track, surface).figures
-
-
 def _figures(
     reference: Reference,
     track: Track,
@@ -148,7 +142,6 @@ def _figures(
         nearest=_nearest(track, found, near_ground, distance_m),
         min_vertical_m=_smallest(height_m, near_ground),
         nearest_on_way_home=_nearest(track, found, home, distance_m),
-        min_vertical_on_way_home_m=_smallest(height_m, home),
         came_home=_came_home(reference, track, window),
         unknown_positions=0 if below is None else int(np.isnan(below).sum()),
         histogram_edges_m=edges_m,

@@ -54,11 +54,6 @@ def tube_words(following_m: float, min_distance_m: float) -> str:
     )
 
 
-def sum_words(budget: ClearanceBudget) -> str:
-    """All terms in one line, added up."""
-    return " + ".join(f"{term.name} {rounded_up(term.value_m)} m" for term in budget.terms)
-
-
 def uncovered_words(budget: ClearanceBudget | None, required_m: float) -> str | None:
     """What a clearance that was set by hand does not cover; None when it covers everything."""
     parts = () if budget is None else budget.uncovered_by(required_m)

@@ -28,8 +28,6 @@ class Decimated:
     """(K,) whole centimetres above ``grid_origin_m``."""
     excess_height_m: float
     """The excess that was allowed."""
-    largest_excess_m: float
-    """How far the straight lines really rise above the path."""
 
 
 def decimate(
@@ -58,8 +56,7 @@ def decimate(
         grid_origin_m=grid_origin_m,
     )
     sample, alt_m = fewest_bends(band, bends(band))
-    flown_m = np.interp(path.s_m, path.s_m[sample], alt_m)
-    return Decimated(sample, alt_m, excess_height_m, float(np.max(flown_m - path.alt_dsm_m)))
+    return Decimated(sample, alt_m, excess_height_m)
 
 
 def decimate_to_fit(

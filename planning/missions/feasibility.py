@@ -67,7 +67,7 @@ def not_judged(why: str) -> Feasibility:
 
 def battery_row(predicted_s: float | None, profile: VehicleProfile) -> FeasibilityRow:
     """The predicted flight against the endurance less its reserve."""
-    usable_s = profile.endurance_s * (1 - profile.reserve_share)
+    usable_s = profile.usable_endurance_s
     usable = f"endurance less reserve is {_time(usable_s)}"
     if predicted_s is None:
         return FeasibilityRow("battery", "unknown", f"How long the flight takes is not known; {usable}.")

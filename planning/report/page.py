@@ -129,7 +129,7 @@ def _environment() -> Environment:
 def _tiles(plan: ReportInput) -> list[tuple[str, str, str, bool]]:
     """The key figures: (caption, value, remark, whether it is a concern)."""
     certificate, profile = plan.certificate, plan.profile
-    usable_s = profile.endurance_s * (1 - profile.reserve_share)
+    usable_s = profile.usable_endurance_s
     items, need, rtl_m = len(plan.mission.items), certificate.required_clearance_m, certificate.rtl_height_needed_m
     tiles = [
         (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from affine import Affine
@@ -19,9 +18,6 @@ from planning.safe_surface.kernel import dilate_grid
 from planning.safe_surface.smooth import gaussian_grid, reach_px
 from planning.safe_surface.window import Box
 from planning.terrain.dsm import Dsm
-from planning.terrain.holes import fill_holes
-
-Method = Literal["exact", "fast"]
 
 FLOOR_SHARE = 0.8
 """The smoothed surface stays above the model dilated with (R, 0.8 H)."""
@@ -51,38 +47,25 @@ def fit_within(dsm: Dsm, max_px: int) -> Dsm:
     return block_max(dsm, max(1, math.ceil(max(dsm.height_px, dsm.width_px) / max_px)))
 
 
-def dilate(dsm: Dsm, *, radius_m: float, height_m: float, method: Method = "exact") -> Dsm:
+def dilate(dsm: Dsm, *, radius_m: float, height_m: float, block_px: int = 1) -> Dsm:
     """Grey dilation with the upper half of an ellipsoid of radius R and height H (Melita 2020, eq. 2).
 
     ``(A + B)(x, y) = max{A(x - x', y - y') + B(x', y')}``, ``B(r) = H sqrt(1 - (r / R)^2)`` for r <= R.
     Unknown cells and everything outside the model are -inf; a cell with no known cell within R is NaN.
 
-    "exact" costs (R / resolution)^2 per cell. "fast" does not: it is nowhere below eq. 2 with (R, H) and
-    nowhere above eq. 2 with (1.05 R, 1.05 H), and constant over blocks of cells. Below
-    R = 57 cells, where no block is fine enough for that bound, it is the exact form.
-    Raises ParameterError unless R and H are finite and positive and R fits the model.
+    That costs (R / resolution)^2 per cell. With blocks of ``block_px`` cells, one height each, it costs less: in blocks
+    of ``coarsest_block`` and finer it is nowhere below eq. 2 with (R, H) and nowhere above eq. 2 with (1.05 R, 1.05 H).
     """
-    _check_ball(dsm, radius_m, height_m)
-    if method == "exact":
-        return _dilate_in_blocks(dsm, radius_m=radius_m, height_m=height_m, block_px=1)
-    block_px = coarsest_block(radius_m / dsm.resolution_m)
-    coarse = _dilate_in_blocks(dsm, radius_m=radius_m, height_m=height_m, block_px=block_px)
-    return dsm.with_elevation(_spread(coarse.elevation_m, block_px, dsm.elevation_m.shape))
-
-
-def dilate_blocks(dsm: Dsm, *, radius_m: float, height_m: float, max_work: float = AUTO_WORK) -> Dsm:
-    """`dilate` with one height per block of cells: the finest blocks that ``max_work`` pays for.
-
-    The bounds of the fast form hold for every cell of a block. Without blocks (small R or a small model)
-    the result is eq. 2 itself, cell for cell. Needs no temporary of the model's size.
-    """
-    _check_ball(dsm, radius_m, height_m)
-    block_px = finest_block(dsm.elevation_m.shape, radius_m / dsm.resolution_m, max_work)
-    return _dilate_in_blocks(dsm, radius_m=radius_m, height_m=height_m, block_px=block_px)
+    coarse = block_max(dsm, block_px)
+    highest_m = np.ascontiguousarray(coarse.elevation_m)
+    highest_m.flags.writeable = False  # one compiled variant of the kernel serves copies and originals
+    lift_m = rounding_lift_m(highest_m, height_m) if block_px > 1 else 0.0
+    element = ball(radius_px=radius_m / dsm.resolution_m, height_m=height_m, block_px=block_px, lift_m=lift_m)
+    return coarse.with_elevation(dilate_grid(highest_m, element.weights_m, element.pairs))
 
 
 def safe_surface(dsm: Dsm, params: SurfaceParams, *, around_xy_m: F64 | None = None, margin_m: float = 2.0) -> Surfaces:
-    """The surface to fly on: fill small holes, dilate, smooth, keep above the floor (Melita 2020, section 5).
+    """The surface to fly on: dilate, smooth, keep above the floor (Melita 2020, section 5); small holes were filled.
 
     With ``around_xy_m`` (N, 2), projected metres, only their bounding box and ``margin_m`` around it is
     computed and returned, with heights as good as the whole model gives there. "auto" takes the finest
@@ -94,20 +77,19 @@ def safe_surface(dsm: Dsm, params: SurfaceParams, *, around_xy_m: F64 | None = N
     _check_ball(dsm, params.radius_m, params.height_m)
     sigma_m = params.radius_m / 10 if params.smooth_sigma_m is None else params.smooth_sigma_m
     _check_sigma(sigma_m)
-    filled, holes = fill_holes(dsm, params.fill_hole_area_m2)
-    inner = Box.of(filled) if around_xy_m is None else Box.around(filled, around_xy_m, margin_m)
-    block_px, outer = _extent(filled, params, sigma_m, inner)
-    part = outer.cut(filled.as_grid())
-    safe = _dilate_in_blocks(part, radius_m=params.radius_m, height_m=params.height_m, block_px=block_px)
+    inner = Box.of(dsm) if around_xy_m is None else Box.around(dsm, around_xy_m, margin_m)
+    block_px, outer = _extent(dsm, params, sigma_m, inner)
+    part = outer.cut(dsm.as_grid())
+    safe = dilate(part, radius_m=params.radius_m, height_m=params.height_m, block_px=block_px)
     safe = safe.with_elevation(gaussian_grid(safe.elevation_m, sigma_m / safe.resolution_m))  # Melita 2020, fig. 6
     floor = None
     if params.floor:
         low_m = FLOOR_SHARE * params.height_m
-        floor = _dilate_in_blocks(part, radius_m=params.radius_m, height_m=low_m, block_px=block_px)
+        floor = dilate(part, radius_m=params.radius_m, height_m=low_m, block_px=block_px)
         safe = safe.with_elevation(np.maximum(safe.elevation_m, floor.elevation_m))
         floor = inner.relative_to(outer, block_px).cut(floor)
     safe = inner.relative_to(outer, block_px).cut(safe)
-    return Surfaces(safe, holes.count, holes.area_m2, "exact" if block_px == 1 else "fast", floor)
+    return Surfaces(safe, "exact" if block_px == 1 else "fast", floor)
 
 
 def safe_surface_at(surfaces: Surfaces, xy_m: F64) -> F64:
@@ -147,21 +129,6 @@ def _extent(dsm: Dsm, params: SurfaceParams, sigma_m: float, inner: Box) -> tupl
         block_px = finest_block(inner.grown(halo_px, dsm).shape, radius_px, AUTO_WORK)
     # Blocks round the ball, the Gaussian and the cut outwards by up to one block each.
     return block_px, inner.grown(halo_px + 4 * block_px, dsm)
-
-
-def _dilate_in_blocks(dsm: Dsm, *, radius_m: float, height_m: float, block_px: int) -> Dsm:
-    coarse = block_max(dsm, block_px)
-    highest_m = np.ascontiguousarray(coarse.elevation_m)
-    highest_m.flags.writeable = False  # one compiled variant of the kernel serves copies and originals
-    lift_m = rounding_lift_m(highest_m, height_m) if block_px > 1 else 0.0
-    element = ball(radius_px=radius_m / dsm.resolution_m, height_m=height_m, block_px=block_px, lift_m=lift_m)
-    return coarse.with_elevation(dilate_grid(highest_m, element.weights_m, element.pairs))
-
-
-def _spread(coarse_m: F32, block_px: int, shape: tuple[int, int]) -> F32:
-    """Each block's height on all of its cells."""
-    rows = np.repeat(coarse_m, block_px, axis=0)[: shape[0]]
-    return np.ascontiguousarray(np.repeat(rows, block_px, axis=1)[:, : shape[1]])
 
 
 def _check_ball(dsm: Dsm, radius_m: float, height_m: float) -> None:

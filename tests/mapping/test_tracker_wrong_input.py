@@ -18,19 +18,17 @@ HERE = {"position_enu_m": (0.0, 0.0), "velocity_enu_m_s": (0.0, 0.0), "heading_r
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("column", [0, 1])
-def test_a_detection_that_is_no_number_is_left_out_and_counted(bad, column):
+def test_a_detection_that_is_no_number_is_left_out(bad, column):
     tracker = Tracker()
     row = [20.0, 0.1, 0.5]
     row[column] = bad
     assert len(tracker.step(0.0, [row, [30.0, 0.0, 0.0]], **HERE)) == 1
-    assert tracker.refused == 1
 
 
 def test_absurd_ranges_and_speeds_are_left_out():
     tracker = Tracker()
     absurd = [[0.0, 0.1, 0.0], [-3.0, 0.0, 0.0], [1e300, 0.0, 0.0], [5.0, 0.0, math.inf], [5.0, 0.0, 1e300]]
     assert tracker.step(0.0, absurd, **HERE) == []
-    assert tracker.refused == 5
 
 
 def test_a_bearing_may_have_any_number_of_turns():
@@ -79,7 +77,6 @@ def test_a_thousand_detections_a_frame_take_a_bounded_time_and_room():
         noise = random.uniform([2.0, -0.78, -10.0], [120.0, 0.78, 10.0], (1000, 3))
         states = tracker.step(0.1 * k, noise, **HERE)
         assert len(states) <= tracker.params.most
-    assert tracker.crowded_out > 0
     assert time.thread_time() - began_s < 60.0
 
 
@@ -97,7 +94,6 @@ def test_too_many_candidates_leave_the_nearest():
     detections = np.column_stack([np.arange(5.0, 105.0, 5.0), np.zeros(20), np.zeros(20)])
     states = tracker.step(0.0, detections, **HERE)
     assert [round(float(state.position_enu_m[1])) for state in states] == list(range(5, 55, 5))
-    assert tracker.crowded_out == 10
 
 
 @pytest.mark.parametrize(

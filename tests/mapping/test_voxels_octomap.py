@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
 from mapping.voxels import VoxelMap
-from mapping.voxels.octomap_bt import read_bt
 from tests.mapping.clouds import car_clouds, gicp_clouds, seen_by_camera
 from tests.reference.octomap import octree
+from tests.reference.octomap_bt import read_bt
 
 Keys = NDArray[np.int64]
 """Each voxel's three numbers in one, in order."""

@@ -10,7 +10,7 @@ from pymavlink import mavutil
 from pyproj import CRS
 
 from planning.errors import MissionError
-from planning.flight_time.predict import predict_duration, usable_endurance_s
+from planning.flight_time.predict import predict_duration
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 
@@ -146,4 +146,4 @@ def test_what_cannot_be_predicted_is_refused() -> None:
 
 
 def test_the_reserve_is_not_flown() -> None:
-    assert usable_endurance_s(replace(PROFILE, endurance_s=1000.0, reserve_share=0.25)) == 750
+    assert replace(PROFILE, endurance_s=1000.0, reserve_share=0.25).usable_endurance_s == 750

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapping.geometry.arrays import F64
-from planning.following.figures import TrackFigures, judge, track_figures
+from planning.following.figures import TrackFigures, judge
 from planning.following.track import Track
 from tests.planning.following_lines import flown, line
 
@@ -25,7 +25,7 @@ def climbed_over(*, by_m: float = 10.0, until_s: float = 1e9) -> tuple[F64, F64]
 def figures_of(t_s: F64, xyz_m: F64, **facts) -> TrackFigures:
     detour = (TAKEN_OVER_S, float(t_s[-1]))
     track = Track(t_s, xyz_m, **{"on_mission": ((0.0, TAKEN_OVER_S),), "detours": (detour,), **facts})
-    figures = track_figures(ROUTE, track, None)
+    figures = judge(ROUTE, track, None).figures
     assert figures is not None
     return figures
 

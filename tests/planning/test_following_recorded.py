@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from planning.following.figures import track_figures
+from planning.following.figures import judge
 from planning.following.nearest import follow
 from planning.following.reference import level_model, reference_line
 from planning.following.surface import SurfaceDistance
@@ -114,7 +114,7 @@ def test_auto(auto: Log, mission: Mission, surface: SurfaceDistance, kind: str) 
     reference = reference_line(mission, surface.dsm, RECORDED, waypoint_radius_m=0.5)
     rows = auto.estimate if kind == "estimate" else auto.truth
     xyz_m = placed(rows, surface.dsm, reference.home_alt_dsm_m if kind == "estimate" else 0.0)
-    figures = track_figures(reference, Track(rows[:, 0], xyz_m, auto.reached, auto.spans), surface)
+    figures = judge(reference, Track(rows[:, 0], xyz_m, auto.reached, auto.spans), surface).figures
     check(figures, AUTO[kind], exact_count=True)
     assert figures is not None
     assert figures.completed
@@ -128,7 +128,7 @@ def test_guided(guided: Log, mission: Mission, surface: SurfaceDistance, kind: s
     reference = reference_line(mission, surface.dsm, RECORDED).ending_at(LAST_TARGET)
     rows = guided.estimate if kind == "estimate" else guided.truth
     xyz_m = placed(rows, surface.dsm, reference.home_alt_dsm_m if kind == "estimate" else 0.0)
-    figures = track_figures(reference, Track(rows[:, 0], xyz_m, (), guided.spans, one_by_one=True), surface)
+    figures = judge(reference, Track(rows[:, 0], xyz_m, (), guided.spans, one_by_one=True), surface).figures
     check(figures, GUIDED[kind], exact_count=False)
     assert figures is not None
     assert not figures.completed
@@ -137,7 +137,7 @@ def test_guided(guided: Log, mission: Mission, surface: SurfaceDistance, kind: s
 def test_the_window_is_found_without_the_vehicles_word(auto: Log, mission: Mission, surface: SurfaceDistance) -> None:
     reference = reference_line(mission, surface.dsm, RECORDED)
     xyz_m = placed(auto.estimate, surface.dsm, reference.home_alt_dsm_m)
-    figures = track_figures(reference, Track(auto.estimate[:, 0], xyz_m), surface)
+    figures = judge(reference, Track(auto.estimate[:, 0], xyz_m), surface).figures
     assert figures is not None
     assert figures.told_by == "geometry"
     assert figures.completed
@@ -149,7 +149,7 @@ def test_without_a_surface_model(auto: Log, mission: Mission) -> None:
     level = level_model(mission)
     reference = reference_line(mission, level, RECORDED)
     xyz_m = placed(auto.estimate, level, reference.home_alt_dsm_m)
-    figures = track_figures(reference, Track(auto.estimate[:, 0], xyz_m, auto.reached, auto.spans), None)
+    figures = judge(reference, Track(auto.estimate[:, 0], xyz_m, auto.reached, auto.spans), None).figures
     assert figures is not None
     assert figures.nearest is None
     assert figures.cross_track.max_m == pytest.approx(0.08, abs=0.02)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Geod
 
-from planning.following.figures import judge, track_figures
+from planning.following.figures import judge
 from planning.following.lag import late_s, planned_alt_dsm_m, planned_s
 from planning.following.live import Following, follow_on
 from planning.following.nearest import follow
@@ -27,7 +27,7 @@ SQUARE = line([(10, 10, 12), (60, 10, 12), (60, 60, 20), (10, 60, 12)])
 
 
 def figures_of(track, reference=SQUARE, surface=None):
-    figures = track_figures(reference, track, surface)
+    figures = judge(reference, track, surface).figures
     assert figures is not None
     return figures
 

@@ -60,7 +60,7 @@ def test_the_plan_over_a_part_is_the_plan_over_the_whole(monkeypatch: pytest.Mon
     whole, cut = both(monkeypatch, request())
     assert cut.dsm.elevation_m.size < 0.5 * DSM.elevation_m.size
     assert_same_flight(cut, whole)
-    assert cut.surfaces.holes_filled == 1
+    assert cut.holes.count == 1
 
 
 def test_the_part_grows_until_nothing_that_was_found_is_as_far_as_its_border(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,9 +12,10 @@ from scipy import ndimage
 
 from planning.errors import ParameterError
 from planning.model import SurfaceParams
-from planning.safe_surface.surface import block_max, dilate, dilate_blocks, safe_surface, safe_surface_at
+from planning.safe_surface.surface import block_max, dilate, safe_surface, safe_surface_at
 from planning.terrain.dsm import Dsm
-from tests.reference.dilation import ball_structure
+from planning.terrain.holes import fill_holes
+from tests.reference.dilation import ball_structure, dilate_fast
 
 UTM = CRS.from_epsg(32633)
 
@@ -91,8 +92,8 @@ def test_a_mast_of_one_cell_survives_every_step():
     dsm = make_dsm(heights)
     mast = cell_centres(dsm)[301 * 600 + 299][None]
     assert dilate(dsm, radius_m=100.0, height_m=25.0).elevation_at(mast) == 85
-    assert dilate(dsm, radius_m=100.0, height_m=25.0, method="fast").elevation_at(mast) >= 85
-    assert dilate_blocks(block_max(dsm, 7), radius_m=100.0, height_m=25.0).elevation_at(mast) >= 85
+    assert dilate_fast(dsm, radius_m=100.0, height_m=25.0).elevation_at(mast) >= 85
+    assert dilate(block_max(dsm, 7), radius_m=100.0, height_m=25.0, block_px=2).elevation_at(mast) >= 85
 
 
 @pytest.mark.parametrize("method", ["exact", "fast", "auto"])
@@ -114,7 +115,7 @@ FAST_CASES = [
 @pytest.mark.parametrize(("shape", "radius_m", "height_m", "base_m", "unknown"), FAST_CASES)
 def test_fast_form_lies_between_its_bounds(shape, radius_m, height_m, base_m, unknown):
     dsm = rough(*shape, base_m=base_m, unknown=unknown)
-    fast = dilate(dsm, radius_m=radius_m, height_m=height_m, method="fast").elevation_m
+    fast = dilate_fast(dsm, radius_m=radius_m, height_m=height_m).elevation_m
     low = dilate(dsm, radius_m=radius_m, height_m=height_m).elevation_m
     high = dilate(dsm, radius_m=1.05 * radius_m, height_m=1.05 * height_m).elevation_m
     assert not np.array_equal(fast, low)
@@ -128,7 +129,7 @@ def test_fast_form_of_a_single_known_cell_lies_between_its_bounds():
     heights = np.full((480, 475), np.nan, np.float32)
     heights[233, 241] = -12.5
     dsm = make_dsm(heights)
-    fast = dilate(dsm, radius_m=180.0, height_m=45.0, method="fast").elevation_m
+    fast = dilate_fast(dsm, radius_m=180.0, height_m=45.0).elevation_m
     low = dilate(dsm, radius_m=180.0, height_m=45.0).elevation_m
     high = dilate(dsm, radius_m=189.0, height_m=47.25).elevation_m
     assert np.all(np.nan_to_num(fast, nan=-99) >= np.nan_to_num(low, nan=-99))
@@ -137,22 +138,15 @@ def test_fast_form_of_a_single_known_cell_lies_between_its_bounds():
 
 def test_fast_form_is_exact_where_no_block_is_fine_enough():
     dsm = rough(80, 90)
-    fast = dilate(dsm, radius_m=20.0, height_m=5.0, method="fast")
+    fast = dilate_fast(dsm, radius_m=20.0, height_m=5.0)
     np.testing.assert_array_equal(fast.elevation_m, dilate(dsm, radius_m=20.0, height_m=5.0).elevation_m)
-
-
-def test_dilate_blocks_is_the_fast_form_without_spreading():
-    dsm = rough(300, 310)
-    coarse = dilate_blocks(dsm, radius_m=120.0, height_m=30.0, max_work=1.0)
-    fast = dilate(dsm, radius_m=120.0, height_m=30.0, method="fast")
-    np.testing.assert_array_equal(coarse.elevation_at(cell_centres(dsm)), fast.elevation_m.ravel())
 
 
 @pytest.mark.parametrize("value", [0.0, -3.0, math.nan, math.inf])
 def test_radius_and_height_must_make_sense(value):
     dsm = rough(40, 40)
     with pytest.raises(ParameterError, match=rf"radius is {value:g} m"):
-        dilate(dsm, radius_m=value, height_m=5.0)
+        safe_surface(dsm, SurfaceParams(radius_m=value, height_m=5.0))
     with pytest.raises(ParameterError, match=rf"height is {value:g} m"):
         safe_surface(dsm, SurfaceParams(radius_m=5.0, height_m=value))
 
@@ -160,7 +154,7 @@ def test_radius_and_height_must_make_sense(value):
 def test_radius_must_fit_the_model_and_sigma_must_make_sense():
     dsm = rough(40, 60)
     with pytest.raises(ParameterError, match=r"41 m is larger than the surface model's shorter side, 40 m"):
-        dilate(dsm, radius_m=41.0, height_m=5.0)
+        safe_surface(dsm, SurfaceParams(radius_m=41.0, height_m=5.0))
     with pytest.raises(ParameterError, match="sigma is -1 m"):
         safe_surface(dsm, SurfaceParams(radius_m=10.0, smooth_sigma_m=-1.0))
 
@@ -235,12 +229,13 @@ def test_points_off_the_model_are_refused():
         safe_surface(dsm, SurfaceParams(radius_m=5.0), around_xy_m=np.array([[0.0, 0.0]]))
 
 
-def test_small_holes_are_filled_first_and_counted():
+def test_filled_holes_are_under_the_surface():
     heights = np.zeros((50, 50), np.float32)
     heights[20, 20] = np.nan
     heights[20, 21] = 30
-    surfaces = safe_surface(make_dsm(heights), SurfaceParams(radius_m=3.0, height_m=1.0, smooth_sigma_m=0.0))
-    assert (surfaces.holes_filled, surfaces.holes_filled_area_m2) == (1, 1.0)
+    filled, holes = fill_holes(make_dsm(heights))
+    surfaces = safe_surface(filled, SurfaceParams(radius_m=3.0, height_m=1.0, smooth_sigma_m=0.0))
+    assert (holes.count, holes.area_m2) == (1, 1.0)
     assert surfaces.safe.elevation_m[20, 20] == 31
 
 

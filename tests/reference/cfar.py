@@ -43,3 +43,13 @@ def ca(ring: Row, guard: int, training: int, stride: int, factor: float) -> list
         cells = [ring[(c + sign * k) % len(ring)] for k in offsets for sign in (-1, 1)]
         found.append(here > factor * sum(cells) / len(cells))
     return found
+
+
+def independent(cells: int) -> tuple[float, ...]:
+    """Weights of cells that have nothing in common."""
+    return (1.0,) * cells
+
+
+def ca_detection(cells: float, factor: float, snr: float) -> float:
+    """Probability that CA-CFAR sees a fluctuating target (Swerling 1) of mean ``snr`` (a ratio), with one look."""
+    return (1.0 + factor / (cells * (1.0 + snr))) ** -cells

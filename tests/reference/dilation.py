@@ -5,6 +5,9 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F32, F64, Bools
+from planning.safe_surface.element import coarsest_block
+from planning.safe_surface.surface import dilate
+from planning.terrain.dsm import Dsm
 
 
 def dilate_slowly(elevation_m: F32, *, radius_px: float, height_m: float) -> F64:
@@ -29,3 +32,11 @@ def ball_structure(radius_px: float, height_m: float) -> tuple[Bools, F64]:
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     ratio2 = (x**2 + y**2) / radius_px**2
     return ratio2 <= 1, height_m * np.sqrt(np.maximum(1 - ratio2, 0))
+
+
+def dilate_fast(dsm: Dsm, *, radius_m: float, height_m: float) -> Dsm:
+    """In the coarsest blocks that the bounds allow, each block's height on all of its cells."""
+    block_px = coarsest_block(radius_m / dsm.resolution_m)
+    rows, columns = dsm.elevation_m.shape
+    coarse_m = dilate(dsm, radius_m=radius_m, height_m=height_m, block_px=block_px).elevation_m
+    return dsm.with_elevation(coarse_m.repeat(block_px, axis=0)[:rows].repeat(block_px, axis=1)[:, :columns].copy())

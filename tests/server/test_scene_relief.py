@@ -132,7 +132,7 @@ def _over(dsm: Dsm) -> tuple[Surfaces, SampledPath]:
     """The model itself as its safe surface, and a path from west to east over it."""
     x_m = np.arange(500_005.0, 500_075.0, 0.1)
     xy_m = np.column_stack([x_m, np.full(len(x_m), 3_999_968.3)])
-    surfaces = Surfaces(safe=dsm, holes_filled=0, holes_filled_area_m2=0.0, method="exact", floor=None)
+    surfaces = Surfaces(safe=dsm, method="exact", floor=None)
     alt_m = safe_surface_at(surfaces, xy_m)
     path = SampledPath(
         xy_m=xy_m,

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from mapping.geometry.frames import LocalFrame
-from mapping.voxels.octomap_bt import map_from_bt
 from planning.terrain.geotiff import read_dsm
 from telemetry.rebuilding.export import ExportError, exported
 from telemetry.rebuilding.outlines import clusters, outline
 from telemetry.topics.deltas import FoldedMap, in_parts
 from telemetry.topics.obstacles import MapDelta, MapOrigin
+from tests.reference.octomap_bt import map_from_bt
 
 ORIGIN = MapOrigin(-37.1244507, 175.6892879, 803.0)
 FRAME = LocalFrame(ORIGIN.lat_deg, ORIGIN.lon_deg, ORIGIN.alt_amsl_m)

@@ -24,12 +24,6 @@ class ReadReport:
     source_crs: str
     """Name, with its code where it has one."""
     vertical_datum: str | None
-    pixel_size: tuple[float, float]
-    """Width and height of a source pixel in the units of ``source_crs``."""
-    resampled: bool
-    """Whether paths are laid over another grid than the file's; clearance is proved against the file's cells."""
-    reprojected_to: str | None
-    """Code of the UTM zone, when the source's units are not metres."""
     height_scale: float
     """Metres per stored unit."""
     unknown_share: float
@@ -95,14 +89,11 @@ def _masked(stats: HeightStats, sentinels: tuple[float, ...]) -> tuple[str, ...]
 
 
 def _report(dsm: Dsm, plan: SurfacePlan, warnings: tuple[str, ...]) -> ReadReport:
-    t, source = plan.header.affine, plan.reference.source
+    source = plan.reference.source
     epsg = source.to_epsg()
     return ReadReport(
         source_crs=f"{source.name} (EPSG:{epsg})" if epsg else source.name,
         vertical_datum=dsm.vertical_datum,
-        pixel_size=(float(np.hypot(t.a, t.d)), float(np.hypot(t.b, t.e))),
-        resampled=plan.grid is not None,
-        reprojected_to=f"EPSG:{plan.crs.to_epsg()}" if plan.reprojected else None,
         height_scale=plan.height_scale,
         unknown_share=_unknown_share(dsm.elevation_m),
         spikes=(),

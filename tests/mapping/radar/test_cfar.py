@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from mapping.errors import ParameterError
-from mapping.radar.cfar import Cfar, Stage, ca_along_doppler, caso_along_range, doppler_stage, peaks, range_stage
-from mapping.radar.cfar_factors import ca_detection
+from mapping.radar.cfar import Cfar, Stage, doppler_stage, peaks, range_stage
 from mapping.radar.fft import Window, doppler_fft, range_fft, window, windowed
+from tests.mapping.radar.cfar_maps import ca_along_doppler, caso_along_range
 from tests.mapping.radar.echoes import noise
 from tests.reference import cfar as slow
 
@@ -97,7 +97,9 @@ def test_detections_are_as_likely_as_the_closed_form_says(snr_db: float) -> None
     rng, snr = np.random.default_rng(7), 10 ** (snr_db / 10)
     power = rng.exponential(size=(13, 20_000)).astype(np.float32)
     power[6] *= 1.0 + snr
-    assert ca_along_doppler(power, DOPPLER)[6].mean() == pytest.approx(ca_detection(8, DOPPLER.factor, snr), abs=0.015)
+    assert ca_along_doppler(power, DOPPLER)[6].mean() == pytest.approx(
+        slow.ca_detection(8, DOPPLER.factor, snr), abs=0.015
+    )
 
 
 def test_the_smaller_side_keeps_a_target_beside_clutter() -> None:

@@ -7,16 +7,15 @@ from hypothesis import strategies as st
 
 from mapping.errors import ParameterError
 from mapping.radar.cfar_factors import (
-    ca_detection,
     ca_factor,
     ca_false_alarm,
     caso_factor,
     caso_false_alarm,
-    independent,
     weights,
 )
 from mapping.radar.fft import noise_correlation
 from tests.reference import cfar as slow
+from tests.reference.cfar import ca_detection, independent
 
 cells = st.integers(1, 40)
 probabilities = st.floats(1e-8, 0.5)
