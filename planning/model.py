@@ -88,6 +88,10 @@ class VehicleProfile:
         return self.endurance_s * (1 - self.reserve_share)
 
 
+ANY_VEHICLE = VehicleProfile("any")
+"""What is taken of a vehicle that nobody has described."""
+
+
 @dataclass(frozen=True, slots=True)
 class SurfaceParams:
     """Melita 2020, section 5: non-flat ball (R, H), then a Gaussian."""
@@ -106,11 +110,11 @@ class SurfaceParams:
 class PathParams:
     """Melita 2020, section 6: sampling and LSPB timing, with the vehicle's vertical limits."""
 
-    mean_speed_m_s: float = 3.0
-    max_speed_m_s: float = 5.0
-    max_climb_m_s: float = 2.5
-    max_descent_m_s: float = 1.5
-    max_accel_m_s2: float = 2.5
+    mean_speed_m_s: float = ANY_VEHICLE.mean_speed_m_s
+    max_speed_m_s: float = ANY_VEHICLE.max_speed_m_s
+    max_climb_m_s: float = ANY_VEHICLE.max_climb_m_s
+    max_descent_m_s: float = ANY_VEHICLE.max_descent_m_s
+    max_accel_m_s2: float = ANY_VEHICLE.max_accel_m_s2
     step_m: float = 0.1
     on_steep: Literal["raise", "slow"] = "raise"
     """Where the surface is steeper than the limits: raise the path, or fly slower on it."""
@@ -120,7 +124,7 @@ class PathParams:
 class MissionParams:
     """How a path becomes mission items."""
 
-    max_items: int = 650
+    max_items: int = ANY_VEHICLE.max_items
     excess_height_m: float = 1.0
     """The flown lines may run at most this far above the sampled profile; 0 asks for the closest fit."""
     end: Literal["rtl", "land"] = "rtl"

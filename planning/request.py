@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from planning import limits
 from planning.errors import ParameterError
 from planning.margins.following_error import Way
 from planning.missions.vehicle_profile import path_params
@@ -12,11 +13,6 @@ from planning.model import ClearanceParams, MissionParams, PathParams, PlannedFo
 from planning.route.camera import LOOKS_DOWN_DEG
 from planning.route.survey import SurveyPlan
 from planning.terrain.dsm import SurfaceModel
-
-LARGEST = 1e6
-"""Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
-FEWEST_ITEMS = 4
-"""Take-off, two waypoints and the return."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,27 +106,15 @@ def check_request(request: PlanRequest) -> None:
     """Raises ParameterError, naming the first value that no flight can have."""
     path = request.path
     check_demands(request)
-    _positive("Radius R", request.surface.radius_m, "m")
-    _positive("Height H", request.surface.height_m, "m")
-    for name, value, unit in (
-        ("Mean speed", path.mean_speed_m_s, "m/s"),
-        ("Maximum speed", path.max_speed_m_s, "m/s"),
-        ("Climb limit", path.max_climb_m_s, "m/s"),
-        ("Descent limit", path.max_descent_m_s, "m/s"),
-        ("Acceleration limit", path.max_accel_m_s2, "m/s2"),
-        ("Sampling step", path.step_m, "m"),
-    ):
-        _positive(name, value, unit)
-    _at_least_zero("Excess height", request.mission.excess_height_m, "m")
-    check_hole_area(request.surface.fill_hole_area_m2)
-    if request.surface.smooth_sigma_m is not None:
-        _at_least_zero("Smoothing", request.surface.smooth_sigma_m, "m")
+    limits.check(request.surface, limits.SURFACE)
+    limits.check(path, limits.PATH)
+    limits.check(request.mission, limits.MISSION)
     if path.step_m > request.surface.radius_m:
         raise ParameterError(
             f"Sampling step {path.step_m:g} m is larger than radius R, {request.surface.radius_m:g} m.",
             advice="Sample every 0.1 m as a rule: between samples the path does not follow the terrain.",
         )
-    if not path.mean_speed_m_s < path.max_speed_m_s <= 2 * path.mean_speed_m_s:
+    if not limits.speeds_agree(path.mean_speed_m_s, path.max_speed_m_s):
         raise ParameterError(
             f"Mean speed {path.mean_speed_m_s:g} m/s and maximum speed {path.max_speed_m_s:g} m/s contradict"
             " each other.",
@@ -142,27 +126,14 @@ def check_request(request: PlanRequest) -> None:
 def check_demands(request: PlanRequest) -> None:
     """Raises ParameterError for a vehicle or a clearance that cannot be; what certifying alone needs."""
     profile = request.profile
-    _positive("Vehicle radius", profile.radius_m, "m")
-    _positive("Endurance", profile.endurance_s, "s")
-    _at_least_zero("RTL height", profile.rtl_height_m, "m")
-    _at_least_zero("Position error", profile.position_error_m, "m")
-    _at_least_zero("Accuracy of the surface model", profile.dsm_rms_m, "m")
-    for name, value in (("Following error", profile.following_m), ("Rotor downwash", profile.downwash_m)):
-        if value is not None:
-            _at_least_zero(name, value, "m")
-    _positive("Mass", profile.mass_kg, "kg")
-    _positive("Rotor diameter", profile.rotor_diameter_m, "m")
-    _positive("Number of rotors", profile.rotors, "")
-    if request.required_clearance_m is not None:
-        _positive("Required clearance", request.required_clearance_m, "m")
-    if request.max_height_above_ground_m is not None:
-        _positive("Maximum height above ground", request.max_height_above_ground_m, "m")
+    limits.check(profile, limits.PROFILE)
+    limits.check(request, limits.DEMANDS)
     if not 0 <= profile.reserve_share < 1:
         raise ParameterError(f"Reserve is {profile.reserve_share:g}.", advice="Give a share from 0 to below 1.")
-    if profile.max_items < FEWEST_ITEMS:
+    if profile.max_items < limits.FEWEST_ITEMS:
         raise ParameterError(
             f"The vehicle is said to take {profile.max_items} mission items.",
-            advice=f"A mission has {FEWEST_ITEMS} or more: give the vehicle's true limit.",
+            advice=f"A mission has {limits.FEWEST_ITEMS} or more: give the vehicle's true limit.",
         )
 
 
@@ -178,18 +149,3 @@ def check_size(request: PlanRequest, dsm: SurfaceModel) -> None:
                 f"{name} is {value:g} m, larger than the surface model, whose {which} side is {side_m:.4g} m.",
                 advice="Give a smaller one or a larger surface model.",
             )
-
-
-def check_hole_area(max_area_m2: float) -> None:
-    """Raises ParameterError for an area of holes to fill that is no area."""
-    _at_least_zero("Largest hole to fill", max_area_m2, "m2")
-
-
-def _positive(name: str, value: float, unit: str) -> None:
-    if not 0 < value <= LARGEST:
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be above zero, at most {LARGEST:,.0f}.")
-
-
-def _at_least_zero(name: str, value: float, unit: str) -> None:
-    if not 0 <= value <= LARGEST:
-        raise ParameterError(f"{name} is {value:g} {unit}.", advice=f"It must be zero or more, at most {LARGEST:,.0f}.")

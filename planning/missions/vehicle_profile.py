@@ -10,6 +10,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from planning import limits
 from planning.errors import FormatError, ParameterError
 from planning.model import Camera, PathParams, VehicleProfile
 
@@ -17,7 +18,7 @@ SHIPPED = Path(__file__).parent / "profiles"
 DEFAULT_PROFILE = "generic-quad"
 FIRMWARES = ("ardupilot", "px4")
 MAX_FILE_BYTES = 65_536
-MAY_BE_ZERO = ("position_error_m", "rtl_height_m", "reserve_share", "following_m", "dsm_rms_m", "downwash_m")
+MAY_BE_ZERO = {"reserve_share", *(key for key, limit in limits.PROFILE.items() if limit.zero)}
 
 
 def shipped_profiles() -> tuple[str, ...]:
@@ -102,14 +103,14 @@ def check_profile(profile: VehicleProfile, *, where: str = "vehicle profile") ->
     if profile.reserve_share >= 1:
         _refuse(f"A reserve of {profile.reserve_share:g} leaves no time to fly.", where, "reserve_share", "Give 0.25.")
     mean, top = profile.mean_speed_m_s, profile.max_speed_m_s
-    if not mean < top <= 2 * mean:
+    if not limits.speeds_agree(mean, top):
         _refuse(
             f"A mean speed of {mean:g} m/s and a maximum speed of {top:g} m/s contradict each other.",
             where,
             "max_speed_m_s",
             f"Give more than {mean:g} and at most {2 * mean:g} m/s.",
         )
-    if profile.max_items < 4:
+    if profile.max_items < limits.FEWEST_ITEMS:
         _refuse(
             f"A vehicle that takes {profile.max_items} items cannot fly a mission.", where, "max_items", "Give more."
         )

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from planning import limits
 from planning.certificate.clearance import certificate_json
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration
@@ -21,7 +22,6 @@ from planning.model import Mission, VehicleProfile
 from planning.part import certify_part
 from planning.plan import CERTIFICATE_STEP
 from planning.report.summary import certificate_summary, dsm_summary
-from planning.request import check_hole_area
 from planning.terrain.dsm import Dsm
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command
@@ -45,7 +45,7 @@ def certify(
     demands: o.ClearanceOptions,
 ) -> None:
     """Prove the clearance of a mission made anywhere, against your own surface model."""
-    check_hole_area(model.max_hole_m2)
+    limits.SURFACE["fill_hole_area_m2"].check(model.max_hole_m2)
     flight = read_flight(mission.name, read_small(mission))
     request = judged_by(flight, given, demands, demands.flown_as)
     vehicle, params = request.profile, request.clearance()

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.errors import ParameterError
+from planning.limits import LARGEST
 from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
-from planning.request import LARGEST, PlanRequest, check_demands, check_hole_area, check_request, check_size
+from planning.request import PlanRequest, check_demands, check_request, check_size
 from tests.planning.format_examples import make_dsm
 
 SOUND = PlanRequest(pois=(), profile=VehicleProfile("quad"))
@@ -68,7 +69,6 @@ def test_must_not_be_negative(value: float) -> None:
 
 
 def test_zero_where_it_makes_sense() -> None:
-    check_hole_area(0.0)
     check_request(
         replace(
             SOUND,
