@@ -42,7 +42,7 @@ def test_recorded_maps_have_as_many_nodes_as_they_say(name: str, shared_data: Pa
 def test_a_recorded_map_is_written_as_octomap_wrote_it(shared_data: Path) -> None:
     data = (shared_data / "maps" / "octomap" / "geb079.bt").read_bytes()
     voxels = map_from_bt(data)
-    assert voxels.voxel_count == read_bt(data).voxel_count
+    assert voxels.voxel_count == len(read_bt(data).voxels()[0])
     written = write_bt(voxels)
     assert b"\nsize 532566\nres 0.08\n" in written
     assert written.split(b"\ndata\n", 1)[1] == data.split(b"\ndata\n", 1)[1]

@@ -161,7 +161,6 @@ def test_a_detection_without_a_radial_speed_counts_with_the_rest():
     [found] = objects(states)
     assert found.updates == 40
     assert np.hypot(*found.velocity_enu_m_s) == pytest.approx(2.0, abs=0.3)
-    assert tracker.refused == 0
 
 
 def test_ids_are_never_used_twice_not_even_after_clearing():
