@@ -53,7 +53,6 @@ class Pilot:
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
         self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
         self._script_since_s: float | None = None
-        self._script_accepted: Accepted = lambda: None
         self._started_digest: str | None = None
         """Of the mission that is under way, if it was started from here."""
         self._known_foreign = False
@@ -128,8 +127,7 @@ class Pilot:
     def _follow_script(self, script: GuidedScript) -> None:
         status = script.status(since_utc_s=self._script_since_s)
         self.flight.script(status, armed=self.vehicle.state.armed)
-        if script.phase != "arming":
-            self._script_accepted()
+        self._procedures.on_tick()
         if script.is_over:
             self.script = None
 
@@ -163,14 +161,13 @@ class Pilot:
         )
         self.script, self._script_since_s = script, time.time()
 
-        async def fly(accepted: Accepted) -> None:
-            self._script_accepted = accepted
+        async def fly(_: Accepted) -> None:
             try:
                 await vehicle.exchanges.run(script)
             finally:
                 script.stop(SUPERSEDED)
 
-        await self._procedures.take_over(fly)
+        await self._procedures.take_over(fly, shows=lambda: script.phase not in ("idle", "arming"))
 
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
         """Raises NotAllowedError when nothing is flown that could be gone on with."""

@@ -31,27 +31,44 @@ TIMEOUT, LEAST_SILENT_S = "GUID_TIMEOUT", 3.0
 """A shorter one would let it be led faster than it was simulated."""
 
 
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    task: asyncio.Task[None]
+    started: asyncio.Future[None]
+    """Done when it is accepted or over."""
+    shows: Callable[[], bool]
+
+
 class Procedures:
     """``say``: what went wrong after a procedure had been accepted."""
 
     def __init__(self, spawn: Spawn, say: Callable[[str], None]) -> None:
         self._spawn, self._say = spawn, say
-        self._current: asyncio.Task[None] | None = None
+        self._current: _UnderWay | None = None
 
     @property
     def is_under_way(self) -> bool:
-        return self._current is not None and not self._current.done()
+        return self._current is not None and not self._current.task.done()
 
     def end(self) -> None:
         if self._current is not None:
-            self._current.cancel()
+            self._current.task.cancel()
             self._current = None
 
-    async def take_over(self, procedure: Procedure) -> None:
-        """Ends what was under way, then waits until ``procedure`` is accepted or over; it may go on after that."""
+    def on_tick(self) -> None:
+        """Whether what is under way shows by now that it was accepted."""
+        if self._current is not None and not self._current.started.done() and self._current.shows():
+            self._current.started.set_result(None)
+
+    async def take_over(self, procedure: Procedure, *, shows: Callable[[], bool] = lambda: False) -> None:
+        """Ends what was under way, then waits until ``procedure`` is accepted or over; it may go on after that.
+
+        ``shows``: whether it has been accepted, for a procedure that is not told so.
+        """
         self.end()
         started: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        task = self._current = self._spawn(self._carry_out(procedure, started))
+        task = self._spawn(self._carry_out(procedure, started))
+        self._current = _UnderWay(task, started, shows)
         task.add_done_callback(lambda _: _refuse_if_open(started))
         await started
 
