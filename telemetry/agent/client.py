@@ -19,26 +19,7 @@ from websockets.typing import Origin, Subprotocol
 
 from mapping.geometry.arrays import F32
 from mapping.voxels.downsampling import thinned
-from telemetry.agent.link_messages import (
-    NOTICE_LONGEST,
-    PATH,
-    PROTOCOL_VERSION,
-    REACH_M,
-    SUBPROTOCOL,
-    Hello,
-    Notice,
-    Ping,
-    Pong,
-    RadarMessage,
-    Report,
-    Slam,
-    Uwb,
-    Welcome,
-    cloud,
-    decode_from_server,
-    encode,
-    sendable,
-)
+from telemetry.agent import link_messages as wire
 from telemetry.agent.pacing import Bandwidth, RemoteClock
 from telemetry.errors import AddressError, SensorLinkError
 
@@ -70,20 +51,6 @@ class CloudReading:
 
 
 @dataclass(frozen=True, slots=True)
-class SlamReading:
-    t_s: float
-    slam: Slam
-    """Its own ``t_s`` is not looked at."""
-
-
-@dataclass(frozen=True, slots=True)
-class UwbReading:
-    t_s: float
-    scan: Uwb
-    """Its own ``number`` and ``t_s`` are not looked at."""
-
-
-@dataclass(frozen=True, slots=True)
 class NoticeReading:
     """Words for the pilot, about the sensor itself."""
 
@@ -92,7 +59,8 @@ class NoticeReading:
     text: str
 
 
-Reading = RadarReading | CloudReading | SlamReading | UwbReading | NoticeReading
+Reading = RadarReading | CloudReading | wire.Slam | wire.Uwb | NoticeReading
+"""``Slam`` and ``Uwb`` are readings as they are sent, but for their times and numbers."""
 
 
 @dataclass(slots=True)
@@ -107,7 +75,7 @@ class AgentCounts:
     points_not_finite: int = 0
     points_out_of_reach: int = 0
     """Of clouds, left out on board: no numbers, or farther than the wire format reaches."""
-    report: Report | None = None
+    report: wire.Report | None = None
     """The ground station's newest."""
     refused_why: str = ""
     """Why the ground station last refused something."""
@@ -134,7 +102,7 @@ def sensor_url(address: str) -> tuple[str, str]:
             f'"{address}" is no ground station.', where="sensor link", advice="Write http://HOST:PORT or https://HOST."
         )
     web, socket = ("https", "wss") if secure else ("http", "ws")
-    return urlunsplit((socket, parts.netloc, PATH, "", "")), f"{web}://{parts.netloc}"
+    return urlunsplit((socket, parts.netloc, wire.PATH, "", "")), f"{web}://{parts.netloc}"
 
 
 class Agent:
@@ -187,7 +155,7 @@ class Agent:
                 self._url,
                 origin=Origin(self._origin),
                 additional_headers={"Authorization": f"Bearer {self._token}"},
-                subprotocols=[Subprotocol(SUBPROTOCOL)],
+                subprotocols=[Subprotocol(wire.SUBPROTOCOL)],
                 compression=None,
                 open_timeout=OPEN_TIMEOUT_S,
                 ssl=context,
@@ -207,7 +175,7 @@ class Agent:
             raise
 
     async def _talk(self, connection: ClientConnection) -> None:
-        await connection.send(encode(Hello(PROTOCOL_VERSION, self._name)))
+        await connection.send(wire.encode(wire.Hello(wire.PROTOCOL_VERSION, self._name)))
         self.counts.connections += 1
         try:
             async with asyncio.TaskGroup() as group:
@@ -224,16 +192,16 @@ class Agent:
     async def _listen(self, connection: ClientConnection) -> None:
         async for data in connection:
             try:
-                message = decode_from_server(data.encode() if isinstance(data, str) else data)
+                message = wire.decode_from_server(data.encode() if isinstance(data, str) else data)
             except SensorLinkError:
                 self.counts.not_understood += 1
                 continue
             match message:
-                case Welcome():
+                case wire.Welcome():
                     self._connected, self.counts.trouble = True, ""
-                case Pong(asked_s, server_s):
+                case wire.Pong(asked_s, server_s):
                     self._clock.on_answer(asked_s=asked_s, remote_s=server_s, now_s=time.monotonic())
-                case Report():
+                case wire.Report():
                     self.counts.report = message
                     self.counts.refused_why = message.text or self.counts.refused_why
         raise ConnectionClosed(connection.protocol.close_rcvd, connection.protocol.close_sent)
@@ -241,7 +209,7 @@ class Agent:
     async def _ping(self, connection: ClientConnection) -> None:
         """Often at first: nothing is sent before the ground station's clock is known."""
         for number in range(1 << 62):
-            await connection.send(encode(Ping(time.monotonic())))
+            await connection.send(wire.encode(wire.Ping(time.monotonic())))
             await asyncio.sleep(0.05 if number < 10 else PING_EVERY_S)
 
     async def _send(self, connection: ClientConnection) -> None:
@@ -261,20 +229,21 @@ class Agent:
 
     def _packed(self, reading: Reading) -> bytes:
         t_s = self._clock.remote_s(reading.t_s)
-        if isinstance(reading, SlamReading):
-            slam = reading.slam
-            return encode(Slam(t_s, slam.position_m, slam.q_wxyz, slam.tracking))
+        if isinstance(reading, wire.Slam):
+            return wire.encode(msgspec.structs.replace(reading, t_s=t_s))
         if isinstance(reading, NoticeReading):
-            return encode(Notice(reading.warning, reading.text[:NOTICE_LONGEST]))
+            return wire.encode(wire.Notice(reading.warning, reading.text[: wire.NOTICE_LONGEST]))
         number = self._number(reading)
-        if isinstance(reading, UwbReading):
-            return encode(msgspec.structs.replace(reading.scan, number=number, t_s=t_s))
+        if isinstance(reading, wire.Uwb):
+            return wire.encode(msgspec.structs.replace(reading, number=number, t_s=t_s))
         if isinstance(reading, RadarReading):
-            return encode(RadarMessage(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes()))
-        points, not_finite, out_of_reach = sendable(reading.xyz_m, REACH_M)
+            return wire.encode(
+                wire.RadarMessage(number, t_s, np.ascontiguousarray(reading.targets, dtype="<f4").tobytes())
+            )
+        points, not_finite, out_of_reach = wire.sendable(reading.xyz_m, wire.REACH_M)
         self.counts.points_not_finite += not_finite
         self.counts.points_out_of_reach += out_of_reach
-        return encode(cloud(thinned(points, self._voxel_m), number=number, t_s=t_s, voxel_m=self._voxel_m))
+        return wire.encode(wire.cloud(thinned(points, self._voxel_m), number=number, t_s=t_s, voxel_m=self._voxel_m))
 
     def _number(self, reading: Reading) -> int:
         """Counted also for what is left out, so that the ground station sees the gap."""

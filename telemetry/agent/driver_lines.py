@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading
 from telemetry.agent.link_messages import BINS_MAX, TARGET_COLUMNS, Slam, Uwb, intensity_of
 from telemetry.errors import SensorLinkError
 
@@ -137,9 +137,9 @@ def _reading(record: dict[str, Any], t_s: float) -> Reading:
         case "cloud":
             return CloudReading(t_s, _table(record["points"], 3))
         case "slam":
-            return SlamReading(t_s, _slam(record))
+            return _slam(record, t_s)
         case "uwb":
-            return UwbReading(t_s, _uwb(record))
+            return _uwb(record, t_s)
         case other:
             raise BadLineError("unknown type", f"{json.dumps(other)[:40]}; there are radar, cloud, slam and uwb.")
 
@@ -154,22 +154,22 @@ def _table(values: Any, columns: int) -> np.ndarray[Any, np.dtype[np.float32]]:
     return table
 
 
-def _slam(record: dict[str, Any]) -> Slam:
+def _slam(record: dict[str, Any], t_s: float) -> Slam:
     x, y, z = (float(value) for value in record["position_m"])
     qw, qx, qy, qz = (float(value) for value in record["q_wxyz"])
     tracking = record.get("tracking", "good")
     if tracking not in _TRACKING:
         raise ValueError(f"tracking is one of {', '.join(_TRACKING)}")
-    return Slam(0.0, (x, y, z), (qw, qx, qy, qz), tracking)
+    return Slam(t_s, (x, y, z), (qw, qx, qy, qz), tracking)
 
 
-def _uwb(record: dict[str, Any]) -> Uwb:
+def _uwb(record: dict[str, Any], t_s: float) -> Uwb:
     intensity = np.asarray(record["intensity"], dtype=np.float32)
     if intensity.ndim != 1 or len(intensity) > BINS_MAX:
         raise ValueError(f"a scan is one row of at most {BINS_MAX} numbers")
     names = ("bin_m", "first_bin_m", "beamwidth_deg", "bearing_deg")
     told = {name: float(record[name]) for name in names if name in record}
-    scan = Uwb(0, 0.0, intensity.astype("<f4").tobytes(), **told)
+    scan = Uwb(0, t_s, intensity.astype("<f4").tobytes(), **told)
     try:
         intensity_of(scan)
     except SensorLinkError as error:

@@ -7,26 +7,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, packed
-from telemetry.agent.link_messages import (
-    NOTICE_LONGEST,
-    PROTOCOL_VERSION,
-    Cloud,
-    FromAgent,
-    FromServer,
-    Hello,
-    Notice,
-    Ping,
-    Pong,
-    RadarMessage,
-    Report,
-    Slam,
-    Uwb,
-    Welcome,
-    decode_from_agent,
-    intensity_of,
-    points_of,
-    targets_of,
-)
+from telemetry.agent import link_messages as wire
 from telemetry.errors import SensorLinkError
 from telemetry.topics.messages import VehicleText
 
@@ -49,7 +30,7 @@ class Taken:
     """What one message of the agent comes to."""
 
     frame: Frame | None = None
-    answer: FromServer | None = None
+    answer: wire.FromServer | None = None
     notice: VehicleText | None = None
     """For the pilot, among what the vehicle itself says."""
 
@@ -61,7 +42,7 @@ class Intake:
         self.name = ""
         self.received = self.lost = self.late = self.refused = 0
         self._why = ""
-        self._numbers: dict[type[FromAgent], int] = {}
+        self._numbers: dict[type[wire.FromAgent], int] = {}
         self._sizes: deque[tuple[float, int]] = deque()
         self._noticed_s = -math.inf
         self._scans: deque[float] = deque(maxlen=SCANS_MOST_HZ)
@@ -74,18 +55,18 @@ class Intake:
         """
         self._sizes.append((now_mono_s, len(data)))
         try:
-            message = decode_from_agent(data)
+            message = wire.decode_from_agent(data)
         except SensorLinkError as error:
             if not self.name:
                 raise
             return self._refuse(str(error))
-        if isinstance(message, Hello):
+        if isinstance(message, wire.Hello):
             return Taken(answer=self._greet(message, now_mono_s))
         if not self.name:
             raise SensorLinkError("An agent must say hello first.", where="sensor link")
-        if isinstance(message, Ping):
-            return Taken(answer=Pong(message.t_s, now_mono_s))
-        if isinstance(message, Notice):
+        if isinstance(message, wire.Ping):
+            return Taken(answer=wire.Pong(message.t_s, now_mono_s))
+        if isinstance(message, wire.Notice):
             return Taken(notice=self._notice(message, now_mono_s, now_utc_s))
         try:
             frame = self._frame(message, now_mono_s, now_utc_s)
@@ -94,60 +75,62 @@ class Intake:
         self.received += 1
         return Taken(frame=frame)
 
-    def report(self, now_mono_s: float) -> Report:
+    def report(self, now_mono_s: float) -> wire.Report:
         while self._sizes and self._sizes[0][0] < now_mono_s - RATE_OVER_S:
             self._sizes.popleft()
         rate = sum(size for _, size in self._sizes) / RATE_OVER_S
         why, self._why = self._why, ""
-        return Report(self.received, self.lost, self.late, self.refused, rate, why)
+        return wire.Report(self.received, self.lost, self.late, self.refused, rate, why)
 
     def _refuse(self, why: str) -> Taken:
         self.refused, self._why = self.refused + 1, why
         return Taken()
 
-    def _greet(self, hello: Hello, now_mono_s: float) -> Welcome:
-        if hello.version != PROTOCOL_VERSION:
+    def _greet(self, hello: wire.Hello, now_mono_s: float) -> wire.Welcome:
+        if hello.version != wire.PROTOCOL_VERSION:
             raise SensorLinkError(
-                f"The agent speaks version {hello.version} of the sensor link, not {PROTOCOL_VERSION}.",
+                f"The agent speaks version {hello.version} of the sensor link, not {wire.PROTOCOL_VERSION}.",
                 advice="Install the same version of Hedgehop on both computers.",
             )
         if not (0 < len(hello.name) <= NAME_MAX and hello.name.isprintable()):
             raise SensorLinkError(f"An agent's name has 1 to {NAME_MAX} printable characters.", where="sensor link")
         self.name = hello.name
-        return Welcome(now_mono_s)
+        return wire.Welcome(now_mono_s)
 
-    def _notice(self, message: Notice, now_mono_s: float, now_utc_s: float) -> VehicleText | None:
+    def _notice(self, message: wire.Notice, now_mono_s: float, now_utc_s: float) -> VehicleText | None:
         """None for one that comes too soon after another: an agent must not drown what the vehicle says."""
         if now_mono_s - self._noticed_s < NOTICE_EVERY_S:
             self._refuse("Notices come too often.")
             return None
         self._noticed_s = now_mono_s
-        text = "".join(c if c.isprintable() else " " for c in message.text[:NOTICE_LONGEST])
+        text = "".join(c if c.isprintable() else " " for c in message.text[: wire.NOTICE_LONGEST])
         return VehicleText(now_utc_s, WARNING if message.warning else INFO, f"{self.name}: {text}")
 
-    def _frame(self, message: RadarMessage | Cloud | Slam | Uwb, now_mono_s: float, now_utc_s: float) -> Frame:
+    def _frame(
+        self, message: wire.RadarMessage | wire.Cloud | wire.Slam | wire.Uwb, now_mono_s: float, now_utc_s: float
+    ) -> Frame:
         age_s = now_mono_s - message.t_s
         if not -FUTURE_S <= age_s < 3600.0:
             raise SensorLinkError(f"A frame was measured {-age_s:.2f} s from now.", where=type(message).__name__)
         self.late += age_s > LATE_S
-        if isinstance(message, Slam):
+        if isinstance(message, wire.Slam):
             if not all(math.isfinite(value) for value in (*message.position_m, *message.q_wxyz)):
                 raise SensorLinkError("A pose holds what is no number.", where="slam")
             return SlamPose(message.t_s, message.position_m, message.q_wxyz, message.tracking)
-        if isinstance(message, Uwb):
+        if isinstance(message, wire.Uwb):
             return self._scan(message, now_mono_s, now_utc_s - age_s)
-        if isinstance(message, RadarMessage):
-            targets = targets_of(message)
+        if isinstance(message, wire.RadarMessage):
+            targets = wire.targets_of(message)
             self._count(message)
             xyz_m, speed, snr = packed(targets[:, :3]), packed(targets[:, 3]), packed(targets[:, 4])
             return RadarFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, speed, snr)
-        points = points_of(message)
+        points = wire.points_of(message)
         self._count(message)
         xyz_m = packed(points)
         return CloudFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, message.voxel_m)
 
-    def _scan(self, message: Uwb, now_mono_s: float, t_utc_s: float) -> UwbScan:
-        intensity = packed(intensity_of(message))
+    def _scan(self, message: wire.Uwb, now_mono_s: float, t_utc_s: float) -> UwbScan:
+        intensity = packed(wire.intensity_of(message))
         self._count(message)
         if len(self._scans) == SCANS_MOST_HZ and now_mono_s - self._scans[0] < 1.0:
             raise SensorLinkError(f"More than {SCANS_MOST_HZ} scans a second come.", where="uwb", advice="Send fewer.")
@@ -156,7 +139,7 @@ class Intake:
         lies = message.bin_m, message.first_bin_m
         return UwbScan(message.t_s, t_utc_s, message.number, self.name, intensity, *lies, *angles_rad)
 
-    def _count(self, message: RadarMessage | Cloud | Uwb) -> None:
+    def _count(self, message: wire.RadarMessage | wire.Cloud | wire.Uwb) -> None:
         """Numbers count up by one; a smaller one is an agent that began anew, or a frame out of order."""
         last = self._numbers.get(type(message))
         if last is not None and message.number > last + 1:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
+from telemetry.agent.client import CloudReading, RadarReading, Reading
 from telemetry.agent.link_messages import Slam, Uwb
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.topics.messages import Topic
@@ -32,17 +34,9 @@ def recorded_readings(path: Path) -> Iterator[tuple[float, Reading]]:
 
 def at(reading: Reading, t_s: float) -> Reading:
     """The same, measured at another time."""
-    match reading:
-        case RadarReading(_, targets, lost):
-            return RadarReading(t_s, targets, lost)
-        case CloudReading(_, xyz_m):
-            return CloudReading(t_s, xyz_m)
-        case SlamReading(_, slam):
-            return SlamReading(t_s, slam)
-        case UwbReading(_, scan):
-            return UwbReading(t_s, scan)
-        case NoticeReading(_, warning, text):
-            return NoticeReading(t_s, warning, text)
+    if isinstance(reading, Slam | Uwb):
+        return msgspec.structs.replace(reading, t_s=t_s)
+    return replace(reading, t_s=t_s)
 
 
 def _reading(message: RadarFrame | CloudFrame | SlamPose | UwbScan) -> Reading:
@@ -53,9 +47,9 @@ def _reading(message: RadarFrame | CloudFrame | SlamPose | UwbScan) -> Reading:
         case CloudFrame():
             return CloudReading(t_s, message.points_m)
         case UwbScan():
-            return UwbReading(t_s, _scan(message))
+            return _scan(message)
         case SlamPose():
-            return SlamReading(t_s, Slam(t_s, message.position_m, message.q_wxyz, message.tracking))
+            return Slam(t_s, message.position_m, message.q_wxyz, message.tracking)
 
 
 def _scan(message: UwbScan) -> Uwb:

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from mapping.geometry.polyline import along_m
 from mapping.perceiving.corridor import MissionLine
 from planning.evading.columns import REACH_UP
 from planning.evading.seen import conflicts
@@ -108,8 +109,7 @@ class Ahead:
 
 
 def _item(line: FlightLine, s_m: float) -> int:
-    ends_m = np.cumsum(np.linalg.norm(np.diff(line.points_enu, axis=0), axis=1))
-    leg = int(np.searchsorted(ends_m, s_m))
+    leg = int(np.searchsorted(along_m(line.points_enu)[1:], s_m))
     return line.leg_item[min(leg, len(line.leg_item) - 1)]
 
 

@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, rows
 from server.api import sensor_routes as sensors_door
 from server.door.sensor_token import FILE, sensor_token
-from telemetry.agent.client import Agent, CloudReading, RadarReading, SlamReading, UwbReading
+from telemetry.agent.client import Agent, CloudReading, RadarReading
 from telemetry.agent.link_messages import (
     SUBPROTOCOL,
     Hello,
@@ -77,8 +77,8 @@ async def send_all(server: Running, token: str, **options: Any) -> Agent:
             now_s = time.monotonic()
             agent.put(RadarReading(now_s, np.array([[1, 50, 0, -3, 20 + number]], np.float32)))
             agent.put(CloudReading(now_s, np.array([[0, 5, 1], [0.01, 5.01, 1.01], [3, 9, 1]], np.float32)))
-            agent.put(SlamReading(now_s, Slam(0.0, (1.0, 2.0, float(number)), (1.0, 0.0, 0.0, 0.0), "good")))
-            agent.put(UwbReading(now_s, Uwb(0, 0.0, np.full(16, number, "<f4").tobytes(), bearing_deg=90.0)))
+            agent.put(Slam(now_s, (1.0, 2.0, float(number)), (1.0, 0.0, 0.0, 0.0), "good"))
+            agent.put(Uwb(0, now_s, np.full(16, number, "<f4").tobytes(), bearing_deg=90.0))
         await until(lambda: agent.counts.report is not None and agent.counts.report.received >= 12)
         task.cancel()
     return agent

@@ -20,7 +20,7 @@ from server.library import Library
 from server.schemas import TraversabilityState, UwbLiveDoc
 from server.stations import RUNTIME_FOLDER
 from server.traversability.live_uwb import AGAIN_S, SILENT_S, LiveUwb
-from telemetry.agent.client import Agent, UwbReading
+from telemetry.agent.client import Agent
 from telemetry.agent.link_messages import Uwb
 from telemetry.bus import Bus
 from telemetry.topics.messages import Topic, VehicleText
@@ -163,7 +163,7 @@ async def scan_over_sockets(page: Station) -> None:
                 lat_deg, lon_deg = log.lat_lon_deg[k].tolist()
                 bus.publish(Topic.VEHICLE, state_of(begun_s + t_s, lat_deg, lon_deg, float(log.heading_rad[k])))
                 intensity = log.intensity[k].astype("<f4").tobytes()
-                agent.put(UwbReading(begun_s + t_s, Uwb(0, 0.0, intensity, log.geometry.bin_m)))
+                agent.put(Uwb(0, begun_s + t_s, intensity, log.geometry.bin_m))
                 await asyncio.sleep(0.02)
             while agent.counts.report is None or agent.counts.report.received < len(log.t_s):
                 await asyncio.sleep(0.02)

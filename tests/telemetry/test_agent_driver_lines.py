@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading, SlamReading, UwbReading
+from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading
 from telemetry.agent.driver_lines import HOPELESS, NOTICE_EVERY_S, BadLineError, DriverLines, reading_of
+from telemetry.agent.link_messages import Slam, Uwb
 from telemetry.errors import SensorLinkError
 
 GOOD = b'{"type": "radar", "t_s": 1, "targets": [[1, 2, 3, 4, 5]]}'
@@ -45,15 +46,15 @@ def test_lines_become_readings() -> None:
         b'{"type": "uwb", "t_s": 3, "intensity": [1, 2, 3, 4, 5, 6, 7, 8], "bin_m": 0.15, "bearing_deg": 10}',
     )
     radar, cloud, slam, uwb = driver.readings()
-    assert isinstance(uwb, UwbReading)
-    assert (uwb.t_s, uwb.scan.bin_m, uwb.scan.bearing_deg) == (3.0, 0.15, 10.0)
-    assert np.frombuffer(uwb.scan.intensity, "<f4").tolist() == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert isinstance(uwb, Uwb)
+    assert (uwb.t_s, uwb.bin_m, uwb.bearing_deg) == (3.0, 0.15, 10.0)
+    assert np.frombuffer(uwb.intensity, "<f4").tolist() == [1, 2, 3, 4, 5, 6, 7, 8]
     assert isinstance(radar, RadarReading)
     assert radar.targets.tolist() == [[1, 2, 3, 4, 5]]
     assert isinstance(cloud, CloudReading)
     assert cloud.xyz_m.shape == (0, 3)
-    assert isinstance(slam, SlamReading)
-    assert (slam.t_s, slam.slam.tracking) == (100.0, "good")
+    assert isinstance(slam, Slam)
+    assert (slam.t_s, slam.tracking) == (100.0, "good")
     assert driver.told == []
     assert driver.lines.counts.as_dict() == {"good": 4, "bad": 0, "reasons": {}, "last_bad": ""}
 
