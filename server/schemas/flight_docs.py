@@ -117,7 +117,7 @@ class LeaseDoc(Strict):
 
 class NodeDoc(Strict):
     name: str
-    state: Literal["starting", "running", "restarting", "stopped"]
+    state: Literal["starting", "running", "silent", "restarting", "stopped"]
     restarts: int = 0
     text: str = ""
 

@@ -74,8 +74,12 @@ class NodeProcess:
             async with asyncio.timeout(_END_WITHIN_S):
                 await self.ended()
         except TimeoutError:
-            self._signal(signal.SIGKILL)
+            self.kill()
             await self.ended()
+
+    def kill(self) -> None:
+        """At once: what hangs would not hear SIGTERM."""
+        self._signal(signal.SIGKILL)
 
     def _signal(self, number: signal.Signals) -> None:
         # A process that is not our child is named by its lock: without it, its number may be somebody else's by now.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any, Literal
 from planning import __version__
 from server.work.node_process import NodeProcess, bound_log
 from telemetry import nodes
+from telemetry.bus.liveness import HUNG_S, Liveness, Silence
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 from telemetry.bus.sockets import private_directory
 
@@ -23,7 +25,8 @@ _STEADY_S = 30.0
 _LOOK_EVERY_S = 0.1
 
 
-State = Literal["starting", "running", "restarting", "stopped"]
+State = Literal["starting", "running", "silent", "restarting", "stopped"]
+"""silent: it runs, but does not prove that it works; soon it is ended and started again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,22 +148,33 @@ class Supervisor:
     async def _watch(self, node: _Node, process: NodeProcess) -> bool:
         """Until the process has ended. Returns True if it had to, because it was started for something else."""
         since_s = asyncio.get_running_loop().time()
+        # Only the link must never be busy with anything for long.
+        liveness = Liveness(busy_s=HUNG_S) if node.name == "link" else Liveness()
+        hung = ""
         while not process.has_ended():
             if facts := process.facts():
-                self._note_running(node)
-                if self._is_outdated(node, facts) and await self._replace(node, process, facts):
+                silence = liveness.look(facts, time.monotonic())
+                if silence.is_hung:
+                    hung = f" after it had not answered for {silence.silent_s:.0f} s"
+                    log.error("The %s node hangs and is killed.", node.name)
+                    process.kill()
+                self._note(node, silence)
+                outdated = not silence.silent_s and self._is_outdated(node, facts)
+                if outdated and await self._replace(node, process, facts):
                     return True
             if asyncio.get_running_loop().time() - since_s > _STEADY_S:
                 node.failures = 0
             bound_log(self._runtime_dir / f"{node.name}.log")
             await asyncio.sleep(_LOOK_EVERY_S)
         code = "" if process.code is None else f" (code {process.code})"
-        node.last_end = f"The {node.name} node ended{code}"
+        node.last_end = f"The {node.name} node {'was ended' if hung else 'ended'}{hung or code}"
         log.warning("%s. Its log is %s.", node.last_end, self._runtime_dir / f"{node.name}.log")
         return False
 
-    def _note_running(self, node: _Node) -> None:
-        if node.state.state != "running":
+    def _note(self, node: _Node, silence: Silence) -> None:
+        if silence.silent_s:
+            self._tell(node, "silent", f"The {node.name} node does not answer.")
+        elif node.state.state != "running":
             self._tell(node, "running", f"{node.last_end} and was started again." if node.last_end else "")
 
     def _is_outdated(self, node: _Node, facts: NodeFacts) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Awaitable, Callable
@@ -36,8 +37,8 @@ class Bus:
     A process ends only after ``close``: Zenoh's threads are waited for.
     """
 
-    def __init__(self, session: zenoh.Session, folder: Path, name: str) -> None:
-        self.name = name
+    def __init__(self, session: zenoh.Session, runtime_dir: Path, folder: Path, name: str) -> None:
+        self.name, self.runtime_dir = name, runtime_dir
         self._session = session
         self._folder = folder
         self._last: dict[str, tuple[bytes, int]] = {}
@@ -66,7 +67,7 @@ class Bus:
                 advice="Use up to 20 letters, digits, hyphens and underscores.",
             )
         folder = socket_directory(runtime_dir)
-        return cls(await asyncio.to_thread(open_session, folder, name), folder, name)
+        return cls(await asyncio.to_thread(open_session, folder, name), runtime_dir, folder, name)
 
     async def __aenter__(self) -> Self:
         return self
@@ -126,14 +127,16 @@ class Bus:
         self._need_open()
         self._answers.append(Answers(self._session, name, handler, requests))
 
-    async def call(self, name: str, request: object, *, result: type[T], timeout_s: float = 5.0) -> T:
-        """Asks once and waits for the answer; for ``name`` to appear, if it is not there yet.
+    async def call(
+        self, name: str, request: object, *, result: type[T], timeout_s: float = 5.0, appears_s: float = math.inf
+    ) -> T:
+        """Asks once and waits for the answer; at most ``appears_s`` for ``name`` to appear, if it is not there yet.
 
         Raises the DescribedError that the handler raised; BusError when ``name`` does not appear, goes away or does
         not answer in time. A request that was cut off may have been carried out.
         """
         self._need_open()
-        return await call(self._session, name, request, result, timeout_s)
+        return await call(self._session, name, request, result, timeout_s, appears_s)
 
     def _need_open(self) -> None:
         if self._closed:

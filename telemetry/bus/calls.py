@@ -79,10 +79,13 @@ class Answers:
             return encode_failure(error_info(_unforeseen(self._name)))
 
 
-async def call(session: zenoh.Session, name: str, request: object, result: type[T], timeout_s: float) -> T:
+async def call(
+    session: zenoh.Session, name: str, request: object, result: type[T], timeout_s: float, appears_s: float
+) -> T:
     """See ``Bus.call``."""
     loop = asyncio.get_running_loop()
     deadline_s = loop.time() + timeout_s
+    appears_by_s = loop.time() + min(appears_s, timeout_s)
     payload = encode_request(request)
     querier = session.declare_querier(
         _CALLS + name,
@@ -95,6 +98,8 @@ async def call(session: zenoh.Session, name: str, request: object, result: type[
         async with asyncio.timeout_at(deadline_s):
             # Asking before somebody is there to answer would mean asking again, and so perhaps twice.
             while not _is_there(querier):
+                if loop.time() > appears_by_s:
+                    raise TimeoutError
                 await asyncio.sleep(_LOOK_EVERY_S)
             return decode_answer(await _ask(querier, name, payload), result)
     except TimeoutError:
@@ -149,4 +154,7 @@ def _silent(name: str, timeout_s: float, *, there: bool) -> BusError:
             f"{name} did not answer within {timeout_s:g} s.",
             advice="What was asked may still be done: look before you repeat.",
         )
-    return BusError(f"{name} is not running.", advice="It is started again if it ended; try again in some seconds.")
+    return BusError(
+        f"{name} is not running.",
+        advice="It is started again if it ended; try again in some seconds. Until then: the transmitter.",
+    )

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
 from typing import Any, overload
 
 from telemetry.bus import Bus
+from telemetry.bus.liveness import Liveness
+from telemetry.bus.node_lock import running_node
+from telemetry.errors import BusError
 from telemetry.topics.messages import OnboardMission, UploadReport
-from telemetry.topics.requests import Download, LinkRequest, ReadParameters, StartAuto, StartGuided, Upload
+from telemetry.topics.requests import Connect, Download, LinkRequest, ReadParameters, StartAuto, StartGuided, Upload
 
 NAME = "link"
 COMMAND_S = 30.0
@@ -15,6 +20,10 @@ START_S = 90.0
 """Modes, arming and take-off, one after the other."""
 DOWNLOAD_S = 180.0
 UPLOAD_S, UPLOAD_PER_ITEM_S = 240.0, 5.0
+APPEARS_S = 0.5
+"""A link node that is there is found by then; only ``Connect`` waits for one that is being started."""
+HUNG_S, LOOK_EVERY_S = 0.9, 0.1
+TRANSMITTER = "Take the transmitter if the vehicle must act now."
 _ANSWERS: dict[type, Any] = {
     Upload: UploadReport,
     Download: OnboardMission,
@@ -25,6 +34,7 @@ _ANSWERS: dict[type, Any] = {
 class LinkClient:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
+        self._liveness = Liveness(hung_s=HUNG_S, busy_s=HUNG_S)
 
     @overload
     async def call(self, request: Upload) -> UploadReport: ...
@@ -36,8 +46,28 @@ class LinkClient:
     async def call(self, request: LinkRequest) -> Any: ...
     async def call(self, request: LinkRequest) -> Any:
         """Raises what the link raised; BusError when the node is not there or died over it."""
-        answer = _ANSWERS.get(type(request), type(None))
-        return await self._bus.call(NAME, request, result=answer, timeout_s=_patience_s(request))
+        answer, appears_s = _ANSWERS.get(type(request), type(None)), APPEARS_S
+        if isinstance(request, Connect):
+            appears_s = COMMAND_S
+        asking = asyncio.ensure_future(
+            self._bus.call(NAME, request, result=answer, timeout_s=_patience_s(request), appears_s=appears_s)
+        )
+        try:
+            while not asking.done():
+                await asyncio.wait((asking,), timeout=LOOK_EVERY_S)
+                self._check_alive(asking)
+            return asking.result()
+        finally:
+            asking.cancel()
+
+    def _check_alive(self, asking: asyncio.Future[Any]) -> None:
+        """A node that hangs answers nothing for as long as anybody waits."""
+        facts = None if asking.done() else running_node(self._bus.runtime_dir, NAME)
+        if facts is not None and self._liveness.look(facts, time.monotonic()).is_hung:
+            raise BusError(
+                "The link does not answer. It is ended and started again.",
+                advice=f"{TRANSMITTER} What was asked may still be done: look before you repeat.",
+            )
 
 
 def _patience_s(request: LinkRequest) -> float:

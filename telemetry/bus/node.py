@@ -47,8 +47,10 @@ class NodeContext:
         """Until there has been no server for a minute.
 
         ``heard_t_mono_s``: when the vehicle was last heard of whose flight this node goes on for, even so; not for one
-        that nobody has heard of for long. None: there is no such flight.
+        that nobody has heard of for long. None: there is no such flight. Who asks proves that the node does its work:
+        one that has not asked for some seconds is ended and started anew.
         """
+        self._lock.prove_alive()
         if self.unattended_s() < UNATTENDED_S:
             return True
         return heard_t_mono_s is not None and time.monotonic() - heard_t_mono_s < GIVEN_UP_S

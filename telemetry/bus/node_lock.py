@@ -7,7 +7,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -29,6 +29,8 @@ class NodeFacts:
     version: str
     replaceable: bool
     """May be ended without asking anybody. A link node is not, while its vehicle is armed."""
+    proved_t_mono_s: float = field(default=0.0, compare=False)
+    """When it last proved that it does its work, on the clock that all processes here share."""
 
 
 def running_node(runtime_dir: Path, name: str) -> NodeFacts | None:
@@ -74,6 +76,11 @@ class NodeLock:
         # The file stays: whoever opened it before it was removed would hold a lock that nobody sees.
         os.close(self._fd)
 
+    def prove_alive(self) -> None:
+        """Called by the node's own work, twice a second. Kept as the file's time: there is nothing to write or tear."""
+        now_ns = time.monotonic_ns()
+        os.utime(self._fd, ns=(now_ns, now_ns))
+
     def set_replaceable(self, replaceable: bool) -> None:
         if replaceable != self._facts.replaceable:
             self._facts = replace(self._facts, replaceable=replaceable)
@@ -93,6 +100,7 @@ class NodeLock:
         text = json.dumps(asdict(self._facts)).encode() + b"\n"
         os.pwrite(self._fd, text, 0)
         os.ftruncate(self._fd, len(text))
+        self.prove_alive()
 
 
 def _take(fd: int, kind: int) -> bool:
@@ -113,6 +121,7 @@ def _read(fd: int) -> NodeFacts | None:
             arguments=tuple(str(argument) for argument in found["arguments"]),
             version=str(found["version"]),
             replaceable=bool(found["replaceable"]),
+            proved_t_mono_s=os.fstat(fd).st_mtime_ns / 1e9,
         )
     except (ValueError, KeyError, TypeError):
         return None

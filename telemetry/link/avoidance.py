@@ -41,6 +41,12 @@ class Avoidance:
         return self._avoiding.is_engaged
 
     @property
+    def avoids_by(self) -> AvoidBy | None:
+        """None: it is off, or the pilot has taken over."""
+        avoiding = self._avoiding
+        return avoiding.by if avoiding.enabled and not avoiding.released else None
+
+    @property
     def status(self) -> AvoidanceStatus:
         return self._avoiding.status
 

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
+from operator import attrgetter
 from typing import Any
 
 from telemetry.errors import NotAllowedError, NoVehicleError
@@ -25,7 +26,7 @@ from telemetry.mavlink.connections import Peer
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.mavlink.ranges import RangeReader
 from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Published, Topic
-from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.tracks import TracksStatus
 
 TICK_S = 0.05
@@ -57,6 +58,8 @@ class Link:
         self._told_flight: FlightStatus | None = None
         self._told_avoidance: AvoidanceStatus | None = None
         self._settings: PerceptionSettings | None = None
+        self._again: tuple[Candidate, AvoidBy] | None = None
+        """The vehicle for which avoidance was on when the node before this one ended."""
         self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell)
         self._ranges = RangeReader()
 
@@ -93,6 +96,20 @@ class Link:
         line = self.lines[candidate.address]
         self.session = Session(candidate, line, self._around, self._ranges, self._settings)
         self.session.begin()
+        again, self._again = self._again, None
+        if again is not None and _is_same(again[0], candidate):
+            self.session.avoid_again(again[1])
+
+    @property
+    def avoids_by(self) -> AvoidBy | None:
+        """Of the adopted vehicle; of the one before this node's start until it is heard again."""
+        if self.session is None:
+            return None if self._again is None else self._again[1]
+        return self.session.pilot.avoidance.avoids_by
+
+    def avoid_again(self, vehicle: Candidate, by: AvoidBy) -> None:
+        """As soon as this vehicle is heard again: it was on when the node before this one ended."""
+        self._again = (vehicle, by)
 
     def release(self, *, forget_wish: bool = True) -> None:
         if self.session is not None:
@@ -238,6 +255,12 @@ class Link:
         self.release()
         for task in self._own_tasks:
             task.cancel()
+
+
+def _is_same(before: Candidate, now: Candidate) -> bool:
+    """Whatever port it sends from now."""
+    parts = attrgetter("address", "system_id", "component_id")
+    return parts(before) == parts(now)
 
 
 @contextlib.asynccontextmanager

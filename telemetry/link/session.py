@@ -24,12 +24,15 @@ from telemetry.mavlink.actions import Message
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.mavlink.ranges import RangeReader
 from telemetry.topics.messages import Candidate, Published, RawFrame, Topic, VehicleText
-from telemetry.topics.obstacles import PerceptionSettings
+from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
 
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
 ALERT = 1
 """MAV_SEVERITY"""
+AVOIDS_AGAIN = (
+    "The link has restarted: nothing avoided obstacles meanwhile. Avoidance is on again. Look where the vehicle is."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,12 @@ class Session:
         self.vehicle.send_first()
         self._around.changed()
         self._read_back()
+
+    def avoid_again(self, by: AvoidBy) -> None:
+        """It was on, with its operator's consent, when the link before this one ended."""
+        self.pilot.avoidance.enable(by)
+        self._on_text(ALERT, AVOIDS_AGAIN)
+        self._around.spawn(self._around.commands.record(AUTOPILOT, "avoidance on again", must=False))
 
     def close(self) -> None:
         self._is_over = True

@@ -22,8 +22,8 @@ from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.audit import AuditLog
 from telemetry.link.link import Link, open_link
 from telemetry.topics.messages import Candidate, FlightStatus, Topic
-from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus
-from telemetry.topics.requests import LinkRequest
+from telemetry.topics.obstacles import AvoidBy, PerceptionSettings, PerceptionStatus
+from telemetry.topics.requests import LinkRequest, SetAvoidance
 from telemetry.topics.tracks import TracksStatus
 
 PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
@@ -46,6 +46,8 @@ class Memory:
     adopted: Candidate | None = None
     flight: FlightStatus = field(default_factory=FlightStatus)
     highest_token: int = 0
+    avoid_by: AvoidBy | None = None
+    """Avoidance is on for the adopted vehicle, its operator has consented; None: off, or its pilot has taken over."""
 
 
 def read_memory(file: Path) -> Memory:
@@ -83,11 +85,20 @@ class LinkNode:
                 await self._link.connect(address, adopt=True)
         self._memory, self._expected = memory, adopted is not None
         self._link.flight.take_up(memory.flight)
+        if adopted is not None and memory.avoid_by is not None:
+            self._link.avoid_again(adopted, memory.avoid_by)
 
     async def run(self) -> None:
         """Until nobody needs it any more: no server for a minute, and no armed vehicle that can be heard."""
+        remembering = self._link.spawn(self._keep_remembering())
         while self._is_needed():
-            await self._remember()
+            await asyncio.sleep(LOOK_EVERY_S)
+        remembering.cancel()
+
+    async def _keep_remembering(self) -> None:
+        """Beside what proves that the node is alive: a slow disk holds up no more than this."""
+        while True:
+            await self.remember()
             await asyncio.sleep(LOOK_EVERY_S)
 
     def _is_needed(self) -> bool:
@@ -111,13 +122,13 @@ class LinkNode:
         """The vehicle of the node before this one has not been heard yet; it may be flying."""
         return self._expected and time.monotonic() - self._started_s < FIND_AGAIN_S
 
-    async def _remember(self) -> None:
+    async def remember(self) -> None:
         link = self._link
         wanted = tuple(Wanted(address, link.peers.adopts_first_of(address)) for address in link.lines)
         adopted = link.peers.adopted
         if adopted is None and self._is_expected:
             adopted = self._memory.adopted
-        memory = Memory(wanted, adopted, link.flight.status, self._right.highest)
+        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.avoids_by)
         if memory != self._memory:
             self._memory = memory
             await asyncio.to_thread(write_memory, self._file, memory)
@@ -133,7 +144,15 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
         async with open_link(bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log) as link:
             node = LinkNode(link, right, context, file)
             await node.take_up(memory, links)
-            await bus.serve("link", Answering(link, right).answer, LinkRequest)
+            answering = Answering(link, right)
+
+            async def answer(request: LinkRequest) -> object:
+                answered = await answering.answer(request)
+                if isinstance(request, SetAvoidance):
+                    await node.remember()  # what protects the vehicle outlives this node from now on
+                return answered
+
+            await bus.serve("link", answer, LinkRequest)
             for topic in (*PERCEPTION, Topic.TRACKS, Topic.PERCEPTION_SETTINGS):
                 link.spawn(_listen(bus, link, topic))
             await node.run()

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from telemetry.bus import Bus
-from telemetry.bus.node import NodeContext, run_node
+from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.mend import mend
 from telemetry.recording.recorder import Recorder
@@ -68,9 +68,23 @@ class RecorderNode:
             subscription.close()
 
     async def _work(self) -> None:
-        while self._context.is_needed(self._heard_mono_s if self._recorder.recording else None):
+        """A disk that takes its time holds up what is written, not this: the node is alive all the same."""
+        writing = asyncio.ensure_future(self._keep_writing())
+        try:
+            while self._context.is_needed(self._heard_mono_s if self._recorder.recording else None):
+                self._context.set_replaceable(not self._recorder.recording)
+                await asyncio.wait((writing,), timeout=LOOK_EVERY_S)
+                if writing.done():
+                    break
+        finally:
+            writing.cancel()
+            await asyncio.wait((writing,))
+        if not writing.cancelled():
+            writing.result()
+
+    async def _keep_writing(self) -> None:
+        while True:
             await self._write()
-            self._context.set_replaceable(not self._recorder.recording)
             await asyncio.sleep(WORK_EVERY_S)
 
     async def _write(self) -> None:

@@ -47,7 +47,7 @@ async def fly_supervised(bus: Bus, context: NodeContext, options: SimOptions) ->
         pilot = simulator.vehicle.autopilot
         telling = asyncio.ensure_future(_tell_truth(bus, simulator))
         try:
-            while (pilot.armed or context.is_needed()) and not telling.done():
+            while (context.is_needed() or pilot.armed) and not telling.done():
                 context.set_replaceable(not pilot.armed)
                 await asyncio.wait((telling,), timeout=LOOK_EVERY_S)
         finally:

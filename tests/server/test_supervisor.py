@@ -13,6 +13,7 @@ import pytest
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
+from telemetry.bus.liveness import HUNG_S
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +33,11 @@ async def main(bus, context):
     if "--deaf" in sys.argv:
         asyncio.get_running_loop().remove_signal_handler(signal.SIGTERM)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    await asyncio.Event().wait()
+    if "--busy" in sys.argv:
+        while True:
+            pass
+    while context.is_needed():
+        await asyncio.sleep(0.1)
 
 sys.exit(run_node(Path(__file__).stem, Path(sys.argv[2]), main))
 """
@@ -274,3 +279,39 @@ def test_a_log_keeps_its_newest_part(tmp_path: Path) -> None:
     assert len(content) <= LOG_BYTES // 2 + 20
     assert content.startswith(b"a line")
     assert content.endswith(b"\nthe last line\n")
+
+
+@pytest.mark.parametrize("how", ["stopped", "busy"])
+def test_a_link_that_hangs_is_said_then_killed_and_started_again(folder: Path, how: str) -> None:
+    async def whole() -> None:
+        async with supervised(folder) as watched:
+            since_s = time.monotonic()
+            await watched.supervisor.start("link", ["--busy"] if how == "busy" else [])
+            if how == "stopped":
+                os.kill((await watched.running("link")).pid, signal.SIGSTOP)
+            await until(lambda: (s := watched.state("link")) is not None and s.state == "silent")
+            first = running_node(folder, "link")
+            again = await watched.running("link", restarts=1)
+            assert first is not None
+            assert again.pid != first.pid
+            assert time.monotonic() - since_s >= HUNG_S
+            state = watched.state("link")
+            assert state is not None
+            assert "was ended after it had not answered for 3 s and was started again" in state.text
+            await watched.supervisor.stop("link")
+
+    run(whole)
+
+
+def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path) -> None:
+    async def whole() -> None:
+        async with supervised(folder) as watched:
+            await watched.supervisor.start("link", [])
+            facts = await watched.running("link")
+            os.kill(facts.pid, signal.SIGSTOP)
+            await until(lambda: (s := watched.state("link")) is not None and s.state == "silent")
+            os.kill(facts.pid, signal.SIGCONT)
+            assert (await watched.running("link")).pid == facts.pid
+            await watched.supervisor.stop("link")
+
+    run(whole)

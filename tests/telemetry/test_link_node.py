@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -17,13 +18,15 @@ from typing import Any
 import pytest
 
 from telemetry.bus import Bus
-from telemetry.bus.link_client import LinkClient
+from telemetry.bus.link_client import COMMAND_S, LinkClient
 from telemetry.bus.node_lock import running_node
-from telemetry.errors import AddressError, MissionUnknownError, NoVehicleError
+from telemetry.errors import AddressError, BusError, MissionUnknownError, NoVehicleError
 from telemetry.link.audit import check_chain
+from telemetry.link.session import AVOIDS_AGAIN
 from telemetry.simulation.simulator.run import SimOptions, flying
-from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic
-from telemetry.topics.requests import Arm, Connect, Operator, ReadParameters, StartAuto, Upload
+from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic, VehicleText
+from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.requests import Arm, Connect, Operator, Pause, ReadParameters, SetAvoidance, StartAuto, Upload
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import ROOT, run
 from tests.telemetry.link_bench import free_port, until
@@ -39,6 +42,7 @@ class Node:
         self.folder, self.runtime = folder, folder / "run"
         self._processes: list[subprocess.Popen[bytes]] = []
         self.last: dict[type, Any] = {}
+        self.texts: list[str] = []
 
     def start(self, *arguments: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "telemetry.nodes.link", "--runtime", str(self.runtime), *arguments]
@@ -63,9 +67,15 @@ class Node:
     def flight(self) -> FlightStatus:
         return self.last.get(FlightStatus, FlightStatus())
 
+    @property
+    def avoidance(self) -> AvoidanceStatus:
+        return self.last.get(AvoidanceStatus, AvoidanceStatus())
+
     async def listen(self, bus: Bus) -> None:
         async for _, message in bus.subscribe("**", keep_all=True):
             self.last[type(message)] = message
+            if isinstance(message, VehicleText):
+                self.texts.append(message.text)
 
 
 async def stand_for_a_server(bus: Bus) -> None:
@@ -119,6 +129,7 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
                 await client.call(StartAuto(ME, "another"))
             await client.call(StartAuto(ME, report.onboard.digest))
             await until(lambda: node.flight.phase == "flying")
+            await client.call(SetAvoidance(ME, enabled=True, by="sidestep"))
             facts = running_node(node.runtime, "link")
             assert facts is not None
             assert not facts.replaceable
@@ -132,6 +143,9 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             assert node.status.mission_digest == report.onboard.digest
             assert node.flight.since_utc_s == since
             assert (node.status.adopted and node.status.adopted.system_id) == 1
+            await until(lambda: node.avoidance.enabled)
+            assert node.avoidance.by == "sidestep"
+            await until(lambda: AVOIDS_AGAIN in node.texts)
             simulator.options = replace(simulator.options, speedup=15.0)
             await until(lambda: node.flight.phase == "landed")
             await until(lambda: (facts := running_node(node.runtime, "link")) is not None and facts.replaceable)
@@ -140,6 +154,30 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             assert check_chain(audit.read_bytes()) is None
             words = [json.loads(line)["words"] for line in audit.read_bytes().splitlines()]
             assert words[0] == "upload 8 items"
-            assert words[-1] == f"start mission {report.onboard.digest[:12]} at item 1"
+            assert words[-3:] == [
+                f"start mission {report.onboard.digest[:12]} at item 1",
+                "avoidance on by sidestep",
+                "avoidance on again",
+            ]
+
+    run(whole)
+
+
+def test_a_command_to_a_link_that_hangs_or_is_gone_fails_soon_and_says_so(tmp_path: Path) -> None:
+    async def whole() -> None:
+        async with station(tmp_path) as (node, client):
+            began_s = time.monotonic()
+            with pytest.raises(BusError, match="link is not running"):
+                await client.call(Pause(ME))
+            gone_s = time.monotonic() - began_s
+            process = node.start()
+            await client.call(Connect(ME, f"udpin:127.0.0.1:{free_port()}"))
+            os.kill(process.pid, signal.SIGSTOP)
+            began_s = time.monotonic()
+            with pytest.raises(BusError, match="does not answer") as told:
+                await client.call(Pause(ME))
+            assert "transmitter" in (told.value.advice or "")
+            assert gone_s < COMMAND_S / 3
+            assert time.monotonic() - began_s < COMMAND_S / 3
 
     run(whole)

@@ -12,6 +12,7 @@ FULL = Memory(
     Candidate("id", "udpin:0.0.0.0:14550", "10.0.0.2:4000", 1, 1, "ardupilot", 2),
     FlightStatus("auto", "flying", 3, 88, 1.7e9),
     highest_token=1_795_000_000_000,
+    avoid_by="sidestep",
 )
 
 
