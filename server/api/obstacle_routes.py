@@ -16,6 +16,7 @@ from server.schemas import (
     PlanState,
     PlanWithSeen,
     RadarTargetsDoc,
+    SectionAsked,
     SectionDoc,
     SetAvoidanceBody,
     Source,
@@ -81,15 +82,9 @@ async def plan_with_seen(body: PlanWithSeen, operator: InCharge, flying: Fly) ->
 
 
 @router.get("/section", response_model=SectionDoc)
-async def section(
-    flying: Fly,
-    source: Annotated[Source, Query()] = "live",
-    across: Annotated[bool, Query()] = False,
-    thickness_m: Annotated[float, Query(ge=0.1, le=50)] = 4.0,
-    reach_m: Annotated[float, Query(ge=5, le=200)] = 40.0,
-) -> Response:
+async def section(flying: Fly, asked: Annotated[SectionAsked, Query()]) -> Response:
     """A vertical slice through the maps where the vehicle is, or was at the replay's time."""
-    return answer(await flying.obstacles.section(source, across, thickness_m, reach_m))
+    return answer(await flying.obstacles.section(asked))
 
 
 @router.get("/targets", response_model=RadarTargetsDoc)

@@ -9,16 +9,18 @@ from typer import Option
 
 from server.app import run
 from server.cli.shared.command import command
-from server.settings import load_settings
+from server.settings import Settings, load_settings
 from telemetry.topics.vehicle import RadarKind
+
+_USUAL = Settings.model_fields
 
 
 @command
 def serve(
     *,
     demo: Annotated[bool, Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
-    host: Annotated[str | None, Option(help="Address to listen on; default 127.0.0.1.")] = None,
-    port: Annotated[int | None, Option(help="Port; default 8000.")] = None,
+    host: Annotated[str | None, Option(help=f"Address to listen on; default {_USUAL['host'].default}.")] = None,
+    port: Annotated[int | None, Option(help=f"Port; default {_USUAL['port'].default}.")] = None,
     demo_world: Annotated[
         bool | None,
         Option("--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."),

@@ -20,7 +20,9 @@ from server.cli.shared.command import Without, command
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.output import say_notes
 from server.cli.shared.planning_run import request_of, run, vehicle_of
+from server.schemas.plan_docs import SurveyDoc
 
+_SURVEY = SurveyDoc()
 _DEFAULTS = o.PlanOptions(vehicle=o.PlannedVehicle(profile="mapper-rtk"))
 
 
@@ -29,10 +31,12 @@ class PatternOptions:
     """The lines over the area."""
 
     PANEL: ClassVar = "Pattern"
-    gsd_cm: Annotated[float | None, Option(help="Ground sampling distance; sets the height. Default 1 cm.")] = None
+    gsd_cm: Annotated[
+        float | None, Option(help=f"Ground sampling distance; sets the height. Default {_SURVEY.gsd_cm:g} cm.")
+    ] = None
     height_m: Annotated[float | None, Option(help="Height above the surface instead.")] = None
-    side_overlap: Annotated[float, Option(help="Share between lines.")] = 0.7
-    front_overlap: Annotated[float, Option(help="Share between photos.")] = 0.8
+    side_overlap: Annotated[float, Option(help="Share between lines.")] = _SURVEY.side_overlap
+    front_overlap: Annotated[float, Option(help="Share between photos.")] = _SURVEY.front_overlap
     angle_deg: Annotated[
         float | None, Option(help="Direction of the lines from grid north; default: fewest turns.")
     ] = None
@@ -65,7 +69,7 @@ def survey(
             corners,
             model,
             camera=camera,
-            gsd_cm=1.0 if pattern.gsd_cm is None and pattern.height_m is None else pattern.gsd_cm,
+            gsd_cm=_SURVEY.gsd_cm if pattern.gsd_cm is None and pattern.height_m is None else pattern.gsd_cm,
             height_m=pattern.height_m,
             side_overlap=pattern.side_overlap,
             front_overlap=pattern.front_overlap,

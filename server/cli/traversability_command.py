@@ -16,6 +16,7 @@ from mapping.uwb import Cleared, Rule, UwbParams, in_words, of_rule
 from planning.errors import ParameterError
 from planning.ground.landing_sites import CAUTION, LandingSites
 from planning.ground.traversable import (
+    FINEST_M,
     TraversableGround,
     UwbScans,
     cleared_ground,
@@ -29,11 +30,12 @@ from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.files_in_out import check_directory, write_files
 from server.cli.shared.output import answer, end_progress, progress
 from server.cli.shared.terrain_given import read_model
+from server.schemas.traversability_docs import LandingSitesBody
 from server.work.clocks import StepTimer
 from telemetry.perception.uwb_drive import read_scans
 
 Layers = dict[str, F32]
-_UWB = UwbParams()
+_UWB, _SITES = UwbParams(), LandingSitesBody.model_fields
 
 WORK_STEP, RADAR_STEP = "Working out slope and roughness", "Clearing foliage"
 
@@ -67,10 +69,10 @@ def traversability(
     ] = None,
     rotor_span_m: Annotated[
         float, Option("--rotor-span-m", "--rotor-span", help="Across all rotors; sites keep twice as much away.")
-    ] = 0.8,
-    radius_m: Annotated[float, Option(help="So far from the point sites are looked for.")] = 150.0,
+    ] = _SITES["rotor_span_m"].default,
+    radius_m: Annotated[float, Option(help="So far from the point sites are looked for.")] = _SITES["radius_m"].default,
     resolution_m: Annotated[
-        float | None, Option(help="Of the map; default: 0.3, or the model's own if coarser.")
+        float | None, Option(help=f"Of the map; default: {FINEST_M:g}, or the model's own if coarser.")
     ] = None,
     as_json: o.AsJson = False,
     how: Annotated[o.ModelOptions, Without("max_hole_m2")],

@@ -8,11 +8,10 @@ from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError
 from server.flying.check_task import Checked
 from server.schemas import CheckRow, PreflightDoc, StartFlight
+from server.schemas.flight_docs import CHECK_FRESH_S
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.vehicle import VehicleState
 
-FRESH_S = 120.0
-"""Long enough to read the check and to hold the button; the vehicle must not have moved meanwhile."""
 MOVED_M, ROSE_M = 3.0, 2.0
 """More than a standing receiver and barometer wander in that time."""
 _AGAIN = "Press Check again."
@@ -55,7 +54,7 @@ def check_start(
     """The check that allows this start. Raises CheckNeededError with the first reason why there is none."""
     if ready is None or ready.digest != body.digest:
         raise CheckNeededError("This mission has not been checked before the start.", advice="Press Check first.")
-    if now_mono_s - ready.checked_mono_s > FRESH_S:
+    if now_mono_s - ready.checked_mono_s > CHECK_FRESH_S:
         raise CheckNeededError(f"The check is {now_mono_s - ready.checked_mono_s:.0f} s old.", advice=_AGAIN)
     if _has_moved(ready.state, state):
         raise CheckNeededError("The vehicle was moved after the check.", advice=_AGAIN)

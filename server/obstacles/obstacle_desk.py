@@ -28,6 +28,7 @@ from server.schemas import (
     PlanState,
     PlanWithSeen,
     RadarTargetsDoc,
+    SectionAsked,
     SectionDoc,
     SetAvoidanceBody,
     Source,
@@ -164,11 +165,9 @@ class ObstacleDesk:
             maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
 
-    async def section(self, source: Source, across: bool, thickness_m: float, reach_m: float) -> SectionDoc:
+    async def section(self, asked: SectionAsked) -> SectionDoc:
         """Through the maps as they are now."""
-        return await asyncio.to_thread(
-            self._looking.section, source, across=across, thickness_m=thickness_m, reach_m=reach_m
-        )
+        return await asyncio.to_thread(self._looking.section, asked)
 
     async def targets(self, source: Source) -> RadarTargetsDoc:
         return self._looking.targets(source)

@@ -15,7 +15,7 @@ from mapping.geometry.arrays import F64
 from mapping.sensor_frames import rows
 from server.obstacles.obstacle_watch import Watch
 from server.scene.mirror import Voxels
-from server.schemas import RadarTargetsDoc, SectionDoc, SectionMap, Source
+from server.schemas import RadarTargetsDoc, SectionAsked, SectionDoc, SectionMap, Source
 from telemetry.topics.obstacles import MAP_NAMES, MapOrigin, PerceptionStatus
 
 MOST_CELLS = 4_000
@@ -35,15 +35,15 @@ class Looking:
     def __init__(self, watches: Mapping[Source, Watch], grounds: Grounds | None) -> None:
         self._watches, self._grounds = watches, grounds
 
-    def section(self, source: Source, *, across: bool, thickness_m: float, reach_m: float) -> SectionDoc:
+    def section(self, asked: SectionAsked) -> SectionDoc:
         """Where the vehicle is, or was at the replay's time. Takes milliseconds: for a thread."""
-        watch = self._watches[source]
-        found = SectionDoc(across=across, thickness_m=thickness_m, reach_m=reach_m)
+        watch, thickness_m, reach_m = self._watches[asked.source], asked.thickness_m, asked.reach_m
+        found = SectionDoc(across=asked.across, thickness_m=thickness_m, reach_m=reach_m)
         status = placed_status(list(watch.statuses.values()))
         if status is None or status.region is None or status.origin is None:
             return found.model_copy(update={"text": "No sensor tells where the vehicle is."})
         at, heading_rad = np.array(status.region.enu_m), status.region.heading_rad
-        axis = level_axis(heading_rad + (math.pi / 2 if across else 0.0))
+        axis = level_axis(heading_rad + (math.pi / 2 if asked.across else 0.0))
         maps = [watch.mirrors[name].voxels() for name in MAP_NAMES if watch.mirrors[name].origin == status.origin]
         s_m, up_m = self._ground(status.origin, at, axis, reach_m)
         return found.model_copy(

@@ -67,6 +67,10 @@ class CheckRow(Strict):
     mend: str = ""
 
 
+CHECK_FRESH_S = 120.0
+"""Long enough to read the check and to hold the button; the vehicle must not have moved meanwhile."""
+
+
 class PreflightDoc(Strict):
     """The check before the start, on what was read back and where the vehicle really stands."""
 

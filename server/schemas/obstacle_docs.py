@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.schemas.strict_model import Strict
+from server.schemas.flight_docs import Source
+from server.schemas.strict_model import Asked, Strict
 from telemetry.topics.obstacles import AvoidanceStatus, MapName, ObstacleAlert, PerceptionSettings
 
 SensorName = Literal["radar", "vision", "ranges"]
@@ -136,7 +137,17 @@ class RadarTargetsDoc(Strict):
     farthest_m: float = 0.0
 
 
-# Bodies of requests
+# Bodies and queries of requests
+
+
+class SectionAsked(Strict):
+    """A vertical slice that is asked for."""
+
+    source: Source = "live"
+    across: bool = False
+    """Of the vehicle's heading; else along it."""
+    thickness_m: Annotated[float, Field(ge=0.1, le=50), Asked(min=0.5)] = 4.0
+    reach_m: Annotated[float, Field(ge=5, le=200), Asked(10, 150, initial=25)] = 40.0
 
 
 class SetAvoidanceBody(Strict):

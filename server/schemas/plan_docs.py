@@ -6,7 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from server.schemas.strict_model import Latitude, Longitude, Metres, Name, Strict
+from planning.limits import FEWEST_ITEMS
+from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
+from planning.route.camera import LOOKS_DOWN_DEG
+from server.schemas.strict_model import Asked, Latitude, Longitude, Metres, Name, Strict
+
+Speed = Annotated[Metres, Asked(0.1, 50)]
+Overlap = Annotated[float, Field(ge=0, lt=0.95), Asked(0, 0.94)]
+_VEHICLE, _SURFACE, _PATH, _MISSION = VehicleProfile(""), SurfaceParams(), PathParams(), MissionParams()
 
 
 class PoiDoc(Strict):
@@ -24,75 +31,81 @@ class PlaceDoc(Strict):
 
 class SurveyDoc(Strict):
     polygon: list[PlaceDoc] = Field(default=[], max_length=200)
-    gsd_cm: Annotated[float, Field(gt=0, le=100)] = 1.0
-    side_overlap: Annotated[float, Field(ge=0, lt=0.95)] = 0.7
-    front_overlap: Annotated[float, Field(ge=0, lt=0.95)] = 0.8
-    angle_deg: Annotated[float, Field(ge=0, lt=180)] | None = None
+    gsd_cm: Annotated[float, Field(gt=0, le=100), Asked(min=0.05)] = 1.0
+    side_overlap: Overlap = 0.7
+    front_overlap: Overlap = 0.8
+    angle_deg: Annotated[float, Field(ge=0, lt=180), Asked(0, 179, initial=0)] | None = None
 
 
 class CameraDoc(Strict):
-    image_width_px: Annotated[int, Field(gt=0, le=100_000)]
-    image_height_px: Annotated[int, Field(gt=0, le=100_000)]
-    focal_mm: Annotated[float, Field(gt=0, le=1000)]
-    sensor_width_mm: Annotated[float, Field(gt=0, le=200)]
-    sensor_height_mm: Annotated[float, Field(gt=0, le=200)]
+    image_width_px: Annotated[int, Field(gt=0, le=100_000), Asked(min=1)]
+    image_height_px: Annotated[int, Field(gt=0, le=100_000), Asked(min=1)]
+    focal_mm: Annotated[float, Field(gt=0, le=1000), Asked(min=0.1)]
+    sensor_width_mm: Annotated[float, Field(gt=0, le=200), Asked(min=0.1)]
+    sensor_height_mm: Annotated[float, Field(gt=0, le=200), Asked(min=0.1)]
+
+
+USUAL_CAMERA = CameraDoc(
+    image_width_px=4000, image_height_px=3000, focal_mm=8.8, sensor_width_mm=13.2, sensor_height_mm=8.8
+)
+"""Of a vehicle that is given one: what the console begins with."""
 
 
 class ProfileDoc(Strict):
     """A vehicle profile; the same fields as ``planning.model.VehicleProfile``."""
 
     name: Name
-    firmware: Literal["ardupilot", "px4"] = "ardupilot"
-    radius_m: Metres = 0.35
-    mean_speed_m_s: Metres = 3.0
-    max_speed_m_s: Metres = 5.0
-    max_climb_m_s: Metres = 2.5
-    max_descent_m_s: Metres = 1.5
-    max_accel_m_s2: Metres = 2.5
-    max_jerk_m_s3: Metres = 1.0
-    brake_decel_m_s2: Metres = 7.5
-    brake_jerk_m_s3: Metres = 5.0
-    endurance_s: Metres = 1200.0
-    reserve_share: Metres = 0.25
-    max_items: int = 650
-    position_error_m: Metres = 2.5
-    rtl_height_m: Metres = 30.0
-    following_m: Metres | None = None
-    dsm_rms_m: Metres = 0.023
-    mass_kg: Metres = 2.0
-    rotors: int = 4
-    rotor_diameter_m: Metres = 0.254
-    downwash_m: Metres | None = None
+    firmware: Literal["ardupilot", "px4"] = _VEHICLE.firmware
+    radius_m: Annotated[Metres, Asked(0.05, 20)] = _VEHICLE.radius_m
+    mean_speed_m_s: Speed = _VEHICLE.mean_speed_m_s
+    max_speed_m_s: Speed = _VEHICLE.max_speed_m_s
+    max_climb_m_s: Speed = _VEHICLE.max_climb_m_s
+    max_descent_m_s: Speed = _VEHICLE.max_descent_m_s
+    max_accel_m_s2: Speed = _VEHICLE.max_accel_m_s2
+    max_jerk_m_s3: Annotated[Metres, Asked(0.1, 50)] = _VEHICLE.max_jerk_m_s3
+    brake_decel_m_s2: Metres = _VEHICLE.brake_decel_m_s2
+    brake_jerk_m_s3: Annotated[Metres, Asked(0.5, 50)] = _VEHICLE.brake_jerk_m_s3
+    endurance_s: Annotated[Metres, Asked(30, 86_400)] = _VEHICLE.endurance_s
+    reserve_share: Annotated[Metres, Asked(0, 0.9)] = _VEHICLE.reserve_share
+    max_items: Annotated[int, Asked(FEWEST_ITEMS, 100_000)] = _VEHICLE.max_items
+    position_error_m: Annotated[Metres, Asked(0, 100)] = _VEHICLE.position_error_m
+    rtl_height_m: Annotated[Metres, Asked(0, 2000)] = _VEHICLE.rtl_height_m
+    following_m: Annotated[Metres, Asked(0, 50, initial=1)] | None = None
+    dsm_rms_m: Annotated[Metres, Asked(0, 20)] = _VEHICLE.dsm_rms_m
+    mass_kg: Annotated[Metres, Asked(0.05, 500)] = _VEHICLE.mass_kg
+    rotors: Annotated[int, Asked(1, 32)] = _VEHICLE.rotors
+    rotor_diameter_m: Annotated[Metres, Asked(0.03, 10)] = _VEHICLE.rotor_diameter_m
+    downwash_m: Annotated[Metres, Asked(0, 50, initial=0.5)] | None = None
     camera: CameraDoc | None = None
 
 
 class SurfaceDoc(Strict):
-    radius_m: Metres = 20.0
-    height_m: Metres = 5.0
-    smooth_sigma_m: Metres | None = None
-    floor: bool = True
+    radius_m: Annotated[Metres, Asked(0.1, 1000)] = _SURFACE.radius_m
+    height_m: Annotated[Metres, Asked(0.1, 500)] = _SURFACE.height_m
+    smooth_sigma_m: Annotated[Metres, Asked(0, 200)] | None = None
+    floor: bool = _SURFACE.floor
 
 
 class PathDoc(Strict):
-    step_m: Metres = 0.1
-    on_steep: Literal["raise", "slow"] = "raise"
+    step_m: Annotated[Metres, Asked(0.05, 10)] = _PATH.step_m
+    on_steep: Literal["raise", "slow"] = _PATH.on_steep
 
 
 class MissionDoc(Strict):
-    excess_height_m: Metres = 1.0
-    end: Literal["rtl", "land"] = "rtl"
-    altitude_reference: Literal["home", "amsl"] = "home"
-    heading: Literal["path", "fixed", "point"] = "path"
-    heading_deg: Annotated[float, Field(ge=0, lt=360)] = 0.0
+    excess_height_m: Annotated[Metres, Asked(0, 100)] = _MISSION.excess_height_m
+    end: Literal["rtl", "land"] = _MISSION.end
+    altitude_reference: Literal["home", "amsl"] = _MISSION.altitude_reference
+    heading: Literal["path", "fixed", "point"] = _MISSION.heading
+    heading_deg: Annotated[float, Field(ge=0, lt=360), Asked(0, 359.9)] = _MISSION.heading_deg
     look_at: PlaceDoc | None = None
-    gimbal_pitch_deg: Annotated[float, Field(ge=-90, le=30)] | None = None
-    camera_trigger_m: Annotated[float, Field(gt=0, le=1000)] | None = None
+    gimbal_pitch_deg: Annotated[float, Field(ge=-90, le=30), Asked(initial=LOOKS_DOWN_DEG)] | None = None
+    camera_trigger_m: Annotated[float, Field(gt=0, le=1000), Asked(min=0.1, initial=5)] | None = None
 
 
 class ClearanceDoc(Strict):
-    required_clearance_m: Metres | None = None
+    required_clearance_m: Annotated[Metres, Asked(0.01, 500)] | None = None
     """None: the sum of the terms of the vehicle's profile."""
-    max_height_above_ground_m: Metres | None = None
+    max_height_above_ground_m: Annotated[Metres, Asked(1, 10_000, initial=120)] | None = None
     way: Literal["auto", "guided"] = "auto"
     """How it will be flown: the autopilot departs from the line by that much."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
@@ -15,6 +16,17 @@ Name = Annotated[str, StringConstraints(max_length=80, strip_whitespace=True), A
 Latitude = Annotated[float, Field(ge=-90, le=90, allow_inf_nan=False)]
 Longitude = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Metres = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which numbers the console lets an operator type, where these are fewer than the server takes: an end that is
+    itself excluded has no number, and a slip of a finger is not to plan for a million metres."""
+
+    min: float | None = None
+    max: float | None = None
+    initial: float | None = None
+    """What a number begins with that is left out as a rule."""
 
 
 class Strict(BaseModel):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.result_docs import ErrorDoc
-from server.schemas.strict_model import Strict
+from server.schemas.strict_model import Asked, Strict
 
 RadarSensor = Literal["awr1843", "position2go"]
 SamplesAs = Literal["auto", "twos-complement", "offset-binary"]
@@ -31,7 +31,7 @@ class RadarReading(Strict):
     sensor: RadarSensor | None = None
     """Null: a Position2Go's for .csv, else an AWR1843's."""
     samples: SamplesAs = "auto"
-    most: Annotated[int, Field(ge=1)] | None = None
+    most: Annotated[int, Field(ge=1), Asked(max=1_000_000)] | None = None
     """Only the first so many frames."""
 
 

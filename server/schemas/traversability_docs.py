@@ -6,9 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from mapping.uwb import UwbParams
+from planning.ground.traversable import FINEST_M
 from server.schemas.result_docs import ErrorDoc
-from server.schemas.strict_model import Strict
+from server.schemas.strict_model import Asked, Strict
 
+_UWB = UwbParams()
 LayerName = Literal["before", "cleared", "probability", "time_in_view"]
 
 
@@ -89,7 +92,7 @@ class TraversabilityState(Strict):
 class TraversabilityBody(Strict):
     """Works out the traversability of the open surface model."""
 
-    resolution_m: Annotated[float, Field(ge=0.1, le=10)] | None = None
+    resolution_m: Annotated[float, Field(ge=0.1, le=10), Asked(initial=FINEST_M)] | None = None
     """Of the grid; null: 0.3 m, or the model's own where that is coarser."""
 
 
@@ -98,14 +101,14 @@ class UwbRule(Strict):
 
     rule: Literal["explained", "paper"] = "explained"
     """explained: an echo that a likely obstacle accounts for says little of other cells; paper: all are to blame."""
-    p_o: Annotated[float, Field(gt=0.5, lt=1)] | None = None
-    p_c2: Annotated[float, Field(gt=0, lt=0.5)] | None = None
-    p_c3: Annotated[float, Field(gt=0, lt=0.5)] | None = None
+    p_o: Annotated[float, Field(gt=0.5, lt=1), Asked(0.51, 0.99, initial=_UWB.most_occupied)] | None = None
+    p_c2: Annotated[float, Field(gt=0, lt=0.5), Asked(0.01, 0.49, initial=_UWB.free_before)] | None = None
+    p_c3: Annotated[float, Field(gt=0, lt=0.5), Asked(0.01, 0.49, initial=_UWB.free_behind)] | None = None
     """At least P_C2; left out: 0.1 above it."""
-    c_th: Annotated[float, Field(gt=0, le=100)] | None = None
-    nearest_m: Annotated[float, Field(gt=0, le=50)] | None = None
-    farthest_m: Annotated[float, Field(gt=0, le=100)] | None = None
-    prior: Annotated[float, Field(gt=0.5, lt=1)] | None = None
+    c_th: Annotated[float, Field(gt=0, le=100), Asked(min=0.5, initial=_UWB.least_headroom)] | None = None
+    nearest_m: Annotated[float, Field(gt=0, le=50), Asked(min=0.5, initial=_UWB.nearest_m)] | None = None
+    farthest_m: Annotated[float, Field(gt=0, le=100), Asked(min=1, initial=_UWB.farthest_m)] | None = None
+    prior: Annotated[float, Field(gt=0.5, lt=1), Asked(0.51, 0.99, initial=_UWB.prior)] | None = None
 
 
 class LandingSitesBody(Strict):

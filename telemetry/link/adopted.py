@@ -22,10 +22,9 @@ from telemetry.mavlink.orders import Order, Orders
 from telemetry.mavlink.parameters import BYTEWISE
 from telemetry.mavlink.reduce import reduce
 from telemetry.mavlink.texts import Texts
-from telemetry.topics.messages import Candidate
+from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 from telemetry.topics.vehicle import Autopilot, VehicleState
 
-STALE_S, LOST_S = 1.5, 3.5
 FAST_LINK_BAUD = 400_000
 SIMULATION = b"hedgehop"
 """What Hedgehop's own simulated vehicle says for its firmware's version; others have a hash of their sources there."""

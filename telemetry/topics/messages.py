@@ -22,6 +22,9 @@ from telemetry.topics.obstacles import (
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import SimTruth, VehicleState
 
+STALE_S, LOST_S = 1.5, 3.5
+"""Without a message of it a vehicle's link is stale, then lost."""
+
 
 class Topic(StrEnum):
     """Names on the bus and what they carry."""
@@ -125,7 +128,7 @@ class LinkStatus:
     candidates: tuple[Candidate, ...] = ()
     adopted: Candidate | None = None
     state: Literal["none", "live", "stale", "lost"] = "none"
-    """none: no vehicle adopted; stale after 1.5 s, lost after 3.5 s without a message of it."""
+    """none: no vehicle adopted; stale and lost: ``STALE_S`` and ``LOST_S``."""
     silent_s: float | None = None
     quality: float | None = None
     """Share of the vehicle's packets of the last seconds that arrived, from sequence numbers."""

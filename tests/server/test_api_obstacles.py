@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from server.schemas import AcknowledgeBody, PerceptionSettingsBody, PlanWithSeen, SetAvoidanceBody
+from server.schemas import AcknowledgeBody, PerceptionSettingsBody, PlanWithSeen, SectionAsked, SetAvoidanceBody
 from tests.server.running import PASSWORD, Running
 
 CHANGES: list[tuple[str, str, dict[str, Any]]] = [
@@ -111,7 +111,7 @@ def test_slices_and_targets_are_for_everybody_who_is_signed_in(served: Running) 
     answer = served.http.get("/api/obstacles/section", params=asked)
     assert answer.json()["text"] == "No sensor tells where the vehicle is."
     assert served.http.get("/api/obstacles/targets").json()["t_mono_s"] is None
-    assert served.flying.asked == [("section", "replay", True, 2.0, 30.0), ("targets", "live")]
+    assert served.flying.asked == [("section", SectionAsked.model_validate(asked)), ("targets", "live")]
     for wrong in ({"thickness_m": 0}, {"reach_m": 1e9}, {"thickness_m": "nan"}, {"source": "dream"}):
         assert served.http.get("/api/obstacles/section", params=wrong).status_code == 422
     with served.stranger() as other:

@@ -12,6 +12,7 @@ from mapping.sensor_frames import packed
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.section import MOST_CELLS, Looking, level_axis, placed_status, sliced
 from server.scene.mirror import MapMirror
+from server.schemas import SectionAsked
 from telemetry.topics.looks import RadarLook
 from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta, status
@@ -72,10 +73,10 @@ def test_the_slice_is_where_the_vehicle_is_with_the_models_ground() -> None:
     watch.mirrors["radar"].fold(delta([(0, 10, 4)]))
     watch.mirrors["vision_flight"].fold(delta([(0, 11, 4)], sensor="vision_flight", resolution_m=0.5))
     looking = Looking({"live": watch}, Slope())
-    nothing = looking.section("live", across=False, thickness_m=4.0, reach_m=40.0)
+    nothing = looking.section(SectionAsked())
     assert (nothing.text, nothing.maps) == ("No sensor tells where the vehicle is.", [])
     watch.on_status(status())
-    found = looking.section("live", across=False, thickness_m=4.0, reach_m=40.0)
+    found = looking.section(SectionAsked())
     assert (found.vehicle_up_m, found.heading_deg, found.text) == (5.0, 0.0, "")
     assert {m.name: m.s_m for m in found.maps} == {"radar": [10.0], "vision_flight": [6.0]}
     ground = dict(zip(found.ground_s_m, found.ground_up_m, strict=True))

@@ -24,7 +24,8 @@ def test_names_options_and_unions() -> None:
 def test_the_console_asks_for_no_other_numbers_than_the_server_takes() -> None:
     text = generate()
     assert "    radar_depth_m: { min: 2, max: 120 },\n" in text
-    assert "    camera_trigger_m: { max: 1_000 },\n" in text, "above zero: the least has no number"
+    assert "    camera_trigger_m: { min: 0.1, max: 1_000, initial: 5 },\n" in text, "above zero has no least number"
+    assert "    radius_m: { min: 0.1, max: 1_000, initial: 20.0 },\n" in text
     assert "    paper_bare" not in text
 
 

@@ -2,47 +2,85 @@
 
 export const PROTOCOL_VERSION = 1;
 
-/** Numbers that the server takes. */
+/** Numbers that pages ask for, never more than the server takes, and what they begin with. */
 export const LIMITS = {
   PoiDoc: {
     lat_deg: { min: -90, max: 90 },
     lon_deg: { min: -180, max: 180 },
-    loiter_s: { min: 0, max: 3_600 },
+    loiter_s: { min: 0, max: 3_600, initial: 0.0 },
   },
   PlaceDoc: {
     lat_deg: { min: -90, max: 90 },
     lon_deg: { min: -180, max: 180 },
   },
   SurveyDoc: {
-    gsd_cm: { max: 100 },
-    side_overlap: { min: 0 },
-    front_overlap: { min: 0 },
-    angle_deg: { min: 0 },
+    gsd_cm: { min: 0.05, max: 100, initial: 1.0 },
+    side_overlap: { min: 0, max: 0.94, initial: 0.7 },
+    front_overlap: { min: 0, max: 0.94, initial: 0.8 },
+    angle_deg: { min: 0, max: 179, initial: 0 },
   },
   CameraDoc: {
-    image_width_px: { max: 100_000 },
-    image_height_px: { max: 100_000 },
-    focal_mm: { max: 1_000 },
-    sensor_width_mm: { max: 200 },
-    sensor_height_mm: { max: 200 },
+    image_width_px: { min: 1, max: 100_000 },
+    image_height_px: { min: 1, max: 100_000 },
+    focal_mm: { min: 0.1, max: 1_000 },
+    sensor_width_mm: { min: 0.1, max: 200 },
+    sensor_height_mm: { min: 0.1, max: 200 },
+  },
+  ProfileDoc: {
+    radius_m: { min: 0.05, max: 20, initial: 0.35 },
+    mean_speed_m_s: { min: 0.1, max: 50, initial: 3.0 },
+    max_speed_m_s: { min: 0.1, max: 50, initial: 5.0 },
+    max_climb_m_s: { min: 0.1, max: 50, initial: 2.5 },
+    max_descent_m_s: { min: 0.1, max: 50, initial: 1.5 },
+    max_accel_m_s2: { min: 0.1, max: 50, initial: 2.5 },
+    max_jerk_m_s3: { min: 0.1, max: 50, initial: 1.0 },
+    brake_jerk_m_s3: { min: 0.5, max: 50, initial: 5.0 },
+    endurance_s: { min: 30, max: 86_400, initial: 1_200.0 },
+    reserve_share: { min: 0, max: 0.9, initial: 0.25 },
+    max_items: { min: 4, max: 100_000, initial: 650 },
+    position_error_m: { min: 0, max: 100, initial: 2.5 },
+    rtl_height_m: { min: 0, max: 2_000, initial: 30.0 },
+    following_m: { min: 0, max: 50, initial: 1 },
+    dsm_rms_m: { min: 0, max: 20, initial: 0.023 },
+    mass_kg: { min: 0.05, max: 500, initial: 2.0 },
+    rotors: { min: 1, max: 32, initial: 4 },
+    rotor_diameter_m: { min: 0.03, max: 10, initial: 0.254 },
+    downwash_m: { min: 0, max: 50, initial: 0.5 },
+  },
+  SurfaceDoc: {
+    radius_m: { min: 0.1, max: 1_000, initial: 20.0 },
+    height_m: { min: 0.1, max: 500, initial: 5.0 },
+    smooth_sigma_m: { min: 0, max: 200 },
+  },
+  PathDoc: {
+    step_m: { min: 0.05, max: 10, initial: 0.1 },
   },
   MissionDoc: {
-    heading_deg: { min: 0 },
-    gimbal_pitch_deg: { min: -90, max: 30 },
-    camera_trigger_m: { max: 1_000 },
+    excess_height_m: { min: 0, max: 100, initial: 1.0 },
+    heading_deg: { min: 0, max: 359.9, initial: 0.0 },
+    gimbal_pitch_deg: { min: -90, max: 30, initial: -90.0 },
+    camera_trigger_m: { min: 0.1, max: 1_000, initial: 5 },
+  },
+  ClearanceDoc: {
+    required_clearance_m: { min: 0.01, max: 500 },
+    max_height_above_ground_m: { min: 1, max: 10_000, initial: 120 },
   },
   PlannedOnDoc: {
     home_lat_deg: { min: -90, max: 90 },
     home_lon_deg: { min: -180, max: 180 },
   },
   ViewDoc: {
-    vertical_exaggeration: { min: 1, max: 5 },
+    vertical_exaggeration: { min: 1, max: 5, initial: 1.0 },
   },
   StartFlight: {
-    from_item: { min: 1 },
+    from_item: { min: 1, initial: 1 },
   },
   PlayReview: {
     speed: { min: 0.1, max: 50 },
+  },
+  SectionAsked: {
+    thickness_m: { min: 0.5, max: 50, initial: 4.0 },
+    reach_m: { min: 10, max: 150, initial: 25 },
   },
   TrackerSettingsBody: {
     range_sigma_m: { min: 0.01, max: 10 },
@@ -88,24 +126,28 @@ export const LIMITS = {
     memory_limit_bytes: { min: 1_000_000, max: 100_000_000_000 },
   },
   TraversabilityBody: {
-    resolution_m: { min: 0.1, max: 10 },
+    resolution_m: { min: 0.1, max: 10, initial: 0.3 },
   },
   UwbRule: {
-    c_th: { max: 100 },
-    nearest_m: { max: 50 },
-    farthest_m: { max: 100 },
+    p_o: { min: 0.51, max: 0.99, initial: 0.8 },
+    p_c2: { min: 0.01, max: 0.49, initial: 0.2 },
+    p_c3: { min: 0.01, max: 0.49, initial: 0.3 },
+    c_th: { min: 0.5, max: 100, initial: 3.0 },
+    nearest_m: { min: 0.5, max: 50, initial: 3.5 },
+    farthest_m: { min: 1, max: 100, initial: 10.0 },
+    prior: { min: 0.51, max: 0.99, initial: 0.9 },
   },
   LandingSitesBody: {
     lat_deg: { min: -90, max: 90 },
     lon_deg: { min: -180, max: 180 },
-    rotor_span_m: { min: 0.1, max: 10 },
-    radius_m: { min: 5, max: 2_000 },
+    rotor_span_m: { min: 0.1, max: 10, initial: 0.8 },
+    radius_m: { min: 5, max: 2_000, initial: 150.0 },
   },
   RadarReading: {
-    most: { min: 1 },
+    most: { min: 1, max: 1_000_000 },
   },
   RunScenario: {
-    seed: { min: 0, max: 10_000 },
+    seed: { min: 0, max: 10_000, initial: 0 },
   },
   HoverView: {
     x: { min: 0, max: 1 },
@@ -118,6 +160,17 @@ export const LIMITS = {
     change: { min: 0, max: 9_007_199_254_740_991 },
   },
 } as const;
+
+export const CHECK_FRESH_S = 120;
+export const STALE_S = 1.5;
+export const LOST_S = 3.5;
+export const USUAL_CAMERA: CameraDoc = {
+  image_width_px: 4000,
+  image_height_px: 3000,
+  focal_mm: 8.8,
+  sensor_width_mm: 13.2,
+  sensor_height_mm: 8.8,
+};
 
 /** The link node's: what is done about obstacles by itself. */
 export interface AvoidanceStatus {
@@ -1062,7 +1115,7 @@ export interface LeaseDoc {
 
 export interface NodeDoc {
   name: string;
-  state: "starting" | "running" | "restarting" | "stopped";
+  state: "starting" | "running" | "silent" | "restarting" | "stopped";
   restarts: number;
   text: string;
 }
@@ -1319,6 +1372,15 @@ export interface RadarTargetsDoc {
   high_deg: number;
   nearest_m: number;
   farthest_m: number;
+}
+
+/** A vertical slice that is asked for. */
+export interface SectionAsked {
+  source?: "live" | "replay";
+  /** Of the vehicle's heading; else along it. */
+  across?: boolean;
+  thickness_m?: number;
+  reach_m?: number;
 }
 
 export interface SetAvoidanceBody {

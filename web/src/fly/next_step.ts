@@ -1,4 +1,12 @@
-import type { CheckRow, FlightStatus, FlyState, LinkStatus, TransferStatus, VehicleState } from "../messages";
+import {
+  CHECK_FRESH_S,
+  type CheckRow,
+  type FlightStatus,
+  type FlyState,
+  type LinkStatus,
+  type TransferStatus,
+  type VehicleState,
+} from "../messages";
 import { isAcceptable, type Accepted } from "../vehicle/orders";
 
 /** What the page knows when it says what comes next. */
@@ -22,9 +30,6 @@ export type Step =
   | { id: "simulator" | "adopt" | "take_control"; why?: string }
   | { id: "upload" | "check" | "start" | "pause" | "resume"; why?: string }
   | { id: "wait"; why: string };
-
-/** The server refuses a start on an older check. */
-const FRESH_S = 120;
 
 export const openChecks = (rows: readonly CheckRow[]) =>
   rows.filter((row) => row.state === "bad" || row.state === "unknown");
@@ -58,7 +63,7 @@ function onGround(facts: Facts): Step {
   }
   const rows = fly?.preflight?.rows;
   if (!rows) return { id: "check" };
-  if (facts.check_age_s > FRESH_S) return { id: "check", why: "The check is older than two minutes" };
+  if (facts.check_age_s > CHECK_FRESH_S) return { id: "check", why: "The check is older than two minutes" };
   if (openChecks(rows).length > 0) return { id: "check", why: "Mend what stands above, then check again" };
   const left = unaccepted(rows, accepted).length;
   if (left > 0) return { id: "start", why: "Tick what you accept first" };

@@ -1,6 +1,6 @@
 import { useState } from "preact/hooks";
 import { metres } from "../format";
-import type { SectionDoc } from "../messages";
+import { LIMITS, type SectionDoc } from "../messages";
 import type { Source } from "../store/flying";
 import type { MapName } from "../store/obstacles";
 import { Segmented } from "../ui/Button";
@@ -91,13 +91,12 @@ function drawSection(pen: Pen, doc: SectionDoc): void {
   drawVehicle(pen, frame, doc);
 }
 
-const EMPTY = { across: false, thickness_m: 4, reach_m: 25 };
+const { thickness_m: THICKNESS, reach_m: REACH } = LIMITS.SectionAsked;
+const EMPTY = { across: false, thickness_m: THICKNESS.initial as number, reach_m: REACH.initial as number };
 const SIZES = [
   { key: "thickness_m", label: "Thickness", unit: "m", step: 0.5 },
   { key: "reach_m", label: "To both sides", unit: "m", step: 10 },
 ] as const;
-
-const SIZE_LIMITS = { thickness_m: { min: 0.5, max: 50 }, reach_m: { min: 10, max: 150 } };
 
 const cellsOf = (doc: SectionDoc | null) =>
   doc?.maps.reduce((sum, map) => sum + map.known_ground.filter((known) => !known).length, 0) ?? 0;
@@ -127,7 +126,7 @@ export function SectionPanel({ source }: { source: Source }) {
       <div class="field-grid">
         <NumberFields
           fields={SIZES}
-          limits={SIZE_LIMITS}
+          limits={LIMITS.SectionAsked}
           values={wanted}
           group="section"
           onChange={(key, value) => setWanted({ ...wanted, [key]: value })}

@@ -1,13 +1,10 @@
-import type { VehicleMessage, VehicleState } from "../messages";
+import { LOST_S, STALE_S, type VehicleMessage, type VehicleState } from "../messages";
 
 /** A message about the vehicle and when, by this page's clock, it came. */
 export interface Heard {
   message: VehicleMessage;
   received_ms: number;
 }
-
-/** Older values are greyed and shown with their age. */
-export const STALE_S = 1.5;
 
 export type Group = "heartbeat" | "position" | "attitude" | "battery" | "gnss";
 
@@ -19,8 +16,11 @@ const CLOCKS = {
   gnss: "gnss_t_mono_s",
 } as const;
 
-/** Batteries and receivers report less often than position and attitude do. */
-const SLOW: Partial<Record<Group, number>> = { battery: 6, gnss: 3, heartbeat: 3.5 };
+/**
+ * Older values than STALE_S are greyed and shown with their age. Batteries and receivers report less often than
+ * position and attitude do.
+ */
+const SLOW: Partial<Record<Group, number>> = { battery: 6, gnss: 3, heartbeat: LOST_S };
 
 const newest = (state: VehicleState) =>
   Math.max(...Object.values(CLOCKS).map((clock) => state[clock] ?? -Infinity));

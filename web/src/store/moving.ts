@@ -2,6 +2,7 @@ import { computed, signal, type Signal } from "@preact/signals";
 import type { TracksMessage, TracksStatus } from "../messages";
 import { now_ms } from "./clock";
 import type { Source } from "./flying";
+import { SILENT_S } from "./sensing";
 
 /** Moving objects as the server last said: live and of a recording. */
 export interface Moving {
@@ -24,9 +25,6 @@ export function takeMoving({ source, status }: TracksMessage, received_ms: numbe
 export function forgetMoving(source: Source): void {
   moving[source].value = null;
 }
-
-/** The node says something every second; after this it is silent. */
-const SILENT_S = 2.5;
 
 export type MovingWatch = TracksStatus["state"] | "silent";
 

@@ -43,7 +43,7 @@ export function withStatus(
 }
 
 /** A node says something every second; after this it is silent. */
-const SILENT_S = 2.5;
+export const SILENT_S = 2.5;
 
 /** Seconds since a live sensor's node said anything; a recording is never silent. */
 export function silence_s(sensed: Sensed, isLive: boolean, now_ms: number): number | null {

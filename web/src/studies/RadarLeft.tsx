@@ -1,6 +1,6 @@
 import { useEffect, useState } from "preact/hooks";
 import { bytes, count, day } from "../format";
-import type { RadarFileDoc, RadarReading } from "../messages";
+import { LIMITS, type RadarFileDoc, type RadarReading } from "../messages";
 import { chooseFiles } from "../ui/choose_files";
 import { pending } from "../store/outcomes";
 import { chosen, chosenId, opened, radarFiles, reading } from "../store/studies";
@@ -165,8 +165,7 @@ function Reading() {
         auto={opened.value ? `(all ${opened.value.frames})` : "(all)"}
         value={most ?? null}
         initial={opened.value?.frames ?? 1}
-        min={1}
-        max={1e6}
+        {...LIMITS.RadarReading.most}
         step={1}
         whole
         testid="radar-most"

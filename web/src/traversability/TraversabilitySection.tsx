@@ -17,7 +17,6 @@ import { LandingSites } from "./LandingSites";
 import { LiveRadar } from "./LiveRadar";
 import { TRAVERSABILITY, putAway, resolution_m, takeRadarLogs, workOut } from "./ground_orders";
 
-const DEFAULT_M = 0.3;
 const TEACHING = "Slope and roughness of the surface model: where to drive, where to land.";
 
 /** What is being done, how far it is, or what the map says: always at this place, and as tall. */
@@ -96,11 +95,10 @@ function WorkOut({ plan, state, isBusy, hasMap }: Props & { hasMap: boolean }) {
     <>
       <AutoField
         label="Own grid"
-        auto="0.3 m, or the model's if coarser"
+        auto={`${LIMITS.TraversabilityBody.resolution_m.initial} m, or the model's if coarser`}
         unit="m"
         {...LIMITS.TraversabilityBody.resolution_m}
         step={0.1}
-        initial={DEFAULT_M}
         value={resolution_m.value}
         testid="traversability-resolution"
         onChange={(value) => (resolution_m.value = value)}

@@ -65,7 +65,7 @@ export const putAway = () =>
 
 /** What the operator set for the sites; null: as wide as the plan's vehicle. */
 export const rotorSpan_m = signal<number | null>(null);
-export const searched_m = signal(150);
+export const searched_m = signal<number>(LIMITS.LandingSitesBody.radius_m.initial);
 
 const SPAN_M = LIMITS.LandingSitesBody.rotor_span_m;
 

@@ -1,5 +1,5 @@
 import { latLon } from "../../format";
-import type { MissionDoc } from "../../messages";
+import { LIMITS, type MissionDoc } from "../../messages";
 import { Button, Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
 import { drawer } from "../../store/view";
@@ -42,8 +42,7 @@ export function Heading({ mission }: { mission: MissionDoc }) {
         <NumberField
           label="Heading, clockwise from north"
           unit="°"
-          min={0}
-          max={359.9}
+          {...LIMITS.MissionDoc.heading_deg}
           step={5}
           value={mission.heading_deg}
           testid="heading-input"

@@ -21,7 +21,6 @@ const CAMERA = [
     unit: "°",
     ...LIMITS.MissionDoc.gimbal_pitch_deg,
     step: 5,
-    initial: -90,
     testid: "gimbal",
   },
   {
@@ -30,10 +29,8 @@ const CAMERA = [
     says: "Camera trigger",
     auto: "(none)",
     unit: "m",
-    min: 0.1,
     ...LIMITS.MissionDoc.camera_trigger_m,
     step: 0.5,
-    initial: 5,
     testid: "trigger",
   },
 ] as const;
@@ -59,11 +56,9 @@ function HeightLimit({ clearance }: { clearance: ClearanceDoc }) {
       label="Limit height above ground"
       auto="(none)"
       unit="m"
-      min={1}
-      max={10_000}
+      {...LIMITS.ClearanceDoc.max_height_above_ground_m}
       step={5}
       value={clearance.max_height_above_ground_m}
-      initial={120}
       testid="max-height"
       onChange={(max_height_above_ground_m) => demand("Height limit", { max_height_above_ground_m })}
     />
@@ -83,8 +78,7 @@ export function MissionSection({ plan }: { plan: PlanDoc }) {
       <NumberField
         label="Excess height"
         unit="m"
-        min={0}
-        max={100}
+        {...LIMITS.MissionDoc.excess_height_m}
         step={0.1}
         value={mission.excess_height_m}
         testid="excess-input"
@@ -110,8 +104,7 @@ export function MissionSection({ plan }: { plan: PlanDoc }) {
       <NumberField
         label="Return height above home, as set in the autopilot"
         unit="m"
-        min={0}
-        max={2000}
+        {...LIMITS.ProfileDoc.rtl_height_m}
         step={1}
         value={profile.rtl_height_m}
         testid="rtl-height-input"

@@ -1,5 +1,5 @@
 import { demanded } from "../../format";
-import type { BudgetDoc, ClearanceDoc, PlanDoc, ProfileDoc } from "../../messages";
+import { LIMITS, type BudgetDoc, type ClearanceDoc, type PlanDoc, type ProfileDoc } from "../../messages";
 import { editGroup } from "../../store/plan";
 import { isFresh, result } from "../../store/state";
 import { Segmented } from "../../ui/Button";
@@ -52,8 +52,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
         <NumberField
           label="Take-off mass"
           unit="kg"
-          min={0.05}
-          max={500}
+          {...LIMITS.ProfileDoc.mass_kg}
           step={0.1}
           value={profile.mass_kg}
           testid="mass-input"
@@ -62,8 +61,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
         <NumberField
           label="Rotors"
           unit=""
-          min={1}
-          max={32}
+          {...LIMITS.ProfileDoc.rotors}
           step={1}
           whole
           value={profile.rotors}
@@ -73,8 +71,7 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
         <NumberField
           label="Rotor diameter"
           unit="m"
-          min={0.03}
-          max={10}
+          {...LIMITS.ProfileDoc.rotor_diameter_m}
           step={0.01}
           value={profile.rotor_diameter_m}
           testid="rotor-diameter-input"
@@ -85,11 +82,9 @@ function Downwash({ profile }: { profile: ProfileDoc }) {
         label="Own downwash"
         auto="(by mass and rotors)"
         unit="m"
-        min={0}
-        max={50}
+        {...LIMITS.ProfileDoc.downwash_m}
         step={0.1}
         value={profile.downwash_m}
-        initial={0.5}
         testid="downwash"
         onChange={(downwash_m) => set("Downwash", { downwash_m })}
       />
@@ -132,19 +127,16 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
         label="Own following error"
         auto="(as measured)"
         unit="m"
-        min={0}
-        max={50}
+        {...LIMITS.ProfileDoc.following_m}
         step={0.1}
         value={profile.following_m}
-        initial={1}
         testid="following"
         onChange={(following_m) => set("Following error", { following_m })}
       />
       <NumberField
         label="RMS error of the surface model"
         unit="m"
-        min={0}
-        max={20}
+        {...LIMITS.ProfileDoc.dsm_rms_m}
         step={0.01}
         value={profile.dsm_rms_m}
         testid="dsm-rms-input"
@@ -155,8 +147,7 @@ export function RequiredSection({ plan: { clearance, profile } }: { plan: PlanDo
         label="Own required clearance"
         auto={budget ? `(${demanded(budget.total_m)})` : ""}
         unit="m"
-        min={0}
-        max={500}
+        {...LIMITS.ClearanceDoc.required_clearance_m}
         step={0.1}
         value={clearance.required_clearance_m}
         initial={Number((budget?.total_m ?? 5).toFixed(2))}

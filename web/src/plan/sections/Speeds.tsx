@@ -1,5 +1,5 @@
 import { withUnit } from "../../format";
-import type { PlanDoc, ProfileDoc } from "../../messages";
+import { LIMITS, type PlanDoc, type ProfileDoc } from "../../messages";
 import { Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
 import { Section } from "../../ui/Section";
@@ -26,8 +26,7 @@ export function SpeedsSection({ plan: { profile, path } }: { plan: PlanDoc }) {
           <NumberField
             key={key}
             {...field}
-            min={0.1}
-            max={50}
+            {...LIMITS.ProfileDoc[key]}
             step={0.1}
             value={profile[key]}
             onChange={(value) => editGroup("profile", "speeds", field.label, { [key]: value })}
@@ -36,8 +35,7 @@ export function SpeedsSection({ plan: { profile, path } }: { plan: PlanDoc }) {
         <NumberField
           label="Sampled every"
           unit="m"
-          min={0.05}
-          max={10}
+          {...LIMITS.PathDoc.step_m}
           step={0.05}
           value={path.step_m}
           testid="step-input"

@@ -1,5 +1,5 @@
 import { metres } from "../../format";
-import type { PlanDoc, SurfaceDoc } from "../../messages";
+import { LIMITS, type PlanDoc, type SurfaceDoc } from "../../messages";
 import { Section } from "../../ui/Section";
 import { AutoField, Check, SliderField } from "../../ui/fields";
 import { editGroup } from "../../store/plan";
@@ -36,8 +36,7 @@ export function SurfaceSection({ plan: { surface, source, survey } }: { plan: Pl
         label="R, sideways"
         hint="How far the safe surface keeps away from walls, trees and masts."
         unit="m"
-        min={0.1}
-        max={1000}
+        {...LIMITS.SurfaceDoc.radius_m}
         sliderMax={50}
         step={0.1}
         value={radius_m}
@@ -51,8 +50,7 @@ export function SurfaceSection({ plan: { surface, source, survey } }: { plan: Pl
           label="H, upwards"
           hint="How high it runs above the ground."
           unit="m"
-          min={0.1}
-          max={500}
+          {...LIMITS.SurfaceDoc.height_m}
           sliderMax={30}
           step={0.1}
           value={surface.height_m}
@@ -64,8 +62,7 @@ export function SurfaceSection({ plan: { surface, source, survey } }: { plan: Pl
         label="Own smoothing"
         auto={`(R / 10 = ${metres(radius_m / 10, 2)})`}
         unit="m"
-        min={0}
-        max={200}
+        {...LIMITS.SurfaceDoc.smooth_sigma_m}
         step={0.1}
         value={surface.smooth_sigma_m}
         initial={Number((radius_m / 10).toFixed(2))}

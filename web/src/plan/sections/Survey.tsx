@@ -1,25 +1,17 @@
 import { latLon, number } from "../../format";
-import { LIMITS, type CameraDoc, type PlanDoc, type SurveyDoc } from "../../messages";
+import { LIMITS, USUAL_CAMERA, type CameraDoc, type PlanDoc, type SurveyDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { AutoField } from "../../ui/fields";
 import { NumberField } from "../../ui/NumberField";
 import { editGroup } from "../../store/plan";
 import { CopyPlace } from "../../ui/CopyPlace";
 
-const DEFAULT_CAMERA: CameraDoc = {
-  image_width_px: 4000,
-  image_height_px: 3000,
-  focal_mm: 8.8,
-  sensor_width_mm: 13.2,
-  sensor_height_mm: 8.8,
-};
-
 const CAMERA_FIELDS = [
-  { key: "image_width_px", label: "Image width", unit: "px", min: 1, step: 1, whole: true },
-  { key: "image_height_px", label: "Image height", unit: "px", min: 1, step: 1, whole: true },
-  { key: "focal_mm", label: "Focal length", unit: "mm", min: 0.1, step: 0.1 },
-  { key: "sensor_width_mm", label: "Sensor width", unit: "mm", min: 0.1, step: 0.1 },
-  { key: "sensor_height_mm", label: "Sensor height", unit: "mm", min: 0.1, step: 0.1 },
+  { key: "image_width_px", label: "Image width", unit: "px", step: 1, whole: true },
+  { key: "image_height_px", label: "Image height", unit: "px", step: 1, whole: true },
+  { key: "focal_mm", label: "Focal length", unit: "mm", step: 0.1 },
+  { key: "sensor_width_mm", label: "Sensor width", unit: "mm", step: 0.1 },
+  { key: "sensor_height_mm", label: "Sensor height", unit: "mm", step: 0.1 },
 ] as const;
 
 const OVERLAPS = [
@@ -61,7 +53,7 @@ function Camera({ camera }: { camera: CameraDoc | null }) {
     return (
       <div class="callout">
         <p>The vehicle profile has no camera: a survey needs one.</p>
-        <Button testid="camera-add" onClick={() => change(DEFAULT_CAMERA)}>
+        <Button testid="camera-add" onClick={() => change(USUAL_CAMERA)}>
           Add camera
         </Button>
       </div>
@@ -99,7 +91,6 @@ export function SurveyFields({ plan }: { plan: PlanDoc }) {
         <NumberField
           label="Ground sampling"
           unit="cm"
-          min={0.05}
           {...LIMITS.SurveyDoc.gsd_cm}
           step={0.1}
           value={survey.gsd_cm}
@@ -111,8 +102,8 @@ export function SurveyFields({ plan }: { plan: PlanDoc }) {
             key={key}
             {...field}
             unit="%"
-            min={0}
-            max={94}
+            min={LIMITS.SurveyDoc[key].min * 100}
+            max={LIMITS.SurveyDoc[key].max * 100}
             step={1}
             value={survey[key] * 100}
             onChange={(percent) => set(field.label, { [key]: percent / 100 })}
@@ -123,11 +114,9 @@ export function SurveyFields({ plan }: { plan: PlanDoc }) {
         label="Own angle of the lines"
         auto="(fewest turns)"
         unit="°"
-        min={0}
-        max={179}
+        {...LIMITS.SurveyDoc.angle_deg}
         step={1}
         value={survey.angle_deg}
-        initial={0}
         testid="angle"
         onChange={(angle_deg) => set("Angle of the lines", { angle_deg })}
       />

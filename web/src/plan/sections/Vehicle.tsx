@@ -1,11 +1,13 @@
 import { duration } from "../../format";
-import type { PlanDoc, ProfileDoc } from "../../messages";
+import { LIMITS, type PlanDoc, type ProfileDoc } from "../../messages";
 import { Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
 import { Section } from "../../ui/Section";
 import { TextField } from "../../ui/fields";
 import { edit, editGroup } from "../../store/plan";
 import { library } from "../../store/state";
+
+const { endurance_s: ENDURANCE, reserve_share: RESERVE } = LIMITS.ProfileDoc;
 
 const set = (label: string, fields: Partial<ProfileDoc>) => editGroup("profile", "vehicle", label, fields);
 
@@ -60,8 +62,7 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Vehicle radius"
           unit="m"
-          min={0.05}
-          max={20}
+          {...LIMITS.ProfileDoc.radius_m}
           step={0.05}
           value={profile.radius_m}
           testid="vehicle-radius-input"
@@ -70,8 +71,7 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Position error"
           unit="m"
-          min={0}
-          max={100}
+          {...LIMITS.ProfileDoc.position_error_m}
           step={0.1}
           value={profile.position_error_m}
           testid="position-error-input"
@@ -80,8 +80,8 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Endurance"
           unit="min"
-          min={0.5}
-          max={1440}
+          min={ENDURANCE.min / 60}
+          max={ENDURANCE.max / 60}
           step={1}
           value={profile.endurance_s / 60}
           testid="endurance-input"
@@ -90,8 +90,8 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Reserve"
           unit="%"
-          min={0}
-          max={90}
+          min={RESERVE.min * 100}
+          max={RESERVE.max * 100}
           step={5}
           value={profile.reserve_share * 100}
           testid="reserve-input"
@@ -100,8 +100,7 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Mission items"
           unit="at most"
-          min={4}
-          max={100_000}
+          {...LIMITS.ProfileDoc.max_items}
           step={10}
           whole
           value={profile.max_items}
@@ -111,8 +110,7 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Corner jerk"
           unit="m/s³"
-          min={0.1}
-          max={50}
+          {...LIMITS.ProfileDoc.max_jerk_m_s3}
           step={0.1}
           value={profile.max_jerk_m_s3}
           testid="jerk-input"
@@ -121,8 +119,7 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
         <NumberField
           label="Braking jerk"
           unit="m/s³"
-          min={0.5}
-          max={50}
+          {...LIMITS.ProfileDoc.brake_jerk_m_s3}
           step={0.5}
           value={profile.brake_jerk_m_s3}
           testid="brake-jerk-input"
