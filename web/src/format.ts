@@ -55,16 +55,15 @@ export const degrees = (value: number) => value.toFixed(7);
 export const latLon = (place: { lat_deg: number; lon_deg: number }) =>
   `${degrees(place.lat_deg)}, ${degrees(place.lon_deg)}`;
 
-/** The time of day here of a UTC timestamp. */
-export function clock(utc: string): string {
-  const date = new Date(utc);
+/** The time of day here of a UTC timestamp, or of UTC seconds. */
+export function clock(utc: string | number): string {
+  const date = new Date(typeof utc === "number" ? utc * 1000 : utc);
   return Number.isNaN(date.getTime()) ? DASH : date.toLocaleTimeString("en-GB");
 }
 
 export function day(utc: string): string {
-  const date = new Date(utc);
-  if (Number.isNaN(date.getTime())) return DASH;
-  return `${date.toLocaleDateString("en-CA")} ${date.toLocaleTimeString("en-GB").slice(0, 5)}`;
+  const time = clock(utc);
+  return time === DASH ? DASH : `${new Date(utc).toLocaleDateString("en-CA")} ${time.slice(0, 5)}`;
 }
 
 /** How long ago, coarsely: "now", "8 s", "3 min". */

@@ -48,6 +48,8 @@ describe("times", () => {
 
   it("a broken timestamp is a dash", () => {
     expect(f.clock("yesterday")).toBe(f.DASH);
+    expect(f.clock(1_700_000_000)).toBe(f.clock("2023-11-14T22:13:20Z"));
+    expect(f.clock(NaN)).toBe(f.DASH);
   });
 });
 

@@ -5,7 +5,7 @@ import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 
 const MOST_SHOWN = 60;
-const time = (entry: TextEntry) => clock(new Date(entry.last_utc_s * 1000).toISOString());
+const time = (entry: TextEntry) => clock(entry.last_utc_s);
 
 function Words({ entry }: { entry: TextEntry }) {
   const level = severityLevel(entry.severity);

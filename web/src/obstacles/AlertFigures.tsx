@@ -57,10 +57,10 @@ export function Figures({ obstacle, isOver }: { obstacle: Obstacle; isOver: bool
   );
 }
 
-const began = (entry: AlertDoc) => clock(new Date(entry.began_utc_s * 1000).toISOString());
+const began = (entry: AlertDoc) => clock(entry.began_utc_s);
 
 export function State({ entry }: { entry: AlertDoc }) {
-  const ended = clock(new Date(entry.alert.t_utc_s * 1000).toISOString());
+  const ended = clock(entry.alert.t_utc_s);
   if (entry.over)
     return (
       <span class="alert-state" data-testid="alert-over">

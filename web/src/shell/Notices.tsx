@@ -78,7 +78,7 @@ export function NoticeMenu() {
               <li key={notice.id}>
                 <NoticeIcon notice={notice} />
                 <ErrorText error={notice.error} />
-                <time>{clock(new Date(notice.at_ms).toISOString())}</time>
+                <time>{clock(notice.at_ms / 1000)}</time>
               </li>
             ))}
           </ul>

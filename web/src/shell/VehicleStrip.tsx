@@ -160,9 +160,7 @@ function Alerts() {
           <Icon name="warning" size={16} />
           <strong>{severityWord(worst.severity)}</strong>
           <span class="alert-text">{worst.text}</span>
-          <span class="visually-hidden">
-            , heard {clock(new Date(worst.last_utc_s * 1000).toISOString())}
-          </span>
+          <span class="visually-hidden">, heard {clock(worst.last_utc_s)}</span>
         </button>
       )}
       {linkStatus.value?.status.warnings[0] && (

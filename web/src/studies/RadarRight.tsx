@@ -2,7 +2,7 @@ import { forConsole, number, withUnit } from "../format";
 import type { RadarDetectionDoc, RadarParametersDoc } from "../messages";
 import { marked, opened, shownFrame } from "../store/studies";
 import { Icon } from "../ui/Icon";
-import { Fact } from "../ui/Fact";
+import { Fact } from "../ui/Section";
 
 const SENSORS = { awr1843: "AWR1843", position2go: "Position2Go" } as const;
 

@@ -1,6 +1,6 @@
 import { day, duration } from "../format";
 import { chosenScenario, scenarios, shownResult } from "../store/studies";
-import { Fact } from "../ui/Fact";
+import { Fact } from "../ui/Section";
 
 /** What is proved, by whom it was measured first, and what came of it. */
 export function ScenarioRight() {
