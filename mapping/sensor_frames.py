@@ -20,6 +20,8 @@ from mapping.geometry.arrays import F32
 MOST_POINTS = 2_000_000
 """Of one frame; more than any sensor has."""
 _XYZ_BYTES, _NUMBER_BYTES = 12, 4
+_REACH = 1 << 20
+"""Voxels to each side of the origin that a thinned cloud's keys can tell apart."""
 
 
 def packed(values: ArrayLike) -> bytes:
@@ -162,3 +164,13 @@ class UwbScan:
 
 SensorFrame = RadarFrame | CloudFrame | RangeFrame
 """What goes into a map."""
+
+
+def thinned(xyz_m: F32, voxel_m: float) -> F32:
+    """One of the finite points (N, 3) in each voxel, the first. 0: all stay."""
+    if voxel_m <= 0.0 or not len(xyz_m):
+        return xyz_m
+    cells = np.clip(np.floor(xyz_m / np.float32(voxel_m)), -_REACH, _REACH - 1).astype(np.int64) + _REACH
+    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    _, first = np.unique(keys, return_index=True)
+    return xyz_m[np.sort(first)]

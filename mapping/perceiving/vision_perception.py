@@ -19,8 +19,7 @@ from mapping.perceiving.camera_path import Break, PathWatch
 from mapping.perceiving.flight_map import FlightMap
 from mapping.perceiving.frame_result import FrameResult, Settings, State
 from mapping.perceiving.perception import Perception
-from mapping.sensor_frames import CloudFrame, SlamPose
-from mapping.voxels.downsampling import thinned
+from mapping.sensor_frames import CloudFrame, SlamPose, thinned
 
 NEAREST_M, FARTHEST_M = 0.3, 40.0
 """Bigazzi 2022: vision reaches 40 m."""

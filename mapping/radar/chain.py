@@ -16,9 +16,8 @@ from mapping.geometry.arrays import C64, F32, F64, Bools
 from mapping.radar import cfar, doa, fft
 from mapping.radar.cfar import Cfar
 from mapping.radar.detections import Detections, between_cells, detections
-from mapping.radar.fft import Window
+from mapping.radar.fft import Window, envelope, own_peaks
 from mapping.radar.params import FmcwParams
-from mapping.radar.side_lobes import envelope, own_peaks
 from mapping.radar.targets import Gate, Polar, in_gate
 
 TI_RANGE, TI_DOPPLER = Cfar(guard=4, training=8), Cfar(guard=2, training=4)

@@ -1,4 +1,7 @@
-"""The two Fourier transforms of a frame, along the samples of a chirp (range) and along the chirps (Doppler)."""
+"""The two Fourier transforms of a frame, along the samples of a chirp (range) and along the chirps (Doppler).
+
+With them what their windows leave of a target beside it: which peaks are only the side lobes of stronger ones.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
-from mapping.geometry.arrays import C64, C128, F32
+from mapping.geometry.arrays import C64, C128, F32, F64, Bools
 
 Window = Literal["rectangular", "hann"]
 """Rectangular resolves best and has side lobes of -13 dB; Hann has -31 dB, and peaks twice as wide."""
@@ -52,3 +55,34 @@ def noise_correlation(name: Window, count: int) -> C128:
     """
     power = window(name, count).astype(np.float64) ** 2
     return (np.fft.fft(power) / power.sum())[: max(1, count // 2)]
+
+
+FINE = 8
+"""Steps of an envelope per cell."""
+
+
+def envelope(name: Window, count: int) -> F64:
+    """(FINE * count / 2 + 1,) the most that a target shows so many cells (in eighths) or more away from itself."""
+    response = np.abs(np.fft.fft(window(name, count).astype(np.float64), FINE * count)) ** 2
+    half = response[: FINE * count // 2 + 1]
+    return np.maximum.accumulate(half[::-1])[::-1]
+
+
+def own_peaks(power: F64, doppler: F64, ranges: F64, across: F64, along: F64, margin: float) -> Bools:
+    """(N,) Which peaks are more than ``margin`` times what the stronger ones' side lobes may show at their place.
+
+    ``doppler`` and ``ranges`` (N,) are places in cells, both on rings; ``across`` and ``along`` their envelopes.
+    Powers of side lobes are summed; twice that is what two alike come to when they meet in phase. Targets of about one
+    strength, a cell or more apart, are all kept.
+    """
+    shown = _shown(doppler, across) * _shown(ranges, along) * power[None, :]
+    stronger = power[None, :] > power[:, None]
+    return power > margin * np.sum(shown, axis=1, where=stronger)
+
+
+def _shown(place: F64, lobes: F64) -> F64:
+    """(N, N) the envelope at the distance between every two places on the ring."""
+    around = 2 * (len(lobes) - 1)
+    apart = np.abs(place[:, None] - place[None, :]) * FINE
+    steps = np.minimum(apart, np.abs(around - apart)).astype(np.int64)
+    return lobes[np.minimum(steps, len(lobes) - 1)]

@@ -21,12 +21,10 @@ from pyproj import Proj
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.certificate.as_json import certificate_json
-from planning.certificate.cone import NEAR_M, SLOPE, return_altitudes
 from planning.certificate.heights import height_range
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
 from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
-from planning.certificate.nearest import nearest_distances
-from planning.certificate.places import distance_flown, places_along
+from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (
     height_reason,
@@ -37,9 +35,7 @@ from planning.certificate.reasons import (
     return_reason,
     scale_reason,
 )
-from planning.certificate.returns import return_altitude
-from planning.certificate.threads import threads_for
-from planning.certificate.true_metres import SCALE_TOLERANCE, true_cells
+from planning.certificate.returns import NEAR_M, SLOPE, return_altitude, return_altitudes
 from planning.certificate.unjudged import unjudged_reasons
 from planning.errors import MissionError, ParameterError
 from planning.model import (
@@ -52,7 +48,7 @@ from planning.model import (
     WorstPoint,
 )
 from planning.terrain.cells.cells import Layout
-from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.terrain.dsm import SCALE_TOLERANCE, Dsm, SurfaceModel, true_cells
 
 __all__ = ["certificate_json", "certify"]
 
@@ -175,6 +171,27 @@ def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Non
             f"The line is {length_m / 1000:.0f} km long; at most {LONGEST_LINE_M / 1000:.0f} km are judged.",
             advice="Check that the mission belongs to this surface model.",
         )
+
+
+def places_along(points_m: F64, step_m: float) -> tuple[F64, F64]:
+    """Places at most ``step_m`` apart along the (K, 3) polyline, every vertex among them.
+
+    Returns (M, 3) places and (M,) the horizontal distance flown up to each.
+    """
+    legs = np.diff(points_m, axis=0)
+    parts = np.maximum(1, np.ceil(np.linalg.norm(legs, axis=1) / step_m)).astype(np.int64)
+    leg = np.repeat(np.arange(len(legs)), parts)
+    share = (np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[leg]
+    places = points_m[:-1][leg] + share[:, None] * legs[leg]
+    s_m = distance_flown(points_m)
+    along = s_m[:-1][leg] + share * np.diff(s_m)[leg]
+    return np.vstack([places, points_m[-1:]]), np.append(along, s_m[-1])
+
+
+def distance_flown(points_m: F64) -> F64:
+    """(K,) horizontal distance from the first of (K, 3) points to each."""
+    steps = np.hypot(*np.diff(points_m[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _legs(line: FlownLine, distance_m: F64, share: F64, lowest_m: F64) -> tuple[LegClearance, ...]:

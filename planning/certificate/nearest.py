@@ -13,8 +13,11 @@ the SOUTH), z up.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange, set_num_threads
 
 from mapping.geometry.arrays import F64
 from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
@@ -45,6 +48,21 @@ def nearest_distances(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F6
         share,
     )
     return distance_m, share
+
+
+SMALL_MODEL_PX = 500_000
+"""On a busy machine, waking and awaiting a second thread costs more than it brings for fewer cells."""
+
+
+@contextmanager
+def threads_for(cells: int) -> Iterator[None]:
+    """Run the parallel kernels on one thread when the model has few cells; only this thread's setting changes."""
+    before = get_num_threads()
+    set_num_threads(1 if cells < SMALL_MODEL_PX else before)
+    try:
+        yield
+    finally:
+        set_num_threads(before)
 
 
 @njit(cache=True, inline="always")

@@ -8,6 +8,10 @@ triangle: no mast, however thin, stands between two ways home. A block of cells 
 column over its outline with its largest elevation asks for, so branch and bound over the pyramid of
 maxima finds the exact height at full resolution.
 
+Near home autopilots climb less than to the set return height: ArduCopter to at most RTL_CONE_SLOPE (3) times the
+distance from home; PX4, within RTL_MIN_DIST (10 m), to where its cone RTL_CONE_ANG (45 degrees) is. Both keep
+their own height where that is larger. The lower of the two counts, so that a certificate holds for either.
+
 Coordinates: the lattice's frame, z up.
 """
 
@@ -26,6 +30,18 @@ _THIN = 1e-9
 """A triangle flatter than this share of its length is judged by its sides alone: it has no inside to speak of."""
 CHUNKS = 32
 """Parts of the line searched independently; inside one, what was found raises the bar for the next place."""
+SLOPE, NEAR_SLOPE, NEAR_M = 3.0, 1.0, 10.0
+"""Of the cones around home; the flatter one holds within NEAR_M."""
+
+
+def return_altitudes(places_m: F64, home_xy_m: F64, home_alt_m: float, *, rtl_height_m: float, step_m: float) -> F64:
+    """(N,) altitude at which a return from each of the (N, 3) places flies home.
+
+    It is the lowest for all places within half of ``step_m``, the spacing of the places.
+    """
+    away_m = np.maximum(0.0, np.hypot(*(places_m[:, :2] - home_xy_m).T) - step_m / 2)
+    cone_m = np.where(away_m <= NEAR_M, NEAR_SLOPE, SLOPE) * away_m
+    return np.maximum(places_m[:, 2], home_alt_m + np.minimum(rtl_height_m, cone_m))
 
 
 def return_altitude(pyramid: MaxPyramid, places_m: F64, home_xy_m: F64, clearance_m: float) -> tuple[float, int]:

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F32, F64, Bools
-from planning.certificate.nearest import nearest_distances
+from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import MaxPyramid, max_pyramid
-from planning.certificate.threads import threads_for
 from planning.evading.boxes import nearest_box
 
 ENDLESS_M = 1000.0

@@ -10,7 +10,7 @@ from affine import Affine
 from pyproj import CRS
 
 from mapping.geometry.arrays import F64, I64
-from planning.certificate.places import distance_flown
+from mapping.geometry.polyline import along_m
 from planning.certificate.unjudged import unjudged_words
 from planning.errors import MissionError
 from planning.flight_time.predict import WAYPOINT_RADIUS_M, PredictedTime, predict_duration
@@ -94,7 +94,7 @@ def reference_line(
     first_item, first_m = _first_waypoint(mission, line)
     return Reference(
         points_m=line.points_m,
-        s_m=distance_flown(line.points_m),
+        s_m=along_m(line.points_m[:, :2]),
         leg_item=line.leg_item,
         arrive_s=arrive_s,
         leave_s=leave_s,

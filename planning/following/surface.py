@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.certificate.nearest import nearest_distances
+from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import cells_pyramid
-from planning.certificate.threads import threads_for
-from planning.certificate.true_metres import true_cells
 from planning.terrain import SMALL_HOLE_M2
-from planning.terrain.dsm import Dsm
+from planning.terrain.dsm import Dsm, true_cells
 from planning.terrain.holes import fill_holes
 
 ALONE = 256

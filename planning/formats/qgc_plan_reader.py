@@ -9,12 +9,23 @@ from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
 from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import read_planned_for
-from planning.formats.qgc_words import ALTITUDE_MODE, COMPUTED_ABOVE_TERRAIN, FIRMWARE_TYPE
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
+from planning.mav_cmd import MavFrame
 from planning.model import Firmware, Home, Mission, MissionItem, Poi
 
 Json = dict[str, Any]
+
+
+FIRMWARE_TYPE = {"ardupilot": 3, "px4": 12}
+"""MAV_AUTOPILOT"""
+QUADROTOR = 2
+"""MAV_TYPE"""
+ALTITUDE_MODE: dict[int, int] = {MavFrame.GLOBAL_RELATIVE_ALT: 1, MavFrame.GLOBAL: 2, MavFrame.GLOBAL_TERRAIN_ALT: 4}
+"""MAV_FRAME -> QGroundControl's altitude mode: relative, absolute, terrain frame."""
+COMPUTED_ABOVE_TERRAIN = 3
+"""QGroundControl's altitude mode whose heights it turned into AMSL itself."""
+DEFAULT_SPEED_M_S = 5.0
 
 
 def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 from affine import Affine
-from pyproj import CRS, Transformer
+from pyproj import CRS, Proj, Transformer
 
 from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError
@@ -18,6 +18,8 @@ from planning.terrain.cells.squares import squares
 
 LARGE_PX = 4_000_000
 """A model with more cells is read and looked at in part; a smaller one whole."""
+SCALE_TOLERANCE = 0.01
+"""Largest deviation of the CRS's metre from the true one."""
 
 
 class SurfaceModel(ABC):
@@ -193,3 +195,19 @@ def _transformer(wkt: str, *, inverse: bool) -> Transformer:
     wgs84, projected = CRS.from_epsg(4326), CRS.from_wkt(wkt)
     pair = (projected, wgs84) if inverse else (wgs84, projected)
     return Transformer.from_crs(*pair, always_xy=True)
+
+
+def true_cells(dsm: Dsm, xy_m: F64) -> Cells:
+    """The model's cells in metres no longer than those on the ground at any of the projected (N, 2) places."""
+    return dsm.cells.measured_in(stretch_at(dsm, xy_m))
+
+
+def stretch_at(dsm: Dsm, xy_m: F64) -> float:
+    """Metres of the CRS in a metre on the ground, in the direction and at the place where they are most; 1 at least.
+
+    Where they are fewer than one, distances are longer on the ground than in the CRS, in which they are judged then.
+    More than are tolerated at all are not counted: such a model is refused.
+    """
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(xy_m).T
+    longest = float(np.max(Proj(dsm.crs).get_factors(lon_deg, lat_deg).tissot_semimajor))
+    return min(max(1.0, longest), 1.0 + SCALE_TOLERANCE) if math.isfinite(longest) else 1.0

@@ -22,8 +22,7 @@ from planning.terrain.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_
 from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.dsm_file import DsmFile
-from planning.terrain.rasters.header import RasterHeader, check_georeference, check_size
-from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_georeference, check_size
 from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without_spikes

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidSta
 from websockets.typing import Origin, Subprotocol
 
 from mapping.geometry.arrays import F32
-from mapping.voxels.downsampling import thinned
+from mapping.sensor_frames import thinned
 from telemetry.agent import link_messages as wire
 from telemetry.agent.pacing import Bandwidth, RemoteClock
 from telemetry.errors import AddressError, SensorLinkError

@@ -17,9 +17,8 @@ from affine import Affine
 from pyproj import CRS
 from scipy.spatial import KDTree
 
-from planning.certificate.clearance import certify
+from planning.certificate.clearance import certify, places_along
 from planning.certificate.home_ground import home_ground
-from planning.certificate.places import places_along
 from planning.model import ClearanceParams, FlownLine
 from planning.terrain.cells.squares import squares
 from planning.terrain.dsm import Dsm

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.certificate.places import distance_flown
+from mapping.geometry.polyline import along_m
 from planning.following.reference import Reference
 
 
 def line(points: object, *, speed_m_s: float = 2.0, hold_s: float = 0.0, takeoff_s: float = 5.0) -> Reference:
     """A reference over points (K, 3), passed at a steady speed, holding at every inner one."""
     points_m = np.array(points, dtype=np.float64)
-    s_m = distance_flown(points_m)
+    s_m = along_m(points_m[:, :2])
     flown_s = takeoff_s + s_m / speed_m_s
     holds_s = hold_s * np.clip(np.arange(len(points_m)), 0, len(points_m) - 2)
     arrive_s = flown_s + np.concatenate([[0.0], holds_s[:-1]])

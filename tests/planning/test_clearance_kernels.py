@@ -10,13 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import get_num_threads
 
-from planning.certificate.cone import return_altitudes
+from planning.certificate.clearance import distance_flown, places_along
 from planning.certificate.heights import height_range
-from planning.certificate.nearest import nearest_distances
-from planning.certificate.places import distance_flown, places_along
+from planning.certificate.nearest import SMALL_MODEL_PX, nearest_distances, threads_for
 from planning.certificate.pyramid import LEAF_PX, max_pyramid
-from planning.certificate.returns import return_altitude
-from planning.certificate.threads import SMALL_MODEL_PX, threads_for
+from planning.certificate.returns import return_altitude, return_altitudes
 from tests.reference import clearance as oracle
 
 

@@ -13,8 +13,7 @@ from affine import Affine
 from pyproj import CRS, Proj
 from scipy import ndimage
 
-from planning.certificate.clearance import certify
-from planning.certificate.places import places_along
+from planning.certificate.clearance import certify, places_along
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
 from planning.missions.flown import flown_line

@@ -18,8 +18,8 @@ from planning.errors import NoElevationError, ParameterError, RasterError
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import DsmFile, open_dsm, read_dsm
 from planning.terrain.rasters import decode, dsm_file
+from planning.terrain.rasters.header import RasterLimits
 from planning.terrain.rasters.heights import mask_and_scale
-from planning.terrain.rasters.limits import RasterLimits
 from planning.terrain.rasters.part_of import needed_pixels, part_of
 from planning.terrain.rasters.reading import Declared, Read, all_of, read_surface
 from tests.planning.geotiff_samples import HALF_METRE, write_raster

@@ -6,8 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planning.report.figures.chart import Chart, Mark, Series, keep_extremes, render_chart
-from planning.report.figures.ticks import label, padded, round_step, ticks
+from planning.report.figures.chart import (
+    Chart,
+    Mark,
+    Series,
+    keep_extremes,
+    label,
+    padded,
+    render_chart,
+    round_step,
+    ticks,
+)
 from planning.safe_surface.surface import fit_within
 from tests.planning.format_examples import HOSTILE, make_dsm
 

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from planning.certificate.places import distance_flown
+from mapping.geometry.polyline import along_m
 from planning.following.nearest import follow, follow_track
 from tests.planning.following_lines import flown, line
 from tests.reference import following as oracle
@@ -132,5 +132,5 @@ def test_ending_at_an_item():
     assert follow(part, (33, 0, 10)).cross_track_m == pytest.approx(3)
     assert whole.ending_at(2) is whole
     assert whole.ending_at(99) is whole
-    assert np.array_equal(distance_flown(part.points_m), part.s_m)
+    assert np.array_equal(along_m(part.points_m[:, :2]), part.s_m)
     assert replace(part, whole=True).last_item == 1

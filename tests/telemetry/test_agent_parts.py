@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.voxels.downsampling import thinned
+from mapping.sensor_frames import thinned
 from telemetry.agent.client import sensor_url
 from telemetry.agent.link_messages import REACH_M, cloud, points_of, sendable
 from telemetry.agent.pacing import Bandwidth, RemoteClock

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -10,7 +11,6 @@ from html import escape
 import numpy as np
 
 from mapping.geometry.arrays import F64, I64
-from planning.report.figures.ticks import label, padded, round_step, ticks
 
 LEFT, RIGHT, TOP, BOTTOM = 58, 16, 34, 46
 INK, MUTED, GRID = "#1f2933", "#5b6770", "#e3e8ec"
@@ -230,3 +230,30 @@ def keep_extremes(y: F64, max_points: int = 1200) -> I64:
     low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
     picked = [a + k for a, b in itertools.pairwise(edges) for k in (np.argmin(low[a:b]), np.argmax(high[a:b]))]
     return np.unique(np.array([0, len(y) - 1, *picked], dtype=np.int64))
+
+
+def round_step(span: float, count: int) -> float:
+    """The smallest 1-2-5 step that divides ``span`` into at most ``count`` parts."""
+    raw = max(span, 1e-12) / max(count, 1)
+    power = 10.0 ** math.floor(math.log10(raw))
+    return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * (1 - 1e-9))
+
+
+def ticks(low: float, high: float, count: int = 6) -> list[float]:
+    """Round values inside [low, high], about ``count`` of them."""
+    step = round_step(high - low, count)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
+
+
+def label(value: float, step: float) -> str:
+    """A tick's text with as many decimals as its step needs."""
+    decimals = max(0, -math.floor(math.log10(step) + 1e-9))
+    return f"{value + 0.0:.{decimals}f}"
+
+
+def padded(low: float, high: float, count: int = 6) -> tuple[float, float]:
+    """The range widened to whole ticks."""
+    step = round_step(max(high - low, 1e-9), count)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return first * step, max(last, first + 1) * step

@@ -12,8 +12,8 @@ from PIL import Image
 
 from mapping.geometry.arrays import F64, U8
 from planning.model import Certificate, FlownLine, Poi
+from planning.report.figures.chart import label, round_step
 from planning.report.figures.curves import BAD, PATH, short_name
-from planning.report.figures.ticks import label, round_step
 from planning.report.words import metres
 from planning.safe_surface.surface import fit_within
 from planning.terrain.dsm import Dsm

@@ -14,9 +14,8 @@ import numpy as np
 from mapping.geometry.arrays import F32
 from planning.errors import RasterError, RasterFormatError
 from planning.terrain.rasters import sandbox
-from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.header import RasterHeader, RasterLimits
 from planning.terrain.rasters.heights import HeightStats
-from planning.terrain.rasters.limits import RasterLimits
 from planning.terrain.rasters.magic import driver_of
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 

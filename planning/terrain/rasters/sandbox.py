@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from planning.errors import NoElevationError, RasterError, RasterFormatError, RasterTooLargeError
-from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.header import RasterLimits
 
 Json = dict[str, Any]
 Progress = Callable[[str, float], None]

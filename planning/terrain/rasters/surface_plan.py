@@ -12,8 +12,13 @@ from planning.errors import RasterTooLargeError
 from planning.terrain.cells.cells import Placing, place_cells
 from planning.terrain.cells.squares import square_grid
 from planning.terrain.rasters import georef
-from planning.terrain.rasters.header import RasterHeader, check_georeference, check_size, check_surface_bands
-from planning.terrain.rasters.limits import RasterLimits
+from planning.terrain.rasters.header import (
+    RasterHeader,
+    RasterLimits,
+    check_georeference,
+    check_size,
+    check_surface_bands,
+)
 from planning.terrain.rasters.mapping import extent_of, source_mapping
 
 _MOST_DRIFT_PX = 0.1

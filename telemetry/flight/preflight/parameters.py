@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from planning.certificate.cone import SLOPE
+from planning.certificate.returns import SLOPE
 from planning.model import Firmware
 
 NAMES: dict[Firmware, tuple[str, ...]] = {

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapping.radar.fft import Window, window
-from mapping.radar.side_lobes import FINE, envelope, own_peaks
+from mapping.radar.fft import FINE, Window, envelope, own_peaks, window
 
 RECTANGULAR, HANN = envelope("rectangular", 64), envelope("hann", 64)
 
