@@ -3,8 +3,7 @@
 MappingError
 ├── ParameterError         a resolution, range or probability that contradicts itself
 ├── CapacityError          a map or region that cannot fit, with the number that would
-├── RadarDataError         raw radar data, or a radar's configuration, that is cut, unreadable or contradicts itself
-└── FormatError            a map file that cannot be read or a map that cannot be written
+└── RadarDataError         raw radar data, or a radar's configuration, that is cut, unreadable or contradicts itself
 
 Every error says what is wrong, where, and what to do.
 """
@@ -51,7 +50,3 @@ class CapacityError(MappingError):
 
 class RadarDataError(MappingError):
     code = "radar_data"
-
-
-class FormatError(MappingError):
-    code = "map_format"

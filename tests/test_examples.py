@@ -13,12 +13,12 @@ import pytest
 
 from mapping import POSITION2GO
 from mapping.sensor_frames import RadarFrame
-from planning.formats.poi_files import write_pois_csv
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.terrain.geotiff import write_dsm
 from server.door.sensor_token import FILE
 from tests.conftest import ROOT
 from tests.mapping.radar.echoes import Echo, frame
+from tests.planning.format_examples import write_pois_csv
 from tests.server.running import running
 from tests.server.station import PATIENCE_S, ok, station
 

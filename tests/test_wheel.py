@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 
 from hatch_build import moved_imports
-from planning.formats.poi_files import write_pois_csv
 from planning.ground.demo_hillside import small_hill
 from planning.model import Poi
 from planning.terrain.geotiff import write_dsm
 from server.settings import default_console_dir
 from telemetry.bus.node_lock import running_nodes
 from tests.e2e.stations import Station
+from tests.planning.format_examples import write_pois_csv
 from tests.server.station import PATIENCE_S
 
 # One worker builds and installs for all of them.

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, Bools
 from mapping.perceiving.frame_result import Settings
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 
 
 class FlightMap:

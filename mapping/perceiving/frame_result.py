@@ -14,7 +14,6 @@ from mapping.perceiving.braking import Braking
 from mapping.perceiving.obstacles import Found
 from mapping.radar.targets import Variant
 
-Sensor = Literal["radar", "vision", "ranges"]
 State = Literal["waiting", "running", "blind", "frozen", "stale"]
 
 

@@ -20,7 +20,7 @@ from mapping.perceiving.obstacles import Found, obstacles, sweep
 from mapping.perceiving.remembered import Field, Remembered, Way
 from mapping.perceiving.roi import search_sector, sector_points, to_enu
 from mapping.sensor_frames import SensorFrame
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 
 FUTURE_S = 0.05
 """A frame may be measured so much after now: clocks of one machine are read one after the other."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from mapping.errors import CapacityError
 from mapping.geometry.arrays import I32, I64, U16
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 
 FIRST_LINE = b"# Octomap OcTree binary file"
 DEPTH = 16

@@ -5,7 +5,6 @@ Both papers avoid upwards or sideways and never downwards (Miccinesi 2022, fig. 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +14,7 @@ from planning.evading.around import way_around
 from planning.evading.keep_clear import Room, Seen, Surface
 from planning.evading.line import LineAhead
 from planning.evading.model import AvoidanceParams, Kind, Manoeuvre, NoWay
-from planning.evading.over import way_over, way_up
+from planning.evading.over import way_over
 
 __all__ = [
     "AvoidanceParams",
@@ -24,7 +23,6 @@ __all__ = [
     "Seen",
     "Surface",
     "around",
-    "climb",
     "over",
 ]
 
@@ -56,31 +54,6 @@ def around(
 ) -> Manoeuvre | NoWay:
     """Sideways past what was seen and back onto the line behind it; arguments as for ``over``."""
     return _way("around", position_enu_m, line_enu_m, seen, surface, params or AvoidanceParams())
-
-
-def climb(
-    position_enu_m: ArrayLike,
-    heading_rad: float,
-    depth_m: float,
-    seen: Sequence[Seen],
-    surface: Surface | None = None,
-    params: AvoidanceParams | None = None,
-) -> Manoeuvre | NoWay:
-    """Straight up until the level region ahead is clear, ``depth_m`` deep along ``heading_rad`` (clockwise from north).
-
-    What avoidance does in flight with what it sees by and by, worked out from all that was seen. Where it is clear
-    already the climb is 0 m.
-    """
-    params = params or AvoidanceParams()
-    position = np.asarray(position_enu_m, np.float64).reshape(3)
-    if not (np.isfinite(position).all() and math.isfinite(heading_rad) and depth_m > 0.0):
-        return NoWay("over", "Where the vehicle is, or what is ahead of it, is not known.")
-    here = np.vstack([position, position])
-    room = Room(here, depth_m + params.keep_m + BEYOND_M, seen, surface)
-    here_m = min(room.seen_m(here), room.surface_m(here))
-    if here_m < params.radius_m + params.least_beside_m:
-        return NoWay("over", f"The vehicle is only {here_m:.1f} m from what was seen.")
-    return way_up(position, heading_rad, depth_m, room, min(params.keep_m, here_m), params)
 
 
 def _way(

@@ -3,35 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.errors import FormatError
 from planning.formats.commands import has_position, home_altitude_note
-from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite, load_json
+from planning.formats.safe_text import check_lat_lon, clean_name, finite
 from planning.model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
 from planning.terrain.dsm import Dsm
 
 Json = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class GeoJsonPlan:
-    """What our own GeoJSON holds."""
-
-    home: Home
-    pois: tuple[Poi, ...]
-    waypoints: tuple[MissionItem, ...]
-    lat_lon_deg: F64
-    """(N, 2) of the sampled path"""
-    alt_rel_home_m: F64
-    """(N,)"""
-    summary: Json
 
 
 def write_geojson(path: SampledPath, mission: Mission, dsm: Dsm, *, summary: Json | None = None) -> str:
@@ -98,26 +79,6 @@ def _home(mission: Mission) -> Json:
     return _feature("Point", _lon_lat(home.lat_deg, home.lon_deg), properties)
 
 
-def read_geojson(data: bytes | str, name: str = "mission.geojson") -> GeoJsonPlan:
-    """The GeoJSON that `write_geojson` wrote. Raises FormatError with file and feature index."""
-    file = clean_name(name)
-    by_role: dict[str, list[Json]] = {"path": [], "waypoint": [], "poi": [], "home": []}
-    for feature in features(load_json(name, decode_text(name, data)), file):
-        by_role.setdefault(str(feature["properties"].get("role")), []).append(feature)
-    if len(by_role["path"]) != 1 or len(by_role["home"]) != 1:
-        raise FormatError("The file should hold one path and one home.", where=file, advice="Export it again.")
-    path, home = by_role["path"][0], by_role["home"][0]["properties"]
-    lat, lon = point(by_role["home"][0], file)
-    return GeoJsonPlan(
-        Home(lat, lon, _number(home.get("home_alt_dsm_m"), file), home.get("vertical_datum")),
-        tuple(poi_from_feature(f, file) for f in by_role["poi"]),
-        tuple(_item(f, file) for f in by_role["waypoint"]),
-        np.array([lat_lon(c, file) for c in path["geometry"]["coordinates"]]).reshape(-1, 2),
-        np.array([_number(z, file) for z in path["properties"].get("alt_rel_home_m", [])]),
-        path["properties"].get("summary", {}),
-    )
-
-
 def features(document: object, file: str) -> list[Json]:
     """The features of a GeoJSON document (a bare geometry counts as one), each with dict properties and geometry."""
     if not isinstance(document, dict) or not isinstance(document.get("type"), str):
@@ -158,18 +119,3 @@ def poi_from_feature(feature: Json, where: str) -> Poi:
     properties = feature["properties"]
     loiter_s = finite(properties.get("loiter_s") or 0.0, "loiter_s", where)
     return Poi(*point(feature, where), clean_name(properties.get("name") or ""), max(0.0, loiter_s))
-
-
-def _number(value: object, where: str) -> float:
-    return math.nan if value is None else finite(value, "A height", where)
-
-
-def _item(feature: Json, file: str) -> MissionItem:
-    raw, (lat, lon) = feature["properties"], point(feature, file)
-    params = raw.get("params")
-    if not isinstance(params, list) or len(params) != 4:
-        raise FormatError(f"A waypoint has 4 params, got {clean_name(params)!r}.", where=file)
-    p1, p2, p3, p4 = (_number(p, file) for p in params)
-    command, frame = (int(finite(raw.get(k), k, file)) for k in ("command", "frame"))
-    alt_m = _number(raw.get("alt_m"), file)
-    return MissionItem(command, frame, (p1, p2, p3, p4), lat, lon, alt_m, raw.get("autocontinue") is not False)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
-from collections.abc import Sequence
 
 from planning.errors import FormatError
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
@@ -19,16 +17,6 @@ ALIASES = {
     "loiter_s": "loiter_s", "loiter": "loiter_s", "hold": "loiter_s", "hold_s": "loiter_s",
 }  # fmt: skip
 _EXPECTED = "Use lat_deg,lon_deg[,name][,loiter_s]."
-
-
-def write_pois_csv(pois: Sequence[Poi]) -> str:
-    """POIs -> CSV text with header, 9 decimals of latitude and longitude."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for poi in pois:
-        writer.writerow([f"{poi.lat_deg:.9f}", f"{poi.lon_deg:.9f}", clean_name(poi.name), f"{poi.loiter_s:g}"])
-    return out.getvalue()
 
 
 def read_pois_csv(name: str, data: bytes | str) -> tuple[Poi, ...]:

@@ -12,14 +12,14 @@ from planning.formats.commands import FLOWN_TO, has_position
 from planning.formats.detect import read_mission
 from planning.formats.kml import poi_from_placemark
 from planning.formats.kml_reader import Placemark, read_placemarks
-from planning.formats.poi_csv import read_pois_csv, write_pois_csv
+from planning.formats.poi_csv import read_pois_csv
 from planning.formats.safe_text import check_count, clean_name, decode_text, load_json, said_once
 from planning.formats.swapped import looks_swapped
 from planning.mav_cmd import MavCmd
 from planning.model import Mission, MissionItem, Poi
 from planning.terrain.dsm import SurfaceModel
 
-__all__ = ["PoiFile", "Polygon", "looks_swapped", "read_pois", "warn_swapped", "write_pois_csv"]
+__all__ = ["PoiFile", "Polygon", "looks_swapped", "read_pois", "warn_swapped"]
 
 Polygon = tuple[tuple[float, float], ...]
 """Corners (lat_deg, lon_deg), the first not repeated."""

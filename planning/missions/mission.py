@@ -12,7 +12,7 @@ from planning.errors import CapacityError
 from planning.flight_time.predict import predict_duration
 from planning.mav_cmd import MavCmd
 from planning.missions.decimate import Decimated, decimate_to_fit
-from planning.missions.home import check_start, home_from_dsm, item_heights
+from planning.missions.home import check_start, item_heights
 from planning.missions.mission_items import (
     GROUND_SPEED,
     LANDING_ITEMS,
@@ -33,8 +33,6 @@ from planning.missions.vehicle_profile import path_params
 from planning.model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
 from planning.route.slopes import slope_limits
 from planning.terrain.dsm import Dsm
-
-__all__ = ["BuiltMission", "Choice", "build_mission", "decimation_trade", "home_from_dsm"]
 
 EXCESSES_M = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 NO_LIMIT = 1_000_000

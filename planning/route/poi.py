@@ -10,10 +10,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from planning.errors import PoiError
 from planning.model import Poi
-from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import Dsm, SurfaceModel
-
-__all__ = ["check_pois", "shortest_order"]
 
 MIN_APART_M = 0.1
 Bounds = tuple[float, float, float, float]

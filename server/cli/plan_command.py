@@ -15,7 +15,8 @@ from planning.formats.poi_files import read_pois, warn_swapped
 from planning.formats.safe_text import clean_name
 from planning.model import Poi
 from planning.request import PlanRequest
-from planning.route.poi import check_pois, shortest_order
+from planning.route.poi import check_pois
+from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
 from server.cli.shared.command import command

@@ -21,7 +21,7 @@ from planning.report.exports import export_file
 from planning.report.summary import plan_summary
 from planning.request import PlanRequest
 from planning.route.camera import gsd_cm
-from planning.route.poi import shortest_order
+from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import Dsm
 from server.library.documents import request_from_doc
 from server.library.orthophotos import load_orthophoto

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import U8
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from telemetry.topics.deltas import in_parts
 from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin
 

@@ -12,7 +12,7 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from mapping.voxels.octomap_bt import write_bt
 from mapping.voxels.ply import ply
 from planning.terrain.dsm import Dsm

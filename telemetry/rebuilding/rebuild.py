@@ -17,8 +17,8 @@ from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.settings_limits import COARSEST_CLOUD, check_gate, check_thinning
 from mapping.radar.targets import Variant
 from mapping.sensor_frames import SensorFrame, SlamPose
-from mapping.voxels import VoxelMap
 from mapping.voxels.checks import checked_size
+from mapping.voxels.map import VoxelMap
 from planning.terrain.dsm import Dsm
 from telemetry.errors import RecordingError
 from telemetry.perception.inbox import HOLD_S

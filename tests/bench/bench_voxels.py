@@ -14,7 +14,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.perceiving.roi import search_sector, sector_points, to_enu
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from tests.mapping.clouds import seen_by_camera
 from tests.reference.octomap import octree
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapping.errors import CapacityError
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from mapping.voxels.octomap_bt import write_bt
 from tests.reference.octomap import octree
 from tests.reference.octomap_bt import map_from_bt, read_bt

@@ -10,8 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mapping.errors import CapacityError, ParameterError
-from mapping.perceiving.roi import search, search_sector, sector_points, to_enu
-from mapping.voxels import VoxelMap
+from mapping.perceiving.roi import search_sector, sector_points, to_enu
+from mapping.voxels.map import VoxelMap
 from tests.reference.sector import sector
 
 FOV_RAD = math.radians(24.0)
@@ -53,7 +53,7 @@ def test_what_is_found_is_occupied_and_unexplained_nearest_first() -> None:
     assert not voxels.explained(at_enu[found]).any()
     with_ground = search_sector(voxels, points, here, heading_rad, include_explained=True)
     assert set(with_ground.tolist()) >= {40, 200, 300}
-    np.testing.assert_array_equal(found, search(voxels, at_enu))
+    np.testing.assert_array_equal(found, search_sector(voxels, at_enu, (0.0, 0.0, 0.0), 0.0))
 
 
 @given(st.integers(0, 10_000), st.floats(-50.0, 50.0), st.floats(-7.0, 7.0))
@@ -78,7 +78,7 @@ def test_nothing_is_found_in_an_empty_map() -> None:
     voxels = VoxelMap(resolution_m=0.5, memory_limit_bytes=4_000_000)
     points = sector_points(depth_m=7.0, fov_rad=FOV_RAD, height_m=2.0, resolution_m=0.5)
     assert search_sector(voxels, points, (0.0, 0.0, 0.0), 0.0).size == 0
-    assert search(voxels, np.full((2, 3), np.nan)).size == 0
+    assert search_sector(voxels, np.full((2, 3), np.nan), (0.0, 0.0, 0.0), 0.0).size == 0
 
 
 @pytest.mark.parametrize(

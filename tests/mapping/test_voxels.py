@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapping.errors import CapacityError, ParameterError
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from tests.reference.octomap_rules import SlowMap
 
 SMALL_BYTES = 2_000_000

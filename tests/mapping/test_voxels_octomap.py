@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from tests.mapping.clouds import car_clouds, gicp_clouds, seen_by_camera
 from tests.reference.octomap import octree
 from tests.reference.octomap_bt import read_bt

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from affine import Affine
@@ -49,3 +54,21 @@ def make_mission(dsm: Dsm, path: SampledPath, names: tuple[str, ...] = ("P1", "P
     speed = MissionItem(178, 2, (1.0, 3.0, -1.0, 0.0))
     waypoints = [MissionItem(16, 3, (1.5, 0.0, 0.0, 0.0), *ll, z) for ll, z in zip(places, up, strict=True)]
     return Mission(home, (takeoff, speed, *waypoints, MissionItem(20, 2)), "ardupilot", pois, 3.0)
+
+
+def write_pois_csv(pois: Sequence[Poi]) -> str:
+    """POIs -> CSV text with header, 9 decimals of latitude and longitude."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(("lat_deg", "lon_deg", "name", "loiter_s"))
+    for poi in pois:
+        writer.writerow([f"{poi.lat_deg:.9f}", f"{poi.lon_deg:.9f}", poi.name, f"{poi.loiter_s:g}"])
+    return out.getvalue()
+
+
+def geojson_by_role(text: str) -> dict[str, list[dict[str, Any]]]:
+    """Features of our own GeoJSON: path, waypoint, poi, home."""
+    by_role: dict[str, list[dict[str, Any]]] = {}
+    for feature in json.loads(text)["features"]:
+        by_role.setdefault(feature["properties"]["role"], []).append(feature)
+    return by_role

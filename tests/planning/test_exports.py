@@ -9,12 +9,12 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
+from planning.formats import kml, qgc_plan, trajectory_csv, wpl
 from planning.model import Camera
 from planning.plan import Plan, plan_mission
 from planning.report.exports import FILES, export_file, report_input
 from planning.terrain.dsm import Dsm
-from tests.planning.format_examples import HOSTILE
+from tests.planning.format_examples import HOSTILE, geojson_by_role
 from tests.planning.plan_examples import QUAD, pois_at, request_over, small_dsm
 
 SECONDS = {"read": 0.5, "total": 1.5}
@@ -50,10 +50,12 @@ def test_missions_agree(plan: Plan, dsm: Dsm) -> None:
     assert [(p.name, p.loiter_s) for p in items.pois] == [(p.name, p.loiter_s) for p in plan.mission.pois]
     for ours, planned in zip(items.pois, plan.mission.pois, strict=True):
         assert (ours.lat_deg, ours.lon_deg) == pytest.approx((planned.lat_deg, planned.lon_deg), abs=1e-9)
-    marks = geojson.read_geojson(export("mission.geojson", plan, dsm))
-    assert [w.lat_deg for w in marks.waypoints] == [i.lat_deg for i in plan.mission.items if i.lat_deg]
-    assert marks.summary["certified"] is True
-    assert "dsm" not in marks.summary
+    marks = geojson_by_role(export("mission.geojson", plan, dsm))
+    waypoints = [mark["geometry"]["coordinates"][1] for mark in marks["waypoint"]]
+    assert waypoints == [i.lat_deg for i in plan.mission.items if i.lat_deg]
+    summary = marks["path"][0]["properties"]["summary"]
+    assert summary["certified"] is True
+    assert "dsm" not in summary
 
 
 def test_paths_agree(plan: Plan, dsm: Dsm) -> None:

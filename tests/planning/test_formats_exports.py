@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from planning.errors import FormatError
-from planning.formats.geojson import read_geojson, write_geojson
+from planning.formats.geojson import write_geojson
 from planning.formats.kml import read_kml_track, write_kml
 from planning.formats.kml_reader import read_placemarks
 from planning.formats.trajectory_csv import read_trajectory, write_trajectory
-from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing
+from tests.planning.format_examples import HOSTILE, geojson_by_role, make_dsm, make_mission, make_path, make_timing
 
 DATUMS = [None, "WGS 84 ellipsoid", "EGM96 height"]
 
@@ -75,12 +75,16 @@ def test_geojson_survives_the_round_trip():
     path = make_path(dsm)
     mission = make_mission(dsm, path)
     text = write_geojson(path, mission, dsm, summary={"certified": True})
-    back = read_geojson(text)
-    assert back.summary == {"certified": True}
-    assert back.home.alt_dsm_m == mission.home.alt_dsm_m
-    assert [w.alt_m for w in back.waypoints] == [i.alt_m for i in mission.items if i.command in (16, 22)]
-    np.testing.assert_allclose(back.lat_lon_deg, dsm.lat_lon_from_xy(path.xy_m), atol=1e-9)
-    np.testing.assert_allclose(back.alt_rel_home_m, path.alt_dsm_m - mission.home.alt_dsm_m, atol=6e-4)
+    marks = geojson_by_role(text)
+    [home], [line] = marks["home"], marks["path"]
+    assert line["properties"]["summary"] == {"certified": True}
+    assert home["properties"]["home_alt_dsm_m"] == mission.home.alt_dsm_m
+    above_home_m = [mark["properties"]["alt_m"] for mark in marks["waypoint"]]
+    assert above_home_m == [i.alt_m for i in mission.items if i.command in (16, 22)]
+    lon_lat_deg = np.array(line["geometry"]["coordinates"])
+    np.testing.assert_allclose(lon_lat_deg[:, ::-1], dsm.lat_lon_from_xy(path.xy_m), atol=1e-9)
+    heights_m = np.array(line["properties"]["alt_rel_home_m"])
+    np.testing.assert_allclose(heights_m, path.alt_dsm_m - mission.home.alt_dsm_m, atol=6e-4)
 
 
 def test_geojson_puts_longitude_first_and_no_third_coordinate():

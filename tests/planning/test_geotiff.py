@@ -25,7 +25,7 @@ from tests.planning.geotiff_samples import HALF_METRE, UTM, hill, write_raster
 def test_heights_grid_and_digest(tmp_path: Path) -> None:
     path = write_raster(tmp_path / "x.tif", hill())
     stages: list[tuple[str, float]] = []
-    dsm, report = read_dsm_reported(path, progress=lambda stage, share: stages.append((stage, share)))
+    dsm, _ = read_dsm_reported(path, progress=lambda stage, share: stages.append((stage, share)))
     np.testing.assert_array_equal(dsm.elevation_m, hill())
     assert dsm.transform == HALF_METRE
     assert dsm.crs == CRS.from_user_input(UTM)
@@ -33,7 +33,6 @@ def test_heights_grid_and_digest(tmp_path: Path) -> None:
     assert not dsm.elevation_m.flags.writeable
     assert ("decode", 1.0) in stages
     assert stages[-1] == ("spikes", 1.0)
-    assert report.source_crs == "WGS 84 / UTM zone 33N (EPSG:32633)"
 
 
 @pytest.mark.parametrize("tile", [(2048, 2048), (4096, 256), (256, 4096)])
@@ -52,7 +51,6 @@ def test_unknown_cells_are_masked_and_undeclared_ones_named(tmp_path: Path) -> N
     expected = hill()
     expected[0, :4] = expected[1, :3] = np.nan
     np.testing.assert_array_equal(dsm.elevation_m, expected)
-    assert report.unknown_share == pytest.approx(7 / heights.size)
     assert "2 cells of -9999" in " ".join(report.warnings)
     assert "3 cells with infinite or absurd" in " ".join(report.warnings)
 

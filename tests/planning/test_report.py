@@ -8,7 +8,7 @@ import pytest
 
 from planning.missions.feasibility import feasibility_of
 from planning.model import Certificate, FlownLine, LegClearance, Reason, SurfaceParams, VehicleProfile, WorstPoint
-from planning.report import ReportInput, TradeRow, render_report
+from planning.report.page import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
 from planning.route.survey_coverage import SurveyCoverage
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing

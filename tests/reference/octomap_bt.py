@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.arrays import I32, Bools
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from mapping.voxels.octomap_bt import DEPTH, FIRST_LINE, HALF, INNER, OCCUPIED
 
 

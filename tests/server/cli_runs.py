@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from planning.formats.poi_files import write_pois_csv
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.terrain.geotiff import write_dsm
 from server.cli import app
 from server.cli.shared.command import run_command
+from tests.planning.format_examples import write_pois_csv
 
 
 @dataclass(frozen=True)

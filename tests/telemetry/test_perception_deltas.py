@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.voxels import VoxelMap
+from mapping.voxels.map import VoxelMap
 from telemetry.perception.map_changes import ChangeTeller, told_probability
 from telemetry.topics import deltas as d
 from telemetry.topics.deltas import FoldedMap, in_parts

@@ -21,12 +21,9 @@ from planning.terrain.spikes import Spike
 class ReadReport:
     """What was found in a file and what was done to make a surface model of it."""
 
-    source_crs: str
-    """Name, with its code where it has one."""
     vertical_datum: str | None
     height_scale: float
     """Metres per stored unit."""
-    unknown_share: float
     spikes: tuple[Spike, ...]
     spikes_removed: bool
     warnings: tuple[str, ...]
@@ -89,22 +86,10 @@ def _masked(stats: HeightStats, sentinels: tuple[float, ...]) -> tuple[str, ...]
 
 
 def _report(dsm: Dsm, plan: SurfacePlan, warnings: tuple[str, ...]) -> ReadReport:
-    source = plan.reference.source
-    epsg = source.to_epsg()
     return ReadReport(
-        source_crs=f"{source.name} (EPSG:{epsg})" if epsg else source.name,
         vertical_datum=dsm.vertical_datum,
         height_scale=plan.height_scale,
-        unknown_share=_unknown_share(dsm.elevation_m),
         spikes=(),
         spikes_removed=False,
         warnings=warnings,
     )
-
-
-def _unknown_share(elevation_m: F32) -> float:
-    rows = max(1, 4_000_000 // elevation_m.shape[1])
-    unknown = sum(
-        int(np.count_nonzero(np.isnan(elevation_m[row : row + rows]))) for row in range(0, len(elevation_m), rows)
-    )
-    return unknown / elevation_m.size

@@ -29,7 +29,6 @@ _UNIT_TAGS_M = {
 class Georeference:
     """The reference system of a file, split into its parts."""
 
-    source: CRS
     """As declared or as in the file."""
     horizontal: CRS
     """Its two-dimensional part."""
@@ -51,7 +50,7 @@ def interpret(header: RasterHeader, *, crs: str | None, vertical_datum: str | No
             *unit_notes,
             f'The file\'s vertical datum is "{in_file}"; the declared "{vertical_datum}" is used.',
         )
-    return Georeference(source, _horizontal_part(source), vertical_datum or in_file, metres, (*notes, *unit_notes))
+    return Georeference(_horizontal_part(source), vertical_datum or in_file, metres, (*notes, *unit_notes))
 
 
 def _source_crs(header: RasterHeader, crs: str | None, where: str) -> tuple[CRS, tuple[str, ...]]:

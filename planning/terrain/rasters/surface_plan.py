@@ -41,7 +41,6 @@ class SurfacePlan:
     """Where the file's cells lie; None: they are squares of the model themselves."""
     grid: tuple[Affine, tuple[int, int]] | None
     """Transform and (rows, columns) of the squares that stand for them; None: one for each pixel."""
-    reprojected: bool
     height_scale: float
     height_offset: float
     """metres = stored * scale + offset"""
@@ -84,9 +83,7 @@ def plan_surface(
             f"The file declares heights = stored * {header.scale:g} + {header.offset:g}; this was applied.",
         )
     scaled = z_scale is not None or scale != 1.0
-    return SurfacePlan(
-        header, reference, target, affine, placing, grid, reason is not None, scale, offset, scaled, notes
-    )
+    return SurfacePlan(header, reference, target, affine, placing, grid, scale, offset, scaled, notes)
 
 
 def _placed(

@@ -294,7 +294,7 @@ class Detour:
     def _is_clear(self, state: VehicleState, now_s: float) -> bool:
         assert self._climb is not None
         is_clear = not self.variant.climbs_over or self._trusted.say_clear(now_s)
-        return self._climb.is_high_enough(state) and is_clear
+        return self._climb.is_high_enough(state) and is_clear  # Bigazzi 2022, fig. 9
 
     def _is_highest(self, state: VehicleState, _: float) -> bool:
         assert self._climb is not None
