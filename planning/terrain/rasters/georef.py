@@ -27,11 +27,9 @@ _UNIT_TAGS_M = {
 
 @dataclass(frozen=True, slots=True)
 class Georeference:
-    """The reference system of a file, split into its parts."""
+    """The reference system of a file, as declared or as it says itself, split into its parts."""
 
-    """As declared or as in the file."""
     horizontal: CRS
-    """Its two-dimensional part."""
     vertical_datum: str | None
     metres_per_height_unit: float
     notes: tuple[str, ...]
