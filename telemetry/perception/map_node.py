@@ -10,7 +10,7 @@ from telemetry.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.perception.ahead import Ahead, Flight
 from telemetry.perception.frame_worker import CONFLICT, WHOLE
-from telemetry.perception.map_sender import MapSender
+from telemetry.perception.map_changes import MapSender
 from telemetry.perception.map_worker import MapWorker
 from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.sensor_node import SensorNode, run_sensor_node

@@ -14,7 +14,7 @@ from mapping.perceiving.frame_result import FrameResult
 from mapping.perceiving.ground import GroundGrid
 from mapping.sensor_frames import SensorFrame, SlamPose
 from mapping.voxels.checks import checked_size
-from telemetry.perception.flown_line import FlownLine
+from telemetry.perception.mission_line import FlownLine
 from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.status import Outcome, Teller
 from telemetry.perception.whereabouts import Whereabouts, has_fix, is_flying, velocity_enu_m_s

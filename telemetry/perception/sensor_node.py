@@ -15,15 +15,66 @@ from planning.errors import DescribedError
 from telemetry.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import BusError
-from telemetry.perception.frame_worker import GROUND
+from telemetry.perception.frame_worker import AVOIDANCE, CAMERA, FLIGHT, GROUND, NOTICE, PLAN, SETTINGS, STATE
 from telemetry.perception.inbox import Inbox
 from telemetry.perception.known_ground import ground_around, why_none
-from telemetry.perception.listening import Listening
 from telemetry.perception.perceiver import GroundWanted
 from telemetry.perception.sensor_kinds import SensorKind
-from telemetry.topics.messages import Published
+from telemetry.topics.messages import Published, RecorderStatus, Topic
+from telemetry.topics.vehicle import VehicleState
 
+_MOST_UNREAD = 2000
+_LATEST = {
+    Topic.PERCEPTION_SETTINGS: SETTINGS,
+    Topic.PLAN: PLAN,
+    Topic.FLIGHT: FLIGHT,
+    Topic.AVOIDANCE: AVOIDANCE,
+    Topic.GROUND: NOTICE,
+}
 _log = logging.getLogger(__name__)
+
+
+class Listening:
+    """What a node hears on the bus, and hands to its thread."""
+
+    def __init__(self, bus: Bus, inbox: Inbox, kind: SensorKind, *, recording_began: Callable[[], None]) -> None:
+        self._bus, self._inbox, self._kind = bus, inbox, kind
+        self._recording_began = recording_began
+        self._recording: str | None = None
+        self.flying_mono_s: float | None = None
+        """When the vehicle was last heard of; None: it was not armed then."""
+
+    def parts(self) -> list[Coroutine[Any, Any, None]]:
+        """To be run side by side until cancelled."""
+        parts: list[Coroutine[Any, Any, None]] = [self._frames(), self._states(), self._recorder()]
+        parts += [self._messages(topic, kind, each=False) for topic, kind in _LATEST.items()]
+        if self._kind.uses_camera:
+            parts.append(self._messages(Topic.SLAM_POSE, CAMERA, each=True))
+        return parts
+
+    async def _frames(self) -> None:
+        # Of large clouds the bus keeps the newest only: no others must be fetched.
+        each = self._kind.backlog > 1
+        async for _, frame in self._bus.subscribe(self._kind.frames, keep_all=each, limit=_MOST_UNREAD):
+            self._inbox.put_frame(frame)
+
+    async def _states(self) -> None:
+        async for _, state in self._bus.subscribe(Topic.VEHICLE, keep_all=True, limit=_MOST_UNREAD):
+            if isinstance(state, VehicleState):
+                self.flying_mono_s = time.monotonic() if state.armed else None
+            self._inbox.put(STATE, state)
+
+    async def _messages(self, topic: Topic, kind: str, *, each: bool) -> None:
+        async for _, message in self._bus.subscribe(topic, keep_all=each, limit=_MOST_UNREAD):
+            self._inbox.put(kind, message)
+
+    async def _recorder(self) -> None:
+        async for _, status in self._bus.subscribe(Topic.RECORDER):
+            if isinstance(status, RecorderStatus):
+                began = status.recording and status.name != self._recording
+                self._recording = status.name if status.recording else None
+                if began:
+                    self._recording_began()
 
 
 class SensorNode:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import tempfile
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
-from mapping.geometry.arrays import F64
+from mapping.geometry.arrays import F64, I32, I64
 from mapping.voxels.map import VoxelMap
 from mapping.voxels.octomap_bt import write_bt
 from mapping.voxels.ply import ply
@@ -20,8 +24,7 @@ from planning.terrain.geotiff import write_dsm
 from telemetry.errors import TelemetryError
 from telemetry.perception.convert import frame_of
 from telemetry.perception.mission_line import local_crs
-from telemetry.rebuilding.outlines import clusters, outline
-from telemetry.topics.deltas import FoldedMap, Voxels
+from telemetry.topics.deltas import FoldedMap, Voxels, packed_keys
 from telemetry.topics.obstacles import MapDelta
 
 Kind = Literal["ply", "bt", "tif", "geojson"]
@@ -29,6 +32,7 @@ KINDS: tuple[Kind, ...] = ("ply", "bt", "tif", "geojson")
 
 MOST_CELLS = 100_000_000
 """Of a GeoTIFF: 400 MB before it is compressed."""
+_HALF_OF_26 = [d for d in product((-1, 0, 1), repeat=3) if d > (0, 0, 0)]
 
 
 class ExportError(TelemetryError):
@@ -120,3 +124,31 @@ def _feature(obstacles: Voxels, rows: NDArray[np.intp], head: MapDelta) -> dict[
             "largest_probability": round(float(obstacles.probability[rows].max()) / 255.0, 3),
         },
     }
+
+
+def clusters(keys: I32) -> I32:
+    """(N, 3) voxels, each once -> (N,) number of the cluster: voxels that touch, corners included, are one."""
+    packed = packed_keys(keys)
+    order = np.argsort(packed)
+    in_order = packed[order]
+    pairs = [_neighbours(keys, np.array(step, np.int32), order, in_order) for step in _HALF_OF_26]
+    one, other = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    graph = coo_array((np.ones(len(one), np.bool_), (one, other)), shape=(len(keys), len(keys)))
+    return connected_components(graph, directed=False)[1]
+
+
+def _neighbours(
+    keys: I32, step: I32, order: NDArray[np.intp], in_order: I64
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    wanted = packed_keys(keys + step)
+    at = np.minimum(np.searchsorted(in_order, wanted), len(in_order) - 1)
+    there = np.flatnonzero(in_order[at] == wanted)
+    return there, order[at[there]]
+
+
+def outline(columns: I32) -> F64:
+    """(N, 2) -> (K, 2) closed convex ring around these cells, counter-clockwise, in cells."""
+    cells = np.unique(columns, axis=0).astype(np.float64)
+    corners = np.concatenate([cells + offset for offset in product((0.0, 1.0), repeat=2)])
+    ring = corners[ConvexHull(corners).vertices]
+    return np.vstack([ring, ring[:1]])

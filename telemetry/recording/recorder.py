@@ -16,14 +16,12 @@ from pathlib import Path
 
 from mapping.sensor_frames import CloudFrame
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.recording.cloud_budget import CloudBudget, LocalMapBudget
 from telemetry.recording.disk_space import Measure, Space, full, running_out, space_at
 from telemetry.recording.mcap_files.sink import Write, describe
 from telemetry.recording.mcap_files.writer import RecordingWriter
-from telemetry.recording.preroll import Preroll, Stamped
 from telemetry.recording.recorded_topics import RECORDED
-from telemetry.recording.trigger import Trigger
-from telemetry.recording.waiting import Waiting
+from telemetry.recording.trigger import Preroll, Stamped, Trigger
+from telemetry.recording.waiting import CloudBudget, LocalMapBudget, Waiting
 from telemetry.topics.messages import ErrorInfo, PlanRecord, Published, RecorderStatus
 from telemetry.topics.obstacles import MapDelta
 from telemetry.topics.vehicle import VehicleState

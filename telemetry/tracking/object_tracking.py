@@ -25,9 +25,8 @@ from telemetry.topics.obstacles import ObstacleAlert, PerceptionSettings, Percep
 from telemetry.topics.track_settings import USUAL_MAX_SPEED_M_S, TrackerSettings
 from telemetry.topics.tracks import Track, TracksState, TracksStatus
 from telemetry.tracking.approach import FOLLOWED_AFRESH, LANDED, ApproachBook
-from telemetry.tracking.evasion import Evasion, Rules, evasion
+from telemetry.tracking.evasion import Evasion, GroundRoom, Rules, evasion
 from telemetry.tracking.followed import UNSEEN_S, Followed, Keep, TrackMemory
-from telemetry.tracking.ground_room import GroundRoom
 from telemetry.tracking.out_of_view import Remembered
 
 USUAL = Limits(max_speed_m_s=USUAL_MAX_SPEED_M_S)

@@ -14,8 +14,7 @@ from server.plan import demo, tasks
 from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanState, ServerMessage
 from server.work.jobs import Lane
-from telemetry.mavlink.storage import as_stored
-from telemetry.mavlink.verify import compare, digest
+from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.requests import Download, Operator, ReadParameters, Upload

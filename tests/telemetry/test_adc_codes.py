@@ -14,7 +14,7 @@ from mapping.geometry.arrays import I64, U16
 from mapping.radar.chain import RadarChain
 from mapping.radar.params import AWR1843, POSITION2GO
 from telemetry.sensors.adc.codes import SampleCode, histogram, told
-from telemetry.sensors.adc.opening import open_adc
+from telemetry.sensors.adc.read_adc import open_adc
 from tests.mapping.radar.echoes import SMALL as SMALL_RADAR
 from tests.mapping.radar.echoes import Echo, frame
 from tests.telemetry.test_adc_files import I_FIRST, SHAPE, cube, cubes, dca1000_bytes, oda_line, save

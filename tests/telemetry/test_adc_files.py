@@ -17,7 +17,7 @@ from mapping.radar.params import AWR1843, POSITION2GO
 from telemetry.sensors.adc.adc_file import AdcFile
 from telemetry.sensors.adc.dca1000 import open_dca1000
 from telemetry.sensors.adc.oda import open_oda
-from telemetry.sensors.adc.opening import open_adc
+from telemetry.sensors.adc.read_adc import open_adc
 from tests.telemetry.test_ti_config import config
 
 SMALL = config(frameCfg="frameCfg 0 2 4 0 100 1 0", adcbufCfg="adcbufCfg -1 0 0 1 1")

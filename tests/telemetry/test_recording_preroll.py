@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.recording.preroll import SECONDS, Preroll, Stamped
+from telemetry.recording.trigger import SECONDS, Preroll, Stamped
 from telemetry.topics.messages import FlightStatus, Topic, VehicleText
 from tests.telemetry.recordings import PLAN, state_at
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mapping.sensor_frames import CloudFrame
-from telemetry.recording.cloud_budget import BYTES_PER_S, CloudBudget, LocalMapBudget
-from telemetry.recording.preroll import Stamped
-from telemetry.recording.waiting import Waiting
+from telemetry.recording.trigger import Stamped
+from telemetry.recording.waiting import BYTES_PER_S, CloudBudget, LocalMapBudget, Waiting
 from telemetry.topics.messages import Published, Topic, VehicleText
 from telemetry.topics.obstacles import MapDelta, MapOrigin
 

@@ -13,7 +13,7 @@ from mapping.errors import ParameterError
 from planning.errors import ParameterError as PlanningError
 from telemetry.flight.avoidance.aside import Aside
 from telemetry.simulation.scenarios.arena import arena, arena_course
-from telemetry.simulation.scenarios.arena.arena_charts import error_charts, ways_chart
+from telemetry.simulation.scenarios.arena.arena import error_charts, ways_chart
 from telemetry.simulation.scenarios.arena.arena_course import Approach, approaches
 from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
 from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planning.errors import ParameterError
-from telemetry.simulation.simulator.airframe.disturbances import AttitudeError
+from telemetry.simulation.simulator.airframe.dynamics import AttitudeError
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent, has_fix, offset_neu, read_event
 from tests.telemetry.simulator_bench import Bench
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from telemetry.simulation.simulator.airframe.disturbances import GUST_SHARE, Wind
+from telemetry.simulation.simulator.airframe.dynamics import GUST_SHARE, Wind
 
 
 def blown(seed: int, speed_m_s: float, from_rad: float, steps: int) -> np.ndarray:

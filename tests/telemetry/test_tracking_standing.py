@@ -13,8 +13,8 @@ from mapping.perceiving.ground import ground_grid
 from mapping.tracking.tracker_params import TrackState
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
+from telemetry.tracking.evasion import DIRECTIONS, FARTHEST_M, GroundRoom
 from telemetry.tracking.followed import Followed
-from telemetry.tracking.ground_room import DIRECTIONS, FARTHEST_M, GroundRoom
 from telemetry.tracking.out_of_view import GONE_S, LONGEST_MOVING_S, LONGEST_S, Remembered
 from tests.telemetry.moving_flights import Flight, straight
 

@@ -1,25 +1,63 @@
-"""Chunks of an MCAP file: compressed stretches of messages, each with a checksum."""
+"""Records of an MCAP file, found one behind the other, and its chunks: compressed messages, each with a checksum."""
 
 from __future__ import annotations
 
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
 from typing import NamedTuple
 
 import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from telemetry.recording.mcap_files.closing import ChunkPlace
-from telemetry.recording.mcap_files.mcap_records import Record, record_at, records
 from telemetry.recording.tlog import Data
 
+_RECORD = struct.Struct("<BQ")
+RECORD_HEAD_BYTES = _RECORD.size
+BROKEN = (McapError, struct.error, ValueError, OverflowError, MemoryError, zstandard.ZstdError)
+"""What reading damaged records raises."""
 _CHUNK = struct.Struct("<QQQI")
 _MESSAGE = struct.Struct("<HIQQ")
 _LARGEST_CHUNK_BYTES = 256 * 1024 * 1024
 _INDEX_RECORD = struct.Struct("<BQHI")
 _INDEX_ENTRY = struct.Struct("<QQ")
 _INDEX_OPCODE = 7
+
+
+class Record(NamedTuple):
+    opcode: int
+    offset: int
+    start: int
+    """Where the content begins."""
+    end: int
+
+
+def records(data: Data, start: int, stop: int) -> Iterator[Record]:
+    """All whole records of ``data[start:stop]``."""
+    at = start
+    while at + _RECORD.size <= stop:
+        opcode, length = _RECORD.unpack_from(data, at)
+        content = at + _RECORD.size
+        if opcode == 0 or length > stop - content:
+            return
+        yield Record(opcode, at, content, content + length)
+        at = content + length
+
+
+def record_at(data: Data, at: int, stop: int) -> Record:
+    """The whole record that begins there; ValueError when there is none."""
+    for record in records(data, at, stop):
+        return record
+    raise ValueError("no record where one should be")
+
+
+def stream_of(data: Data, record: Record) -> ReadDataStream:
+    """For the library's readers of single records: the content, and nothing behind it."""
+    return ReadDataStream(BytesIO(data[record.start : record.end]))
 
 
 class Message(NamedTuple):

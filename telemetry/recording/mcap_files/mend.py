@@ -10,9 +10,8 @@ from pathlib import Path
 
 from telemetry.errors import RecordingError
 from telemetry.recording.file_types import is_mcap, opened
-from telemetry.recording.mcap_files.chunks import chunk_content, message_index, messages
+from telemetry.recording.mcap_files.chunks import BROKEN, chunk_content, message_index, messages
 from telemetry.recording.mcap_files.closing import ChunkPlace, Closing
-from telemetry.recording.mcap_files.mcap_records import BROKEN
 from telemetry.recording.mcap_files.scan import Contents, read_contents
 from telemetry.recording.mcap_files.sink import describe
 from telemetry.recording.tlog import Data

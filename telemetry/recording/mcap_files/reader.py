@@ -12,9 +12,8 @@ from mcap.records import Attachment, Channel
 
 from telemetry.errors import RecordingError
 from telemetry.recording.file_types import foreign, is_mcap, opened
-from telemetry.recording.mcap_files.chunks import chunk_content, messages
+from telemetry.recording.mcap_files.chunks import BROKEN, chunk_content, messages, record_at, stream_of
 from telemetry.recording.mcap_files.closing import ChunkPlace
-from telemetry.recording.mcap_files.mcap_records import BROKEN, record_at, stream_of
 from telemetry.recording.mcap_files.scan import Contents, read_contents
 from telemetry.recording.mcap_files.schemas import codec_of
 from telemetry.recording.mcap_files.writer import ABOUT

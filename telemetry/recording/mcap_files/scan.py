@@ -9,9 +9,17 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
 
 from telemetry.recording.file_types import MCAP_MAGIC
-from telemetry.recording.mcap_files.chunks import chunk_content, chunk_place
+from telemetry.recording.mcap_files.chunks import (
+    BROKEN,
+    RECORD_HEAD_BYTES,
+    Record,
+    chunk_content,
+    chunk_place,
+    record_at,
+    records,
+    stream_of,
+)
 from telemetry.recording.mcap_files.closing import ChunkPlace
-from telemetry.recording.mcap_files.mcap_records import BROKEN, RECORD_HEAD_BYTES, Record, record_at, records, stream_of
 from telemetry.recording.tlog import Data
 
 _CHANNEL = struct.Struct("<H")

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from telemetry.simulation.simulator.airframe.battery import Battery, Pack
-from telemetry.simulation.simulator.airframe.disturbances import AttitudeError, Wind
-from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, Airframe, Multirotor
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, Airframe, AttitudeError, Multirotor, Wind
 from telemetry.simulation.simulator.airframe.gnss import Gnss, GnssKind
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent, has_fix, offset_neu
 from telemetry.simulation.simulator.autopilot.autopilot import Autopilot

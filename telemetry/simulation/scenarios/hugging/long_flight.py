@@ -13,7 +13,7 @@ from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.hugging.terrain_hugging import APART_M, etna
-from telemetry.simulation.scenarios.stage.map_figures import radar_figures
+from telemetry.simulation.scenarios.stage.map_against_world import radar_figures
 from telemetry.simulation.scenarios.stage.result import (
     Figure,
     FlightResult,

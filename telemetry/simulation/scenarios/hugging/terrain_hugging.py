@@ -13,7 +13,7 @@ from planning.terrain.dsm import Dsm
 from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import Hugging, hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
-from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
+from telemetry.simulation.scenarios.stage.map_against_world import radar_figures, vision_figures
 from telemetry.simulation.scenarios.stage.result import FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, own_ground, surveyed
 from telemetry.simulation.scenarios.stage.setup import Setup

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from telemetry.simulation.scenarios.stage import scenes
-from telemetry.simulation.scenarios.stage.map_figures import radar_figures, vision_figures
+from telemetry.simulation.scenarios.stage.map_against_world import radar_figures, vision_figures
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 

@@ -1,8 +1,9 @@
-"""The sensors' frames on their way through perception, as they would go through its nodes."""
+"""The sensors' frames at their rates, on their way through perception as they would go through its nodes."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
 from telemetry.perception.known_ground import ground_around
@@ -14,12 +15,44 @@ from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
 from telemetry.simulation.scenarios.stage.setup import PERCEPTION_S, Setup
 from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
+from telemetry.simulation.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
 from telemetry.topics.looks import CloudLook, RadarLook
 from telemetry.topics.messages import FlightStatus, PlanRecord, Published
 from telemetry.topics.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import SimTruth, VehicleState
 
+RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 TICK_S = 1.0
+
+
+class Sensors:
+    """Radar 10 Hz, stereo camera 5 Hz, its SLAM 30 Hz: measures while the vehicle is armed, from where it really is."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._radar = radar_sensor(setup.radar, setup.world, seed=setup.seed) if "radar" in setup.sensors else None
+        self._stereo = None
+        if "vision" in setup.sensors:
+            self._stereo = StereoSensor(setup.world, seed=setup.seed, dark=setup.dark)
+        self._slam = SlamDrift(seed=setup.seed)
+        self._due_s: dict[str, float] = dict.fromkeys(("radar", "cloud", "slam"), 0.0)
+
+    def measure(self, truth: SimTruth) -> Iterator[RadarFrame | CloudFrame | SlamPose]:
+        """What is due now."""
+        if not truth.armed:
+            return
+        if self._stereo is not None:
+            if self._is_due("slam", SLAM_HZ, truth):
+                yield self._slam.pose(truth, self._stereo.share_seen)
+            if self._is_due("cloud", CLOUD_HZ, truth):
+                yield self._stereo.frame(truth)
+        if self._radar is not None and self._is_due("radar", RADAR_HZ, truth):
+            yield self._radar.frame(truth)
+
+    def _is_due(self, name: str, hz: float, truth: SimTruth) -> bool:
+        if truth.t_sim_s < self._due_s[name] - 1e-6:
+            return False
+        self._due_s[name] = max(self._due_s[name] + 1 / hz, truth.t_sim_s)
+        return True
 
 
 class Perceiving:

@@ -17,16 +17,13 @@ from telemetry.flight.guided.remaining_mission import remaining_flight
 from telemetry.mavlink.actions import Action
 from telemetry.mavlink.items import items_from_mission
 from telemetry.perception.status import Outcome
-from telemetry.simulation.scenarios.stage.beginning import plan_record_of, vehicle_of
 from telemetry.simulation.scenarios.stage.course import script_request
 from telemetry.simulation.scenarios.stage.paper_fields import notice
-from telemetry.simulation.scenarios.stage.perceiving import Perceiving
+from telemetry.simulation.scenarios.stage.perceiving import Perceiving, Sensors
 from telemetry.simulation.scenarios.stage.pilots import MissionPilot, ScenarioPilot, ScriptPilot
-from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame, Told
-from telemetry.simulation.scenarios.stage.sensor_rates import Sensors
-from telemetry.simulation.scenarios.stage.setup import ORDER_S, Setup, Tell
+from telemetry.simulation.scenarios.stage.seen_flight import Flown, RegionWatch, SeenRadarFrame, Told
+from telemetry.simulation.scenarios.stage.setup import ORDER_S, Setup, Tell, plan_record_of, vehicle_of
 from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
-from telemetry.simulation.scenarios.stage.watching import RegionWatch
 from telemetry.topics.messages import FlightStatus, Published, Topic
 from telemetry.topics.obstacles import GroundNotice, Sensor
 from telemetry.topics.vehicle import SimTruth, VehicleState
