@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.link.link import Link
@@ -33,6 +33,27 @@ class OperatorRight:
         self.highest, self.name = operator.token, operator.name
 
 
+class _Command(NamedTuple):
+    """What needs no more than the pilot."""
+
+    words: str
+    carry_out: Callable[[Pilot], Awaitable[None]]
+    live: bool = True
+    """Not over a link that seems lost. Whatever makes a flight end well is tried over that, too."""
+    must: bool = True
+    """It is not sent unless it is in the audit log."""
+
+
+_COMMANDS: dict[type, _Command] = {
+    requests.Arm: _Command("arm", Pilot.arm),
+    requests.Disarm: _Command("disarm", Pilot.disarm, must=False),
+    requests.Pause: _Command("pause", Pilot.pause, live=False, must=False),
+    requests.Resume: _Command("resume", Pilot.resume),
+    requests.ReturnHome: _Command("return home", Pilot.return_home, live=False, must=False),
+    requests.Land: _Command("land", Pilot.land, live=False, must=False),
+}
+
+
 class Answering:
     """What ``telemetry.topics.requests`` promises for each; errors are DescribedErrors."""
 
@@ -46,14 +67,8 @@ class Answering:
             requests.Upload: self._upload,
             requests.Download: self._download,
             requests.ReadParameters: self._read_parameters,
-            requests.Arm: self._arm,
-            requests.Disarm: self._disarm,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
-            requests.Pause: self._pause,
-            requests.Resume: self._resume,
-            requests.ReturnHome: self._return_home,
-            requests.Land: self._land,
             requests.SetAvoidance: self._set_avoidance,
             requests.FlyManoeuvre: self._fly_manoeuvre,
             requests.FlyRest: self._fly_rest,
@@ -62,7 +77,14 @@ class Answering:
     async def answer(self, request: requests.LinkRequest) -> object:
         if not isinstance(request, requests.ReadParameters):
             self._right.check(request.operator)
+        if (command := _COMMANDS.get(type(request))) is not None:
+            return await self._command(request, command)
         return await self._answers[type(request)](request)
+
+    async def _command(self, request: requests.LinkRequest, command: _Command) -> None:
+        pilot = self._link.need_session(live=command.live).pilot
+        await self._record(request, command.words, must=command.must)
+        await command.carry_out(pilot)
 
     async def _connect(self, request: requests.Connect) -> None:
         await self._link.connect(request.address, adopt=request.adopt)
@@ -100,16 +122,6 @@ class Answering:
         transfers = self._link.need_session().transfers
         return await transfers.read_parameters(request.names)
 
-    async def _arm(self, request: requests.Arm) -> None:
-        pilot = self._link.need_session().pilot
-        await self._record(request, "arm")
-        await pilot.arm()
-
-    async def _disarm(self, request: requests.Disarm) -> None:
-        pilot = self._link.need_session().pilot
-        await self._record(request, "disarm", must=False)
-        await pilot.disarm()
-
     async def _start_auto(self, request: requests.StartAuto) -> None:
         session = self._link.need_session()
         _refuse_while(session.transfers.is_busy)
@@ -146,28 +158,6 @@ class Answering:
         else:
             await self._record(request, "avoidance off", must=False)
             pilot.avoidance.disable()
-
-    # Whatever makes a flight end well is tried over a link that seems lost, too.
-
-    async def _pause(self, request: requests.Pause) -> None:
-        pilot = self._link.need_session(live=False).pilot
-        await self._record(request, "pause", must=False)
-        await pilot.pause()
-
-    async def _resume(self, request: requests.Resume) -> None:
-        pilot = self._link.need_session().pilot
-        await self._record(request, "resume")
-        await pilot.resume()
-
-    async def _return_home(self, request: requests.ReturnHome) -> None:
-        pilot = self._link.need_session(live=False).pilot
-        await self._record(request, "return home", must=False)
-        await pilot.return_home()
-
-    async def _land(self, request: requests.Land) -> None:
-        pilot = self._link.need_session(live=False).pilot
-        await self._record(request, "land", must=False)
-        await pilot.land()
 
     async def _record(self, request: Any, words: str, *, must: bool = True) -> None:
         await self._link.commands.record(request.operator, words, must=must)

@@ -23,42 +23,41 @@ class Operator:
 
 
 @dataclass(frozen=True, slots=True)
-class Connect:
+class OperatorRequest:
+    operator: Operator
+
+
+@dataclass(frozen=True, slots=True)
+class Connect(OperatorRequest):
     """Opens a connection and keeps it open. ``adopt``: take the first autopilot heard on it. -> None"""
 
-    operator: Operator
     address: str
     adopt: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Disconnect:
+class Disconnect(OperatorRequest):
     """-> None"""
 
-    operator: Operator
     address: str
 
 
 @dataclass(frozen=True, slots=True)
-class Adopt:
+class Adopt(OperatorRequest):
     """Takes a candidate as the one vehicle that is commanded. -> None"""
 
-    operator: Operator
     candidate: str
 
 
 @dataclass(frozen=True, slots=True)
-class Release:
+class Release(OperatorRequest):
     """Nothing is sent to the vehicle any more. -> None"""
-
-    operator: Operator
 
 
 @dataclass(frozen=True, slots=True)
-class Upload:
+class Upload(OperatorRequest):
     """Replaces the mission on board and reads it back. Refused while a mission is being flown. -> UploadReport"""
 
-    operator: Operator
     items: tuple[Item, ...]
     """Without home."""
     home_lat_deg: float
@@ -67,10 +66,8 @@ class Upload:
 
 
 @dataclass(frozen=True, slots=True)
-class Download:
+class Download(OperatorRequest):
     """-> OnboardMission"""
-
-    operator: Operator
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,38 +78,32 @@ class ReadParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class Arm:
+class Arm(OperatorRequest):
     """-> None; RefusedError with the vehicle's words"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class Disarm:
+class Disarm(OperatorRequest):
     """Only on the ground. -> None"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class StartAuto:
+class StartAuto(OperatorRequest):
     """Arms if need be and flies the mission on board from ``from_item`` on. Only if its digest is this. -> None
 
     ``from_item`` 1 is the first item. Above 1 (after a battery swap) the vehicle first takes off to ``climb_to_m``
     above home and goes straight to that item at that height.
     """
 
-    operator: Operator
     digest: str
     from_item: int = 1
     climb_to_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class StartGuided:
+class StartGuided(OperatorRequest):
     """Takes off, hands over the targets one at a time, then returns home (Melita 2020). -> None"""
 
-    operator: Operator
     targets: tuple[GuidedTarget, ...]
     takeoff_alt_rel_home_m: float
     waypoint_radius_m: float = 0.5
@@ -120,35 +111,27 @@ class StartGuided:
 
 
 @dataclass(frozen=True, slots=True)
-class Pause:
+class Pause(OperatorRequest):
     """The vehicle holds its position. -> None"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(OperatorRequest):
     """Goes on with the paused mission or script. -> None"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class ReturnHome:
+class ReturnHome(OperatorRequest):
     """-> None"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class Land:
+class Land(OperatorRequest):
     """Here and now. -> None"""
 
-    operator: Operator
-
 
 @dataclass(frozen=True, slots=True)
-class SetAvoidance:
+class SetAvoidance(OperatorRequest):
     """Switches avoiding obstacles by itself on or off, and says how.
 
     ``consent``: of the operator, for a vehicle that is no simulation.
@@ -156,21 +139,19 @@ class SetAvoidance:
     -> None; NotAllowedError without consent, or for an autopilot for which it is not built
     """
 
-    operator: Operator
     enabled: bool
     consent: bool = False
     by: AvoidBy = "climb"
 
 
 @dataclass(frozen=True, slots=True)
-class FlyManoeuvre:
+class FlyManoeuvre(OperatorRequest):
     """Flies a prepared way over or around an obstacle in GUIDED, then goes on. -> None
 
     ``targets`` begin ahead of the vehicle and end on the mission ahead (or above it); ``rejoin_item`` is the item flown
     to after them, in GUIDED and ``height_offset_m`` higher than planned; None: hold at the last target.
     """
 
-    operator: Operator
     kind: Literal["over", "around", "sidestep"]
     targets: tuple[GuidedTarget, ...]
     rejoin_item: int | None
@@ -178,13 +159,12 @@ class FlyManoeuvre:
 
 
 @dataclass(frozen=True, slots=True)
-class FlyRest:
+class FlyRest(OperatorRequest):
     """The rest of a flight that goes on higher, planned again past what was seen and certified, is flown instead.
 
     ``targets`` begin where the vehicle was when it was planned. -> None; NotAllowedError when it does not go on higher
     """
 
-    operator: Operator
     targets: tuple[GuidedTarget, ...]
 
 

@@ -33,7 +33,7 @@ _FORBIDDEN = "Every velocity within the vehicle's limits leads into something: s
 
 
 class GroundRoom:
-    """How far the vehicle may fly level in each direction before known ground comes too near: what is unknown is ground.
+    """How far the vehicle may fly level in each direction before known ground comes too near; unknown is ground.
 
     Keeps the coarse ground of the newest surface model.
     """

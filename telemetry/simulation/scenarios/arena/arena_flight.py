@@ -13,7 +13,6 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.perceiving.ground import GroundGrid, ground_grid
 from mapping.sensor_frames import RadarFrame
-from telemetry.errors import TelemetryError
 from telemetry.flight.avoidance.avoiding import Avoiding
 from telemetry.flight.guided.remaining_mission import remaining_flight
 from telemetry.mavlink.items import items_from_mission
@@ -42,7 +41,7 @@ MARGIN_M = 0.35
 STANDS_M = POLE_RADIUS_M + VEHICLE_RADIUS_M + MARGIN_M
 STANDS_S = 4.0
 MAX_SPEED_M_S, MAX_TURN_DEG = 1.8, 90.0
-ARRIVED_M, LATEST_S, READY_S = 0.5, 60.0, 60.0
+ARRIVED_M, LATEST_S = 0.5, 60.0
 SAME_M = 1.5
 """A track this near to a pole is that pole's."""
 LOOK_EVERY = 3
@@ -100,7 +99,7 @@ class _Way:
         self._waiting: deque[RadarFrame] = deque()
         self._following = ObjectTracking(run="arena", utc_minus_mono_s=T0_UTC_S - T0_MONO_S)
         self._following.on_settings(settings)
-        self._until_ready()
+        self._wire.until_ready()
         self._pilot = pilot = MissionPilot(self._wire, items_from_mission(_mission(approach)))
         self._avoiding = Avoiding(
             VEHICLE, remaining=lambda state: remaining_flight(pilot.onboard, state), settings=settings
@@ -115,14 +114,6 @@ class _Way:
         while wire.now_s < until_s and not flown.arrived:
             self._step()
         return flown
-
-    def _until_ready(self) -> None:
-        while self._wire.now_s < T0_MONO_S + READY_S:
-            self._wire.step()
-            state = self._wire.state
-            if state is not None and state.estimator_ok and state.home_lat_deg is not None and state.landed is not None:
-                return
-        raise TelemetryError("The simulated vehicle did not become ready.")
 
     def _step(self) -> None:
         wire, avoiding, before = self._wire, self._avoiding, self._wire.state

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose
-from telemetry.errors import TelemetryError
 from telemetry.flight.avoidance.avoiding import Avoiding
 from telemetry.flight.guided.remaining_mission import remaining_flight
 from telemetry.mavlink.actions import Action
@@ -26,9 +25,8 @@ from telemetry.simulation.scenarios.stage.setup import ORDER_S, Setup, Tell, pla
 from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
 from telemetry.topics.messages import FlightStatus, Published, Topic
 from telemetry.topics.obstacles import GroundNotice, Sensor
-from telemetry.topics.vehicle import SimTruth, VehicleState
+from telemetry.topics.vehicle import SimTruth
 
-NOT_READY_S = 60.0
 TRACK_S = 0.1
 AVOIDANCE_EVERY = 3
 """Slices between the avoidance's own looks, about as the link's clock has it."""
@@ -50,7 +48,7 @@ class _Flight:
         self._sensors = Sensors(setup)
         self._truths: deque[SimTruth] = deque()
         """Of the radar's frames that are still on their way."""
-        self._state = self._ready()
+        self._state = self._wire.until_ready()
         plan = plan_record_of(setup)
         self._publish(Topic.PERCEPTION_SETTINGS, setup.settings)
         self._publish(Topic.PLAN, plan)
@@ -85,15 +83,6 @@ class _Flight:
         return setup.most_armed_s is not None and flown.armed_s >= setup.most_armed_s
 
     # Before the take-off.
-
-    def _ready(self) -> VehicleState:
-        """Until the vehicle has told its home and would arm."""
-        while self._wire.vehicle.now_s < NOT_READY_S:
-            self._wire.step()
-            state = self._wire.state
-            if state is not None and state.estimator_ok and state.home_lat_deg is not None and state.landed is not None:
-                return state
-        raise TelemetryError("The simulated vehicle did not become ready.")
 
     def _pilot_of(self, setup: Setup) -> ScenarioPilot:
         if setup.course is not None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.errors import TelemetryError
 from telemetry.link.streams import StreamRequests
 from telemetry.mavlink.actions import Action, Message, Send
 from telemetry.mavlink.conversation import GROUND_STATION
@@ -28,6 +29,7 @@ VEHICLE = (1, 1)
 PEER = "scenario"
 LINK = "scenario:virtual"
 HEARTBEAT_EVERY = 50
+NOT_READY_S = 60.0
 
 
 class Wire:
@@ -56,6 +58,15 @@ class Wire:
     @property
     def now_utc_s(self) -> float:
         return T0_UTC_S + self.vehicle.now_s
+
+    def until_ready(self) -> VehicleState:
+        """Steps until the vehicle has told its home and would arm. Raises TelemetryError when it never does."""
+        while self.vehicle.now_s < NOT_READY_S:
+            self.step()
+            state = self.state
+            if state is not None and state.estimator_ok and state.home_lat_deg is not None and state.landed is not None:
+                return state
+        raise TelemetryError("The simulated vehicle did not become ready.")
 
     def step(self) -> list[Message]:
         """One slice of simulated time; what the vehicle said in it."""
