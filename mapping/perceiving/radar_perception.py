@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from mapping.geometry.arrays import F64, Bools
 from mapping.geometry.poses import Pose
 from mapping.perceiving.frame_result import FrameResult, Settings
 from mapping.perceiving.perception import Perception
-from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence, side_lobes
+from mapping.perceiving.radar_evidence import RadarEvidence, side_lobes
 from mapping.perceiving.radar_passing import Passing
 from mapping.perceiving.remembered import Field
 from mapping.radar.targets import Gate, in_gate, polar, to_enu
@@ -34,46 +35,15 @@ class Targets:
     """(N,) through the gate"""
 
 
-class RadarPerception(Perception):
-    """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, or has only passed
-    by, is "explained"."""
+class RadarTargets:
+    """Which targets of a radar's frames are taken; ``dropped`` counts the others, by reason."""
 
-    name = "radar"
-    evidence = EvidenceParams()
-
-    def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
-        super().__init__(settings, alert_prefix=alert_prefix)
-        self._evidence = RadarEvidence(self.evidence)
-        self._passing = Passing()
+    def __init__(self, dropped: Counter[str]) -> None:
+        self.gate = Gate()
         self.newest: Targets | None = None
-        self._look_through_the_gate()
+        self._dropped = dropped
 
-    def set_settings(self, settings: Settings) -> None:
-        super().set_settings(settings)
-        self._look_through_the_gate()
-
-    @staticmethod
-    def reach_down(settings: Settings) -> float:
-        """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
-        return math.tan(max(0.0, settings.gate_high_rad))
-
-    def _look_through_the_gate(self) -> None:
-        """What is expected of known ground is what the gate lets through."""
-        s = self.settings
-        self.gate = Gate(s.gate_azimuth_rad, s.gate_low_rad, s.gate_high_rad)
-        self.field = Field(self.gate.nearest_m, self.gate.azimuth_rad)
-        self._evidence.set_gate(self.gate)
-
-    def on_frame(self, frame: RadarFrame, now_mono_s: float) -> FrameResult:
-        """Take one frame; never raises for what is in it."""
-        pose = self._pose_for(frame, now_mono_s)
-        if isinstance(pose, FrameResult):
-            return pose
-        xyz, speed, snr, ghost = self._kept(frame)
-        self._insert(frame.t_mono_s, pose, xyz, speed, snr, ghost)
-        return self._look(frame.t_mono_s, now_mono_s, pose, len(xyz))
-
-    def _kept(self, frame: RadarFrame) -> tuple[F64, F64, F64, Bools]:
+    def kept(self, frame: RadarFrame) -> tuple[F64, F64, F64, Bools]:
         """Believable numbers inside the gate, and which of them are side lobes' ghosts; the rest is counted."""
         xyz, speed, snr = (column.astype(np.float64) for column in frame.columns())
         finite = np.isfinite(xyz).all(axis=1) & np.isfinite(speed) & np.isfinite(snr)
@@ -92,6 +62,51 @@ class RadarPerception(Perception):
         kept[good] = inside
         self.newest = Targets(frame.t_mono_s, all_xyz, kept)
         return xyz[inside], speed[inside], snr[inside], side_lobes(targets, snr)[inside]
+
+    def _count(self, what: str, count: int) -> None:
+        if count:
+            self._dropped[what] += count
+
+
+def gate_of(settings: Settings) -> Gate:
+    return Gate(settings.gate_azimuth_rad, settings.gate_low_rad, settings.gate_high_rad)
+
+
+class RadarPerception(Perception):
+    """The radar's map. Nothing is ever taken out of it; what is accounted for, or not yet believed, or has only passed
+    by, is "explained"."""
+
+    name = "radar"
+
+    def __init__(self, settings: Settings, *, alert_prefix: str = "") -> None:
+        super().__init__(settings, alert_prefix=alert_prefix)
+        self.targets = RadarTargets(self.dropped)
+        self._evidence, self._passing = RadarEvidence(), Passing()
+        self._look_through_the_gate()
+
+    def set_settings(self, settings: Settings) -> None:
+        super().set_settings(settings)
+        self._look_through_the_gate()
+
+    @staticmethod
+    def reach_down(settings: Settings) -> float:
+        """Targets are put at the vehicle's height but may stand as high as the gate reaches."""
+        return math.tan(max(0.0, settings.gate_high_rad))
+
+    def _look_through_the_gate(self) -> None:
+        """What is expected of known ground is what the gate lets through."""
+        gate = self.targets.gate = gate_of(self.settings)
+        self.field = Field(gate.nearest_m, gate.azimuth_rad)
+        self._evidence.set_gate(gate)
+
+    def on_frame(self, frame: RadarFrame, now_mono_s: float) -> FrameResult:
+        """Take one frame; never raises for what is in it."""
+        pose = self._pose_for(frame, now_mono_s)
+        if isinstance(pose, FrameResult):
+            return pose
+        xyz, speed, snr, ghost = self.targets.kept(frame)
+        self._insert(frame.t_mono_s, pose, xyz, speed, snr, ghost)
+        return self._look(frame.t_mono_s, now_mono_s, pose, len(xyz))
 
     def _insert(self, t_mono_s: float, pose: Pose, xyz: F64, speed: F64, snr: F64, ghost: Bools) -> None:
         points = to_enu(xyz, pose.position_enu_m, pose.rotation_enu_body, pose.heading_rad, self.settings.radar_variant)

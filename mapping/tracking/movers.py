@@ -12,8 +12,9 @@ from mapping.geometry.arrays import F64, Bools
 from mapping.geometry.poses import Pose
 from mapping.perceiving.frame_result import FrameResult, Settings, State
 from mapping.perceiving.ground import GroundGrid
-from mapping.perceiving.radar_evidence import EvidenceParams
-from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.perception import Perception
+from mapping.perceiving.radar_evidence import EvidenceParams, RadarEvidence
+from mapping.perceiving.radar_perception import RadarTargets, gate_of
 from mapping.radar.targets import polar, to_enu
 from mapping.sensor_frames import RadarFrame
 from mapping.tracking.blobs import Blobs, blobs
@@ -30,14 +31,16 @@ MOST_TARGETS = 250
 """A thousand objects in a frame must not hold up the next one: what moves counts first, then what is nearest."""
 
 
-class Movers(RadarPerception):
-    """Frames, poses and ground as for the radar's map, which stays empty here. ``states`` are of the newest frame."""
+class Movers(Perception):
+    """Frames, poses and ground as for any sensor's map, which stays empty here. ``states`` are of the newest frame."""
 
-    evidence = EVIDENCE
+    name = "radar"
 
     def __init__(self, settings: Settings, tracker: Tracker, *, alert_prefix: str = "") -> None:
         """``tracker`` is emptied; it outlives this flight so that no id is ever used twice."""
         super().__init__(settings, alert_prefix=alert_prefix)
+        self._targets, self._evidence = RadarTargets(self.dropped), RadarEvidence(EVIDENCE)
+        self._look_through_the_gate()
         self._tracker = tracker
         tracker.clear()
         self._has_velocity = True
@@ -69,7 +72,7 @@ class Movers(RadarPerception):
             return pose
         if not self._has_velocity:
             return self._drop(frame, "no velocity", now_mono_s)
-        xyz, speed, snr, ghost = self._kept(frame)
+        xyz, speed, snr, ghost = self._targets.kept(frame)
         self.pose, self.blobs = pose, self._believed(frame.t_mono_s, pose, xyz, speed, snr, ghost)
         self.states = self._tracker.step(
             frame.t_mono_s,
@@ -99,9 +102,18 @@ class Movers(RadarPerception):
             fed[:] = False
         return blobs(polar(xyz[fed]), speed[fed], snr[fed], moving[fed])
 
+    def set_settings(self, settings: Settings) -> None:
+        super().set_settings(settings)
+        self._look_through_the_gate()
+
     def _look_through_the_gate(self) -> None:
-        super()._look_through_the_gate()
-        self.gate = replace(self.gate, elevation_low_rad=min(LEVEL_RAD, self.gate.elevation_low_rad))
+        gate = gate_of(self.settings)
+        self._evidence.set_gate(gate)
+        self._targets.gate = replace(gate, elevation_low_rad=min(LEVEL_RAD, gate.elevation_low_rad))
+
+    def _forget(self) -> None:
+        super()._forget()
+        self._evidence.clear()
 
     def _pose_state(self, now_mono_s: float) -> tuple[State, str]:
         state, text = super()._pose_state(now_mono_s)

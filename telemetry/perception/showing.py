@@ -54,7 +54,7 @@ def look_of(
 
 
 def _radar(perception: RadarPerception, utc_minus_mono_s: float) -> RadarLook | None:
-    frame, gate = perception.newest, perception.gate
+    frame, gate = perception.targets.newest, perception.targets.gate
     if frame is None:
         return None
     return RadarLook(
