@@ -23,13 +23,20 @@ from telemetry.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
-from telemetry.simulation.simulator.sensors import SlamDrift, StereoModel, StereoSensor, radar_sensor
+from telemetry.simulation.simulator.sensors import (
+    CLOUD_HZ,
+    RADAR_HZ,
+    SLAM_HZ,
+    SlamDrift,
+    StereoModel,
+    StereoSensor,
+    radar_sensor,
+)
 from telemetry.topics.messages import Topic
 from telemetry.topics.vehicle import RadarKind, SimTruth
 
 _log = logging.getLogger(__name__)
 
-RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 REST_HZ = 4.0
 """The radar's, while the vehicle is not armed."""
 FRESH_S = 0.5

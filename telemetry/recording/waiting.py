@@ -30,7 +30,6 @@ class CloudBudget:
     """A bucket that fills with time; a cloud is recorded when there is anything in it."""
 
     def __init__(self) -> None:
-        self.left_out = 0
         self._left = float(_BURST_BYTES)
         self._seen_s: float | None = None
 
@@ -39,7 +38,6 @@ class CloudBudget:
         self._seen_s = now_s
         self._left = min(self._left + elapsed_s * BYTES_PER_S, _BURST_BYTES)
         if self._left <= 0.0:
-            self.left_out += 1
             return False
         self._left -= size_bytes
         return True

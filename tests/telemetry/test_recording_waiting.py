@@ -79,7 +79,6 @@ def test_clouds_are_recorded_as_fast_as_a_disk_takes_them_for_hours() -> None:
         taken += budget.takes(size, number / 5)
     assert taken * size <= 600 * BYTES_PER_S + 6_000_000
     assert taken * size > 0.95 * 600 * BYTES_PER_S
-    assert budget.left_out == 5 * 600 - taken
     thin = CloudBudget()
     assert all(thin.takes(95_000, number / 5) for number in range(3000))
 

@@ -15,13 +15,12 @@ from telemetry.perception.showing import Showing
 from telemetry.perception.status import Outcome
 from telemetry.simulation.scenarios.stage.setup import PERCEPTION_S, Setup
 from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
-from telemetry.simulation.simulator.sensors import SlamDrift, StereoSensor, radar_sensor
+from telemetry.simulation.simulator.sensors import CLOUD_HZ, RADAR_HZ, SLAM_HZ, SlamDrift, StereoSensor, radar_sensor
 from telemetry.topics.looks import CloudLook, RadarLook
 from telemetry.topics.messages import FlightStatus, PlanRecord, Published
 from telemetry.topics.obstacles import AvoidanceStatus, GroundNotice, MapDelta, Sensor
 from telemetry.topics.vehicle import SimTruth, VehicleState
 
-RADAR_HZ, CLOUD_HZ, SLAM_HZ = 10.0, 5.0, 30.0
 TICK_S = 1.0
 
 

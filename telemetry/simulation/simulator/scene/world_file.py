@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal, TypedDict, cast
 
 from planning.errors import FormatError
 from planning.formats.safe_text import MAX_BYTES, check_lat_lon, clean_name, decode_text, load_json
@@ -105,34 +105,34 @@ def _shape(value: object, where: str, number: int) -> AnyShape:
     return shape
 
 
-@dataclass(frozen=True, slots=True)
-class _Base:
+class _Base(TypedDict):
     base_m: float
     above: Above
 
 
-def _base(fields: Fields) -> _Base:
-    above = cast(Literal["ground", "origin"], fields.word("above", ("ground", "origin"), "ground"))
-    return _Base(fields.number("base_m", -FAR_M, FAR_M, 0.0), above)
-
-
-@dataclass(frozen=True, slots=True)
-class _Where:
+class _Standing(_Base):
     at_m: Pair
     motion: Motion | None
 
 
-def _where(fields: Fields) -> _Where:
-    """A place, or a path whose first point it is."""
+def _base(fields: Fields) -> _Base:
+    above = cast(Literal["ground", "origin"], fields.word("above", ("ground", "origin"), "ground"))
+    return {"base_m": fields.number("base_m", -FAR_M, FAR_M, 0.0), "above": above}
+
+
+def _standing(fields: Fields) -> _Standing:
+    """At a place, or on a path whose first point it is."""
     path = fields.raw("path", None)
     if path is None:
-        return _Where(_place(fields), None)
-    if fields.raw("at_m", None) is not None:
+        at_m, motion = _place(fields), None
+    elif fields.raw("at_m", None) is not None:
         raise FormatError(
             "What moves along a path stands at no place.", where=f"{fields.where}.at_m", advice="Leave it out."
         )
-    motion = _motion(path, f"{fields.where}.path")
-    return _Where(motion.points_m[0], motion)
+    else:
+        motion = _motion(path, f"{fields.where}.path")
+        at_m = motion.points_m[0]
+    return {"at_m": at_m, "motion": motion, **_base(fields)}
 
 
 def _motion(value: object, where: str) -> Motion:
@@ -164,14 +164,11 @@ def _material(fields: Fields) -> str:
 
 
 def _box(fields: Fields, name: str) -> Box:
-    place, base = _where(fields), _base(fields)
+    standing = _standing(fields)
     (width_m, depth_m, height_m) = fields.numbers("size_m", 3, _THIN_M, _LARGE_M)
     return Box(
         name=name,
-        at_m=place.at_m,
-        motion=place.motion,
-        base_m=base.base_m,
-        above=base.above,
+        **standing,
         size_m=(width_m, depth_m, height_m),
         heading_rad=math.radians(fields.number("heading_deg", -360.0, 360.0, 0.0)),
         material=_material(fields),
@@ -189,19 +186,14 @@ def _wall(fields: Fields, name: str) -> Box:
         height_m=_size(fields, "height_m"),
         thickness_m=_size(fields, "thickness_m", 0.3),
         material=_material(fields),
-        base_m=base.base_m,
-        above=base.above,
+        **base,
     )
 
 
 def _cylinder(fields: Fields, name: str) -> Cylinder:
-    place, base = _where(fields), _base(fields)
     return Cylinder(
         name=name,
-        at_m=place.at_m,
-        motion=place.motion,
-        base_m=base.base_m,
-        above=base.above,
+        **_standing(fields),
         radius_m=_size(fields, "radius_m"),
         height_m=_size(fields, "height_m"),
         material=_material(fields),
@@ -209,13 +201,10 @@ def _cylinder(fields: Fields, name: str) -> Cylinder:
 
 
 def _tree(fields: Fields, name: str) -> Tree:
-    place, base, height_m = _where(fields), _base(fields), _size(fields, "height_m")
+    standing, height_m = _standing(fields), _size(fields, "height_m")
     return Tree(
         name=name,
-        at_m=place.at_m,
-        motion=place.motion,
-        base_m=base.base_m,
-        above=base.above,
+        **standing,
         height_m=height_m,
         crown_radius_m=_size(fields, "crown_radius_m"),
         crown_base_m=fields.number("crown_base_m", 0.0, height_m - _THIN_M / 2, 0.35 * height_m),
@@ -225,13 +214,9 @@ def _tree(fields: Fields, name: str) -> Tree:
 
 
 def _reflector(fields: Fields, name: str) -> CornerReflector:
-    place, base = _where(fields), _base(fields)
     return CornerReflector(
         name=name,
-        at_m=place.at_m,
-        motion=place.motion,
-        base_m=base.base_m,
-        above=base.above,
+        **_standing(fields),
         edge_m=fields.number("edge_m", _THIN_M, 2.0, 0.1),
     )
 

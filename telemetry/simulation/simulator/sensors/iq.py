@@ -28,8 +28,6 @@ class IqRadarSensor:
     def __init__(self, world: World, *, seed: int, model: IqModel = AWR1843_IQ) -> None:
         self.model = model
         self.chain = RadarChain(model.params, model.chain)
-        self.left_out = 0
-        """Echoes of the newest frame that were too many to be sampled: its weakest."""
         self._world = world
         self._random = np.random.default_rng([seed, 5])
         self._body_radar = rotation_enu_body(0.0, model.tilt_rad, 0.0)
@@ -42,10 +40,8 @@ class IqRadarSensor:
         return self._told(truth, self.chain.process(self.cube(truth)))
 
     def cube(self, truth: SimTruth) -> C64:
-        """(chirps, virtual antennas, samples): echoes and noise."""
-        everything = self._returns(truth)
-        loudest = strongest(everything, self.model.most_echoes)
-        self.left_out = len(everything.range_m) - len(loudest.range_m)
+        """(chirps, virtual antennas, samples): echoes, the strongest of too many, and noise."""
+        loudest = strongest(self._returns(truth), self.model.most_echoes)
         return sampled(self.model.params, loudest) + noise(self.model.params.shape, self._random)
 
     def _returns(self, truth: SimTruth) -> Returns:
