@@ -32,8 +32,8 @@ from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from telemetry.flight.guided.targets import GuidedPlan
+    from telemetry.flight.preflight.parameters import Speeds
     from telemetry.flight.preflight.preflight import Preflight
-    from telemetry.flight.preflight.speeds import Speeds
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,8 @@ def check_start(
     report: Progress,
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
+    from telemetry.flight.preflight.parameters import flown_speeds
     from telemetry.flight.preflight.preflight import check
-    from telemetry.flight.preflight.speeds import flown_speeds
 
     report("Checking the start", None)
     dsm, planned = load_planned_terrain(directory, seen_in(record)), read_wpl(record.mission_wpl)

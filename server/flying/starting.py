@@ -33,7 +33,7 @@ class Ready:
 def preflight_now(ready: Ready, avoidance: AvoidanceStatus, *, utc_minus_mono_s: float) -> PreflightDoc:
     """The check with what avoidance sees by now: a sensor may have come or gone since."""
     from telemetry.flight.preflight.eyes_check import avoidance_row
-    from telemetry.flight.preflight.speeds import Speeds
+    from telemetry.flight.preflight.parameters import Speeds
 
     checked = ready.checked
     speeds = checked.speeds or Speeds()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import time
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.link_messages import TARGETS_MAX
 from telemetry.errors import SensorError
+from telemetry.sensors.position2go.board_session import Position2GoCounts
+from telemetry.sensors.ti_mmwave.packets import TiCounts
 
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)
 
@@ -33,6 +35,11 @@ class LiveStatus(abc.ABC):
 
     @abc.abstractmethod
     def as_dict(self) -> dict[str, int | str]: ...
+
+    def _as_dict(self, counts: TiCounts | Position2GoCounts, **found: int) -> dict[str, int | str]:
+        """``found``: in its frames."""
+        own = {"interruptions": self.interruptions, "trouble": self.trouble}
+        return {"frames": self.frames, **found, **asdict(counts), **own}
 
     def told(self, counts: str) -> str:
         """``counts`` with what has gone wrong."""

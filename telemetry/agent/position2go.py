@@ -34,17 +34,7 @@ class Position2GoStatus(LiveStatus):
         return self.counts.frames
 
     def as_dict(self) -> dict[str, int | str]:
-        c = self.counts
-        return {
-            "frames": c.frames,
-            "targets": self.targets,
-            "bytes": c.bytes,
-            "bad_bytes": c.bad_bytes,
-            "lost_frames": c.lost_frames,
-            "clipped_frames": c.clipped_frames,
-            "interruptions": self.interruptions,
-            "trouble": self.trouble,
-        }
+        return self._as_dict(self.counts, targets=self.targets)
 
     def __str__(self) -> str:
         c = self.counts

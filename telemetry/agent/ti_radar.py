@@ -41,19 +41,7 @@ class TiStatus(LiveStatus):
         return self.stream.frames
 
     def as_dict(self) -> dict[str, int | str]:
-        s = self.stream
-        return {
-            "frames": s.frames,
-            "points": self.points,
-            "bytes": s.bytes,
-            "bad_bytes": s.bad_bytes,
-            "lost_packets": s.lost_packets,
-            "damaged_packets": s.damaged_packets,
-            "implausible_lengths": s.implausible_lengths,
-            "implausible_points": s.implausible_points,
-            "interruptions": self.interruptions,
-            "trouble": self.trouble,
-        }
+        return self._as_dict(self.stream, points=self.points)
 
     def __str__(self) -> str:
         s = self.stream

@@ -17,9 +17,9 @@ from telemetry.bus.encoding import (
     encode_answer,
     encode_failure,
     encode_request,
-    error_info,
 )
 from telemetry.errors import BusError
+from telemetry.topics.messages import ErrorInfo
 
 _log = logging.getLogger(__name__)
 
@@ -73,10 +73,10 @@ class Answers:
                 raise BusError(f"{self._name} is still busy with {_AT_A_TIME} requests.", advice="Try again later.")
             return encode_answer(await self._handler(decode_request(payload, self._requests)))
         except DescribedError as error:
-            return encode_failure(error_info(error))
+            return encode_failure(ErrorInfo.of(error))
         except Exception:
             _log.exception("A request to %s failed", self._name)
-            return encode_failure(error_info(_unforeseen(self._name)))
+            return encode_failure(ErrorInfo.of(_unforeseen(self._name)))
 
 
 async def call(

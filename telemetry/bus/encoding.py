@@ -117,10 +117,6 @@ def _plain_number(value: object) -> object:
     return item()
 
 
-def error_info(error: DescribedError) -> ErrorInfo:
-    return ErrorInfo(error.code, error.what, error.where, error.advice)
-
-
 def error_of(info: ErrorInfo) -> DescribedError:
     """The error again, of the class that has its code; a ``BusError`` when this process knows no such class."""
     return _class_of(info.code)(info.what, where=info.where, advice=info.advice)

@@ -53,7 +53,7 @@ class Line:
         return ConnectionStatus(
             address=self.text,
             state="failed" if failed else waiting,
-            error=error and ErrorInfo(error.code, error.what, error.where, error.advice),
+            error=error and ErrorInfo.of(error),
             received_messages=self.received_messages,
             bad_bytes=self.bad_bytes,
         )

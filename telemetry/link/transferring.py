@@ -104,8 +104,7 @@ class Transfers:
         try:
             result = await self._vehicle.exchanges.run(machine, progress=progress)
         except TelemetryError as error:
-            info = ErrorInfo(error.code, error.what, error.where, error.advice)
-            self._publish(TransferStatus(direction, "failed", last.done, last.total, info))
+            self._publish(TransferStatus(direction, "failed", last.done, last.total, ErrorInfo.of(error)))
             raise
         else:
             self._publish(TransferStatus(direction, "done", last.total, last.total))

@@ -109,7 +109,7 @@ class Replayer:
         error = None if opening.cancelled() else opening.exception()
         if opening.cancelled() or error is not None:
             if isinstance(error, RecordingError) and opening is self._opening:
-                self._error = ErrorInfo(error.code, error.what, error.where, error.advice)
+                self._error = ErrorInfo.of(error)
                 self._tell()
             return
         if opening is not self._opening:

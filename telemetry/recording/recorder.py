@@ -136,7 +136,7 @@ class Recorder:
             bytes=writer.bytes if writer else 0,
             messages=writer.messages if writer else 0,
             free_bytes=self._space.free if self._space else None,
-            error=ErrorInfo(warning.code, warning.what, warning.where, warning.advice) if warning else None,
+            error=ErrorInfo.of(warning) if warning else None,
         )
 
     def _note_failure(self) -> None:

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Literal
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SlamPose, UwbScan
+from planning.errors import DescribedError
 from telemetry.topics.looks import CloudLook, RadarLook
 from telemetry.topics.obstacles import (
     AvoidanceStatus,
@@ -73,6 +74,10 @@ class ErrorInfo:
     what: str
     where: str = ""
     advice: str = ""
+
+    @classmethod
+    def of(cls, error: DescribedError) -> ErrorInfo:
+        return cls(error.code, error.what, error.where, error.advice)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from planning.errors import CapacityError, DescribedError
-from telemetry.bus import Bus, error_info, error_of
-from telemetry.bus.encoding import encode
+from telemetry.bus import Bus
+from telemetry.bus.encoding import encode, error_of
 from telemetry.errors import BusError, MissionUnknownError, RefusedError, SilentError
 from telemetry.topics.messages import ErrorInfo, Item, OnboardMission
 from telemetry.topics.requests import (
@@ -105,7 +105,7 @@ def test_the_handlers_error_is_raised_at_the_caller(folder: Path, error: Describ
         with pytest.raises(DescribedError) as caught:
             await server.call("link", ARM, result=type(None))
         assert type(caught.value) is type(error)
-        assert error_info(caught.value) == error_info(error)
+        assert ErrorInfo.of(caught.value) == ErrorInfo.of(error)
 
     with_link(folder, handler, use)
 

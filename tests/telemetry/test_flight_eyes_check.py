@@ -9,7 +9,7 @@ import pytest
 from mapping.perceiving.braking import Braking
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.eyes_check import avoidance_row
-from telemetry.flight.preflight.speeds import Speeds, flown_speeds
+from telemetry.flight.preflight.parameters import Speeds, flown_speeds
 from telemetry.topics.messages import Item, OnboardMission
 from telemetry.topics.obstacles import AvoidanceStatus, Eye
 

@@ -15,8 +15,9 @@ from planning.missions.flown import flown_line
 from planning.model import ClearanceParams, Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
+from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.parameters import return_settings
-from telemetry.flight.preflight.preflight import Preflight, Row, actual_home, check
+from telemetry.flight.preflight.preflight import Preflight, actual_home, check
 from telemetry.flight.preflight.rereference import rereference
 from telemetry.flight.preflight.resume import plan_resumption, resume_item
 from telemetry.mavlink.items import items_from_mission

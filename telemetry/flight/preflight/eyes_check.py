@@ -7,7 +7,7 @@ import time
 from mapping.perceiving.braking import Braking
 from telemetry.flight.avoidance.regions import SENSOR_WORDS, largest_speed
 from telemetry.flight.preflight.checks import Row
-from telemetry.flight.preflight.speeds import Speeds
+from telemetry.flight.preflight.parameters import Speeds
 from telemetry.topics.obstacles import AvoidanceStatus, Eye
 
 BLIND = "Avoidance is on, but no sensor sees ahead: nothing would brake."

@@ -19,7 +19,6 @@ from planning.model import Certificate, ClearanceParams, Mission, MissionItem
 from planning.terrain.dsm import Dsm, true_cells
 from telemetry.errors import NotAllowedError
 
-"""The link node sets speeds again."""
 HEADROOM_M = 0.1
 """Above what is needed, so that centimetres that the vehicle cuts do not count."""
 

@@ -65,12 +65,8 @@ def fly_case(case: Case, wanted: ScenarioRequest, *, ahead_m: float = scenes.CAS
         climb_m_s=scenes.CASTLE_CLIMB_M_S,
     )
     flown = flown_of(setup, wanted, part=case.title)
-    return FlightResult(
-        title=case.title,
-        duration_s=flown.duration_s,
-        contact=flown.contact,
-        min_true_distance_m=flown.nearest_m,
-        alerts=flown.alerts_seen(),
+    return flown.result(
+        case.title,
         radar=radar_figures(flown, setup),
         vision=vision_figures(flown, setup),
         figures=_figures(case, flown, ahead_m),

@@ -23,7 +23,6 @@ from telemetry.simulation.scenarios.stage.result import (
     AlertSeen,
     Figure,
     FlightResult,
-    MapFigures,
     ScenarioRequest,
     ScenarioResult,
 )
@@ -77,8 +76,6 @@ def through(
         contact=any(contacts),
         min_true_distance_m=min(one.nearest_gap_m for one in flown),
         alerts=_alerts(flown),
-        radar=MapFigures(),
-        vision=MapFigures(),
         figures=_figures(title, ways, flown, "all 26 (fig. 6)" if nearest_only else "78 by a pilot (fig. 5)"),
         notes=_errors_by_angle([error for one in flown for error in one.errors]),
         charts=(ways_chart(title, ways, flown), *error_charts([error for one in flown for error in one.errors])),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,6 @@ from telemetry.simulation.scenarios.stage.map_against_world import radar_figures
 from telemetry.simulation.scenarios.stage.result import (
     Figure,
     FlightResult,
-    MapFigures,
     ScenarioRequest,
     ScenarioResult,
 )
@@ -96,19 +95,16 @@ def run_for(wanted: ScenarioRequest, seconds: float, every_s: float) -> Scenario
 def _flown(setup: Setup, seconds: float, tell: Tell, growth: Growth) -> FlightResult:
     flown = fly(setup, tell)
     found = encounters(flown, setup.world, setup.settings)
-    return FlightResult(
-        title="an hour over the hillside" if seconds == HOUR_S else f"{seconds:.0f} s over the hillside",
-        duration_s=flown.armed_s,
-        contact=flown.contact,
-        min_true_distance_m=flown.nearest_m,
-        alerts=flown.alerts_seen(),
+    title = "an hour over the hillside" if seconds == HOUR_S else f"{seconds:.0f} s over the hillside"
+    result = flown.result(
+        title,
         radar=radar_figures(flown, setup),
-        vision=MapFigures(),
         false_alarms_per_km=found.false_per_km,
         missed=found.missed,
         figures=(*found.figures, *growth_figures(growth.looks)),
         notes=(*map(_words, growth.looks), *found.notes),
     )
+    return replace(result, duration_s=flown.armed_s)
 
 
 def _setup(seed: int, seconds: float) -> Setup:

@@ -14,7 +14,7 @@ from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import Hugging, hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.stage.map_against_world import radar_figures, vision_figures
-from telemetry.simulation.scenarios.stage.result import FlightResult, ScenarioRequest, ScenarioResult
+from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, own_ground, surveyed
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.simulation.scenarios.stage.world_objects import world_document
@@ -48,12 +48,8 @@ def run_over(
     setup = _setup(plan, wanted, name, random, most_m)
     flown = flown_of(setup, wanted)
     found = encounters(flown, setup.world, setup.settings)
-    flight = FlightResult(
-        title="terrain hugging",
-        duration_s=flown.duration_s,
-        contact=flown.contact,
-        min_true_distance_m=flown.nearest_m,
-        alerts=flown.alerts_seen(),
+    flight = flown.result(
+        "terrain hugging",
         radar=radar_figures(flown, setup),
         vision=vision_figures(flown, setup),
         false_alarms_per_km=found.false_per_km,

@@ -15,7 +15,6 @@ from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import clusters_of, spread, within
 from telemetry.simulation.scenarios.stage.result import (
     Figure,
-    FlightResult,
     MapFigures,
     ScenarioRequest,
     ScenarioResult,
@@ -26,7 +25,7 @@ from telemetry.simulation.simulator.sensors.body import of_truth
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 from telemetry.topics.obstacles import PerceptionSettings
 
-NAME = "corner-reflector"
+NAME, TITLE = "corner-reflector", "lateral flight"
 RANGE_GATE_M, WEAKEST = 1.5, 0.01
 """A return at the reflector's true range and within 20 dB of its strength is its own, side lobes included: the grass
 and the hill at that range are weaker than that."""
@@ -55,7 +54,7 @@ def run(wanted: ScenarioRequest) -> ScenarioResult:
     world = setup.world
     places = world.reflectors
     if len(places) == 0:
-        return ScenarioResult(NAME, wanted.seed, (_result(flown, MapFigures(), (), ("There is no reflector.",)),))
+        return ScenarioResult(NAME, wanted.seed, (flown.result(TITLE, notes=("There is no reflector.",)),))
     returns = returns_of(flown, places[0], float(world.placed.corner_m2.max()))
     errors_m = np.hypot(*(returns.mapped["heading_only"] - places[0])[:, :2].T)
     voxels = flown.voxels("radar")
@@ -68,7 +67,9 @@ def run(wanted: ScenarioRequest) -> ScenarioResult:
         vertical_spread_m=spread(returns.mapped["heading_only"][level, 2]),
     )
     note = f"{len(errors_m)} returns of the reflector in {len(flown.radar)} frames, in {len(mine)} voxels"
-    return ScenarioResult(NAME, wanted.seed, (_result(flown, radar, figures, (note,), _charts(returns, places[0])),))
+    charts = _charts(returns, places[0])
+    flight = flown.result(TITLE, radar=radar, figures=figures, notes=(note,), charts=charts)
+    return ScenarioResult(NAME, wanted.seed, (flight,))
 
 
 def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> ReflectorReturns:
@@ -174,24 +175,3 @@ def _level(returns: ReflectorReturns) -> Bools:
 
 def _share(hits: Bools) -> float:
     return float(hits.mean()) if len(hits) else 0.0
-
-
-def _result(
-    flown: Flown,
-    radar: MapFigures,
-    figures: tuple[Figure, ...],
-    notes: tuple[str, ...],
-    charts: tuple[Chart, ...] = (),
-) -> FlightResult:
-    return FlightResult(
-        title="lateral flight",
-        duration_s=flown.duration_s,
-        contact=flown.contact,
-        min_true_distance_m=flown.nearest_m,
-        alerts=flown.alerts_seen(),
-        radar=radar,
-        vision=MapFigures(),
-        figures=figures,
-        notes=notes,
-        charts=charts,
-    )

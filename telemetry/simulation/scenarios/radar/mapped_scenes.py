@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.map_against_world import radar_figures, vision_figures
-from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult
+from telemetry.simulation.scenarios.stage.result import Figure, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 
 WOOD, RUIN = "wood", "ruined-building"
@@ -27,12 +27,8 @@ def _run(name: str, scene: scenes.ScenarioScene, wanted: ScenarioRequest) -> Sce
         Figure("precision of the radar map", radar.precision or 0.0),
         Figure("recall of the radar map", radar.recall or 0.0),
     )
-    flight = FlightResult(
-        title="mapping flight",
-        duration_s=flown.duration_s,
-        contact=flown.contact,
-        min_true_distance_m=flown.nearest_m,
-        alerts=flown.alerts_seen(),
+    flight = flown.result(
+        "mapping flight",
         radar=radar,
         vision=vision,
         figures=figures,

@@ -105,8 +105,8 @@ class FlightResult:
     min_true_distance_m: float
     """From the vehicle's centre to the nearest object; infinite in a world without any."""
     alerts: tuple[AlertSeen, ...]
-    radar: MapFigures
-    vision: MapFigures
+    radar: MapFigures = field(default_factory=MapFigures)
+    vision: MapFigures = field(default_factory=MapFigures)
     false_alarms_per_km: float | None = None
     missed: int | None = None
     """Unknown objects in the way that were alarmed too late or not at all."""
@@ -123,10 +123,7 @@ def measured(
     title: str, figures: tuple[Figure, ...], notes: Sequence[str] = (), charts: tuple[Chart, ...] = ()
 ) -> FlightResult:
     """Of a part in which nothing flies."""
-    nothing = MapFigures()
-    return FlightResult(
-        title, 0.0, False, math.inf, (), nothing, nothing, figures=figures, notes=tuple(notes), charts=charts
-    )
+    return FlightResult(title, 0.0, False, math.inf, (), figures=figures, notes=tuple(notes), charts=charts)
 
 
 @dataclass(frozen=True, slots=True)

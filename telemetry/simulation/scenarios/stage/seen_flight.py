@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from mapping.geometry.poses import Pose
 from mapping.sensor_frames import RadarFrame
 from telemetry.perception.perceiver import Perceiver
 from telemetry.perception.status import Outcome
-from telemetry.simulation.scenarios.stage.result import AlertSeen
+from telemetry.simulation.scenarios.stage.result import AlertSeen, FlightResult
 from telemetry.topics.obstacles import ObstacleAlert, Sensor
 from telemetry.topics.vehicle import SimTruth
 
@@ -139,6 +140,10 @@ class Flown:
 
     def has_said(self, words: str) -> bool:
         return any(said.startswith(words) for _, said in self.said)
+
+    def result(self, title: str, **found: Any) -> FlightResult:
+        """``found``: the other fields of the result."""
+        return FlightResult(title, self.duration_s, self.contact, self.nearest_m, self.alerts_seen(), **found)
 
     def alerts_seen(self) -> tuple[AlertSeen, ...]:
         """The begin of each that is about an obstacle."""
