@@ -3,11 +3,14 @@ import { now_ms } from "../src/store/clock";
 import {
   adopted,
   flight,
+  hasLinkFailed,
   heard,
   isInAir,
   latched,
   lease,
+  linkState,
   linkStatus,
+  nodes,
   silence_s,
   takeFlying,
   texts,
@@ -115,5 +118,28 @@ describe("the flown path", () => {
     expect(track.t_s.length).toBeLessThan(7000);
     expect(track.t_s[0]).toBe(0);
     expect(track.s_m).toHaveLength(track.t_s.length);
+  });
+});
+
+describe("a link process that fails", () => {
+  beforeEach(() => {
+    takeFlying({ v: 1, type: "link", link: link({ silent_s: 0.1 }) }, 0);
+    nodes.value = [{ name: "link", state: "running", restarts: 0, text: "" }];
+  });
+
+  it("is lost by this page's own clock, whatever was heard last", () => {
+    expect(linkState.value).toBe("live");
+    now_ms.value = 3000;
+    expect(linkState.value).toBe("stale");
+    now_ms.value = 6000;
+    expect(linkState.value).toBe("lost");
+  });
+
+  it.each(["silent", "restarting"] as const)("has failed while it is %s", (state) => {
+    expect(hasLinkFailed.value).toBe(false);
+    nodes.value = [{ name: "link", state, restarts: 0, text: "" }];
+    expect(hasLinkFailed.value).toBe(true);
+    nodes.value = [{ name: "recorder", state, restarts: 0, text: "" }];
+    expect(hasLinkFailed.value).toBe(false);
   });
 });

@@ -17,6 +17,12 @@ describe("the status bar", () => {
       note: "12\u00a0s",
       level: "bad",
     });
+    expect(linkWords(linkStatus(), 5.2, "lost").text).toBe("Link lost");
+    expect(linkWords(linkStatus(), 1.2, "live", true)).toEqual({
+      text: "Link failed",
+      note: "1\u00a0s",
+      level: "bad",
+    });
     expect(linkWords(linkStatus({ quality: 0.4 }), 0.1).level).toBe("near");
     expect(linkWords(linkStatus({ adopted: null, state: "none" }), null).text).toBe("No vehicle");
     expect(linkWords(null, null).text).toBe("No vehicle");

@@ -13,9 +13,11 @@ import { isStale } from "../store/ages";
 import { now_ms } from "../store/clock";
 import {
   adopted,
+  hasLinkFailed,
   heard,
   latched,
   lease,
+  linkState,
   linkStatus,
   recorded_s,
   recorder,
@@ -39,10 +41,12 @@ function isParked(): boolean {
 }
 
 const NO_SERVER = "No connection: use the pilot's transmitter";
+const NO_LINK = "The link has failed: use the pilot's transmitter";
 
 /** Why the vehicle cannot be stopped or called home from this page; null: it can. */
 function whyNot(): string | null {
   if (link.value !== "open") return NO_SERVER;
+  if (hasLinkFailed.value) return NO_LINK;
   if (!lease.value.mine) return "You observe: take control first";
   return isParked() ? "The vehicle is disarmed" : null;
 }
@@ -76,7 +80,7 @@ function Safety() {
         testid="return-home"
         onHold={() => void returnHome()}
       />
-      {why === NO_SERVER && (
+      {(why === NO_SERVER || why === NO_LINK) && (
         <span class="safety-why" role="alert" data-testid="safety-why">
           {why}
         </span>
@@ -91,7 +95,8 @@ function Safety() {
 function VehicleChips() {
   const state = vehicle.value;
   const live = heard.live.value;
-  const words = linkWords(linkStatus.value?.status ?? null, silence_s.value);
+  const status = linkStatus.value?.status ?? null;
+  const words = linkWords(status, silence_s.value, linkState.value, hasLinkFailed.value);
   const old = (group: "heartbeat" | "battery" | "gnss") => isStale(live, group, now_ms.value);
   return (
     <>
@@ -149,6 +154,11 @@ function Recording() {
   );
 }
 
+const NODE_STATES: Readonly<Record<string, string>> = {
+  silent: "does not answer",
+  restarting: "starts again",
+};
+
 /** The newest message that nobody has acknowledged, and nodes that ended: to be seen in every view. */
 function Alerts() {
   const worst = latched.value[0];
@@ -175,8 +185,8 @@ function Alerts() {
       {node && (
         <Chip
           icon="warning"
-          text={`${nodeWord(node.name)} ${node.state === "restarting" ? "starts again" : node.state}`}
-          level="near"
+          text={`${nodeWord(node.name)} ${NODE_STATES[node.state] ?? node.state}`}
+          level={node.name === "link" && hasLinkFailed.value ? "bad" : "near"}
           title={node.text}
           testid="chip-node"
         />

@@ -27,6 +27,10 @@ export type FlyingMessage = Extract<
 /** Where values come from: the vehicle, or a recording. */
 export type Source = VehicleMessage["source"];
 
+/** A second more than the link's own limits, for its status comes once a second. */
+const STALE_AFTER_S = 2.5;
+const LOST_AFTER_S = 4.5;
+
 type BySource<T> = Record<Source, Signal<T>>;
 
 export const heard: BySource<Heard | null> = { live: signal(null), replay: signal(null) };
@@ -48,7 +52,12 @@ export const adopted = computed(() => linkStatus.value?.status.adopted ?? null);
 export const vehicle = computed(() => (adopted.value ? (heard.live.value?.message.state ?? null) : null));
 export const latched = computed(() => texts.value.filter(isLatched));
 export const troubledNodes = computed(() =>
-  nodes.value.filter((node) => node.state === "restarting" || (node.state !== "running" && node.text !== "")),
+  nodes.value.filter(
+    (node) =>
+      node.state === "restarting" ||
+      node.state === "silent" ||
+      (node.state !== "running" && node.text !== ""),
+  ),
 );
 
 /** Seconds since the vehicle was last heard, growing while the page hears nothing either; null: never heard. */
@@ -57,6 +66,24 @@ export const silence_s = computed(() => {
   if (!known || known.status.silent_s === null) return null;
   return known.status.silent_s + Math.max(0, now_ms.value - known.received_ms) / 1000;
 });
+
+/** Of the vehicle's connection, as the link says; what this page has not heard for that long, by its own clock. */
+export const linkState = computed<LinkStatus["state"]>(() => {
+  const state = linkStatus.value?.status.state ?? "none";
+  const silent_s = silence_s.value;
+  if (state === "none" || silent_s === null) return state;
+  if (silent_s >= LOST_AFTER_S) return "lost";
+  return state === "live" && silent_s >= STALE_AFTER_S ? "stale" : state;
+});
+
+/** The process that commands the vehicle does not answer, or is being started again. */
+export const hasLinkFailed = computed(
+  () =>
+    adopted.value !== null &&
+    nodes.value.some(
+      (node) => node.name === "link" && (node.state === "silent" || node.state === "restarting"),
+    ),
+);
 
 /** Length of the running recording; null when nothing is being recorded. */
 export const recorded_s = computed(() => {

@@ -1,7 +1,7 @@
 import { withUnit } from "../format";
 import { age_s, isStale, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
-import { heard, linkStatus, silence_s, type Source } from "../store/flying";
+import { hasLinkFailed, heard, linkState, silence_s, type Source } from "../store/flying";
 import { link } from "../store/state";
 import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
@@ -18,18 +18,25 @@ function ageOf(source: Source, group: Group): { isOld: boolean; age: string } {
   return { isOld, age: isOld && seconds !== null ? `${withUnit(Math.floor(seconds), "s")} old` : "" };
 }
 
-const isLost = () => link.value === "lost" || linkStatus.value?.status.state === "lost";
+const isLost = () => link.value === "lost" || linkState.value === "lost" || hasLinkFailed.value;
+
+function lostWords(): [what: string, then: string] {
+  if (link.value === "lost") return ["This page has lost the server", "It keeps trying."];
+  if (hasLinkFailed.value)
+    return ["The link has failed", "It is started again. Take the pilot's transmitter."];
+  return ["Communication lost", "Last values below. The vehicle follows its failsafe."];
+}
 
 /** Over the attitude, so that nothing moves: the values below stay, greyed. */
 function Lost() {
-  const pageLost = link.value === "lost";
+  const [what, then] = lostWords();
   const seconds = silence_s.value;
   return (
     <div class="lost-notice" role="alert" data-testid="link-lost">
       <Icon name="warning" size={28} />
-      <strong>{pageLost ? "This page has lost the server" : "Communication lost"}</strong>
+      <strong>{what}</strong>
       {seconds !== null && <span class="lost-seconds">{withUnit(Math.floor(seconds), "s")}</span>}
-      <span>{pageLost ? "It keeps trying." : "Last values below. The vehicle follows its failsafe."}</span>
+      <span>{then}</span>
     </div>
   );
 }

@@ -61,12 +61,18 @@ export interface LinkWords {
 }
 
 /** What the link is worth: quality and round trip, or how long it has been silent. */
-export function linkWords(status: LinkStatus | null, silence_s: number | null): LinkWords {
-  if (!status || status.state === "none" || !status.adopted)
+export function linkWords(
+  status: LinkStatus | null,
+  silence_s: number | null,
+  state: LinkStatus["state"] = status?.state ?? "none",
+  hasFailed = false,
+): LinkWords {
+  if (!status || state === "none" || !status.adopted)
     return { text: "No vehicle", note: "", level: "neutral" };
   const silent = silence_s === null ? "" : withUnit(Math.floor(silence_s), "s");
-  if (status.state === "lost") return { text: "Link lost", note: silent, level: "bad" };
-  if (status.state === "stale") return { text: "Silent", note: silent, level: "near" };
+  if (hasFailed) return { text: "Link failed", note: silent, level: "bad" };
+  if (state === "lost") return { text: "Link lost", note: silent, level: "bad" };
+  if (state === "stale") return { text: "Silent", note: silent, level: "near" };
   const note = status.round_trip_s === null ? "" : withUnit(status.round_trip_s * 1000, "ms");
   const isPoor = status.quality !== null && status.quality < POOR_QUALITY;
   return {
