@@ -8,36 +8,82 @@ from __future__ import annotations
 import importlib
 import sys
 from pathlib import Path
+from typing import Any, ClassVar
 
 import typer
+from typer.core import TyperGroup
 
 from planning import __version__
-from server.cli.agent_command import agent
-from server.cli.certify_command import certify
-from server.cli.fly_command import fly
-from server.cli.map_command import build_map
-from server.cli.plan_command import plan
-from server.cli.radar_command import radar
-from server.cli.radar_tracks_command import tracks
-from server.cli.review_command import review
-from server.cli.scenario_command import scenario
-from server.cli.serve_command import serve
 from server.cli.shared import examples
 from server.cli.shared.command import FAILED, run_command
 from server.cli.shared.output import say
-from server.cli.sim_command import sim
-from server.cli.survey_command import survey
-from server.cli.traversability_command import traversability
-from server.cli.upload_command import upload
 
+_PLAIN: dict[str, Any] = {"add_completion": False, "rich_markup_mode": "rich", "pretty_exceptions_enable": False}
+
+
+class _Lazy(TyperGroup):
+    """Each command is imported when it is asked for: one does not wait for what the others need."""
+
+    places: ClassVar[dict[str, tuple[str, str]]]
+    """Of each command: its function below this package, and the epilog of its help."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = dict.fromkeys(self.places, None)  # type: ignore[assignment] # the names, for "Did you mean"
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        del ctx
+        return list(self.places)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        del ctx
+        if cmd_name == "radar" and cmd_name in self.places:
+            return typer.main.get_group(radar)
+        if cmd_name not in self.places:
+            return None
+        place, epilog = self.places[cmd_name]
+        module, _, function = place.rpartition(".")
+        alone = typer.Typer(**_PLAIN)
+        alone.command(cmd_name, epilog=epilog)(getattr(importlib.import_module(__name__ + module), function))
+        return typer.main.get_command(alone)
+
+
+class _Commands(_Lazy):
+    places: ClassVar = {
+        "serve": (".serve_command.serve", examples.SERVE),
+        "plan": (".plan_command.plan", examples.PLAN),
+        "certify": (".certify_command.certify", examples.CERTIFY),
+        "survey": (".survey_command.survey", examples.SURVEY),
+        "upload": (".upload_command.upload", examples.UPLOAD),
+        "fly": (".fly_command.fly", examples.FLY),
+        "sim": (".sim_command.sim", examples.SIM),
+        "review": (".review_command.review", examples.REVIEW),
+        "scenario": (".scenario_command.scenario", examples.SCENARIO),
+        "map": (".map_command.build_map", examples.MAP),
+        "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
+        "agent": (".agent_command.agent", examples.AGENT),
+        "bench": ("bench", examples.BENCH),
+        "radar": ("", ""),
+    }
+
+
+class _RadarCommands(_Lazy):
+    places: ClassVar = {
+        "process": (".radar_command.process", examples.RADAR_PROCESS),
+        "tracks": (".radar_tracks_command.tracks", examples.RADAR_TRACKS),
+    }
+
+
+radar = typer.Typer(
+    name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich", cls=_RadarCommands
+)
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",
     epilog=examples.EXIT_CODES,
     no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
+    cls=_Commands,
+    **_PLAIN,
 )
 
 
@@ -48,23 +94,6 @@ def _options(version: bool = typer.Option(False, "--version", help="Print the ve
         raise typer.Exit
 
 
-app.command(epilog=examples.SERVE)(serve)
-app.command(epilog=examples.PLAN)(plan)
-app.command(epilog=examples.CERTIFY)(certify)
-app.command(epilog=examples.SURVEY)(survey)
-app.command(epilog=examples.UPLOAD)(upload)
-app.command(epilog=examples.FLY)(fly)
-app.command(epilog=examples.SIM)(sim)
-app.command(epilog=examples.REVIEW)(review)
-app.command(epilog=examples.SCENARIO)(scenario)
-app.command("map", epilog=examples.MAP)(build_map)
-app.command(epilog=examples.TRAVERSABILITY)(traversability)
-app.command(epilog=examples.AGENT)(agent)
-radar.command("tracks", epilog=examples.RADAR_TRACKS)(tracks)
-app.add_typer(radar)
-
-
-@app.command(epilog=examples.BENCH)
 def bench() -> None:
     """Measure the kernels against scipy, OpenCV and others, and print the ratios."""
     root = Path(__file__).resolve().parents[2]

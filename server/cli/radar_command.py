@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import typer
 from typer import Argument, Option
 
 from mapping.radar.chain import Spectra
 from mapping.radar.detections import Detections
 from planning.errors import DescribedError
-from server.cli.shared import examples
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import answer, end_progress, progress, say_notes
@@ -27,8 +25,6 @@ from telemetry.sensors.target_recording import write_targets
 
 SHOWN = 10
 """Detections of the first frame, in the answer for people."""
-
-radar = typer.Typer(name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich")
 
 
 class RadarOptionsError(DescribedError):
@@ -86,9 +82,6 @@ def process(
     end_progress()
     used = parameters(reading.sensor, reading.file)
     answer(_summary(done, used), _lines(file, done, used), as_json=as_json)
-
-
-radar.command("process", epilog=examples.RADAR_PROCESS)(process)
 
 
 def _detections(
