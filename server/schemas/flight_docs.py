@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, StringConstraints
 
 from server.schemas.strict_model import Name, Strict
 from telemetry.topics.messages import Rounded
@@ -110,6 +110,10 @@ class FlyState(Strict):
     """After a flight that broke off: where it can go on."""
     busy: str = ""
     """What is being done right now: "Uploading", "Checking the start" ..."""
+
+
+class SignIn(Strict):
+    password: Annotated[str, StringConstraints(max_length=1024)]
 
 
 class LeaseDoc(Strict):

@@ -1,13 +1,13 @@
-"""What the server computes from a plan document, and where that stands."""
+"""What the server computes from a plan document, where that stands, and what pages ask of the open plan."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, StringConstraints
 
 from server.schemas.plan_docs import PlanDoc
-from server.schemas.strict_model import Strict
+from server.schemas.strict_model import Name, Strict
 
 
 class ErrorDoc(Strict):
@@ -212,3 +212,25 @@ class PlanState(Strict):
     redo_label: str = ""
     saved_utc: str
     computation: Computation
+
+
+class PlanEdit(Strict):
+    base_revision: int
+    label: Annotated[str, StringConstraints(max_length=60)]
+    """For the undo button: "Move POI 3"."""
+    document: PlanDoc
+    coalesce: bool = False
+    """Merge with the previous edit of the same label (a slider being dragged is one undo step)."""
+
+
+class OpenPlan(Strict):
+    plan_id: str
+
+
+class SavePlanAs(Strict):
+    name: Name
+
+
+class Imported(Strict):
+    state: PlanState
+    warnings: list[str]

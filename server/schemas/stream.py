@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
@@ -11,7 +11,7 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.strict_model import Strict
+from server.schemas.strict_model import Message, Strict
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
 from server.schemas.view_docs import SelectionDoc, ViewDoc
@@ -28,8 +28,7 @@ from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
 
-class Snapshot(Strict):
-    v: Literal[1] = 1
+class Snapshot(Message):
     type: Literal["snapshot"] = "snapshot"
     product_version: str
     page_id: str
@@ -41,48 +40,41 @@ class Snapshot(Strict):
     jobs: list[JobDoc]
 
 
-class PlanMessage(Strict):
-    v: Literal[1] = 1
+class PlanMessage(Message):
     type: Literal["plan"] = "plan"
     plan: PlanState
 
 
-class LibraryMessage(Strict):
-    v: Literal[1] = 1
+class LibraryMessage(Message):
     type: Literal["library"] = "library"
     library: LibraryState
 
 
-class ViewMessage(Strict):
-    v: Literal[1] = 1
+class ViewMessage(Message):
     type: Literal["view"] = "view"
     view: ViewDoc
 
 
-class SelectionMessage(Strict):
-    v: Literal[1] = 1
+class SelectionMessage(Message):
     type: Literal["selection"] = "selection"
     selection: SelectionDoc
 
 
-class AnsweredMessage(Strict):
+class AnsweredMessage(Message):
     """Every change that this page asked for up to this one is carried out, or refused with a notice."""
 
-    v: Literal[1] = 1
     type: Literal["answered"] = "answered"
     change: int
 
 
-class JobMessage(Strict):
-    v: Literal[1] = 1
+class JobMessage(Message):
     type: Literal["job"] = "job"
     job: JobDoc
 
 
-class CursorMessage(Strict):
+class CursorMessage(Message):
     """The place marked in profile and 3D view at once."""
 
-    v: Literal[1] = 1
     type: Literal["cursor"] = "cursor"
     s_m: float | None
     lat_deg: float | None = None
@@ -91,10 +83,9 @@ class CursorMessage(Strict):
     path_rel_home_m: float | None = None
 
 
-class VehicleMessage(Strict):
+class VehicleMessage(Message):
     """The vehicle as it is now, at most 20 times a second; once a second when nothing is heard of it."""
 
-    v: Literal[1] = 1
     type: Literal["vehicle"] = "vehicle"
     source: Source
     now_mono_s: float
@@ -103,91 +94,78 @@ class VehicleMessage(Strict):
     follow: FollowDoc | None
 
 
-class TrackMessage(Strict):
+class TrackMessage(Message):
     """Replaces the flown path: after a seek, or when another flight begins."""
 
-    v: Literal[1] = 1
     type: Literal["track"] = "track"
     track: TrackDoc
 
 
-class TextMessage(Strict):
+class TextMessage(Message):
     """The vehicle's own words."""
 
-    v: Literal[1] = 1
     type: Literal["text"] = "text"
     source: Source
     text: VehicleText
 
 
-class LinkMessage(Strict):
-    v: Literal[1] = 1
+class LinkMessage(Message):
     type: Literal["link"] = "link"
     link: LinkStatus
 
 
-class TransferMessage(Strict):
-    v: Literal[1] = 1
+class TransferMessage(Message):
     type: Literal["transfer"] = "transfer"
     transfer: TransferStatus
 
 
-class FlightMessage(Strict):
-    v: Literal[1] = 1
+class FlightMessage(Message):
     type: Literal["flight"] = "flight"
     source: Source
     flight: FlightStatus
 
 
-class FlyMessage(Strict):
-    v: Literal[1] = 1
+class FlyMessage(Message):
     type: Literal["fly"] = "fly"
     fly: FlyState
 
 
-class LeaseMessage(Strict):
-    v: Literal[1] = 1
+class LeaseMessage(Message):
     type: Literal["lease"] = "lease"
     lease: LeaseDoc
 
 
-class NodesMessage(Strict):
-    v: Literal[1] = 1
+class NodesMessage(Message):
     type: Literal["nodes"] = "nodes"
     nodes: list[NodeDoc]
 
 
-class RecorderMessage(Strict):
-    v: Literal[1] = 1
+class RecorderMessage(Message):
     type: Literal["recorder"] = "recorder"
     recorder: RecorderStatus
 
 
-class RecordingsMessage(Strict):
-    v: Literal[1] = 1
+class RecordingsMessage(Message):
     type: Literal["recordings"] = "recordings"
     recordings: list[RecordingDoc]
 
 
-class ReviewMessage(Strict):
+class ReviewMessage(Message):
     """The recording that is open for review; null: none."""
 
-    v: Literal[1] = 1
     type: Literal["review"] = "review"
     review: ReviewDoc | None
 
 
-class ReplayMessage(Strict):
-    v: Literal[1] = 1
+class ReplayMessage(Message):
     type: Literal["replay"] = "replay"
     now_mono_s: float
     replay: ReplayStatus
 
 
-class PerceptionMessage(Strict):
+class PerceptionMessage(Message):
     """One sensor's status: with every frame of it, at most 10 times a second; null: forget this sensor."""
 
-    v: Literal[1] = 1
     type: Literal["perception"] = "perception"
     source: Source
     now_mono_s: float
@@ -196,60 +174,53 @@ class PerceptionMessage(Strict):
     status: PerceptionStatus | None
 
 
-class AlertMessage(Strict):
+class AlertMessage(Message):
     """An alert begins, goes on or ends: at once, before the obstacles message that lists it."""
 
-    v: Literal[1] = 1
     type: Literal["alert"] = "alert"
     source: Source
     alert: ObstacleAlert
 
 
-class ObstaclesMessage(Strict):
-    v: Literal[1] = 1
+class ObstaclesMessage(Message):
     type: Literal["obstacles"] = "obstacles"
     source: Source
     obstacles: ObstaclesState
 
 
-class TracksMessage(Strict):
+class TracksMessage(Message):
     """Moving objects: with every radar frame, at most 10 times a second; null: forget them."""
 
-    v: Literal[1] = 1
     type: Literal["tracks"] = "tracks"
     source: Source
     now_mono_s: float
     status: TracksStatus | None
 
 
-class TraversabilityMessage(Strict):
+class TraversabilityMessage(Message):
     """What is known of where ground can be driven on or landed on."""
 
-    v: Literal[1] = 1
     type: Literal["traversability"] = "traversability"
     traversability: TraversabilityState
 
 
-class RadarFilesMessage(Strict):
+class RadarFilesMessage(Message):
     """Files of raw radar samples that are kept, newest first."""
 
-    v: Literal[1] = 1
     type: Literal["radar_files"] = "radar_files"
     files: list[RadarFileDoc]
 
 
-class ScenarioRunsMessage(Strict):
+class ScenarioRunsMessage(Message):
     """The scenario that runs, and those that were run, newest first."""
 
-    v: Literal[1] = 1
     type: Literal["scenario_runs"] = "scenario_runs"
     runs: list[ScenarioRunDoc]
 
 
-class NoticeMessage(Strict):
+class NoticeMessage(Message):
     """Something the operator must read: a failed click, a warning."""
 
-    v: Literal[1] = 1
     type: Literal["notice"] = "notice"
     level: Literal["info", "warning", "error"]
     error: ErrorDoc
@@ -287,6 +258,12 @@ ServerMessage = Annotated[
     | NoticeMessage,
     Field(discriminator="type"),
 ]
+
+
+class Pages(Protocol):
+    """Whoever tells all pages: the hub itself, or what also keeps the latest for pages that open later."""
+
+    def publish(self, message: ServerMessage) -> None: ...
 
 
 Change = Annotated[int, Field(ge=0, le=2**53 - 1)]

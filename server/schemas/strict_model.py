@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from planning.formats.safe_text import clean_name
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION: Literal[1] = 1
 
 Name = Annotated[str, StringConstraints(max_length=80, strip_whitespace=True), AfterValidator(clean_name)]
 """Without control and formatting characters: markup stays text, whoever shows it escapes it."""
@@ -31,3 +31,9 @@ class Asked:
 
 class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+
+class Message(Strict):
+    """Of the ``/ws`` stream."""
+
+    v: Literal[1] = PROTOCOL_VERSION

@@ -14,7 +14,6 @@ from pydantic.fields import FieldInfo
 
 from server import schemas
 from server.schemas import (
-    bodies,
     flight_docs,
     library_docs,
     obstacle_docs,
@@ -69,7 +68,6 @@ def _models() -> Iterator[type[BaseModel]]:
         result_docs,
         library_docs,
         view_docs,
-        bodies,
         flight_docs,
         review_docs,
         obstacle_docs,

@@ -893,6 +893,28 @@ export interface PlanState {
   computation: Computation;
 }
 
+export interface PlanEdit {
+  base_revision: number;
+  /** For the undo button: "Move POI 3". */
+  label: string;
+  document: PlanDoc;
+  /** Merge with the previous edit of the same label (a slider being dragged is one undo step). */
+  coalesce?: boolean;
+}
+
+export interface OpenPlan {
+  plan_id: string;
+}
+
+export interface SavePlanAs {
+  name: string;
+}
+
+export interface Imported {
+  state: PlanState;
+  warnings: string[];
+}
+
 export interface SpikeDoc {
   lat_deg: number;
   lon_deg: number;
@@ -996,32 +1018,6 @@ export interface SelectionDoc {
   site_rank: number | null;
 }
 
-export interface PlanEdit {
-  base_revision: number;
-  /** For the undo button: "Move POI 3". */
-  label: string;
-  document: PlanDoc;
-  /** Merge with the previous edit of the same label (a slider being dragged is one undo step). */
-  coalesce?: boolean;
-}
-
-export interface OpenPlan {
-  plan_id: string;
-}
-
-export interface SavePlanAs {
-  name: string;
-}
-
-export interface SignIn {
-  password: string;
-}
-
-export interface Imported {
-  state: PlanState;
-  warnings: string[];
-}
-
 /** Where the vehicle is against the plan and the surface model; null where it cannot be told. */
 export interface FollowDoc {
   /** Distance flown along the planned line, at the place nearest to the vehicle. */
@@ -1105,6 +1101,10 @@ export interface FlyState {
   resume_from_item: number | null;
   /** What is being done right now: "Uploading", "Checking the start" ... */
   busy: string;
+}
+
+export interface SignIn {
+  password: string;
 }
 
 /** Who is in charge. Only they can command the vehicle. */
