@@ -13,9 +13,10 @@ from fastapi import FastAPI
 from server.errors import ServerError, StartError
 from server.library import Library
 from server.settings import Settings
+from server.stations import Flying
 from server.web import create_app
-from server.wiring import make_workspace, open_flying
 from server.work.logs import configure_logging
+from server.workspace import Workspace
 from telemetry.mavlink.address import parse_address
 
 WEBSOCKET_LIMIT_BYTES = 1024**2
@@ -30,7 +31,7 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     for address in settings.link:
         parse_address(address)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
-        app = create_app(settings, library, make_workspace, open_flying, demo=demo)
+        app = create_app(settings, library, Workspace, Flying.open, demo=demo)
         server = AnnouncingServer(app, settings)
         server.run(sockets=[listening])
         if not server.started:

@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any
 
 from server.door.hub import Hub
@@ -15,17 +15,17 @@ from server.door.lease import Lease
 from server.errors import reported
 from server.flying.flight_desk import FlightDesk
 from server.flying.plan_followed import PlanFollowed
+from server.flying.recordings import RecordingDesk, TrackSoFar
 from server.flying.reviewing import Reviewing
 from server.flying.scenery import Scenery
 from server.flying.simulation import Simulation
-from server.flying.track_so_far import TrackSoFar
 from server.flying.work import FlightWork
 from server.heard.agents import Agents
 from server.heard.channel import Channel
 from server.heard.connections import Connections
 from server.heard.node_states import Nodes
+from server.heard.onboard import Aboard
 from server.heard.present import Present
-from server.heard.recording import RecordingDesk
 from server.heard.relay import Relay
 from server.library import Library
 from server.library.recording_list import RecordingShelf
@@ -40,137 +40,107 @@ from server.schemas import (
     TransferMessage,
 )
 from server.settings import Settings
+from server.studies.scenario_desk import ScenarioDesk
 from server.traversability.live_uwb import LiveUwb
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
-from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, RecorderStatus, ServerAlive, Topic
-from telemetry.topics.requests import RecorderRequest, ReplayRequest, StartRecording
+from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic
+from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")
 
 RUNTIME_FOLDER = "run"
 ALIVE_EVERY_S = 1.0
-CALL_TIMEOUT_S = 15.0
-"""A node may have to start first, on a busy machine."""
 
 
 class Flying:
     """Everything about vehicles that the server does; all methods belong to the event loop."""
 
     def __init__(
-        self, bus: Bus, lease: Lease, library: Library, hub: Hub, workspace: Workspace, settings: Settings
+        self,
+        bus: Bus,
+        lease: Lease,
+        library: Library,
+        hub: Hub,
+        workspace: Workspace,
+        scenarios: ScenarioDesk,
+        settings: Settings,
     ) -> None:
-        self._bus, self._hub, self._workspace = bus, hub, workspace
+        self._bus, self._hub, self._workspace, self._scenarios = bus, hub, workspace, scenarios
         self.lease = lease
-        self._present = Present(hub.publish)
-        tell = self._present.tell
-        runtime_dir = library.root / RUNTIME_FOLDER
-        self.shelf = RecordingShelf(library.root, terrains=library.terrains)
-        self.nodes = Nodes(runtime_dir, self.shelf.folder, tell, demo_radar=settings.demo_radar)
-        self._lane = Lane("flight")
+        self._present = present = Present(hub)
+        self._lane = lane = Lane("flight")
+        runtime_dir, board = library.root / RUNTIME_FOLDER, workspace.board
+        link, aboard = LinkClient(bus), Aboard(library.root / "onboard.json")
+        self.shelf = RecordingShelf(library)
+        self.nodes = Nodes(bus, runtime_dir, self.shelf.folder, present, demo_radar=settings.demo_radar)
         self.agents = Agents(bus)
-        self.live, self.replay = Channel("live", tell), Channel("replay", tell)
-        link = LinkClient(bus)
-        self.connections = Connections(
-            link, need_link=self.nodes.link, server_operator=lease.server_operator, configured=settings.link
-        )
-        work = FlightWork(
-            library,
-            link,
-            present_plan=lambda: workspace.state,
-            plan_lane=workspace.plan_lane,
-            flight_lane=self._lane,
-        )
-        self.desk = FlightDesk(
-            link,
-            work,
-            file=library.root / "onboard.json",
-            present_document=lambda: workspace.document,
-            vehicle=lambda: self.live.state,
-            tell=tell,
-            publish_plan=self._publish_plan,
-            avoidance=lambda: self._obstacles.watches["live"].avoidance,
-        )
-        self.recording = RecordingDesk(
-            self.shelf,
-            ask=self._ask_recorder,
-            run=workspace.board.run,
-            tell=tell,
-            in_review=lambda: self.reviewing.file_name,
-        )
-        self._obstacles = Obstacles(
-            bus,
-            library,
-            workspace,
-            self.nodes,
-            link,
-            self.live,
-            lane=self._lane,
-            server_operator=lease.server_operator,
-            onboard=lambda: self.desk.record,
-            tell=tell,
-        )
+        self.live, self.replay = Channel("live", present), Channel("replay", present)
+        self.connections = Connections(link, self.nodes, lease, configured=settings.link)
+        self._obstacles = Obstacles(bus, library, workspace, self.nodes, link, self.live, aboard, lane, lease, present)
         self.obstacles = self._obstacles.desk
+        self._watch = self._obstacles.watches["live"]
+        work = FlightWork(library, link, workspace, lane)
+        self.desk = FlightDesk(link, work, aboard, workspace, self.live, self._watch, bus, present)
         self.reviewing = Reviewing(
             library,
             self.shelf,
             workspace.on_show,
             self.replay,
-            ask=self._ask_replay,
-            run=workspace.board.run,
-            tell=tell,
-            forget=self._forget_replay,
-            jumped=self._obstacles.watches["replay"].forget_alerts,
+            self.nodes,
+            board,
+            self._obstacles.watches["replay"],
+            self._obstacles.tracks["replay"],
+            present,
         )
+        self.recording = RecordingDesk(self.shelf, self.nodes, board, self.reviewing, present)
         self.simulation = Simulation(
             library,
             workspace,
             self.nodes,
             self.connections,
-            self._lane,
+            self._obstacles,
+            lane,
             runtime_dir,
             demo_world=settings.demo_world,
-            sees=self._obstacles.simulated,
         )
+        self.uwb = LiveUwb(workspace.traversability, library, bus)
         self._scenery = Scenery(workspace.stage, {"live": self.live, "replay": self.replay})
-        self.on_armed: Callable[[], None] = lambda: None
-        """What must make way for a flight hears that one begins."""
-        self._followed = PlanFollowed(library, self.live, open_dsm=lambda: workspace.dsm)
-        self._uwb = LiveUwb(workspace.traversability, library, tell_pilot=lambda text: bus.publish(Topic.TEXT, text))
-        self._track_so_far = TrackSoFar(self.shelf.folder, self.live, self._lane)
+        self._followed = PlanFollowed(library, self.live, aboard, workspace)
+        self._track_so_far = TrackSoFar(self.shelf.folder, self.live, lane)
 
     @classmethod
-    async def open(cls, library: Library, hub: Hub, workspace: Workspace, settings: Settings) -> Flying:
+    async def open(
+        cls, settings: Settings, library: Library, hub: Hub, workspace: Workspace, scenarios: ScenarioDesk
+    ) -> Flying:
         """Joins the bus; nodes that a server before this one has left running are taken over. Raises BusError."""
         lease = await asyncio.to_thread(Lease, library.root / "lease.json")
         bus = await Bus.open(library.root / RUNTIME_FOLDER, "server")
-        return cls(bus, lease, library, hub, workspace, settings)
+        return cls(bus, lease, library, hub, workspace, scenarios, settings)
 
     # Life
 
     def loops(self, *, demo: bool = False) -> list[Coroutine[Any, Any, None]]:
         """To be run by the application's task group until it ends."""
-        self._workspace.changed = self._on_plan_changed
-        self._workspace.picture.held = lambda: self.armed
-        self._workspace.picture.live_home = lambda: self._home
         starts = [self._start(demo=demo), *([self._start_demo()] if demo else [])]
         return [
             *self._relay().loops(),
             self.nodes.supervisor.run(),
             self._beat(),
+            self._hear_of_plan(),
             self._scenery.run(),
             self._followed.run(),
-            *self._uwb.loops(),
+            *self.uwb.loops(),
             *self._obstacles.loops(),
             *starts,
         ]
 
     async def close(self) -> None:
         """Nodes go on while a vehicle is armed: the next server finds them again."""
-        if self.armed:
+        if self.live.armed:
             sys.stdout.write(_LEFT_FLYING)
             sys.stdout.flush()
         else:
@@ -180,25 +150,13 @@ class Flying:
         await self._lane.close()
         await self._bus.close()
 
-    @property
-    def armed(self) -> bool:
-        return self.live.state is not None and self.live.state.armed
-
-    @property
-    def _home(self) -> tuple[float, float] | None:
-        state = self.live.state
-        if state is None or state.home_lat_deg is None or state.home_lon_deg is None:
-            return None
-        return state.home_lat_deg, state.home_lon_deg
-
     async def _start(self, *, demo: bool) -> None:
         await self._obstacles.start()
         await self.recording.refresh()
         if self.connections.wanted or demo:
             await self.nodes.link()
             await self.connections.ask_for_configured()
-        if self.desk.record is not None:
-            self._publish_plan(self.desk.record)
+        self.desk.tell_recorder()
 
     async def _start_demo(self) -> None:
         """Once the demo's plan is open; whoever is in charge by then stays so."""
@@ -214,46 +172,55 @@ class Flying:
             self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
             self.live.tick()
             self._obstacles.tick()
-            if self.lease.pass_on(self._hub.session_keys, in_flight=self.armed):
+            if self.lease.pass_on(self._hub.session_keys, in_flight=self.live.armed):
                 await self._lease_changed()
             await asyncio.sleep(ALIVE_EVERY_S)
+
+    async def _hear_of_plan(self) -> None:
+        """Another document is open, or there is another answer to it."""
+        while True:
+            await self._workspace.changed.wait()
+            self._workspace.changed.clear()
+            self.desk.refresh()
+            self._followed.look()
+            self._obstacles.on_plan()
 
     # What is heard
 
     def _relay(self) -> Relay:
-        relay, tell = Relay(self._bus), self._present.tell
+        relay, present = Relay(self._bus), self._present
         relay.on(Topic.VEHICLE, self._on_state)
         relay.on(Topic.TEXT, self.live.on_text, each=True)
         relay.on(Topic.LINK, self._on_link)
-        relay.on(Topic.UWB_SCAN, self._uwb.on_scan, each=True)
-        relay.on(Topic.TRANSFER, lambda transfer: tell(TransferMessage(transfer=transfer)))
+        relay.on(Topic.UWB_SCAN, self.uwb.on_scan, each=True)
+        relay.on(Topic.TRANSFER, lambda transfer: present.publish(TransferMessage(transfer=transfer)))
         relay.on(Topic.FLIGHT, self._on_flight)
+        relay.on(Topic.AVOIDANCE, self._on_avoidance)
         relay.on(Topic.RECORDER, self._on_recorder)
         relay.on(Topic.REPLAY, self.reviewing.on_status)
         relay.on(Topic.VEHICLE, self.replay.on_state, replayed=True)
         relay.on(Topic.TEXT, self.replay.on_text, replayed=True, each=True)
         relay.on(Topic.FLIGHT, self.replay.on_flight, replayed=True)
         self._obstacles.hear(relay)
-        self._obstacles.sees_differently = self.desk.refresh
         return relay
 
     def _on_state(self, state: VehicleState) -> None:
-        was_armed, home = self.armed, self._home
+        was_armed = self.live.armed
         self.live.on_state(state)
-        self._uwb.on_state(state)
-        if self.armed != was_armed or self._home != home:
-            self._workspace.picture.again()
+        self.uwb.on_state(state)
+        self._workspace.picture.on_vehicle(self.live.armed, self.live.home)
         if was_armed and not state.armed:
             self.desk.on_disarmed()
         if state.armed and not was_armed:
-            self.on_armed()
+            self._scenarios.on_armed()
 
     async def _on_link(self, status: LinkStatus) -> None:
-        self._present.tell(LinkMessage(link=status))
+        self._present.publish(LinkMessage(link=status))
         if status.adopted is None and self.live.state is not None:
             self.live.forget()
+            self._workspace.picture.on_vehicle(False, None)
         self.desk.on_link(status)
-        self._followed.want(self.desk.record)
+        self._followed.look()
         await self.connections.on_status(status)
         await self.simulation.on_link(status)
         await self._obstacles.on_link(status)
@@ -262,33 +229,13 @@ class Flying:
         self.live.on_flight(flight)
         self.desk.on_flight(flight)
 
+    def _on_avoidance(self, status: AvoidanceStatus) -> None:
+        self._watch.on_avoidance(status)
+        self.desk.refresh()
+
     async def _on_recorder(self, status: RecorderStatus) -> None:
         await self.recording.on_status(status)
         await self._track_so_far.on_status(status)
-
-    def _on_plan_changed(self) -> None:
-        self.desk.refresh()
-        self._followed.want(self.desk.record)
-        self._obstacles.on_plan()
-
-    def _forget_replay(self) -> None:
-        self._obstacles.forget_replay()
-        self._present.forget_replay()
-
-    def _publish_plan(self, record: PlanRecord) -> None:
-        self._followed.want(record)
-        self._bus.publish(Topic.PLAN, record)
-
-    # What is asked of other nodes
-
-    async def _ask_recorder(self, request: RecorderRequest) -> object:
-        await self.nodes.recorder()
-        result = str if isinstance(request, StartRecording) else type(None)
-        return await self._bus.call("recorder", request, result=result, timeout_s=CALL_TIMEOUT_S)
-
-    async def _ask_replay(self, request: ReplayRequest) -> object:
-        await self.nodes.replay()
-        return await self._bus.call("replay", request, result=type(None), timeout_s=CALL_TIMEOUT_S)
 
     # Pages and who is in charge
 

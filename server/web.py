@@ -58,7 +58,7 @@ log = logging.getLogger("hedgehop.app")
 
 MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
-OpenFlying = Callable[[Settings, Library, Hub, "Workspace"], Awaitable["Flying"]]
+OpenFlying = Callable[[Settings, Library, Hub, "Workspace", ScenarioDesk], Awaitable["Flying"]]
 """Joins the bus and all that hangs on it."""
 ROUTERS = (
     session_routes,
@@ -154,25 +154,23 @@ async def _open(
     stack.callback(host.close)
     workspace = make_workspace(library, hub, host, background)
     stack.push_async_callback(workspace.close)
-    flying = await open_flying(settings, library, hub, workspace)
+    radar, scenarios = await asyncio.to_thread(_open_studies, library, hub, background)
+    stack.push_async_callback(radar.close)
+    stack.push_async_callback(scenarios.close)
+    flying = await open_flying(settings, library, hub, workspace, scenarios)
     stack.push_async_callback(flying.close)
-    radar_desk, scenario_desk = await asyncio.to_thread(_open_studies, library, hub, flying, background)
-    stack.push_async_callback(radar_desk.close)
-    stack.push_async_callback(scenario_desk.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
-    return Parts(settings, auth, hub, library, host, workspace, flying, radar_desk, scenario_desk)
+    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios)
 
 
-def _open_studies(library: Library, hub: Hub, flying: Flying, background: Background) -> tuple[RadarDesk, ScenarioDesk]:
-    """What Review looks at beside recordings. No scenario runs beside a flight."""
+def _open_studies(library: Library, hub: Hub, background: Background) -> tuple[RadarDesk, ScenarioDesk]:
+    """What Review looks at beside recordings."""
     damaged = library.notices.append
-    runs = ScenarioShelf(library.root, damaged)
-    desk = ScenarioDesk(runs, tell=hub.publish, armed=lambda: flying.armed, spawn=background.spawn)
-    flying.on_armed = desk.on_armed
-    return RadarDesk(RadarShelf(library.root, damaged), hub.publish), desk
+    scenarios = ScenarioDesk(ScenarioShelf(library.root, damaged), hub, background)
+    return RadarDesk(RadarShelf(library.root, damaged), hub), scenarios
 
 
 async def _tell(request: Request, error: Exception) -> Response:

@@ -5,9 +5,10 @@ All methods run on the event loop; heavy work goes to worker lanes. Every page h
 
 from __future__ import annotations
 
+import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any, Protocol
+from collections.abc import Awaitable, Coroutine
+from typing import Any
 
 from planning.terrain.dsm import Dsm
 from server.errors import reported
@@ -16,27 +17,20 @@ from server.plan import file_tasks, tasks
 from server.plan.computing import Computing
 from server.plan.file_jobs import FileJobs
 from server.plan.on_show import OnShow
-from server.plan.picture import Picture, View
+from server.plan.picture import Picture
 from server.plan.plan_desk import PlanDesk
 from server.plan.plan_requests import PlanRequests
 from server.plan.pointing import Pointing
 from server.plan.terrain_desk import TerrainDesk
+from server.scene.host import SceneHost
 from server.scene.layers.sights import Sights
 from server.scene.layers.vehicles import Vehicles
-from server.schemas import (
-    ErrorDoc,
-    LibraryMessage,
-    NoticeMessage,
-    PlanDoc,
-    PlanMessage,
-    PlanState,
-    SelectionDoc,
-    ServerMessage,
-    Snapshot,
-)
+from server.scene.view import SceneView
+from server.schemas import Pages, PlanDoc, PlanMessage, PlanState, SelectionDoc, ServerMessage, Snapshot
 from server.traversability.traversability_desk import TraversabilityDesk
-from server.work.job_board import JobBoard, Spawn
+from server.work.job_board import JobBoard
 from server.work.jobs import Lane
+from server.work.task_group import Background
 
 log = logging.getLogger("hedgehop.plan")
 
@@ -44,80 +38,29 @@ _FILES_NICENESS = 10
 """Reading files leaves the processor to the answer that an operator waits for."""
 
 
-class Streams(Protocol):
-    """The part of ``server.door.hub.Hub`` that the workspace uses."""
-
-    def publish(self, message: ServerMessage) -> None: ...
-
-    def send(self, page_id: str, message: ServerMessage) -> None: ...
-
-
 class Workspace:
     """One open plan at a time: a ground station has one task in hand."""
 
-    def __init__(
-        self,
-        library: Library,
-        streams: Streams,
-        view: View,
-        *,
-        spawn: Spawn,
-        stage: Vehicles | None = None,
-        sights: Sights | None = None,
-    ) -> None:
-        """``stage``, ``sights``: where the 3D view shows vehicles and what they see; None without a 3D view."""
-        self._library, self._publish, self._spawn = library, streams.publish, spawn
-        self._plan_lane, self._file_lane = Lane("plan"), Lane("files", niceness=_FILES_NICENESS)
-        self._board = JobBoard(self._file_lane, publish=self._publish, spawn=spawn)
-        self._computing = Computing(self._plan_lane, terrain_dir=library.terrain_dir, changed=self._computed)
-        self._picture = Picture(
-            view, library, self._plan_lane, changed=lambda: self.on_show.tell_legend(), failed=self._tell
-        )
-        self._desk = PlanDesk(library, changed=self._changed, saved=self._publish_plan, tell=self._publish)
-        self.plans = PlanRequests(
-            self._desk,
-            self._computing,
-            library,
-            self._plan_lane,
-            dsm=lambda: self._picture.dsm,
-            library_changed=self._publish_library,
-        )
-        self.terrains = TerrainDesk(
-            library, self._desk, self._board, open_plan=self.plans.open, library_changed=self._publish_library
-        )
+    def __init__(self, library: Library, pages: Pages, host: SceneHost, background: Background) -> None:
+        self._library, self._pages, self._background = library, pages, background
+        self.plan_lane, self._file_lane = Lane("plan"), Lane("files", niceness=_FILES_NICENESS)
+        """The plan lane's worker holds the plan that was computed last."""
+        self.board = JobBoard(self._file_lane, pages, background)
+        self._view = SceneView(host, self)
+        self._computing = Computing(self.plan_lane, library, changed=self._computed)
+        self.picture = Picture(self._view, library, self.plan_lane, pages, changed=self._model_shown)
+        self._desk = PlanDesk(library, pages, changed=self._changed, saved=self._publish_plan)
+        self.plans = PlanRequests(self._desk, self._computing, self.picture, library, self.plan_lane, pages)
+        self.terrains = TerrainDesk(library, self._desk, self.plans, self.board, pages)
+        self.traversability = TraversabilityDesk(library, self.board, self.plan_lane, pages, show=self.picture.lay_over)
         self.on_show = OnShow(
-            self._picture,
-            self._desk,
-            self._computing,
-            layers_changed=lambda: self.traversability.on_view(),
-            publish=self._publish,
+            self.picture, self._desk, self._computing, pages, layers_changed=self.traversability.on_view
         )
-        self.files = FileJobs(
-            library,
-            self._board,
-            propose=self._desk.propose,
-            library_changed=self._publish_library,
-            show_orthophoto=self.on_show.show_orthophoto,
-        )
-        self.traversability = TraversabilityDesk(
-            library,
-            self._board,
-            self._plan_lane,
-            terrain_id=lambda: self.document.terrain_id,
-            view=lambda: self.on_show.view,
-            tell=self._publish,
-            show=self._picture.lay_over,
-        )
-        self.stage, self.sights = stage, sights
+        self.files = FileJobs(library, self.board, self._desk, self.on_show, pages)
+        self.pointing = Pointing(self._desk, self.on_show, pages)
         self._listed: tuple[str, str | None] | None = None
-        self.changed: Callable[[], None] = lambda: None
-        """Called after every change of the plan or its answer."""
-        self.pointing = Pointing(
-            self._desk,
-            selection=lambda: self.on_show.selection,
-            select=self.on_show.select,
-            tell=self._publish,
-        )
+        self.changed = asyncio.Event()
+        """Set by every change of the plan or its answer; whoever flies by it clears it."""
 
     # Life
 
@@ -125,42 +68,39 @@ class Workspace:
         """Opens the plan that was open last, or the demo's; what has to be generated for it is a job of its own."""
         await self._desk.open_last()
         if with_demo and not await self.terrains.open_made_demo():
-            self._spawn(_logged(self.terrains.add_demo(), "Making the demo"))
+            self._background.spawn(_logged(self.terrains.add_demo(), "Making the demo"))
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         """To be run by the application's task group until it ends."""
-        return [self._computing.run(), self._picture.run(), self._desk.run(), self._warm_up()]
+        return [self._view.run(), self._computing.run(), self.picture.run(), self._desk.run(), self._warm_up()]
 
     async def close(self) -> None:
         await self._desk.close()
-        await self._plan_lane.close()
+        await self.plan_lane.close()
         await self._file_lane.close()
 
     async def _warm_up(self) -> None:
         """Saves the first edit and the first file a wait. A failure shows itself again, and is told, in earnest."""
         if self._computing.state.state != "running":
-            await _logged(self._plan_lane.call(tasks.warm_up), "Getting ready to plan")
-        await _logged(self._board.unseen(lambda lane: lane.call(file_tasks.warm_up)), "Getting ready for files")
+            await _logged(self.plan_lane.call(tasks.warm_up), "Getting ready to plan")
+        await _logged(self.board.unseen(lambda lane: lane.call(file_tasks.warm_up)), "Getting ready for files")
 
     # What flying needs
 
     @property
-    def plan_lane(self) -> Lane:
-        """Its worker holds the plan that was computed last."""
-        return self._plan_lane
+    def stage(self) -> Vehicles:
+        """Where the 3D view shows vehicles."""
+        return self._view.vehicles
 
     @property
-    def board(self) -> JobBoard:
-        return self._board
-
-    @property
-    def picture(self) -> Picture:
-        return self._picture
+    def sights(self) -> Sights:
+        """Where the 3D view shows what they see."""
+        return self._view.sights
 
     @property
     def dsm(self) -> Dsm | None:
         """The surface model on show, at full resolution."""
-        return self._picture.dsm
+        return self.picture.dsm
 
     @property
     def planned_home(self) -> tuple[float, float] | None:
@@ -168,7 +108,7 @@ class Workspace:
         place = self.document.home or (self.document.pois[0] if self.document.pois else None)
         if place is not None and (self.document.home is not None or self.document.source == "pois"):
             return place.lat_deg, place.lon_deg
-        scene, dsm = self._computing.scene, self._picture.dsm
+        scene, dsm = self._computing.scene, self.picture.dsm
         if scene is None or dsm is None:
             return None
         lat_deg, lon_deg = dsm.lat_lon_from_xy(scene.home_m[None, :2])[0].tolist()
@@ -198,12 +138,23 @@ class Workspace:
             library=self._library.state(),
             view=self.on_show.view,
             selection=self.on_show.selection,
-            jobs=self._board.jobs,
+            jobs=self.board.jobs,
         )
 
     def present(self) -> list[ServerMessage]:
         """What a page is told right after its snapshot."""
         return [self.traversability.message()]
+
+    # What hands in the 3D view do
+
+    async def on_terrain_click(self, lat_deg: float, lon_deg: float, known: bool) -> None:
+        await self.pointing.on_terrain(lat_deg, lon_deg, known=known)
+
+    async def on_poi_click(self, poi_id: str) -> None:
+        self.pointing.on_poi(poi_id)
+
+    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
+        await self.pointing.on_poi_moved(poi_id, lat_deg, lon_deg)
 
     # What follows
 
@@ -213,24 +164,21 @@ class Workspace:
             self.on_show.select(SelectionDoc())
         listed = (self.document.name, self.document.terrain_id)
         if forget or listed != self._listed:
-            self._publish_library()
+            self._pages.publish(self._library.message())
         self._listed = listed
-        self.traversability.on_document()
+        self.traversability.on_document(self.document.terrain_id)
         self._computed()
 
     def _computed(self) -> None:
         self.on_show.draw()
         self._publish_plan()
 
-    def _tell(self, error: ErrorDoc) -> None:
-        self._publish(NoticeMessage(level="error", error=error))
+    def _model_shown(self) -> None:
+        self.on_show.tell_legend()
 
     def _publish_plan(self) -> None:
-        self._publish(PlanMessage(plan=self.state))
-        self.changed()
-
-    def _publish_library(self) -> None:
-        self._publish(LibraryMessage(library=self._library.state()))
+        self._pages.publish(PlanMessage(plan=self.state))
+        self.changed.set()
 
 
 async def _logged(work: Awaitable[object], doing: str) -> None:

@@ -38,7 +38,8 @@ async def runs(request: Request) -> Response:
 @router.post("/runs", response_model=ScenarioRunDoc, status_code=202)
 async def run(body: RunScenario, request: Request) -> Response:
     """Flies one with one seed; 409 while a vehicle is armed, 503 while another runs."""
-    return answer(parts_of(request).scenarios.run(body), 202)
+    parts = parts_of(request)
+    return answer(parts.scenarios.run(body, armed=parts.flying.live.armed), 202)
 
 
 @router.post("/runs/{run_id}/cancel", status_code=204)

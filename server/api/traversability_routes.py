@@ -12,7 +12,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from mapping.uwb import UwbParams, of_rule
-from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
+from server.api.access import ERROR_RESPONSES, Fly, SignedIn, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
@@ -58,9 +58,9 @@ async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbC
 
 
 @router.put("/uwb/live", response_model=TraversabilityState)
-async def fuse_live(workspace: Work, asked: Annotated[UwbRule, Query()]) -> Response:
+async def fuse_live(workspace: Work, flying: Fly, asked: Annotated[UwbRule, Query()]) -> Response:
     """How the scans of a radar that scans now are fused, those before as well."""
-    workspace.traversability.live_params(uwb_params(asked))
+    flying.uwb.set_params(uwb_params(asked))
     return answer(workspace.traversability.state)
 
 
@@ -79,7 +79,8 @@ async def export_layer(layer: LayerName, workspace: Work) -> Response:
 
 
 @router.delete("", status_code=204)
-async def forget(workspace: Work) -> Response:
-    """Forgets the maps; what is being worked out is cancelled."""
+async def forget(workspace: Work, flying: Fly) -> Response:
+    """Forgets the maps, and live scans; what is being worked out is cancelled."""
     workspace.traversability.forget()
+    flying.uwb.clear()
     return Response(status_code=204)

@@ -8,80 +8,50 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
 
 from server.errors import CheckNeededError, ConflictError
 from server.flying.check_task import Checked
-from server.flying.onboard import Onboard, is_plan, onboard, read_onboard, write_onboard
 from server.flying.starting import Ready, check_start, preflight_now
-from server.flying.upload_task import MadeUpload
-from server.heard.channel import Asks
-from server.schemas import FlyMessage, FlyState, OnboardDoc, PlanDoc, PreflightDoc, ServerMessage, StartFlight
-from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
-from telemetry.topics.messages import FlightStatus, Item, LinkStatus, OnboardMission, PlanRecord, UploadReport
-from telemetry.topics.obstacles import AvoidanceStatus
+from server.flying.work import FlightWork
+from server.heard.channel import Channel
+from server.heard.onboard import Aboard, onboard
+from server.obstacles.obstacle_watch import Watch
+from server.schemas import FlyMessage, FlyState, Pages, PreflightDoc, StartFlight
+from server.workspace import Workspace
+from telemetry.bus import Bus
+from telemetry.bus.link_client import LinkClient
+from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
+from telemetry.topics.messages import FlightStatus, Item, LinkStatus, PlanRecord, Topic, UploadReport
 from telemetry.topics.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
 from telemetry.topics.vehicle import VehicleState
 
-if TYPE_CHECKING:
-    from telemetry.flight.guided.targets import GuidedPlan
-
-
-class Works(Protocol):
-    """What is done in worker processes: ``server.flying.work``."""
-
-    async def made_upload(self, revision: int) -> MadeUpload: ...
-
-    async def checked(
-        self, record: PlanRecord, mission: OnboardMission, state: VehicleState, rereferenced_m: float | None
-    ) -> Checked: ...
-
-    async def guided(self, record: PlanRecord) -> GuidedPlan: ...
-
-    async def way_back(self, record: PlanRecord, checked: Checked, from_item: int) -> tuple[int, float]: ...
-
 
 class FlightDesk:
-    """``present_document()`` is the open plan; ``publish_plan`` tells the recorder what is being flown."""
-
     def __init__(
         self,
-        link: Asks,
-        works: Works,
-        *,
-        file: Path,
-        present_document: Callable[[], PlanDoc],
-        vehicle: Callable[[], VehicleState | None],
-        tell: Callable[[ServerMessage], None],
-        publish_plan: Callable[[PlanRecord], None],
-        avoidance: Callable[[], AvoidanceStatus] = AvoidanceStatus,
+        link: LinkClient,
+        work: FlightWork,
+        aboard: Aboard,
+        workspace: Workspace,
+        live: Channel,
+        watch: Watch,
+        bus: Bus,
+        pages: Pages,
     ) -> None:
-        self._link, self._works, self._file = link, works, file
-        self._present_document, self._vehicle, self._tell = present_document, vehicle, tell
-        self._publish_plan, self._avoidance = publish_plan, avoidance
+        self._link, self._work, self._aboard, self._workspace = link, work, aboard, workspace
+        self._live, self._watch, self._bus, self._pages = live, watch, bus, pages
         self._utc_minus_mono_s = time.time() - time.monotonic()
-        self._onboard: Onboard | None = read_onboard(file)
-        self._status: LinkStatus | None = None
         self._flight = FlightStatus()
         self._ready: Ready | None = None
         self._busy = ""
         self._told: FlyState | None = None
 
     @property
-    def record(self) -> PlanRecord | None:
-        """Of the mission that is on board, or was when the vehicle was last heard; None for a foreign one."""
-        kept, status = self._onboard, self._status
-        if kept is None or (status is not None and status.mission_digest not in (None, kept.record.digest)):
-            return None
-        return kept.record
-
-    @property
     def state(self) -> FlyState:
         return FlyState(
-            onboard=self._onboard_doc(),
+            onboard=self._aboard.doc(self._workspace.document),
             preflight=None if self._ready is None else self._preflight(self._ready),
             resume_from_item=self._flight.broke_off_at,
             busy=self._busy,
@@ -90,7 +60,7 @@ class FlightDesk:
     # What is heard
 
     def on_link(self, status: LinkStatus) -> None:
-        self._status = status
+        self._aboard.on_link(status)
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
         self.refresh()
@@ -108,7 +78,12 @@ class FlightDesk:
         """Tells the pages, if there is anything new; also when the open plan has changed."""
         if (state := self.state) != self._told:
             self._told = state
-            self._tell(FlyMessage(fly=state))
+            self._pages.publish(FlyMessage(fly=state))
+
+    def tell_recorder(self) -> None:
+        """Which plan is flown."""
+        if (record := self._aboard.record) is not None:
+            self._bus.publish(Topic.PLAN, record)
 
     # What is asked
 
@@ -116,7 +91,7 @@ class FlightDesk:
         """Raises NotReadyError, NotCertifiedError, StaleRevisionError, TransferError and what the vehicle said."""
         async with self._doing("Uploading"):
             self._ready = None
-            made = await self._works.made_upload(revision)
+            made = await self._work.made_upload(revision)
             _check_firmware(made.record, self._state())
             await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
         return self.state
@@ -133,19 +108,21 @@ class FlightDesk:
                 checked = await self._checked(operator, state, rereferenced_m=moved.shift_m)
             if vehicle != self._vehicle_id():
                 raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
-            self._ready = Ready(checked, self._digest(), vehicle, state, time.monotonic())
-            await self._certified(checked.certificate_json)
+            self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
+            if checked.certificate_json:
+                self._aboard.certified(checked.certificate_json)
+                await self._note()
         return self.state
 
     async def start(self, operator: Operator, body: StartFlight) -> None:
         """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted."""
         async with self._doing("Starting"):
             ready = self._check_start(body)
-            record = self._known_record(body.digest)
+            record = self._aboard.known_record(body.digest)
             request = await self._start_request(operator, body, record, ready)
             # What was prepared meanwhile may have taken its time.
             self._check_start(body)
-            self._publish_plan(replace(record, t_utc_s=time.time()))
+            self._bus.publish(Topic.PLAN, replace(record, t_utc_s=time.time()))
             await self._link.call(request)
 
     async def command(self, request: LinkRequest) -> None:
@@ -155,14 +132,14 @@ class FlightDesk:
     # How
 
     def _preflight(self, ready: Ready) -> PreflightDoc:
-        return preflight_now(ready, self._avoidance(), utc_minus_mono_s=self._utc_minus_mono_s)
+        return preflight_now(ready, self._watch.avoidance, utc_minus_mono_s=self._utc_minus_mono_s)
 
     def _check_start(self, body: StartFlight) -> Ready:
         return check_start(
             self._ready,
             body,
             self._state(),
-            self._avoidance(),
+            self._watch.avoidance,
             now_mono_s=time.monotonic(),
             utc_minus_mono_s=self._utc_minus_mono_s,
         )
@@ -174,22 +151,21 @@ class FlightDesk:
         if not report.verified:
             raise _not_verified(report)
         record = replace(record, digest=report.onboard.digest, t_utc_s=time.time())
-        await self._keep(onboard(record, len(report.onboard.items), report.rounded))
+        self._aboard.read_back(onboard(record, len(report.onboard.items), report.rounded))
+        await self._note()
 
-    async def _keep(self, kept: Onboard) -> None:
-        self._onboard = kept
-        if self._status is not None:
-            self._status = replace(self._status, mission_state="verified", mission_digest=kept.record.digest)
-        self._publish_plan(kept.record)
-        await asyncio.to_thread(write_onboard, self._file, kept)
+    async def _note(self) -> None:
+        """What is on board now, for the recorder and for the next server."""
+        self.tell_recorder()
+        await asyncio.to_thread(self._aboard.save)
 
     async def _checked(
         self, operator: Operator, state: VehicleState, *, rereferenced_m: float | None = None
     ) -> Checked:
         mission = await self._link.call(Download(operator))
-        record = self._known_record(mission.digest)
+        record = self._aboard.known_record(mission.digest)
         _check_firmware(record, state)
-        return await self._works.checked(record, mission, state, rereferenced_m)
+        return await self._work.checked(record, mission, state, rereferenced_m)
 
     async def _start_request(
         self, operator: Operator, body: StartFlight, record: PlanRecord, ready: Ready
@@ -202,56 +178,24 @@ class FlightDesk:
             if ready.checked.not_guided:
                 advice = "Choose GUIDED under Required clearance in Plan and upload again, or fly in AUTO."
                 raise NotAllowedError(ready.checked.not_guided, advice=advice)
-            plan = await self._works.guided(record)
+            plan = await self._work.guided(record)
             return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
         if body.from_item == 1:
             return StartAuto(operator, body.digest)
-        from_item, climb_to_m = await self._works.way_back(record, ready.checked, body.from_item)
+        from_item, climb_to_m = await self._work.way_back(record, ready.checked, body.from_item)
         return StartAuto(operator, body.digest, from_item, climb_to_m)
 
-    async def _certified(self, certificate_json: str) -> None:
-        if self._onboard is not None and certificate_json:
-            await self._keep(
-                replace(self._onboard, record=replace(self._onboard.record, certificate_json=certificate_json))
-            )
-
-    def _known_record(self, digest: str) -> PlanRecord:
-        if self._onboard is None or self._onboard.record.digest != digest:
-            raise MissionUnknownError(
-                "The mission on board was not uploaded from this plan.", advice="Upload the plan, then check again."
-            )
-        return self._onboard.record
-
     def _state(self) -> VehicleState:
-        state = self._vehicle()
+        state = self._live.state
         if state is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         return state
 
     def _vehicle_id(self) -> str:
-        adopted = None if self._status is None else self._status.adopted
-        if adopted is None:
+        vehicle = self._aboard.vehicle
+        if vehicle is None:
             raise NoVehicleError("No vehicle is adopted.", advice="Connect to one first.")
-        return adopted.id
-
-    def _digest(self) -> str:
-        return "" if self._onboard is None else self._onboard.record.digest
-
-    def _onboard_doc(self) -> OnboardDoc:
-        status, kept = self._status, self._onboard
-        if status is None or status.mission_state != "verified" or kept is None:
-            return OnboardDoc(state="unknown" if status is None else status.mission_state)
-        if status.mission_digest != kept.record.digest:
-            return OnboardDoc(state="verified", digest=status.mission_digest)
-        return OnboardDoc(
-            state="verified",
-            digest=kept.record.digest,
-            plan_name=kept.record.name,
-            is_open_plan=is_plan(kept.record, self._present_document()),
-            items=kept.items,
-            rounded=list(kept.rounded),
-            rounded_note=kept.note,
-        )
+        return vehicle
 
     @contextlib.asynccontextmanager
     async def _doing(self, what: str) -> AsyncIterator[None]:

@@ -4,32 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
 
 from planning.terrain.dsm import Dsm
 from server.errors import reported
 from server.heard.channel import Channel
+from server.heard.onboard import Aboard
 from server.heard.plan_follower import Followed, Follower
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
+from server.workspace import Workspace
 from telemetry.topics.messages import PlanRecord
 
 log = logging.getLogger("hedgehop.flying")
 
 
 class PlanFollowed:
-    """``want`` what is on board; ``run`` makes it ready beside the event loop. The last wish counts."""
+    """``look`` after every change; ``run`` makes what is on board ready beside the event loop. The last one counts."""
 
-    def __init__(self, library: Library, channel: Channel, *, open_dsm: Callable[[], Dsm | None]) -> None:
-        self._library, self._channel, self._open_dsm = library, channel, open_dsm
-        self._wanted: PlanRecord | None = None
+    def __init__(self, library: Library, channel: Channel, aboard: Aboard, workspace: Workspace) -> None:
+        self._library, self._channel, self._aboard, self._workspace = library, channel, aboard, workspace
         self._wake = asyncio.Event()
         self._made: tuple[str, Dsm | None] | None = None
 
-    def want(self, record: PlanRecord | None) -> None:
-        """None: nothing is known of what is on board."""
-        if not _same(self._key(record), self._made):
-            self._wanted = record
+    def look(self) -> None:
+        if not _same(self._key(self._aboard.record), self._made):
             self._wake.set()
 
     async def run(self) -> None:
@@ -37,24 +35,25 @@ class PlanFollowed:
         while True:
             await self._wake.wait()
             self._wake.clear()
-            record, key = self._wanted, self._key(self._wanted)
+            record = self._aboard.record
+            key = self._key(record)
             try:
                 follower = await asyncio.to_thread(self._follower, record)
             except Exception as error:
                 log.warning("The plan on board cannot be followed: %s", reported(error, log, "Following").what)
-                follower = Follower(over=self._open_dsm())
+                follower = Follower(over=self._workspace.dsm)
             self._channel.follower, self._made = follower, key
 
     def _key(self, record: PlanRecord | None) -> tuple[str, Dsm | None]:
         """Without a plan the model on show is enough; which one it is, is told by identity."""
-        return ("", self._open_dsm()) if record is None else (f"{record.digest} {record.home_alt_dsm_m}", None)
+        return ("", self._workspace.dsm) if record is None else (f"{record.digest} {record.home_alt_dsm_m}", None)
 
     def _follower(self, record: PlanRecord | None) -> Follower:
         if record is None:
-            return Follower(over=self._open_dsm())
+            return Follower(over=self._workspace.dsm)
         terrain = terrain_of(FlownOver(record.terrain_id, record.terrain_sha256), self._library.terrains())
         if terrain is None:
-            return Follower(over=self._open_dsm())
+            return Follower(over=self._workspace.dsm)
         return Follower(Followed.of(record, self._library.load_terrain(terrain.id)))
 
 

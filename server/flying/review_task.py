@@ -1,6 +1,6 @@
-"""What the file lane's worker does for a review: reads the recording, finds what it was flown over, judges it.
+"""What workers do with recordings: read them, find what they were flown over, judge them.
 
-The readers bring in the wire protocols; they are imported by the worker only, so that the page answers sooner.
+The readers bring in the wire protocols; they are imported by the workers only, so that the page answers sooner.
 """
 
 from __future__ import annotations
@@ -15,13 +15,17 @@ import numpy as np
 from planning.following.reference import Reference
 from planning.plan import plan_mission
 from planning.terrain.dsm import Dsm
+from server.heard.flown_track import EVERY_S
 from server.library.documents import request_from_doc
 from server.library.terrain_of import FlownOver
 from server.library.terrains import load_terrain
+from server.plan.file_tasks import named
 from server.scene.geometry.payload import ReviewScene, TerrainScene
 from server.scene.geometry.plain import plain_ground
 from server.schemas import PlanDoc, RecordingDoc, ReviewDoc
 from server.work.jobs import Progress
+from telemetry.errors import TelemetryError
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from telemetry.recording.flight_log import FlightLog
@@ -49,6 +53,29 @@ class Reviewed:
     scene: ReviewScene | None
     reference: Reference | None
     """In the coordinates of that surface model, or of the recording's own; None without one, or without a plan."""
+
+
+def read(upload: Path, filename: str, *, report: Progress) -> None:
+    """Raises RecordingError, in words about the operator's own file."""
+    from telemetry.recording.flight_log import read_flight_log
+
+    report("Reading the recording", None)
+    with named(upload, filename, kind=TelemetryError):
+        read_flight_log(upload)
+
+
+def states_so_far(path: Path, *, report: Progress) -> list[VehicleState]:
+    """Of a recording that is being written: the positions since the vehicle armed, thinned. Raises RecordingError."""
+    from telemetry.recording.flight_log import read_flight_log
+
+    report("Reading the recording", None)
+    log = read_flight_log(path)
+    armed_utc_s = next((t for t, armed in reversed(log.armed) if armed), log.end_utc_s)
+    kept: list[VehicleState] = []
+    for t_utc_s, state in log.states:
+        if t_utc_s >= armed_utc_s and (not kept or state.t_utc_s - kept[-1].t_utc_s >= EVERY_S):
+            kept.append(state)
+    return kept
 
 
 def flown_over(path: Path, *, report: Progress) -> FlownOver:

@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from server.errors import NotReadyError
 from server.flying import review_task
 from server.flying.review_task import FlownTerrain, Reviewed
 from server.heard.channel import Channel
+from server.heard.node_states import Nodes
 from server.heard.plan_follower import Followed, Follower
-from server.heard.recording import Run
+from server.heard.present import Present
 from server.library import Library
 from server.library.recording_list import RecordingShelf
 from server.library.terrain_of import FlownOver, terrain_of
-from server.scene.geometry.payload import ReviewScene
+from server.obstacles.moving_objects import TracksWatch
+from server.obstacles.obstacle_watch import Watch
+from server.plan.on_show import OnShow
 from server.schemas import (
     OpenReview,
     PlanDoc,
@@ -29,23 +30,14 @@ from server.schemas import (
     RecordingDoc,
     ReplayMessage,
     ReviewMessage,
-    ServerMessage,
 )
+from server.work.job_board import JobBoard
 from server.work.jobs import Lane, Progress
 from telemetry.topics.messages import ReplayStatus
-from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from telemetry.topics.requests import CloseRecording, OpenRecording, Play
 
 _SEEK_S = 2.0
 """A jump of the clock beyond what playing explains."""
-
-
-class ReplayScreen(Protocol):
-    """The part of ``server.plan.on_show.OnShow`` that shows a recording in the 3D view instead of the plan."""
-
-    @property
-    def document(self) -> PlanDoc: ...
-
-    def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,26 +47,22 @@ class _Open:
 
 
 class Reviewing:
-    """``ask`` reaches the replay node, which is started for it; ``channel`` is the replayed vehicle's.
-
-    ``forget`` is called with every other recording, ``jumped`` when the clock has moved by more than playing explains.
-    """
+    """``channel``, ``watch`` and ``tracks`` are the replay's; ``screen`` shows a recording instead of the plan."""
 
     def __init__(
         self,
         library: Library,
         shelf: RecordingShelf,
-        screen: ReplayScreen,
+        screen: OnShow,
         channel: Channel,
-        *,
-        ask: Callable[[ReplayRequest], Awaitable[object]],
-        run: Run,
-        tell: Callable[[ServerMessage], None],
-        forget: Callable[[], None],
-        jumped: Callable[[], None] = lambda: None,
+        nodes: Nodes,
+        board: JobBoard,
+        watch: Watch,
+        tracks: TracksWatch,
+        present: Present,
     ) -> None:
         self._library, self._shelf, self._screen, self._channel = library, shelf, screen, channel
-        self._ask, self._run, self._tell, self._forget, self._jumped = ask, run, tell, forget, jumped
+        self._nodes, self._board, self._watch, self._tracks, self._present = nodes, board, watch, tracks, present
         self._open: _Open | None = None
         self._opening = asyncio.Lock()
         self._last: ReplayStatus | None = None
@@ -95,8 +83,7 @@ class Reviewing:
             async def work(lane: Lane, progress: Progress) -> Reviewed:
                 return await self._reviewed(lane, progress, path, doc, plan, terrain_id)
 
-            reviewed = await self._run(f"Opening {doc.name}", work)
-            assert isinstance(reviewed, Reviewed)
+            reviewed = await self._board.run(f"Opening {doc.name}", work)
             followed = await asyncio.to_thread(self._followed, reviewed)
             await self._ask_to_open(path)
             self._show(_Open(path, reviewed), Follower(followed))
@@ -108,39 +95,38 @@ class Reviewing:
             self._open = None
             self._screen.show_review(None, None)
             self._forget()
-            self._channel.forget()
-            self._tell(ReviewMessage(review=None))
-            await self._ask(CloseRecording())
+            self._present.publish(ReviewMessage(review=None))
+            await self._nodes.ask_replay(CloseRecording())
 
     async def play(self, body: PlayReview) -> None:
         if self._open is None:
             raise NotReadyError("No recording is open.", advice="Open one first.")
         start_s = self._open.reviewed.start_utc_s
         at_utc_s = None if body.at_s is None else start_s + body.at_s
-        await self._ask(Play(body.playing, at_utc_s, body.speed))
+        await self._nodes.ask_replay(Play(body.playing, at_utc_s, body.speed))
 
     async def on_status(self, status: ReplayStatus) -> None:
         """Where the replay is. A replay node that was started again gets its recording again."""
         before, before_mono_s, now_mono_s = self._last, self._last_mono_s, time.monotonic()
         self._last, self._last_mono_s = status, now_mono_s
-        self._tell(ReplayMessage(now_mono_s=now_mono_s, replay=status))
+        self._present.publish(ReplayMessage(now_mono_s=now_mono_s, replay=status))
         if self._opening.locked():
             return
         if self._open is None:
             if status.recording is not None:
                 # Of a server before this one.
-                await self._ask(CloseRecording())
+                await self._nodes.ask_replay(CloseRecording())
             return
         if status.recording is None and status.error is None:
             # One told before it was asked would have it open again from the start, and stop what plays by now.
             if status.t_mono_s > self._asked_mono_s:
                 await self._ask_to_open(self._open.path)
         elif before is None or _jumped(before, status, now_mono_s - before_mono_s):
-            self._jumped()
+            self._watch.forget_alerts()
             self._cut_track(self._open.reviewed, status.at_utc_s)
 
     async def _ask_to_open(self, path: Path) -> None:
-        await self._ask(OpenRecording(str(path)))
+        await self._nodes.ask_replay(OpenRecording(str(path)))
         self._asked_mono_s = time.monotonic()
 
     async def _reviewed(
@@ -176,11 +162,17 @@ class Reviewing:
         self._open, self._last = opened, None
         reviewed = opened.reviewed
         self._forget()
-        self._channel.forget()
         self._channel.follower = follower
         self._screen.show_review(reviewed.terrain_id, reviewed.scene)
-        self._tell(ReviewMessage(review=reviewed.doc))
+        self._present.publish(ReviewMessage(review=reviewed.doc))
         self._cut_track(reviewed, reviewed.start_utc_s)
+
+    def _forget(self) -> None:
+        """Another recording, or none."""
+        self._watch.forget()
+        self._tracks.forget()
+        self._present.forget_replay()
+        self._channel.forget()
 
     def _cut_track(self, reviewed: Reviewed, at_utc_s: float) -> None:
         """After a seek the path behind the vehicle is the one that was flown until then."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol
 
 import numpy as np
 
-from mapping.geometry.arrays import F64
-from planning.terrain.dsm import Dsm
 from server.heard.channel import Channel
 from server.heard.vehicle_place import Placer
 from server.scene.layers.vehicle_layers import VehiclePose
+from server.scene.layers.vehicles import Vehicles
 from server.schemas import Source
 from telemetry.topics.vehicle import VehicleState
 
@@ -20,21 +18,10 @@ _TRACK_EVERY = 5
 """Of the periods: a path grows by half a metre in one."""
 
 
-class VehicleStage(Protocol):
-    """The part of ``server.scene.layers.vehicles.Vehicles`` that is used here."""
-
-    @property
-    def dsm(self) -> Dsm | None: ...
-
-    def move(self, source: Source, pose: VehiclePose | None) -> None: ...
-
-    def follow(self, source: Source, points_m: F64) -> None: ...
-
-
 class Scenery:
     """Draws only what has changed since the last time."""
 
-    def __init__(self, stage: VehicleStage | None, channels: dict[Source, Channel]) -> None:
+    def __init__(self, stage: Vehicles | None, channels: dict[Source, Channel]) -> None:
         self._stage = stage
         self._actors = {source: _Actor(source, channel) for source, channel in channels.items()}
         self._placer: Placer | None = None
@@ -76,13 +63,13 @@ class _Actor:
         self._placed = 0
         self._points = np.zeros((0, 3))
 
-    def move(self, stage: VehicleStage, placer: Placer) -> None:
+    def move(self, stage: Vehicles, placer: Placer) -> None:
         state = self._channel.state
         if state is not self._drawn:
             self._drawn = state
             stage.move(self._source, None if state is None else _pose(state, placer))
 
-    def draw_track(self, stage: VehicleStage, placer: Placer) -> None:
+    def draw_track(self, stage: Vehicles, placer: Placer) -> None:
         states = self._channel.track.states
         if len(states) == self._placed:
             return

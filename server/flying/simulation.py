@@ -4,32 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Protocol
 
 from server.errors import NotReadyError
 from server.heard.connections import Connections
 from server.heard.ground_task import Ground, export_ground, write_demo_world
 from server.heard.node_states import Nodes
 from server.library import Library
+from server.obstacles.obstacles import Obstacles
 from server.plan import demo
-from server.schemas import PlanDoc
 from server.work.jobs import Lane
+from server.workspace import Workspace
 from telemetry.topics.messages import LinkStatus
 from telemetry.topics.requests import Operator
 
 _OUT, _IN = "udpout:", "udpin:"
-
-
-class Plans(Protocol):
-    """The part of the workspace that is used here."""
-
-    @property
-    def document(self) -> PlanDoc: ...
-
-    @property
-    def planned_home(self) -> tuple[float, float] | None: ...
 
 
 class Simulation:
@@ -38,20 +27,20 @@ class Simulation:
     def __init__(
         self,
         library: Library,
-        plans: Plans,
+        workspace: Workspace,
         nodes: Nodes,
         connections: Connections,
+        obstacles: Obstacles,
         lane: Lane,
         runtime_dir: Path,
         *,
         demo_world: bool = True,
-        sees: Callable[[Ground, Path], Awaitable[None]] | None = None,
     ) -> None:
-        """``sees`` is called where the vehicle gets a world of its own, with that world's file."""
-        self._library, self._plans, self._nodes, self._connections = library, plans, nodes, connections
+        self._library, self._workspace, self._nodes, self._connections = library, workspace, nodes, connections
+        self._obstacles = obstacles
         self._lane, self._ground_file = lane, runtime_dir / "ground.tif"
         self._port_file = runtime_dir / "simulator-port.txt"
-        self._world_file, self._demo_world, self._sees = runtime_dir / "world.json", demo_world, sees
+        self._world_file, self._demo_world = runtime_dir / "world.json", demo_world
         self._starting = asyncio.Lock()
         self._last_port = self._read_port()
 
@@ -75,15 +64,15 @@ class Simulation:
                 await self._connections.forget(address)
 
     async def _start_node(self, ground: Ground, link: str) -> None:
-        document = self._plans.document
+        document = self._workspace.document
         known = demo.terrain(self._library)
         world = None
         if self._demo_world and known is not None and document.terrain_id == known.id:
             world = self._world_file
             await self._lane.call(write_demo_world, world)
         await self._nodes.simulator(ground, link, rtl_height_m=document.profile.rtl_height_m, world=world)
-        if world is not None and self._sees is not None:
-            await self._sees(ground, world)
+        if world is not None:
+            await self._obstacles.simulated(ground, world)
 
     async def _port(self) -> int:
         """The same as last time if it can be had; else the link node does not go on listening at the last one."""
@@ -103,7 +92,7 @@ class Simulation:
             return 0
 
     async def _make_ground(self) -> Ground:
-        document, home = self._plans.document, self._plans.planned_home
+        document, home = self._workspace.document, self._workspace.planned_home
         if document.terrain_id is None or home is None:
             raise NotReadyError(
                 "A simulated vehicle needs a place to stand.", advice="Open a plan with a surface model and a point."

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from server.errors import NotCertifiedError, NotReadyError, StaleRevisionError
 from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets
 from server.flying.upload_task import MadeUpload, make_upload
-from server.heard.channel import Asks
 from server.library import Library
 from server.library.documents import seen_in
 from server.library.terrain_of import FlownOver, terrain_of
 from server.schemas import PlanState, TerrainDoc
 from server.work.jobs import Lane
+from server.workspace import Workspace
+from telemetry.bus.link_client import LinkClient
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.topics.messages import OnboardMission, PlanRecord
 from telemetry.topics.requests import ReadParameters
@@ -25,44 +25,35 @@ if TYPE_CHECKING:
 
 
 class FlightWork:
-    """``plan_lane``'s worker still has the plan that is on show; the check does not wait for planning."""
+    """The plan lane's worker still has the plan that is on show; the check, on ``lane``, does not wait for planning."""
 
-    def __init__(
-        self,
-        library: Library,
-        link: Asks,
-        *,
-        present_plan: Callable[[], PlanState],
-        plan_lane: Lane,
-        flight_lane: Lane,
-    ) -> None:
-        self._library, self._link = library, link
-        self._present_plan, self._plan_lane, self._flight_lane = present_plan, plan_lane, flight_lane
+    def __init__(self, library: Library, link: LinkClient, workspace: Workspace, lane: Lane) -> None:
+        self._library, self._link, self._workspace, self._lane = library, link, workspace, lane
 
     async def made_upload(self, revision: int) -> MadeUpload:
         """Raises StaleRevisionError, NotReadyError, NotCertifiedError."""
-        plan = self._present_plan()
+        plan = self._workspace.state
         check_uploadable(plan, revision)
         terrain = self._terrain(FlownOver(terrain_id=plan.document.terrain_id or ""))
         directory = self._library.terrain_dir(terrain.id)
-        return await self._plan_lane.call(make_upload, directory, plan.document, terrain.name)
+        return await self._workspace.plan_lane.call(make_upload, directory, plan.document, terrain.name)
 
     async def checked(
         self, record: PlanRecord, mission: OnboardMission, state: VehicleState, rereferenced_m: float | None
     ) -> Checked:
         """Judges what was read back, with the vehicle's own return height."""
         parameters = await self._link.call(ReadParameters(NAMES[record.firmware]))
-        return await self._flight_lane.call(
+        return await self._lane.call(
             check_start, self._directory(record), record, mission, state, parameters, rereferenced_m
         )
 
     async def guided(self, record: PlanRecord) -> GuidedPlan:
         """Raises MissionError for a mission that the navigation script cannot fly."""
-        return await self._flight_lane.call(guided_targets, record)
+        return await self._lane.call(guided_targets, record)
 
     async def way_back(self, record: PlanRecord, checked: Checked, from_item: int) -> tuple[int, float]:
         """The item to go on at, and the height above home to fly there at. Raises NotAllowedError."""
-        return await self._flight_lane.call(
+        return await self._lane.call(
             climb_for_resuming,
             self._directory(record),
             checked.mission,

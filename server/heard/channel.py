@@ -5,21 +5,19 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
 
 from server.heard.flown_track import Track
 from server.heard.plan_follower import Follower
 from server.schemas import (
     FlightMessage,
     FollowDoc,
-    ServerMessage,
+    Pages,
     Source,
     TextMessage,
     TrackMessage,
     VehicleMessage,
 )
 from telemetry.topics.messages import FlightStatus, VehicleText
-from telemetry.topics.requests import LinkRequest
 from telemetry.topics.vehicle import VehicleState
 
 RATE_HZ, BURST = 20.0, 20.0
@@ -34,12 +32,12 @@ class Channel:
     def __init__(
         self,
         source: Source,
-        tell: Callable[[ServerMessage], None],
+        pages: Pages,
         *,
         now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._source: Source = source
-        self._tell, self._now_mono_s = tell, now_mono_s
+        self._pages, self._now_mono_s = pages, now_mono_s
         self._pace = Pace(RATE_HZ, burst=BURST)
         self._waiting: asyncio.TimerHandle | None = None
         self._told_mono_s = float("-inf")
@@ -48,6 +46,22 @@ class Channel:
         self.state: VehicleState | None = None
         self.flight = FlightStatus()
         self.follow: FollowDoc | None = None
+
+    @property
+    def armed(self) -> bool:
+        return self.state is not None and self.state.armed
+
+    @property
+    def in_air(self) -> bool:
+        return self.state is not None and self.state.armed and self.state.landed != "on_ground"
+
+    @property
+    def home(self) -> tuple[float, float] | None:
+        """(lat_deg, lon_deg)"""
+        state = self.state
+        if state is None or state.home_lat_deg is None or state.home_lon_deg is None:
+            return None
+        return state.home_lat_deg, state.home_lon_deg
 
     def on_state(self, state: VehicleState) -> None:
         """A new flight begins where the vehicle arms: its path starts afresh."""
@@ -64,10 +78,10 @@ class Channel:
 
     def on_flight(self, flight: FlightStatus) -> None:
         self.flight = flight
-        self._tell(FlightMessage(source=self._source, flight=flight))
+        self._pages.publish(FlightMessage(source=self._source, flight=flight))
 
     def on_text(self, text: VehicleText) -> None:
-        self._tell(TextMessage(source=self._source, text=text))
+        self._pages.publish(TextMessage(source=self._source, text=text))
 
     def forget(self) -> None:
         """The vehicle is another one, or gone."""
@@ -90,7 +104,7 @@ class Channel:
         self.publish_track()
 
     def publish_track(self) -> None:
-        self._tell(TrackMessage(track=self.track.doc(self._source)))
+        self._pages.publish(TrackMessage(track=self.track.doc(self._source)))
 
     def tick(self) -> None:
         """Once a second: when nothing is heard, ages go on running."""
@@ -109,7 +123,9 @@ class Channel:
         if state is not None and (state.armed or self._source == "replay"):
             self.track.add(state, self.follow)
         self._told_mono_s = self._now_mono_s()
-        self._tell(VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow))
+        self._pages.publish(
+            VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow)
+        )
 
 
 class Pace:
@@ -127,9 +143,3 @@ class Pace:
             self._tokens -= 1.0
             return 0.0
         return (1.0 - self._tokens) / self._rate_hz
-
-
-class Asks(Protocol):
-    """The part of ``telemetry.bus.link_client.LinkClient`` that the server uses."""
-
-    async def call(self, request: LinkRequest) -> Any: ...

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable
 
+from server.door.lease import Lease
 from server.errors import reported
-from server.heard.channel import Asks
+from server.heard.node_states import Nodes
+from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import LinkStatus
 from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release
 
@@ -14,17 +15,8 @@ log = logging.getLogger("hedgehop.flying")
 
 
 class Connections:
-    """``need_link()`` starts the link node; ``server_operator()`` is for what the server asks on its own."""
-
-    def __init__(
-        self,
-        link: Asks,
-        *,
-        need_link: Callable[[], Awaitable[None]],
-        server_operator: Callable[[], Operator],
-        configured: tuple[str, ...] = (),
-    ) -> None:
-        self._link, self._need_link, self._server_operator = link, need_link, server_operator
+    def __init__(self, link: LinkClient, nodes: Nodes, lease: Lease, *, configured: tuple[str, ...] = ()) -> None:
+        self._link, self._nodes, self._lease = link, nodes, lease
         self._wanted: dict[str, bool] = dict.fromkeys(configured, True)
         """Address -> whether the first vehicle heard on it is adopted."""
         self._candidate: str | None = None
@@ -40,11 +32,11 @@ class Connections:
     async def ask_for_configured(self) -> None:
         """At the start: a link node that is just starting has told nothing yet."""
         for address, adopt in list(self._wanted.items()):
-            await self._ask(Connect(self._server_operator(), address, adopt), f"Connecting {address}")
+            await self._ask(Connect(self._lease.server_operator(), address, adopt), f"Connecting {address}")
 
     async def connect(self, operator: Operator, address: str, *, adopt: bool) -> None:
         """Raises AddressError, ConnectionFailedError."""
-        await self._need_link()
+        await self._nodes.link()
         await self._link.call(Connect(operator, address, adopt))
         self._wanted[address] = adopt
 
@@ -59,8 +51,8 @@ class Connections:
     async def forget(self, address: str) -> None:
         """Of a vehicle that the server itself started and that has ended."""
         self._wanted.pop(address, None)
-        await self._need_link()
-        await self._ask(Disconnect(self._server_operator(), address), f"Disconnecting {address}")
+        await self._nodes.link()
+        await self._ask(Disconnect(self._lease.server_operator(), address), f"Disconnecting {address}")
 
     async def adopt(self, operator: Operator, candidate: str) -> None:
         await self._link.call(Adopt(operator, candidate))
@@ -82,9 +74,11 @@ class Connections:
         if status.adopted is not None:
             self._candidate = status.adopted.id
         for address in [address for address in self._wanted if address not in held]:
-            await self._ask(Connect(self._server_operator(), address, self._wanted[address]), f"Connecting {address}")
+            await self._ask(
+                Connect(self._lease.server_operator(), address, self._wanted[address]), f"Connecting {address}"
+            )
         if status.adopted is None and self._candidate in {candidate.id for candidate in status.candidates}:
-            await self._ask(Adopt(self._server_operator(), self._candidate or ""), "Adopting the vehicle again")
+            await self._ask(Adopt(self._lease.server_operator(), self._candidate or ""), "Adopting the vehicle again")
 
     async def _ask(self, request: Connect | Disconnect | Adopt, doing: str) -> None:
         try:

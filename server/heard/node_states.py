@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from server.heard.ground_task import Ground
-from server.schemas import NodeDoc, NodesMessage, ServerMessage
+from server.schemas import NodeDoc, NodesMessage, Pages
 from server.work.supervisor import NodeState, Supervisor
+from telemetry.bus import Bus
 from telemetry.bus.node_lock import running_node
 from telemetry.topics.obstacles import SENSORS, Sensor
+from telemetry.topics.requests import RecorderRequest, ReplayRequest, StartRecording
 from telemetry.topics.vehicle import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
@@ -18,20 +20,17 @@ TRACKS = "tracks"
 SIMULATED_SENSORS = "sensors"
 
 _SENSOR_SEED = 1
+_CALL_TIMEOUT_S = 15.0
+"""A node may have to start first, on a busy machine."""
 
 
 class Nodes:
     """Starts nodes when they are needed. Those that outlived a server before this one are taken over."""
 
     def __init__(
-        self,
-        runtime_dir: Path,
-        recordings_dir: Path,
-        tell: Callable[[ServerMessage], None],
-        *,
-        demo_radar: RadarKind = "model",
+        self, bus: Bus, runtime_dir: Path, recordings_dir: Path, pages: Pages, *, demo_radar: RadarKind = "model"
     ) -> None:
-        self._runtime_dir, self._recordings_dir, self._tell = runtime_dir, recordings_dir, tell
+        self._bus, self._runtime_dir, self._recordings_dir, self._pages = bus, runtime_dir, recordings_dir, pages
         self._demo_radar = demo_radar
         self.supervisor = Supervisor(runtime_dir, changed=self._changed)
 
@@ -57,6 +56,15 @@ class Nodes:
 
     async def replay(self) -> None:
         await self.supervisor.start(REPLAY, [])
+
+    async def ask_recorder(self, request: RecorderRequest) -> object:
+        await self.recorder()
+        result = str if isinstance(request, StartRecording) else type(None)
+        return await self._bus.call(RECORDER, request, result=result, timeout_s=_CALL_TIMEOUT_S)
+
+    async def ask_replay(self, request: ReplayRequest) -> object:
+        await self.replay()
+        return await self._bus.call(REPLAY, request, result=type(None), timeout_s=_CALL_TIMEOUT_S)
 
     async def sensor(self, sensor: Sensor) -> None:
         """A map, regions and alerts of what one sensor sends."""
@@ -88,4 +96,4 @@ class Nodes:
 
     def _changed(self, nodes: Sequence[NodeState]) -> None:
         docs = [NodeDoc(name=n.name, state=n.state, restarts=n.restarts, text=n.text) for n in nodes]
-        self._tell(NodesMessage(nodes=docs))
+        self._pages.publish(NodesMessage(nodes=docs))

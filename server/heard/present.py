@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
 
 from server.door.hub import key_of
 from server.schemas import (
     AlertMessage,
+    Pages,
     PerceptionMessage,
     ReplayMessage,
     ServerMessage,
@@ -23,18 +23,18 @@ TEXTS_KEPT = 50
 class Present:
     """Publishes and keeps: the latest of each kind, and the vehicles' last words in their order."""
 
-    def __init__(self, publish: Callable[[ServerMessage], None]) -> None:
-        self._publish = publish
+    def __init__(self, hub: Pages) -> None:
+        self._hub = hub
         self._latest: dict[object, ServerMessage] = {}
         self._texts: deque[TextMessage] = deque(maxlen=TEXTS_KEPT)
 
-    def tell(self, message: ServerMessage) -> None:
+    def publish(self, message: ServerMessage) -> None:
         if isinstance(message, TextMessage):
             self._texts.append(message)
         elif not isinstance(message, AlertMessage):
             # Alerts are latched in the obstacles message, which a page that opens later gets.
             self._latest[key_of(message)] = message
-        self._publish(message)
+        self._hub.publish(message)
 
     def forget_replay(self) -> None:
         """Another recording, or none: what the last one said is over."""

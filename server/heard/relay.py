@@ -8,7 +8,7 @@ from typing import Any
 from telemetry.bus import Bus
 from telemetry.topics.messages import REPLAY_PREFIX, Topic
 
-Handler = Callable[[Any], Awaitable[None] | None]
+Handler = Callable[[Any], object]
 
 
 class Relay:
@@ -31,7 +31,7 @@ class Relay:
         try:
             async for _, message in subscription:
                 done = handler(message)
-                if done is not None:
+                if isinstance(done, Awaitable):
                     await done
         finally:
             subscription.close()

@@ -27,7 +27,7 @@ from server.library.plans import PlanSummary
 from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
 from server.library.whole_files import clean, new_id, storage_errors, write_atomically
-from server.schemas import ErrorDoc, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
+from server.schemas import ErrorDoc, LibraryMessage, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
 
 _SEEN = "seen-"
 _KEPT_IN = (f"{plans.FOLDER}/**/*.json", "set-aside/**/*.json", "*.json", "run/*.json")
@@ -79,6 +79,9 @@ class Library:
         return LibraryState(
             terrains=self.terrains(), orthophotos=self.orthophotos(), plans=self.plans(), profiles=self.profiles()
         )
+
+    def message(self) -> LibraryMessage:
+        return LibraryMessage(library=self.state())
 
     def new_upload(self, suffix: str = "") -> Path:
         """Where to stream an upload; whoever used it deletes it, and the next start clears what was left."""

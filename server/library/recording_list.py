@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
 from server.errors import BadRequestError, NotFoundError
+from server.library.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
 from server.library.whole_files import check_id, storage_errors, sync_directory
-from server.schemas import RecordingDoc, TerrainDoc
+from server.schemas import RecordingDoc
 
 if TYPE_CHECKING:
     from telemetry.recording.describe import RecordingInfo
@@ -27,9 +27,9 @@ KINDS: dict[str, Literal["hedgehop", "tlog"]] = {".mcap": "hedgehop", ".tlog": "
 class RecordingShelf:
     """Blocking calls, for threads; what a file says about itself is kept until it changes."""
 
-    def __init__(self, root: Path, *, terrains: Callable[[], Sequence[TerrainDoc]]) -> None:
-        self.folder = root / FOLDER
-        self._terrains = terrains
+    def __init__(self, library: Library) -> None:
+        self.folder = library.root / FOLDER
+        self._library = library
         self._known: dict[tuple[str, int, int], RecordingInfo] = {}
         with storage_errors(self.folder):
             self.folder.mkdir(mode=0o700, exist_ok=True)
@@ -72,7 +72,7 @@ class RecordingShelf:
     def _doc(self, path: Path) -> RecordingDoc:
         info = self._info(path)
         flown = FlownOver(info.terrain_id, info.terrain_sha256)
-        terrain = terrain_of(flown, self._terrains())
+        terrain = terrain_of(flown, self._library.terrains())
         return RecordingDoc(
             id=recording_id_of(path.name),
             name=path.name,

@@ -25,9 +25,6 @@ class LatchedAlerts:
         """Newest first."""
         return list(reversed(self._docs.values()))
 
-    def get(self, alert_id: str) -> AlertDoc | None:
-        return self._docs.get(alert_id)
-
     def on_alert(self, alert: ObstacleAlert, now_mono_s: float) -> bool:
         """Whether it is one that was not there before. What ends without having begun here is not latched."""
         known = self._docs.get(alert.id)

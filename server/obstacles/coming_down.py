@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
 
+from server.door.lease import Lease
 from server.errors import reported
-from server.heard.channel import Asks
-from server.obstacles.coming_down_task import RestPlanned
-from server.obstacles.manoeuvre_situation import Situation
-from server.obstacles.obstacle_watch import Watch
-from telemetry.topics.requests import FlyRest, Operator
+from server.obstacles.coming_down_task import RestPlanned, plan_rest
+from server.obstacles.surroundings import Surroundings
+from server.work.jobs import Lane
+from telemetry.bus.link_client import LinkClient
+from telemetry.topics.requests import FlyRest
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -20,17 +20,8 @@ LOOK_S, AGAIN_S = 0.5, 5.0
 
 
 class ComingDown:
-    def __init__(
-        self,
-        watch: Watch,
-        link: Asks,
-        *,
-        situation: Callable[[], Situation | None],
-        plan: Callable[[Situation], Awaitable[RestPlanned]],
-        operator: Callable[[], Operator],
-    ) -> None:
-        self._watch, self._link, self._situation, self._plan = watch, link, situation, plan
-        self._operator = operator
+    def __init__(self, around: Surroundings, link: LinkClient, lane: Lane, lease: Lease) -> None:
+        self._around, self._watch, self._link, self._lane, self._lease = around, around.watch, link, lane, lease
 
     @property
     def _is_higher(self) -> bool:
@@ -49,10 +40,12 @@ class ComingDown:
 
     async def come_down(self) -> None:
         try:
-            situation = await asyncio.to_thread(self._situation)
-            planned = RestPlanned(why="Its plan is not known.") if situation is None else await self._plan(situation)
+            situation = await asyncio.to_thread(self._around.situation)
+            planned = RestPlanned(why="Its plan is not known.")
+            if situation is not None:
+                planned = await self._lane.call(plan_rest, situation)
             if planned.targets and self._is_higher:
-                await self._link.call(FlyRest(self._operator(), planned.targets))
+                await self._link.call(FlyRest(self._lease.server_operator(), planned.targets))
             self._say(planned.why)
         except Exception as error:
             self._say(reported(error, log, "Planning the rest of the flight").what)

@@ -12,18 +12,15 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from server.errors import reported
+from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
-from server.scene.layers.region_layers import Route
-from server.scene.layers.sights import MapLook
-from server.scene.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, Voxels, coarser
+from server.scene.layers.sights import MapLook, Sights
+from server.scene.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, coarser
 from server.schemas import MapDrawn, Source
-from telemetry.topics.looks import CloudLook
-from telemetry.topics.obstacles import MAP_NAMES, MapName, MapOrigin, PerceptionStatus, Sensor
-from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.obstacles import MAP_NAMES, MapName, MapOrigin
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -38,33 +35,6 @@ CHUNKS_PER_TURN = 24
 NEAR_M, FAR_EVERY_S = 48.0, 1.0
 """What is farther from the vehicle is drawn again less often: a chunk in view of the radar changes with every frame."""
 TOLD_EVERY_S = 1.0
-
-
-class MapStage(Protocol):
-    """The part of ``server.scene.layers.sights.Sights`` that is used here."""
-
-    def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None: ...
-
-    def draw_now(
-        self,
-        source: Source,
-        origin: MapOrigin | None,
-        statuses: Mapping[Sensor, PerceptionStatus],
-        routes: list[Route],
-        tracks: TracksStatus | None,
-    ) -> None: ...
-
-    def draw_cloud(self, source: Source, look: CloudLook | None) -> None: ...
-
-    def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int: ...
-
-    def drop_chunks(self, name: MapName) -> None: ...
-
-
-class Routes(Protocol):
-    """Where prepared manoeuvres come from."""
-
-    def routes(self) -> list[Route]: ...
 
 
 @dataclass(slots=True)
@@ -101,12 +71,12 @@ class MapDrawing:
 
     def __init__(
         self,
-        stage: MapStage | None,
+        stage: Sights | None,
         watches: Mapping[Source, Watch],
-        routes: Routes,
+        manoeuvres: Manoeuvres,
         tracks: Mapping[Source, TracksWatch],
     ) -> None:
-        self._stage, self._watches, self._routes, self._tracks = stage, watches, routes, tracks
+        self._stage, self._watches, self._manoeuvres, self._tracks = stage, watches, manoeuvres, tracks
         self._pictures = {name: _Picture() for name in MAP_NAMES}
         self._allowance = Allowance(time.monotonic())
         self._told_s = 0.0
@@ -121,19 +91,19 @@ class MapDrawing:
             group.create_task(self._draw_now(stage))
             group.create_task(self._draw_maps(stage))
 
-    async def _draw_now(self, stage: MapStage) -> None:
+    async def _draw_now(self, stage: Sights) -> None:
         """Apart from the maps: a region turns red at once."""
         while True:
             await asyncio.sleep(PERIOD_S)
             source = self._shown_source()
             watch = self._watches[source]
-            routes = self._routes.routes() if source == "live" else []
+            routes = self._manoeuvres.routes if source == "live" else []
             tracks = self._tracks[source].status
             origin = _origin(watch) or (None if tracks is None else tracks.origin)
             stage.draw_now(source, origin, watch.statuses, routes, tracks)
             stage.draw_cloud(source, watch.fresh_cloud())
 
-    async def _draw_maps(self, stage: MapStage) -> None:
+    async def _draw_maps(self, stage: Sights) -> None:
         while True:
             await asyncio.sleep(PERIOD_S)
             source = self._shown_source()
@@ -147,7 +117,7 @@ class MapDrawing:
 
     def draw(
         self,
-        stage: MapStage,
+        stage: Sights,
         name: MapName,
         mirror: MapMirror,
         vehicle_enu_m: tuple[float, float, float] | None = None,
@@ -173,7 +143,7 @@ class MapDrawing:
 
     def _draw_waiting(
         self,
-        stage: MapStage,
+        stage: Sights,
         name: MapName,
         mirror: MapMirror,
         picture: _Picture,

@@ -5,19 +5,19 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Awaitable, Callable
 
 import numpy as np
 
 from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
-from server.obstacles.manoeuvre_situation import Prepared, Situation
-from server.obstacles.obstacle_watch import Watch
+from server.obstacles.manoeuvre_situation import Prepared
+from server.obstacles.manoeuvre_task import prepare
+from server.obstacles.surroundings import Surroundings
 from server.scene.layers.region_layers import Route
+from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.requests import FlyManoeuvre, Operator
-from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -33,27 +33,28 @@ TURNED_RAD = math.radians(60.0)
 class Manoeuvres:
     """One obstacle and one moving object at a time, the newest of each: ``run`` prepares, the desk flies."""
 
-    def __init__(
-        self,
-        watch: Watch,
-        *,
-        situation: Callable[[ObstacleAlert | None, ObstacleAlert | None], Situation | None],
-        prepare: Callable[[Situation], Awaitable[tuple[Prepared, ...]]],
-        vehicle: Callable[[], VehicleState | None],
-    ) -> None:
-        self._watch, self._situation, self._prepare, self._vehicle = watch, situation, prepare, vehicle
+    def __init__(self, around: Surroundings, lane: Lane) -> None:
+        self._around, self._watch, self._lane = around, around.watch, lane
         self._alerts: dict[str, ObstacleAlert] = {}
         self._wake = asyncio.Event()
         self.prepared: tuple[Prepared, ...] = ()
-        self._routes: list[Route] = []
-        watch.begins, watch.ends = self.on_begin, self.on_end
+        self.routes: list[Route] = []
+        """Those that can be flown, as lines."""
 
-    def on_begin(self, alert: ObstacleAlert) -> None:
-        if alert.kind in KINDS:
+    def on_alert(self, alert: ObstacleAlert) -> None:
+        is_new = self._watch.on_alert(alert)
+        if is_new and alert.kind in KINDS:
             self._alerts[alert.id] = alert
             self._wake.set()
+        if alert.phase == "ends":
+            self._on_end(alert.id)
 
-    def on_end(self, alert_id: str) -> None:
+    def tick(self) -> None:
+        """Once a second: what a sensor's node has not told again is over."""
+        for alert_id in self._watch.tick():
+            self._on_end(alert_id)
+
+    def _on_end(self, alert_id: str) -> None:
         if self._alerts.pop(alert_id, None) is not None:
             if not self._alerts:
                 self._show(())
@@ -68,10 +69,6 @@ class Manoeuvres:
     def _moving(self) -> ObstacleAlert | None:
         """The newest of a moving object."""
         return next((each for each in reversed(self._alerts.values()) if each.kind == "approach"), None)
-
-    def routes(self) -> list[Route]:
-        """Those that can be flown, as lines."""
-        return list(self._routes)
 
     async def request(self, operator: Operator, manoeuvre_id: str) -> FlyManoeuvre:
         """Raises NotFoundError for one that is out of date, NotAllowedError for one that cannot be flown.
@@ -107,7 +104,7 @@ class Manoeuvres:
         )
 
     def _check_begins_here(self, prepared: Prepared) -> None:
-        state = self._vehicle()
+        state = self._around.live.state
         if state is None or state.lat_deg is None or state.lon_deg is None or prepared.begins_lat_lon_deg is None:
             return
         away_m = apart_m(prepared.begins_lat_lon_deg, (state.lat_deg, state.lon_deg))
@@ -133,12 +130,12 @@ class Manoeuvres:
 
     async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
         try:
-            situation = await asyncio.to_thread(self._situation, standing, moving)  # maps may be large
+            situation = await asyncio.to_thread(self._around.situation, standing, moving)  # maps may be large
             if situation is None or self._watch.avoidance.state == "climbing":
                 self._show(())  # those on show begin where the vehicle is no more
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
-            prepared = await self._prepare(situation)
+            prepared = await self._lane.call(prepare, situation)
         except Exception as error:
             log.warning("No manoeuvre: %s", reported(error, log, "Preparing a manoeuvre").what)
             prepared = ()
@@ -153,7 +150,7 @@ class Manoeuvres:
 
     def _show(self, prepared: tuple[Prepared, ...]) -> None:
         self.prepared = prepared
-        self._routes = [
+        self.routes = [
             Route(each.doc.kind, np.array(each.points_enu_m), _words(each)) for each in prepared if each.points_enu_m
         ]
         self._watch.manoeuvres = [each.doc for each in prepared]

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from server.obstacles.obstacle_watch import DEAD_S, RATE_HZ
-from server.schemas import ServerMessage, Source, TracksMessage
+from server.obstacles.obstacle_watch import DEAD_S, RATE_HZ, Watch
+from server.schemas import Pages, Source, TracksMessage
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.tracks import TracksStatus, VelocityProposal
 
@@ -21,20 +21,20 @@ _LOST = "Nothing is heard of moving objects any more: their node may have died. 
 class TracksWatch:
     """The latest status. A node that falls silent leaves no tracks behind: objects that move are somewhere else now.
 
-    ``alert`` is told when the node falls silent and when it is back.
+    ``watch`` is told when the node falls silent and when it is back.
     """
 
     def __init__(
         self,
         source: Source,
-        tell: Callable[[ServerMessage], None],
-        alert: Callable[[ObstacleAlert], None],
+        pages: Pages,
+        watch: Watch,
         *,
         now_mono_s: Callable[[], float] = time.monotonic,
         now_utc_s: Callable[[], float] = time.time,
     ) -> None:
         self._source: Source = source
-        self._tell, self._alert, self._now_mono_s, self._now_utc_s = tell, alert, now_mono_s, now_utc_s
+        self._pages, self._watch, self._now_mono_s, self._now_utc_s = pages, watch, now_mono_s, now_utc_s
         self._heard_mono_s = self._told_mono_s = self._proposed_mono_s = float("-inf")
         self._proposal: VelocityProposal | None = None
         self._lost: ObstacleAlert | None = None
@@ -92,8 +92,8 @@ class TracksWatch:
 
     def _tell_status(self) -> None:
         now_s = self._told_mono_s = self._now_mono_s()
-        self._tell(TracksMessage(source=self._source, now_mono_s=now_s, status=self.status))
+        self._pages.publish(TracksMessage(source=self._source, now_mono_s=now_s, status=self.status))
 
     def _say(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()
-        self._alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))
+        self._watch.on_alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))

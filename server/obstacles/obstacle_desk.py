@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
 
 from planning.errors import PlanningError
 from planning.missions.vehicle_profile import parse_profile
+from server.door.lease import Lease
 from server.errors import NotReadyError, reported
-from server.heard.channel import Asks
-from server.obstacles.export_task import map_file
 from server.obstacles.keeping import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.rest_of_plan import Underway, rest_of_plan
-from server.obstacles.section import Looking
-from server.scene.mirror import Voxels
+from server.obstacles.rest_of_plan import rest_of_plan
+from server.obstacles.section import Looking, map_file
+from server.obstacles.surroundings import Surroundings
+from server.plan.plan_requests import PlanRequests
 from server.schemas import (
     AcknowledgeBody,
     MapFormat,
@@ -34,22 +33,14 @@ from server.schemas import (
     Source,
 )
 from server.work.jobs import Lane
+from telemetry.bus import Bus
+from telemetry.bus.link_client import LinkClient
 from telemetry.perception.sensor_kinds import check_memory, check_perception
-from telemetry.topics.messages import LinkStatus, PlanRecord
+from telemetry.topics.messages import LinkStatus, PlanRecord, Topic
 from telemetry.topics.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
 from telemetry.topics.requests import Operator, SetAvoidance
 
 log = logging.getLogger("hedgehop.obstacles")
-
-
-class SeesPlans(Protocol):
-    """The part of ``server.plan.plan_requests.PlanRequests`` that takes what was seen into the plan."""
-
-    async def plan_with_seen(
-        self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None
-    ) -> PlanState: ...
-
-    async def plan_without_seen(self) -> PlanState: ...
 
 
 DEMO_SETTINGS = PerceptionSettings(radar_depth_m=15.0, vision_depth_m=14.0)
@@ -64,20 +55,17 @@ class ObstacleDesk:
         root: Path,
         watches: Mapping[Source, Watch],
         manoeuvres: Manoeuvres,
-        link: Asks,
-        plans: SeesPlans,
-        *,
-        lane: Lane,
-        underway: Callable[[], Underway | None],
-        publish_settings: Callable[[PerceptionSettings], None],
-        server_operator: Callable[[], Operator],
+        around: Surroundings,
         looking: Looking,
+        link: LinkClient,
+        plans: PlanRequests,
+        lane: Lane,
+        lease: Lease,
+        bus: Bus,
     ) -> None:
-        self._root, self._watches, self._manoeuvres = root, watches, manoeuvres
-        self._link, self._plans, self._lane = link, plans, lane
-        self._underway = underway
-        self._looking = looking
-        self._publish_settings, self._server_operator = publish_settings, server_operator
+        self._root, self._watches, self._manoeuvres, self._around = root, watches, manoeuvres, around
+        self._looking, self._link, self._plans, self._lane = looking, link, plans, lane
+        self._lease, self._bus = lease, bus
         self._live = watches["live"]
         self._avoid_when_adopted = False
         """Of the demo's simulated vehicle: it climbs over what stands in its way."""
@@ -124,7 +112,7 @@ class ObstacleDesk:
             return
         self._avoid_when_adopted = False
         try:
-            await self._link.call(SetAvoidance(self._server_operator(), enabled=True))
+            await self._link.call(SetAvoidance(self._lease.server_operator(), enabled=True))
         except Exception as error:
             doc = reported(error, log, "Switching avoidance on")
             log.warning("Avoidance stays off in the demo: %s", doc.what)
@@ -160,7 +148,7 @@ class ObstacleDesk:
             )
         if body.part == "whole":
             return await self._plans.plan_with_seen(maps)
-        part, underway = body.part, self._underway()
+        part, underway = body.part, self._around.underway
         return await self._plans.plan_with_seen(
             maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
@@ -185,4 +173,4 @@ class ObstacleDesk:
 
     def _set(self, settings: PerceptionSettings) -> None:
         self._live.on_settings(settings)
-        self._publish_settings(settings)
+        self._bus.publish(Topic.PERCEPTION_SETTINGS, settings)

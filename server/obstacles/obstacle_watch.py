@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from server.errors import reported
+from server.heard.channel import Channel
 from server.obstacles.alert_list import LatchedAlerts
 from server.scene.mirror import MapMirror
 from server.schemas import (
@@ -17,9 +18,9 @@ from server.schemas import (
     MapDrawn,
     ObstaclesMessage,
     ObstaclesState,
+    Pages,
     PerceptionMessage,
     SeesEnough,
-    ServerMessage,
     Source,
 )
 from telemetry.flight.avoidance.regions import sees_enough_for
@@ -36,7 +37,6 @@ from telemetry.topics.obstacles import (
     Sensor,
     sensor_of,
 )
-from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -47,20 +47,22 @@ DEAD_S = 3.0
 
 
 class Watch:
-    """Tells what is heard at once: alerts above all. Maps are folded in threads; nothing waits for them."""
+    """Tells what is heard at once: alerts above all. Maps are folded in threads; nothing waits for them.
+
+    ``vehicle`` is the live one; None where nothing can happen to it any more.
+    """
 
     def __init__(
         self,
         source: Source,
-        tell: Callable[[ServerMessage], None],
+        pages: Pages,
+        vehicle: Channel | None = None,
         *,
         now_mono_s: Callable[[], float] = time.monotonic,
         now_utc_s: Callable[[], float] = time.time,
-        in_air: Callable[[], bool] = lambda: False,
     ) -> None:
         self._source: Source = source
-        self._tell, self._now_mono_s, self._now_utc_s = tell, now_mono_s, now_utc_s
-        self._in_air = in_air
+        self._pages, self._vehicle, self._now_mono_s, self._now_utc_s = pages, vehicle, now_mono_s, now_utc_s
         self._blind: ObstacleAlert | None = None
         self._alerts = LatchedAlerts()
         self._maps_drawn: tuple[MapDrawn, ...] = ()
@@ -79,9 +81,6 @@ class Watch:
         self.manoeuvres: Sequence[ManoeuvreDoc] = ()
         self.seen_in_plan = 0
         self.busy = self.stays_higher = ""
-        self.begins: Callable[[ObstacleAlert], None] = lambda alert: None
-        """Called with every alert that was not there before."""
-        self.ends: Callable[[str], None] = lambda alert_id: None
 
     @property
     def state(self) -> ObstaclesState:
@@ -112,15 +111,12 @@ class Watch:
         if (lost := self._lost.pop(sensor, None)) is not None:
             self._tell_own(replace(lost, phase="ends", text=f"The {sensor} node is back."))
 
-    def on_alert(self, alert: ObstacleAlert) -> None:
-        """Latched before it is told: whoever reads the message finds it in the list that follows."""
+    def on_alert(self, alert: ObstacleAlert) -> bool:
+        """Whether it was not there before. Latched before it is told: the list that follows holds it."""
         is_new = self._alerts.on_alert(alert, self._now_mono_s())
-        self._tell(AlertMessage(source=self._source, alert=alert))
-        if is_new:
-            self.begins(alert)
-        if alert.phase == "ends":
-            self.ends(alert.id)
+        self._pages.publish(AlertMessage(source=self._source, alert=alert))
         self.refresh()
+        return is_new
 
     def on_avoidance(self, status: AvoidanceStatus) -> None:
         before, self.avoidance = self.avoidance, status
@@ -129,7 +125,12 @@ class Watch:
 
     def _tell_blindness(self, before: AvoidanceStatus) -> None:
         """In flight nobody may believe that avoidance watches while it sees nothing."""
-        if self._blind is None and self.avoidance.state == "blind" and self._in_air():
+        if (
+            self._blind is None
+            and self.avoidance.state == "blind"
+            and self._vehicle is not None
+            and self._vehicle.in_air
+        ):
             sensor: Sensor = before.sensors[0] if before.sensors else "radar"
             now_s = self._now_mono_s()
             text = "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself."
@@ -174,35 +175,30 @@ class Watch:
         self._alerts.acknowledge(alert_id)
         self.refresh()
 
-    def is_on(self, alert_id: str) -> bool:
-        """Whether the alert goes on."""
-        doc = self._alerts.get(alert_id)
-        return doc is not None and not doc.over
-
     def refresh(self) -> None:
         """Tells the pages, if there is anything new."""
         if (state := self.state) != self._told:
             self._told = state
-            self._tell(ObstaclesMessage(source=self._source, obstacles=state))
+            self._pages.publish(ObstaclesMessage(source=self._source, obstacles=state))
 
-    def tick(self) -> None:
+    def tick(self) -> list[str]:
         """Once a second: a node that has died tells nothing, so its silence is noted here.
 
-        One that was started anew at once knows nothing of the alerts before: they end here, too.
+        One that was started anew at once knows nothing of the alerts before: they end here, too. Their ids.
         """
-        now_s = self._now_mono_s()
+        now_s, ended = self._now_mono_s(), list[str]()
         for sensor, heard_s in self._heard_mono_s.items():
             silent = now_s - heard_s > DEAD_S
             if silent and sensor not in self._lost and self.statuses[sensor].state != "waiting":
                 self._lose(sensor, now_s)
-            for alert_id in self._alerts.give_up(sensor, now_s):
-                self.ends(alert_id)
+            ended += self._alerts.give_up(sensor, now_s)
         self.refresh()
+        return ended
 
     def forget(self) -> None:
         """Another recording, or none."""
         for sensor in self.statuses:
-            self._tell(
+            self._pages.publish(
                 PerceptionMessage(source=self._source, now_mono_s=self._now_mono_s(), sensor=sensor, status=None)
             )
         self.statuses.clear()
@@ -225,7 +221,7 @@ class Watch:
         now_s = self._now_mono_s()
         self._told_mono_s[sensor] = now_s
         status = self.statuses[sensor]
-        self._tell(PerceptionMessage(source=self._source, now_mono_s=now_s, sensor=sensor, status=status))
+        self._pages.publish(PerceptionMessage(source=self._source, now_mono_s=now_s, sensor=sensor, status=status))
 
     def _lose(self, sensor: Sensor, now_s: float) -> None:
         text = f"Nothing is heard of the {sensor} any more: its node may have died. It is started again."
@@ -245,7 +241,3 @@ def _filled(status: PerceptionStatus) -> list[MapName]:
     if flight is not None and flight.voxels_occupied:
         filled.append("vision_flight")
     return filled
-
-
-def is_in_air(state: VehicleState | None) -> bool:
-    return state is not None and state.armed and state.landed != "on_ground"

@@ -4,37 +4,35 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from pathlib import Path
 from typing import Any
 
+from server.door.lease import Lease
 from server.errors import reported
-from server.heard.channel import Asks, Channel
+from server.heard.channel import Channel
 from server.heard.ground_task import Ground
 from server.heard.node_states import Nodes
+from server.heard.onboard import Aboard
 from server.heard.relay import Relay
 from server.library import Library
-from server.library.terrain_of import FlownOver, terrain_of
 from server.obstacles.coming_down import ComingDown
-from server.obstacles.coming_down_task import plan_rest
 from server.obstacles.drawing import MapDrawing
-from server.obstacles.known_ground import KnownGround
-from server.obstacles.manoeuvre_situation import Situation
-from server.obstacles.manoeuvre_task import prepare
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_desk import ObstacleDesk
-from server.obstacles.obstacle_watch import Watch, is_in_air
-from server.obstacles.rest_of_plan import Underway
+from server.obstacles.obstacle_watch import Watch
 from server.obstacles.section import Looking
-from server.obstacles.sensor_nodes import SensorNodes
-from server.schemas import ServerMessage, Source
+from server.obstacles.sensor_nodes import KnownGround, SensorNodes
+from server.obstacles.surroundings import Surroundings
+from server.schemas import Pages, Source
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
-from telemetry.topics.messages import LinkStatus, PlanRecord, Topic
-from telemetry.topics.obstacles import SENSORS, AvoidanceStatus, ObstacleAlert, Sensor
-from telemetry.topics.requests import Operator, WholeMap
+from telemetry.bus.link_client import LinkClient
+from telemetry.topics.messages import LinkStatus, Topic
+from telemetry.topics.obstacles import SENSORS, Sensor
+from telemetry.topics.requests import WholeMap
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -52,50 +50,35 @@ class Obstacles:
         library: Library,
         workspace: Workspace,
         nodes: Nodes,
-        link: Asks,
+        link: LinkClient,
         live: Channel,
-        *,
+        aboard: Aboard,
         lane: Lane,
-        server_operator: Callable[[], Operator],
-        onboard: Callable[[], PlanRecord | None],
-        tell: Callable[[ServerMessage], None],
+        lease: Lease,
+        pages: Pages,
     ) -> None:
-        self._bus, self._library, self._workspace, self._nodes = bus, library, workspace, nodes
-        self._live, self._onboard, self._lane = live, onboard, lane
-        self.watches: dict[Source, Watch] = {
-            "live": Watch("live", tell, in_air=lambda: is_in_air(live.state)),
-            "replay": Watch("replay", tell),
-        }
-        self.sees_differently: Callable[[], None] = lambda: None
-        """Called whenever what avoidance says of itself has changed."""
-        watch = self.watches["live"]
+        self._bus, self._workspace, self._nodes, self._aboard = bus, workspace, nodes, aboard
+        self.watches: dict[Source, Watch] = {"live": Watch("live", pages, live), "replay": Watch("replay", pages)}
         self.tracks: dict[Source, TracksWatch] = {
-            source: TracksWatch(source, tell, each.on_alert) for source, each in self.watches.items()
+            source: TracksWatch(source, pages, watch) for source, watch in self.watches.items()
         }
-        self._manoeuvres = Manoeuvres(
-            watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: live.state
-        )
-        self._coming_down = ComingDown(
-            watch,
-            link,
-            situation=lambda: self._situation(None, None),
-            plan=lambda situation: lane.call(plan_rest, situation),
-            operator=server_operator,
-        )
-        self._ground = KnownGround(library, lambda notice: bus.publish(Topic.GROUND, notice))
+        around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
+        self._manoeuvres = Manoeuvres(around, lane)
+        self._coming_down = ComingDown(around, link, lane, lease)
+        self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres, self.tracks)
         self.desk = ObstacleDesk(
             library.root,
             self.watches,
             self._manoeuvres,
+            around,
+            Looking(self.watches, workspace.sights),
             link,
             workspace.plans,
-            lane=lane,
-            underway=self._flown,
-            publish_settings=lambda settings: bus.publish(Topic.PERCEPTION_SETTINGS, settings),
-            server_operator=server_operator,
-            looking=Looking(self.watches, workspace.sights),
+            lane,
+            lease,
+            bus,
         )
 
     def hear(self, relay: Relay) -> None:
@@ -109,8 +92,9 @@ class Obstacles:
         for watch, replayed in ((live, False), (replay, True)):
             relay.on(Topic.RADAR_LOOK, watch.on_radar_look, replayed=replayed)
             relay.on(Topic.CLOUD_LOOK, watch.on_cloud_look, replayed=replayed)
-            relay.on(Topic.ALERT, watch.on_alert, replayed=replayed, each=True)
-            relay.on(Topic.AVOIDANCE, watch.on_avoidance if replayed else self._on_avoidance, replayed=replayed)
+        relay.on(Topic.ALERT, self._manoeuvres.on_alert, each=True)
+        relay.on(Topic.ALERT, replay.on_alert, replayed=True, each=True)
+        relay.on(Topic.AVOIDANCE, replay.on_avoidance, replayed=True)
         for source, tracks in self.tracks.items():
             relay.on(Topic.TRACKS, tracks.on_status, replayed=source == "replay")
 
@@ -135,13 +119,8 @@ class Obstacles:
         self.desk.avoid_in_demo()
 
     def tick(self) -> None:
-        self.watches["live"].tick()
+        self._manoeuvres.tick()
         self.tracks["live"].tick()
-
-    def forget_replay(self) -> None:
-        """Another recording, or none."""
-        self.watches["replay"].forget()
-        self.tracks["replay"].forget()
 
     async def on_link(self, status: LinkStatus) -> None:
         self.on_plan()
@@ -149,52 +128,10 @@ class Obstacles:
 
     def on_plan(self) -> None:
         """Another plan on board or open, or another answer to it."""
-        self.desk.brake_as(self._onboard())
-        self._ground.want(self._onboard(), self._workspace.document.terrain_id)
+        self.desk.brake_as(self._aboard.record)
+        self._ground.want(self._aboard.record, self._workspace.document.terrain_id)
         self.watches["live"].seen_in_plan = self._workspace.seen_columns
         self.watches["live"].refresh()
-
-    def _on_avoidance(self, status: AvoidanceStatus) -> None:
-        self.watches["live"].on_avoidance(status)
-        self.sees_differently()
-
-    def _flown(self) -> Underway | None:
-        record, state = self._onboard(), self._live.state
-        return None if record is None or state is None else Underway(record, self._live.flight, state)
-
-    def _situation(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> Situation | None:
-        """None without a vehicle, its plan, or the surface model of that."""
-        record, state = self._onboard(), self._live.state
-        if record is None or state is None:
-            return None
-        terrain = terrain_of(FlownOver(record.terrain_id, record.terrain_sha256), self._library.terrains())
-        if terrain is None:
-            return None
-        watch = self.watches["live"]
-        tracks = self.tracks["live"].fresh()
-        statuses = [*watch.statuses.values(), *([] if tracks is None else [tracks])]
-        origin = next((status.origin for status in statuses if status.origin is not None), None)
-        if origin is None:
-            return None
-        mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
-        maps = tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None)
-        directory = self._library.terrain_dir(terrain.id)
-        return Situation(
-            standing,
-            state,
-            self._live.flight,
-            watch.avoidance.height_offset_m,
-            record,
-            directory,
-            origin,
-            maps,
-            watch.settings.vehicle_radius_m,
-            ceiling_m=watch.settings.climb_ceiling_m,
-            radar_high_deg=watch.settings.radar_high_deg,
-            approach=moving,
-            tracks=tracks,
-            safety_radius_m=watch.settings.safety_radius_m,
-        )
 
     async def _ask_for_whole(self, sensor: Sensor) -> None:
         """A part was missed, or came before this server was there: the node tells its map once more."""
@@ -207,6 +144,3 @@ class Obstacles:
             except Exception as error:
                 log.warning("Asking the %s for its map: %s", sensor, reported(error, log, "Asking for a map").what)
             await asyncio.sleep(_ASK_EVERY_S)
-
-    async def _prepare(self, situation: Situation) -> Any:
-        return await self._lane.call(prepare, situation)

@@ -1,38 +1,33 @@
 """A vertical slice through the maps where the vehicle is, as the paper draws them (Miccinesi 2022, figs 14, 18).
 
-And the radar's newest targets in its own frame (fig. 12). Both are asked for by pages that show them.
+And the radar's newest targets in its own frame (fig. 12), and maps as files. All are asked for by pages.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.sensor_frames import rows
 from server.obstacles.obstacle_watch import Watch
+from server.scene.layers.sights import Sights
 from server.scene.mirror import Voxels
-from server.schemas import RadarTargetsDoc, SectionAsked, SectionDoc, SectionMap, Source
-from telemetry.topics.obstacles import MAP_NAMES, MapOrigin, PerceptionStatus
+from server.schemas import MapFormat, RadarTargetsDoc, SectionAsked, SectionDoc, SectionMap, Source
+from server.work.jobs import Progress
+from telemetry.topics.obstacles import MAP_NAMES, MapDelta, MapName, MapOrigin, PerceptionStatus
 
 MOST_CELLS = 4_000
 """Of one map: more than a panel has pixels for."""
 _GROUND_SAMPLES = 121
 
 
-class Grounds(Protocol):
-    """The part of ``server.scene.layers.sights.Sights`` that knows heights."""
-
-    def ground_up_m(self, origin: MapOrigin, enu_m: F64) -> F64: ...
-
-
 class Looking:
     """What pages look at beside the 3D view; nothing here changes anything."""
 
-    def __init__(self, watches: Mapping[Source, Watch], grounds: Grounds | None) -> None:
+    def __init__(self, watches: Mapping[Source, Watch], grounds: Sights | None) -> None:
         self._watches, self._grounds = watches, grounds
 
     def section(self, asked: SectionAsked) -> SectionDoc:
@@ -116,3 +111,15 @@ def sliced(voxels: Voxels, at: F64, axis: F64, *, thickness_m: float, reach_m: f
         known_ground=(~seen[chosen]).tolist(),
         left_out=len(cells) - len(chosen),
     )
+
+
+def map_file(voxels: Voxels, name: MapName, kind: MapFormat, *, report: Progress) -> bytes:
+    """Like the files of ``hedgehop map``; for a worker. Raises ExportError for a map that the format cannot hold."""
+    from telemetry.rebuilding.export import exported
+    from telemetry.topics import deltas
+
+    report("Writing the map", None)
+    assert voxels.origin is not None
+    last = MapDelta(name, 0.0, 0.0, 0, True, 0, 1, voxels.origin, voxels.resolution_m, b"", b"", b"")
+    kept = deltas.Voxels(voxels.keys, voxels.probability, voxels.explained.astype("u1"))
+    return exported(kind, deltas.FoldedMap(last, kept))

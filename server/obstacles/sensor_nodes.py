@@ -1,14 +1,18 @@
-"""Which of the sensors' nodes run: each from the first frame of its sensor on, or at once in the demo."""
+"""The sensors' nodes: each runs from its first frame on, or at once in the demo, and is told which ground is known."""
 
 from __future__ import annotations
 
 from collections.abc import Coroutine
 from typing import Any
 
+from server.errors import NotFoundError
 from server.heard.node_states import Nodes
+from server.library import Library
+from server.library.terrain_of import FlownOver, terrain_of
+from server.library.terrains import ground_notice
 from telemetry.bus import Bus
-from telemetry.topics.messages import Topic
-from telemetry.topics.obstacles import SENSORS, Sensor
+from telemetry.topics.messages import PlanRecord, Topic
+from telemetry.topics.obstacles import SENSORS, GroundNotice, Sensor
 
 FRAMES: dict[Sensor, Topic] = {
     "radar": Topic.RADAR_FRAME,
@@ -45,3 +49,32 @@ class SensorNodes:
         await self._nodes.sensor(sensor)
         if sensor == "radar":
             await self._nodes.tracks()
+
+
+class KnownGround:
+    """The surface model of the plan on board, else the open one.
+
+    Published when it changes; a node that starts later gets the last word from the bus.
+    """
+
+    def __init__(self, library: Library, bus: Bus) -> None:
+        self._library, self._bus = library, bus
+        self._said: GroundNotice | None = None
+
+    def want(self, record: PlanRecord | None, open_terrain_id: str | None) -> None:
+        """Without either the last one stays: a vehicle may be in the air over it."""
+        notice = self._notice(record, open_terrain_id)
+        if notice is not None and notice != self._said:
+            self._said = notice
+            self._bus.publish(Topic.GROUND, notice)
+
+    def _notice(self, record: PlanRecord | None, open_terrain_id: str | None) -> GroundNotice | None:
+        if record is not None:
+            found = terrain_of(FlownOver(record.terrain_id, record.terrain_sha256), self._library.terrains())
+            open_terrain_id = open_terrain_id if found is None else found.id
+        if open_terrain_id is None:
+            return None
+        try:
+            return ground_notice(self._library.terrain_dir(open_terrain_id))
+        except NotFoundError:
+            return None

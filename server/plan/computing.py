@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from server.errors import JobCancelledError, NotFoundError, NotReadyError, reported
+from server.library import Library
 from server.library.documents import missing
 from server.plan import tasks
 from server.scene.geometry.payload import PlanScene
@@ -29,13 +30,13 @@ class Computing:
     def __init__(
         self,
         lane: Lane,
+        library: Library,
         *,
-        terrain_dir: Callable[[str], Path],
         changed: Callable[[], None],
         supersede_after_s: float = SUPERSEDE_AFTER_S,
         trade_when_idle_s: float = TRADE_WHEN_IDLE_S,
     ) -> None:
-        self._lane, self._terrain_dir, self._changed = lane, terrain_dir, changed
+        self._lane, self._library, self._changed = lane, library, changed
         self._supersede_after_s, self._trade_when_idle_s = supersede_after_s, trade_when_idle_s
         self._wanted: tuple[int, PlanDoc] | None = None
         self._wake = asyncio.Event()
@@ -81,7 +82,7 @@ class Computing:
 
     def _directory(self, document: PlanDoc) -> Path:
         try:
-            return self._terrain_dir(document.terrain_id or "")
+            return self._library.terrain_dir(document.terrain_id or "")
         except NotFoundError:
             raise NotReadyError(
                 "The surface model of this plan has been deleted.", advice="Choose another surface model."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,29 +11,20 @@ from server.errors import NotFoundError
 from server.library import Library
 from server.library.terrains import UNKNOWN_ORIGIN, Origin
 from server.plan import file_tasks
-from server.schemas import JobDoc, OrthophotoDoc, PlanDoc, TerrainDoc
+from server.plan.on_show import OnShow
+from server.plan.plan_desk import PlanDesk
+from server.schemas import JobDoc, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane, Progress
 
 T = TypeVar("T")
-Propose = Callable[[Callable[[PlanDoc], tuple[str, PlanDoc] | None]], Awaitable[object]]
-"""An edit of the document that is open when its turn comes; None: nothing to change."""
 
 
 class FileJobs:
     """Starts jobs on the board and lets the open plan use what they make."""
 
-    def __init__(
-        self,
-        library: Library,
-        board: JobBoard,
-        *,
-        propose: Propose,
-        library_changed: Callable[[], None],
-        show_orthophoto: Callable[[], None],
-    ) -> None:
-        self._library, self._board, self._propose = library, board, propose
-        self._library_changed, self._show_orthophoto = library_changed, show_orthophoto
+    def __init__(self, library: Library, board: JobBoard, desk: PlanDesk, on_show: OnShow, pages: Pages) -> None:
+        self._library, self._board, self._desk, self._on_show, self._pages = library, board, desk, on_show, pages
 
     def add_terrain(
         self,
@@ -63,7 +54,7 @@ class FileJobs:
                     progress=progress,
                 ),
             )
-            await self._propose(lambda document: _use_if_free(document, terrain))
+            await self._desk.propose(lambda document: _use_if_free(document, terrain))
 
         return self._board.start(f"Reading {filename}", work, clean=lambda: upload.unlink(missing_ok=True))
 
@@ -97,7 +88,7 @@ class FileJobs:
             terrain: TerrainDoc = await self._made(
                 lane.call(file_tasks.without_spikes, self._library.root, terrain_dir, progress=progress)
             )
-            await self._propose(lambda document: _swap(document, terrain_id, terrain))
+            await self._desk.propose(lambda document: _swap(document, terrain_id, terrain))
 
         return self._board.start("Removing spikes", work)
 
@@ -107,16 +98,16 @@ class FileJobs:
         except NotFoundError:
             # Its surface model was deleted while it was read.
             await asyncio.to_thread(self._library.delete_orthophoto, photo.id)
-            self._library_changed()
+            self._pages.publish(self._library.message())
             raise
 
         def drape(document: PlanDoc) -> tuple[str, PlanDoc] | None:
             if document.terrain_id != photo.terrain_id:
                 return None
-            self._show_orthophoto()
+            self._on_show.show_orthophoto()
             return "Drape orthomosaic", document.model_copy(update={"orthophoto_id": photo.id})
 
-        await self._propose(drape)
+        await self._desk.propose(drape)
 
     async def _made(self, making: Awaitable[T]) -> T:
         """Takes what a worker stores into the library; a worker that was killed while storing leaves nothing."""
@@ -126,7 +117,7 @@ class FileJobs:
             await asyncio.to_thread(self._library.clear_unfinished)
             raise
         await asyncio.to_thread(self._library.refresh)
-        self._library_changed()
+        self._pages.publish(self._library.message())
         return made
 
 

@@ -14,10 +14,10 @@ from server.schemas import (
     HoldCamera,
     HoverProfile,
     HoverView,
+    Pages,
     PlanDoc,
     SelectionDoc,
     SelectionMessage,
-    ServerMessage,
     SetSelection,
     SetView,
     ViewDoc,
@@ -26,19 +26,19 @@ from server.schemas import (
 
 
 class OnShow:
-    """Any page changes it for all. ``layers_changed`` follows every new view, ``publish`` reaches all pages."""
+    """Any page changes it for all. ``layers_changed(view)`` follows every new view."""
 
     def __init__(
         self,
         picture: Picture,
         desk: PlanDesk,
         computing: Computing,
+        pages: Pages,
         *,
-        layers_changed: Callable[[], None],
-        publish: Callable[[ServerMessage], None],
+        layers_changed: Callable[[ViewDoc], None],
     ) -> None:
-        self._picture, self._desk, self._computing = picture, desk, computing
-        self._layers_changed, self._publish = layers_changed, publish
+        self._picture, self._desk, self._computing, self._pages = picture, desk, computing, pages
+        self._layers_changed = layers_changed
         self.view, self.selection = ViewDoc(), SelectionDoc()
 
     @property
@@ -46,13 +46,18 @@ class OnShow:
         """The open plan, also while a recording is shown instead of it."""
         return self._desk.document
 
+    @property
+    def is_review(self) -> bool:
+        """Whether a recording is shown instead of the plan."""
+        return self._picture.review is not None
+
     async def on_client_message(self, page_id: str, message: ClientMessage) -> None:
         match message:
             case HoverProfile():
-                self._publish(await self._picture.mark(self._plan, message.s_m))
+                self._pages.publish(await self._picture.mark(self._plan, message.s_m))
             case HoverView():
                 place = None if message.x is None or message.y is None else (message.x, message.y)
-                self._publish(await self._picture.mark_under(self._plan, page_id, place))
+                self._pages.publish(await self._picture.mark_under(self._plan, page_id, place))
             case SetView():
                 self.show_view(message.view)
             case SetSelection():
@@ -64,7 +69,7 @@ class OnShow:
 
     def show_view(self, view: ViewDoc) -> None:
         self.view = view
-        self._layers_changed()
+        self._layers_changed(view)
         self.tell_legend()
         self.draw()
 
@@ -77,14 +82,14 @@ class OnShow:
 
     def select(self, selection: SelectionDoc) -> None:
         self.selection = selection
-        self._publish(SelectionMessage(selection=selection))
+        self._pages.publish(SelectionMessage(selection=selection))
         self.draw()
 
     def tell_legend(self) -> None:
         """The heights that the colours mean change with the surface model on show."""
         low_m, high_m = self._picture.legend_m or (None, None)
         self.view = self.view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
-        self._publish(ViewMessage(view=self.view))
+        self._pages.publish(ViewMessage(view=self.view))
 
     def draw(self) -> None:
         stale = self._computing.state.state == "running"
@@ -93,4 +98,4 @@ class OnShow:
     @property
     def _plan(self) -> PlanScene | None:
         """The plan on show; while a recording is, there is none to point at."""
-        return None if self._picture.review is not None else self._computing.scene
+        return None if self.is_review else self._computing.scene

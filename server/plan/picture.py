@@ -6,7 +6,6 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
@@ -14,50 +13,34 @@ from planning.terrain.dsm import Dsm
 from server.errors import JobCancelledError, NotFoundError, reported
 from server.library import Library
 from server.plan import tasks
-from server.scene.cameras.shots import Target
 from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
 from server.scene.geometry.plain import plain_around, plain_scene
-from server.schemas import CursorMessage, ErrorDoc, FrameView, PlanDoc, SelectionDoc, Source, ViewDoc
+from server.scene.view import SceneView
+from server.schemas import CursorMessage, ErrorDoc, FrameView, NoticeMessage, Pages, PlanDoc, SelectionDoc, ViewDoc
 from server.work.jobs import Lane
 
 log = logging.getLogger("hedgehop.scene")
 
 
-class View(Protocol):
-    """The part of ``server.scene.view.SceneView`` that the workspace uses."""
-
-    async def show(self, dsm: Dsm | None, state: SceneState) -> None: ...
-
-    async def cursor(self, at_m: np.ndarray | None) -> None: ...
-
-    async def frame(self, page_id: str, target: Target, source: Source = "live") -> None: ...
-
-    def hold_camera(self, page_id: str, *, held: bool) -> None: ...
-
-    def sample_under(self, page_id: str, x: float, y: float) -> float | None: ...
-
-
 class Picture:
     """Draws the latest wish; wishes that come while it draws are merged into one.
 
-    ``changed()`` is called when the terrain on show is another one, ``failed(error)`` when something cannot be shown.
-    A recording that is open is drawn instead of the plan, unless ``held()``: then the terrain stays as it is.
+    ``changed()`` is called when the terrain on show is another one.
+    A recording that is open is drawn instead of the plan, unless a vehicle is armed: then the terrain stays as it is.
     """
 
     def __init__(
         self,
-        view: View,
+        view: SceneView,
         library: Library,
         lane: Lane,
+        pages: Pages,
         *,
         changed: Callable[[], None],
-        failed: Callable[[ErrorDoc], None],
     ) -> None:
-        self._view, self._library, self._lane = view, library, lane
-        self._changed, self._failed = changed, failed
-        self.held: Callable[[], bool] = lambda: False
-        self.live_home: Callable[[], tuple[float, float] | None] = lambda: None
-        """(lat_deg, lon_deg) of the vehicle; without a surface model plain ground around it is drawn."""
+        self._view, self._library, self._lane, self._pages = view, library, lane, pages
+        self._changed = changed
+        self._vehicle: tuple[bool, tuple[float, float] | None] = (False, None)
         self._plain: Dsm | None = None
         self._review: tuple[str | None, ReviewScene] | None = None
         self._wish: tuple[PlanDoc, SelectionDoc, ViewDoc, PlanScene | None, bool] | None = None
@@ -87,15 +70,18 @@ class Picture:
         """A recorded flight over its surface model, or on its own plain ground; without either, the plan again."""
         drawable = scene is not None and (terrain_id is not None or scene.ground is not None)
         self._review = (terrain_id, scene) if drawable and scene is not None else None
-        self.again()
+        self._wake.set()
 
     def lay_over(self, overlay: OverlayScene | None, sites: tuple[SiteMark, ...]) -> None:
         """Colours and landing sites on the surface model that the overlay belongs to, and on no other."""
         self._overlay = overlay, sites
-        self.again()
-
-    def again(self) -> None:
         self._wake.set()
+
+    def on_vehicle(self, armed: bool, home: tuple[float, float] | None) -> None:
+        """``home``: (lat_deg, lon_deg); without a surface model plain ground around it is drawn."""
+        if (armed, home) != self._vehicle:
+            self._vehicle = armed, home
+            self._wake.set()
 
     @property
     def review(self) -> tuple[str | None, ReviewScene] | None:
@@ -103,7 +89,7 @@ class Picture:
         if self._review is None or self._wish is None:
             return None
         other_terrain = self._review[0] != self._wish[0].terrain_id
-        return None if other_terrain and self.held() else self._review
+        return None if other_terrain and self._vehicle[0] else self._review
 
     async def run(self) -> None:
         """Until cancelled; what cannot be drawn is told, and the next wish is drawn."""
@@ -115,7 +101,7 @@ class Picture:
             try:
                 await self._draw(*self._wish)
             except Exception as error:
-                self._failed(reported(error, log, "Drawing"))
+                self._tell(reported(error, log, "Drawing"))
 
     async def _draw(
         self, document: PlanDoc, selection: SelectionDoc, view: ViewDoc, plan: PlanScene | None, stale: bool
@@ -149,7 +135,7 @@ class Picture:
 
     def _live_ground(self, terrain_id: str | None) -> Dsm | None:
         """The same for as long as home stays on it: another one would forget the path flown so far."""
-        home = self.live_home()
+        home = self._vehicle[1]
         if terrain_id is not None or home is None:
             return None
         if self._plain is None or np.isnan(self._plain.elevation_at(self._plain.xy_from_lat_lon(np.array([home])))[0]):
@@ -194,7 +180,10 @@ class Picture:
             # Whoever computes the plan says that its surface model is gone.
             pass
         except Exception as error:
-            self._failed(reported(error, log, "Drawing the surface model"))
+            self._tell(reported(error, log, "Drawing the surface model"))
+
+    def _tell(self, error: ErrorDoc) -> None:
+        self._pages.publish(NoticeMessage(level="error", error=error))
 
     async def mark(self, plan: PlanScene | None, s_m: float | None) -> CursorMessage:
         """Marks the path at a distance in 3D and says what is there."""

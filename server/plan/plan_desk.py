@@ -16,7 +16,7 @@ from server.errors import InUseError, StaleRevisionError, reported
 from server.library import Library
 from server.library.history import History
 from server.library.planned_on import on_another_model
-from server.schemas import ErrorDoc, NoticeMessage, PlanDoc, PlanEdit
+from server.schemas import ErrorDoc, NoticeMessage, Pages, PlanDoc, PlanEdit
 
 log = logging.getLogger("hedgehop.plan")
 
@@ -32,13 +32,13 @@ class PlanDesk:
     def __init__(
         self,
         library: Library,
+        pages: Pages,
         *,
         changed: Callable[[bool], None],
         saved: Callable[[], None],
-        tell: Callable[[NoticeMessage], None],
         retry_s: float = RETRY_S,
     ) -> None:
-        self._library, self._changed, self._saved, self._tell = library, changed, saved, tell
+        self._library, self._pages, self._changed, self._saved = library, pages, changed, saved
         self._retry_s = retry_s
         self.editing = asyncio.Lock()
         """Held while the plan changes, or while something is deleted that it may need."""
@@ -124,7 +124,7 @@ class PlanDesk:
             return False
         if self._unsaved.is_set():
             self._unsaved.clear()
-            self._tell(_notice("info", ErrorDoc(code="saved", what="The plan is saved again: nothing was lost.")))
+            self._tell("info", ErrorDoc(code="saved", what="The plan is saved again: nothing was lost."))
         return True
 
     def _not_saved(self, why: ErrorDoc) -> None:
@@ -133,7 +133,7 @@ class PlanDesk:
         self._unsaved.set()
         log.error("The plan could not be saved: %s (%s)", why.what, why.where)
         advice = f"{why.advice} Keep Hedgehop running: it holds your changes and tries again every few seconds."
-        self._tell(_notice("error", why.model_copy(update={"advice": advice.strip()})))
+        self._tell("error", why.model_copy(update={"advice": advice.strip()}))
 
     # Plans
 
@@ -177,10 +177,9 @@ class PlanDesk:
             await asyncio.to_thread(self._library.remember_plan, plan_id)
         except Exception as error:
             # The plan is open all the same; only the next start may open another one.
-            self._tell(_notice("warning", reported(error, log, "Noting which plan is open")))
+            self._tell("warning", reported(error, log, "Noting which plan is open"))
         self.revision += 1
         self._changed(True)
 
-
-def _notice(level: Literal["info", "warning", "error"], error: ErrorDoc) -> NoticeMessage:
-    return NoticeMessage(level=level, error=error)
+    def _tell(self, level: Literal["info", "warning", "error"], error: ErrorDoc) -> None:
+        self._pages.publish(NoticeMessage(level=level, error=error))

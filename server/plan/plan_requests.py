@@ -19,10 +19,10 @@ from server.library import Library
 from server.library.documents import missing, with_points
 from server.plan import tasks
 from server.plan.computing import Computing
+from server.plan.picture import Picture
 from server.plan.plan_desk import PlanDesk
-from server.plan.seen_task import keep_seen
 from server.scene.mirror import Voxels
-from server.schemas import Imported, PlanDoc, PlanEdit, PlanState
+from server.schemas import Imported, Pages, PlanDoc, PlanEdit, PlanState
 from server.work.clocks import utc_now
 from server.work.jobs import Lane
 
@@ -32,20 +32,17 @@ MOST_POINTS = 1000
 
 
 class PlanRequests:
-    """``dsm`` is the surface model on show; ``library_changed`` follows what changes the list of plans."""
-
     def __init__(
         self,
         desk: PlanDesk,
         computing: Computing,
+        picture: Picture,
         library: Library,
         lane: Lane,
-        *,
-        dsm: Callable[[], Dsm | None],
-        library_changed: Callable[[], None],
+        pages: Pages,
     ) -> None:
-        self._desk, self._computing, self._library, self._lane = desk, computing, library, lane
-        self._dsm, self._library_changed = dsm, library_changed
+        self._desk, self._computing, self._picture = desk, computing, picture
+        self._library, self._lane, self._pages = library, lane, pages
 
     @property
     def state(self) -> PlanState:
@@ -84,7 +81,7 @@ class PlanRequests:
             await self._desk.open(plan_id)
         finally:
             # A damaged one has left the list.
-            self._library_changed()
+            self._pages.publish(self._library.message())
         return self.state
 
     async def save_as(self, name: str) -> PlanState:
@@ -93,13 +90,13 @@ class PlanRequests:
 
     async def delete(self, plan_id: str) -> None:
         await self._desk.delete(plan_id)
-        self._library_changed()
+        self._pages.publish(self._library.message())
 
     async def import_points(self, filename: str, data: bytes) -> Imported:
         """Replaces the points, or the polygon, by those of a file. Raises FormatError, PoiError."""
         points = await asyncio.to_thread(read_pois, filename, data)
         warnings = list(points.warnings)
-        dsm = self._dsm()
+        dsm = self._picture.dsm
         if dsm is not None and await asyncio.to_thread(looks_swapped, points.pois, dsm):
             warnings.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
         await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, points)))
@@ -107,7 +104,7 @@ class PlanRequests:
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""
-        ordered = await shortest(self._lane, self._desk.document, self._dsm())
+        ordered = await shortest(self._lane, self._desk.document, self._picture.dsm)
         await self._desk.propose(lambda document: ("Shortest order", reordered(document, ordered)))
         return self.state
 
@@ -126,7 +123,7 @@ class PlanRequests:
         if terrain_id is None:
             raise NotReadyError("There is no surface model to add to.", advice="Open the plan that is flown.")
         fields = {} if rest is None else await asyncio.to_thread(rest, terrain_id)
-        fields["seen_id"] = await self._lane.call(keep_seen, self._library.terrain_dir(terrain_id), maps)
+        fields["seen_id"] = await self._lane.call(tasks.keep_seen, self._library.terrain_dir(terrain_id), maps)
         await self._desk.propose(lambda document: ("Plan against what was seen", document.model_copy(update=fields)))
         return self.state
 

@@ -3,64 +3,57 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 
 from server.errors import reported
 from server.library.edits import clicked, moved
+from server.plan.on_show import OnShow
 from server.plan.plan_desk import PlanDesk, Proposal
-from server.schemas import ErrorDoc, NoticeMessage, PlaceDoc, PlanDoc, SelectionDoc
+from server.schemas import ErrorDoc, NoticeMessage, Pages, PlaceDoc, PlanDoc, SelectionDoc
 
 log = logging.getLogger("hedgehop.plan")
 
 
 class Pointing:
-    """``selection`` says which tool is in hand, ``select`` changes it, ``tell`` reaches the operator."""
-
-    def __init__(
-        self,
-        desk: PlanDesk,
-        *,
-        selection: Callable[[], SelectionDoc],
-        select: Callable[[SelectionDoc], None],
-        tell: Callable[[NoticeMessage], None],
-    ) -> None:
-        self._desk, self._selection, self._select, self._tell = desk, selection, select, tell
+    def __init__(self, desk: PlanDesk, on_show: OnShow, pages: Pages) -> None:
+        self._desk, self._on_show, self._pages = desk, on_show, pages
 
     async def on_terrain(self, lat_deg: float, lon_deg: float, *, known: bool) -> None:
-        """A click on the surface model."""
-        is_landing = self._selection().tool == "landing"
-        if not is_landing and clicked(self._desk.document, self._selection(), lat_deg, lon_deg) is None:
+        """A click on the surface model; on that of a recording it means nothing."""
+        if self._on_show.is_review:
+            return
+        is_landing = self._on_show.selection.tool == "landing"
+        if not is_landing and clicked(self._desk.document, self._on_show.selection, lat_deg, lon_deg) is None:
             return
         if not known:
-            self._tell(NoticeMessage(level="warning", error=_unknown_ground(lat_deg, lon_deg)))
+            self._pages.publish(NoticeMessage(level="warning", error=_unknown_ground(lat_deg, lon_deg)))
             return
         if is_landing:
             # Edits nothing: the page that took the tool asks for sites there.
-            self._select(SelectionDoc(place=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg)))
+            self._on_show.select(SelectionDoc(place=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg)))
             return
         selections: list[SelectionDoc] = []
 
         def click(document: PlanDoc) -> tuple[str, PlanDoc] | None:
-            outcome = clicked(document, self._selection(), lat_deg, lon_deg)
+            outcome = clicked(document, self._on_show.selection, lat_deg, lon_deg)
             if outcome is None:
                 return None
             selections.append(outcome[2])
             return outcome[:2]
 
         if await self._propose(click) and selections:
-            self._select(selections[0])
+            self._on_show.select(selections[0])
 
     async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
         await self._propose(lambda document: moved(document, poi_id, lat_deg, lon_deg))
 
     def on_poi(self, poi_id: str) -> None:
-        self._select(self._selection().model_copy(update={"poi_id": poi_id}))
+        self._on_show.select(self._on_show.selection.model_copy(update={"poi_id": poi_id}))
 
     async def _propose(self, proposal: Proposal) -> bool:
         try:
             await self._desk.propose(proposal)
         except Exception as error:
-            self._tell(NoticeMessage(level="error", error=reported(error, log, "An edit in the 3D view")))
+            self._pages.publish(NoticeMessage(level="error", error=reported(error, log, "An edit in the 3D view")))
             return False
         return True
 

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
 from planning import __version__
+from planning.evading.seen import columns_from_voxels
 from planning.ground.demo_hillside import small_hill
 from planning.model import Poi, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
@@ -23,15 +25,23 @@ from planning.request import PlanRequest
 from planning.route.camera import gsd_cm
 from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import Dsm
+from server.errors import NotReadyError
 from server.library.documents import request_from_doc
 from server.library.orthophotos import load_orthophoto
 from server.library.planned_on import other_model
-from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain, load_seen
+from server.library.seen_columns import (
+    SeenColumns,
+    check_home_stands_on_ground,
+    load_planned_terrain,
+    load_seen,
+    store_seen,
+)
 from server.library.terrains import load_terrain
 from server.plan.profile_chart import chart
 from server.scene.geometry.payload import PlanScene, TerrainScene
 from server.scene.geometry.relief import kept_within, relief
 from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
+from server.scene.mirror import Voxels
 from server.schemas import BetterHomeDoc, HomeDoc, PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
 from server.work.clocks import READ_STEP, StepTimer
 from server.work.jobs import Progress
@@ -249,3 +259,26 @@ def plan_scene(plan: Plan) -> PlanScene:
         takeoff_alt_dsm_m=line.takeoff_alt_dsm_m,
         poi_m=np.column_stack([path.xy_m[pois], path.alt_dsm_m[pois]]),
     )
+
+
+def keep_seen(directory: Path, maps: list[Voxels], *, report: Progress) -> str:
+    """Makes columns of what the maps do not explain; the id under which they are kept beside the model.
+
+    Raises NotReadyError.
+    """
+    report("Taking in what was seen", None)
+    dsm = load_terrain(directory)
+    columns = []
+    for voxels in maps:
+        origin = voxels.origin
+        assert origin is not None
+        home_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
+        if not np.isfinite(home_m):
+            raise NotReadyError(
+                "The vehicle took off where this plan's surface model knows nothing.",
+                advice="Open the plan that is flown.",
+            )
+        frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+        centres = voxels.centres_enu_m[~voxels.explained]
+        columns.append(columns_from_voxels(centres, voxels.resolution_m, frame=frame, dsm=dsm, home_alt_dsm_m=home_m))
+    return store_seen(directory, SeenColumns(tuple(columns)))

@@ -3,36 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
 
 from server.errors import InUseError, NotFoundError
 from server.library import Library
 from server.plan import demo
 from server.plan.plan_desk import PlanDesk
-from server.schemas import TerrainDoc
+from server.plan.plan_requests import PlanRequests
+from server.schemas import Pages, TerrainDoc
 from server.work.job_board import JobBoard
 
 
 class TerrainDesk:
-    """``open_plan`` opens the demo's plan; ``library_changed`` follows what changes the list of surface models."""
-
-    def __init__(
-        self,
-        library: Library,
-        desk: PlanDesk,
-        board: JobBoard,
-        *,
-        open_plan: Callable[[str], Awaitable[object]],
-        library_changed: Callable[[], None],
-    ) -> None:
-        self._library, self._desk, self._board = library, desk, board
-        self._open_plan, self._library_changed = open_plan, library_changed
+    def __init__(self, library: Library, desk: PlanDesk, plans: PlanRequests, board: JobBoard, pages: Pages) -> None:
+        self._library, self._desk, self._plans, self._board, self._pages = library, desk, plans, board, pages
         self.demo_is_open = asyncio.Event()
 
     async def add_demo(self) -> TerrainDoc:
         """The generated demo model with its plan, made on first use, opened."""
         await self._board.run("The demo", lambda lane, progress: demo.ensure_terrain(self._library, lane, progress))
-        self._library_changed()
+        self._pages.publish(self._library.message())
         return await self._open_demo(demo.terrain(self._library))
 
     async def open_made_demo(self) -> bool:
@@ -54,11 +43,11 @@ class TerrainDesk:
                     advice="Delete that plan or give it another model first.",
                 )
             await asyncio.to_thread(self._library.delete_terrain, terrain_id)
-        self._library_changed()
+        self._pages.publish(self._library.message())
 
     async def _open_demo(self, terrain: TerrainDoc | None) -> TerrainDoc:
         if terrain is None:
             raise NotFoundError("The demo surface model was deleted meanwhile.", advice="Try again.")
-        await self._open_plan(await asyncio.to_thread(demo.ensure_plan, self._library, terrain))
+        await self._plans.open(await asyncio.to_thread(demo.ensure_plan, self._library, terrain))
         self.demo_is_open.set()
         return terrain

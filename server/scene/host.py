@@ -35,7 +35,7 @@ _constructing = threading.Lock()
 
 
 class SceneHost:
-    """``server`` is for drawing; ``page_of_client`` and ``client_of_page`` tell whose camera and clicks are whose."""
+    """``server`` is for drawing; ``page_of_client`` and ``client`` tell whose camera and clicks are whose."""
 
     def __init__(self) -> None:
         self._secret = secrets.token_urlsafe(32)
@@ -58,10 +58,15 @@ class SceneHost:
         with self._lock:
             return self._pages.get(client_id)
 
-    def client_of_page(self, page_id: str) -> int | None:
-        """The newest viser client of a page; None while its 3D view is not connected. From any thread."""
-        with self._lock:
-            return max((client for client, page in self._pages.items() if page == page_id), default=None)
+    def client(self, page_id: str) -> viser.ClientHandle | None:
+        """The newest client of a page: a reloaded view may leave an old one behind for a moment. None without one."""
+        clients = self.server.get_clients()
+        own = [client_id for client_id in clients if self.page_of_client(client_id) == page_id]
+        return clients[max(own)] if own else None
+
+    def page_ids(self) -> set[str]:
+        """Of the pages whose view is connected."""
+        return {page for client in self.server.get_clients() if (page := self.page_of_client(client)) is not None}
 
     def close(self) -> None:
         with _silent():

@@ -6,8 +6,8 @@ Runs on the application's event loop; viser's callbacks, which come from viser's
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any
+from collections.abc import Coroutine
+from typing import Any, Protocol
 
 import numpy as np
 import viser
@@ -21,6 +21,7 @@ from server.scene.cameras.shots import Target, shot
 from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.payload import SceneState
 from server.scene.geometry.stage import Drawing
+from server.scene.host import SceneHost
 from server.scene.layers.layers import POIS, Key, layers, unchanged
 from server.scene.layers.mark_layers import cursor_nodes
 from server.scene.layers.sights import Sights
@@ -30,30 +31,27 @@ from server.schemas import Source
 _POINTER_REACH_PX = 24.0
 _SHOTS_DUE_MAX = 100
 
-TerrainClick = Callable[[str | None, float, float, bool], Awaitable[None]]
-PoiClick = Callable[[str], Awaitable[None]]
-PoiMove = Callable[[str, float, float], Awaitable[None]]
+
+class Hands(Protocol):
+    """Who hears of clicks and drags: ``server.workspace.Workspace``, which owns the view."""
+
+    async def on_terrain_click(self, lat_deg: float, lon_deg: float, known: bool) -> None: ...
+
+    async def on_poi_click(self, poi_id: str) -> None: ...
+
+    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None: ...
 
 
 class SceneView:
     """One scene for all pages; each page has its own camera."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        *,
-        on_terrain_click: TerrainClick,
-        on_poi_click: PoiClick,
-        on_poi_moved: PoiMove,
-        page_of_client: Callable[[int], str | None],
-    ) -> None:
-        self._server = server
-        self._on_terrain_click, self._on_poi_click, self._on_poi_moved = on_terrain_click, on_poi_click, on_poi_moved
-        self._page_of_client = page_of_client
-        self._canvas = Canvas(server.scene)
-        self.vehicles = Vehicles(self._put)
-        self.sights = Sights(server, self._put)
-        self._cameras = Cameras(self._client, self._page_ids, self.vehicles)
+    def __init__(self, host: SceneHost, hands: Hands) -> None:
+        self._host, self._hands = host, hands
+        self._server = server = host.server
+        self._canvas = Canvas(server)
+        self.vehicles = Vehicles(self._canvas)
+        self.sights = Sights(server, self._canvas)
+        self._cameras = Cameras(host, self.vehicles)
         self._layers = layers(self._watch_gizmo)
         self._keys: dict[str, Key] = {}
         self._wanted: tuple[Dsm | None, SceneState] | None = None
@@ -82,11 +80,11 @@ class SceneView:
     async def cursor(self, at_m: F64 | None) -> None:
         """Marks the hovered place, (3,) x, y, alt_dsm in the model's coordinates; None takes the mark away."""
         self._cursor_m = None if at_m is None or not np.isfinite(at_m).all() else np.asarray(at_m, dtype=np.float64)
-        self._put({"cursor": self._cursor_nodes()})
+        self._canvas.draw({"cursor": self._cursor_nodes()})
 
     async def frame(self, page_id: str, target: Target, source: Source = "live") -> None:
         """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, behind a vehicle."""
-        client = self._client(page_id)
+        client = self._host.client(page_id)
         if client is None:
             self._shots_due.pop(page_id, None)
             self._shots_due[page_id] = target, source
@@ -118,7 +116,7 @@ class SceneView:
 
         ``x`` and ``y`` are shares of the page's 3D view, from its top left.
         """
-        client, drawn = self._client(page_id), self._drawn
+        client, drawn = self._host.client(page_id), self._drawn
         plan = None if drawn is None else drawn.state.plan
         if client is None or drawn is None or plan is None or len(plan.path_m) < 2 or not drawn.state.view.show_path:
             return None
@@ -129,7 +127,7 @@ class SceneView:
     async def _draw(self, drawing: Drawing | None) -> None:
         if drawing is None:
             self._keys.clear()
-            self._put({layer.name: [] for layer in self._layers} | {"cursor": []})
+            self._canvas.draw({layer.name: [] for layer in self._layers} | {"cursor": []})
             self._drawn = None
             self.vehicles.redraw(None)
             self.sights.redraw(None)
@@ -145,22 +143,14 @@ class SceneView:
         ]
         built = await asyncio.to_thread(lambda: {layer.name: layer.build(drawing) for layer in todo})
         before, self._drawn = self._drawn, drawing
-        self._put(built)
+        self._canvas.draw(built)
         self._keys |= keys
         self.sights.redraw(drawing)
         if before is None or before.terrain.terrain_id != drawing.terrain.terrain_id:
             self._aim_all(drawing)
         if before is None or before.frame != drawing.frame or before.dsm is not drawing.dsm:
-            self._put({"cursor": self._cursor_nodes()})
+            self._canvas.draw({"cursor": self._cursor_nodes()})
             self.vehicles.redraw(drawing)
-
-    def _put(self, built: dict[str, list[Node]]) -> None:
-        if not built:
-            return
-        with self._server.atomic():
-            for name, nodes in built.items():
-                self._canvas.put(name, nodes)
-        self._server.flush()
 
     def _cursor_nodes(self) -> list[Node]:
         return [] if self._cursor_m is None or self._drawn is None else cursor_nodes(self._drawn, self._cursor_m)
@@ -176,16 +166,6 @@ class SceneView:
         for client in self._server.get_clients().values():
             move(client, shot(drawing, "terrain", aspect=client.camera.aspect), drawing)
 
-    def _client(self, page_id: str) -> viser.ClientHandle | None:
-        """The newest client of a page: a reloaded view may leave an old one behind for a moment."""
-        clients = self._server.get_clients()
-        own = [client_id for client_id in clients if self._page_of_client(client_id) == page_id]
-        return clients[max(own)] if own else None
-
-    def _page_ids(self) -> set[str]:
-        """Of the pages whose view is connected."""
-        return {page for client in self._server.get_clients() if (page := self._page_of_client(client)) is not None}
-
     # Clicks and drags: on viser's thread up to ``_hand_over``
 
     async def _hand_over(self, intent: Coroutine[Any, Any, None]) -> None:
@@ -197,22 +177,21 @@ class SceneView:
 
     async def _clicked(self, event: viser.SceneClickEvent) -> None:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        page_id = self._page_of_client(event.client_id)
-        await self._hand_over(self._click(page_id, origin, direction, event.client.camera.fov))
+        await self._hand_over(self._click(origin, direction, event.client.camera.fov))
 
-    async def _click(self, page_id: str | None, origin: F64, direction: F64, fov_rad: float) -> None:
+    async def _click(self, origin: F64, direction: F64, fov_rad: float) -> None:
         drawn = self._drawn
         if drawn is None:
             return
         match await asyncio.to_thread(pick, drawn, origin, direction, fov_rad=fov_rad):
             case PoiHit(poi_id):
-                await self._on_poi_click(poi_id)
+                await self._hands.on_poi_click(poi_id)
             case PlaceHit(lat_deg, lon_deg, known):
-                await self._on_terrain_click(page_id, lat_deg, lon_deg, known)
+                await self._hands.on_terrain_click(lat_deg, lon_deg, known)
 
     async def _joined(self, client: viser.ClientHandle) -> None:
         """A page's view has connected: its camera goes where the page has asked for meanwhile."""
-        page_id = self._page_of_client(client.client_id)
+        page_id = self._host.page_of_client(client.client_id)
         if page_id is not None:
             await self._hand_over(self._catch_up(page_id))
 
@@ -244,7 +223,7 @@ class SceneView:
     async def _dropped(self, drawn: Drawing, poi_id: str, at_m: F64) -> None:
         lat_deg, lon_deg = drawn.dsm.lat_lon_from_xy(at_m[None, :2])[0]
         if np.isfinite([lat_deg, lon_deg]).all():
-            await self._on_poi_moved(poi_id, float(lat_deg), float(lon_deg))
+            await self._hands.on_poi_moved(poi_id, float(lat_deg), float(lon_deg))
         # Puts the mark where the document says, also when the move was refused.
         self._keys.pop(POIS, None)
         async with self._one_at_a_time:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from pathlib import Path
 
 from server.library.radar_files import RadarShelf
-from server.schemas import RadarFileDoc, RadarFilesMessage, RadarFrame, RadarOpened, RadarReading, ServerMessage
+from server.schemas import Pages, RadarFileDoc, RadarFilesMessage, RadarFrame, RadarOpened, RadarReading
 from server.studies import radar_task
 from server.studies.latest import Latest
 from server.studies.radar_task import Stored
@@ -15,10 +14,10 @@ from server.work.jobs import Lane
 
 
 class RadarDesk:
-    """All methods belong to the event loop; ``tell`` reaches all pages."""
+    """All methods belong to the event loop."""
 
-    def __init__(self, shelf: RadarShelf, tell: Callable[[ServerMessage], None]) -> None:
-        self._shelf, self._tell = shelf, tell
+    def __init__(self, shelf: RadarShelf, pages: Pages) -> None:
+        self._shelf, self._pages = shelf, pages
         self._lane = Lane("radar")
         self._latest = Latest(self._lane)
 
@@ -34,19 +33,19 @@ class RadarDesk:
             doc = await asyncio.to_thread(self._shelf.add, upload, name)
         finally:
             await asyncio.to_thread(upload.unlink, missing_ok=True)
-        self._tell(self.message())
+        self._pages.publish(self.message())
         return doc
 
     async def set_cfg(self, file_id: str, data: bytes | None, name: str = "") -> RadarFileDoc:
         """The configuration that the radar ran with; None takes it away. Raises NotFoundError."""
         doc = await asyncio.to_thread(self._shelf.set_cfg, file_id, data, name)
-        self._tell(self.message())
+        self._pages.publish(self.message())
         return doc
 
     async def delete(self, file_id: str) -> None:
         """Raises NotFoundError."""
         await asyncio.to_thread(self._shelf.delete, file_id)
-        self._tell(self.message())
+        self._pages.publish(self.message())
 
     async def open(self, page: str, file_id: str, how: RadarReading) -> RadarOpened:
         """Raises NotFoundError, RadarDataError; JobCancelledError when the page asks for something else meanwhile."""

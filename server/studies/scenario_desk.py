@@ -14,16 +14,16 @@ from server.library.shelf import utc_now
 from server.library.whole_files import new_id
 from server.schemas import (
     ErrorDoc,
+    Pages,
     RunScenario,
     ScenarioDoc,
     ScenarioResultDoc,
     ScenarioRunDoc,
     ScenarioRunsMessage,
-    ServerMessage,
 )
 from server.studies import scenario_task
-from server.work.job_board import Spawn
 from server.work.jobs import Lane
+from server.work.task_group import Background
 from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, scenario_named
 
 log = logging.getLogger("hedgehop.scenarios")
@@ -53,18 +53,17 @@ def scenario_docs() -> list[ScenarioDoc]:
 
 
 class ScenarioDesk:
-    """All methods belong to the event loop; ``tell`` reaches all pages, ``armed`` says whether a vehicle is."""
+    """All methods belong to the event loop."""
 
     def __init__(
         self,
         shelf: ScenarioShelf,
+        pages: Pages,
+        background: Background,
         *,
-        tell: Callable[[ServerMessage], None],
-        armed: Callable[[], bool],
-        spawn: Spawn,
         fly: Callable[..., Any] = scenario_task.fly,
     ) -> None:
-        self._shelf, self._tell, self._armed, self._spawn, self._fly = shelf, tell, armed, spawn, fly
+        self._shelf, self._pages, self._background, self._fly = shelf, pages, background, fly
         self._lane = Lane("scenarios", niceness=NICENESS)
         self._now: ScenarioRunDoc | None = None
         """The one that runs."""
@@ -80,8 +79,8 @@ class ScenarioDesk:
         present = [run for run in (self._now, self._last) if run is not None]
         return ScenarioRunsMessage(runs=[*present, *self._shelf.runs()])
 
-    def run(self, body: RunScenario) -> ScenarioRunDoc:
-        """Raises NotFoundError, ConflictError, BusyError."""
+    def run(self, body: RunScenario, *, armed: bool) -> ScenarioRunDoc:
+        """``armed``: a vehicle is. Raises NotFoundError, ConflictError, BusyError."""
         if body.name not in NAMES:
             raise NotFoundError(f"There is no scenario {body.name!r}.", advice=f"Choose one of {', '.join(NAMES)}.")
         if scenario_named(body.name).hours:
@@ -90,7 +89,7 @@ class ScenarioDesk:
                 where="scenarios",
                 advice=f"Run it on the command line: hedgehop scenario {body.name}.",
             )
-        if self._armed():
+        if armed:
             raise ConflictError(IN_FLIGHT.what, where=IN_FLIGHT.where, advice=IN_FLIGHT.advice)
         if self._now is not None:
             raise BusyError(f"{self._now.name} is running.", advice="Let it finish, or cancel it.")
@@ -98,8 +97,8 @@ class ScenarioDesk:
         self._now = ScenarioRunDoc(
             id=new_id(), name=body.name, seed=body.seed, started_utc=utc_now(), state="running", step="Starting"
         )
-        self._spawn(self._run(self._now))
-        self._tell(self.message())
+        self._background.spawn(self._run(self._now))
+        self._pages.publish(self.message())
         return self._now
 
     def cancel(self, run_id: str) -> None:
@@ -121,7 +120,7 @@ class ScenarioDesk:
     async def delete(self, run_id: str) -> None:
         """Raises NotFoundError."""
         await asyncio.to_thread(self._shelf.delete, run_id)
-        self._tell(self.message())
+        self._pages.publish(self.message())
 
     async def _run(self, run: ScenarioRunDoc) -> None:
         began_s = time.monotonic()
@@ -138,7 +137,7 @@ class ScenarioDesk:
             self._last = run.model_copy(update={"state": "failed", "step": "", "error": doc})
         finally:
             self._now = None
-            self._tell(self.message())
+            self._pages.publish(self.message())
 
     def _progress(self, step: str, share: float | None) -> None:
         if self._now is None:
@@ -147,4 +146,4 @@ class ScenarioDesk:
         now_s = time.monotonic()
         if now_s - self._told_mono_s >= TOLD_EVERY_S:
             self._told_mono_s = now_s
-            self._tell(self.message())
+            self._pages.publish(self.message())

@@ -17,9 +17,10 @@ from server.errors import reported
 from server.library import Library
 from server.schemas import UwbLiveDoc
 from server.traversability.traversability_desk import TraversabilityDesk
+from telemetry.bus import Bus
 from telemetry.perception.uwb_drive import UwbDrive
 from telemetry.sensors.uwb_log import write_uwb_log
-from telemetry.topics.messages import VehicleText
+from telemetry.topics.messages import Topic, VehicleText
 from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.uwb")
@@ -35,20 +36,18 @@ WARNING, INFO = 4, 6
 
 
 class LiveUwb:
-    """All methods belong to the event loop. ``tell_pilot``: among what the vehicle itself says."""
+    """All methods belong to the event loop."""
 
     def __init__(
         self,
         desk: TraversabilityDesk,
         library: Library,
+        bus: Bus,
         *,
-        tell_pilot: Callable[[VehicleText], None],
         now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._desk, self._library, self._tell_pilot, self._now = desk, library, tell_pilot, now_mono_s
+        self._desk, self._library, self._bus, self._now = desk, library, bus, now_mono_s
         self.params = UwbParams()
-        desk.forgotten = self.clear
-        desk.live_params = self.set_params
         self._wanted = asyncio.Event()
         self._fresh()
 
@@ -141,7 +140,8 @@ class LiveUwb:
         self._is_silent = not self._is_silent
         words = f"No scans for {SILENT_S:g} s." if self._is_silent else "It scans again."
         severity = WARNING if self._is_silent else INFO
-        self._tell_pilot(VehicleText(time.time(), severity, f"{self._drive.source}: UWB radar: {words}"))
+        # Among what the vehicle itself says.
+        self._bus.publish(Topic.TEXT, VehicleText(time.time(), severity, f"{self._drive.source}: UWB radar: {words}"))
 
     def _doc(self, now_s: float) -> UwbLiveDoc:
         if not self._heard:

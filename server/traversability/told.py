@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.scene.geometry.payload import OverlayScene, SiteMark
-from server.schemas import ServerMessage, TraversabilityMessage, TraversabilityState, UwbLiveDoc, ViewDoc
+from server.schemas import Pages, TraversabilityMessage, TraversabilityState, UwbLiveDoc, ViewDoc
 from server.traversability.legend import legend_of
 from server.traversability.task import Worked
 
@@ -38,16 +38,11 @@ class Kept:
 
 
 class Told:
-    """``show`` puts a layer and landing sites into the 3D view; ``tell`` reaches all pages."""
+    """``show`` puts a layer and landing sites into the 3D view."""
 
-    def __init__(
-        self,
-        *,
-        view: Callable[[], ViewDoc],
-        tell: Callable[[ServerMessage], None],
-        show: Callable[[OverlayScene | None, tuple[SiteMark, ...]], None],
-    ) -> None:
-        self._view, self._tell, self._show = view, tell, show
+    def __init__(self, pages: Pages, *, show: Callable[[OverlayScene | None, tuple[SiteMark, ...]], None]) -> None:
+        self._pages, self._show = pages, show
+        self.view = ViewDoc()
         self.kept: Kept | None = None
         self.live = UwbLiveDoc()
         """Whatever becomes of the map, the radar does as it does."""
@@ -67,14 +62,14 @@ class Told:
 
     def publish(self) -> None:
         """The legend goes with the layer on show."""
-        view = self._view()
+        view = self.view
         legend = legend_of(view.traversability_layer, with_radar=bool(self.state.uwb_log))
         shown = legend if self.kept is not None else ()
         texts, colors = [each.text for each in shown], [each.color for each in shown]
         self.state = self.state.model_copy(update={"legend": texts, "legend_colors": colors, "live": self.live})
         if self.state != self._last:
             self._last = self.state
-            self._tell(self.message())
+            self._pages.publish(self.message())
         self._draw(view)
 
     def _draw(self, view: ViewDoc) -> None:

@@ -17,7 +17,7 @@ from server.schemas import (
     LandingSiteDoc,
     LandingSitesBody,
     LayerName,
-    ServerMessage,
+    Pages,
     TraversabilityBody,
     TraversabilityMessage,
     TraversabilityState,
@@ -43,7 +43,7 @@ def _said(worked: Worked, sites: list[LandingSiteDoc]) -> str:
 class TraversabilityDesk:
     """One map at a time, that of the open model. All methods belong to the event loop.
 
-    ``show`` puts a layer and landing sites into the 3D view; ``tell`` reaches all pages.
+    ``show`` puts a layer and landing sites into the 3D view.
     """
 
     def __init__(
@@ -51,23 +51,16 @@ class TraversabilityDesk:
         library: Library,
         board: JobBoard,
         lane: Lane,
+        pages: Pages,
         *,
-        terrain_id: Callable[[], str | None],
-        view: Callable[[], ViewDoc],
-        tell: Callable[[ServerMessage], None],
         show: Callable[[OverlayScene | None, tuple[SiteMark, ...]], None],
     ) -> None:
         self._library, self._board, self._lane = library, board, lane
-        self._terrain_id = terrain_id
-        self._told = Told(view=view, tell=tell, show=show)
-        self._open: str | None = None
-        """The surface model whose maps are known, or are being worked out."""
+        self._told = Told(pages, show=show)
+        self.open_terrain_id: str | None = None
+        """Its maps are known, or are being worked out."""
         self._jobs: dict[str, str] = {}
         """Those that run or wait, in their order, and what each does."""
-        self.forgotten: Callable[[], None] = lambda: None
-        """Called when operators put the maps away."""
-        self.live_params: Callable[[UwbParams], None] = lambda params: None
-        """Called with how live scans are to be fused."""
 
     @property
     def state(self) -> TraversabilityState:
@@ -128,18 +121,13 @@ class TraversabilityDesk:
         return await self._lane.call(task.layer_file, kept.file, layer)
 
     def forget(self) -> None:
-        """Nothing is kept any more, nor of live scans; what is being worked out is cancelled."""
+        """Nothing is kept any more; what is being worked out is cancelled."""
         self._close()
-        self.forgotten()
-        directory = self._folder(self._terrain_id())
+        directory = self._folder(self.open_terrain_id)
         if directory is not None:
             kept_in(directory).unlink(missing_ok=True)
 
     # A radar that scans now
-
-    @property
-    def open_terrain_id(self) -> str | None:
-        return self._terrain_id()
 
     def tell_live(self, live: UwbLiveDoc) -> None:
         self._told.live = live
@@ -156,7 +144,7 @@ class TraversabilityDesk:
 
         async def work(lane: Lane) -> None:
             worked = await lane.call(task.clear_foliage, directory, source, target, log, name, params)
-            if self._terrain_id() == terrain_id and self._told.kept is kept:
+            if self.open_terrain_id == terrain_id and self._told.kept is kept:
                 self._take(Kept(terrain_id, keep(target, directory), worked))
                 await asyncio.to_thread(settle, directory)
 
@@ -167,19 +155,19 @@ class TraversabilityDesk:
 
     # What else changes
 
-    def on_document(self) -> None:
+    def on_document(self, present: str | None) -> None:
         """Another surface model may be open now: what is kept of it is read again."""
-        present = self._terrain_id()
-        if present == self._open:
+        if present == self.open_terrain_id:
             return
-        self._open = present
+        self.open_terrain_id = present
         self._close()
         directory = self._folder(present)
         if present is not None and directory is not None and kept_in(directory).is_file():
             self._read_again(present, kept_in(directory))
 
-    def on_view(self) -> None:
+    def on_view(self, view: ViewDoc) -> None:
         """Another layer, or none, is to be shown."""
+        self._told.view = view
         self._told.publish()
 
     # How
@@ -280,11 +268,9 @@ class TraversabilityDesk:
         return {"state": "working", "text": next(iter(self._jobs.values()))} if self._jobs else {}
 
     def _open_terrain(self) -> str:
-        terrain_id = self._terrain_id()
-        if terrain_id is None:
+        if self.open_terrain_id is None:
             raise NotReadyError("There is no surface model open.", advice="Add one, or open a plan that has one.")
-        self._open = terrain_id
-        return terrain_id
+        return self.open_terrain_id
 
     def _need(self) -> Kept:
         if self._told.kept is None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from typing import Any, TypeVar
 
 from server.errors import BusyError, JobCancelledError, NotFoundError, reported
-from server.schemas import JobDoc, JobMessage, ServerMessage
+from server.schemas import JobDoc, JobMessage, Pages
 from server.work.jobs import Lane, Progress
+from server.work.task_group import Background
 
 log = logging.getLogger("hedgehop.jobs")
 
@@ -19,7 +20,6 @@ WAITING_MAX = 20
 """Each may hold an upload of the largest size on the disk."""
 
 T = TypeVar("T")
-Spawn = Callable[[Coroutine[Any, Any, None]], "asyncio.Task[Any]"]
 Work = Callable[[Lane, Progress], Awaitable[object]]
 
 
@@ -33,12 +33,12 @@ class JobBoard:
     def __init__(
         self,
         lane: Lane,
+        pages: Pages,
+        background: Background,
         *,
-        publish: Callable[[ServerMessage], None],
-        spawn: Spawn,
         kept_after_end_s: float = KEPT_AFTER_END_S,
     ) -> None:
-        self._lane, self._publish, self._spawn = lane, publish, spawn
+        self._lane, self._pages, self._background = lane, pages, background
         self._kept_after_end_s = kept_after_end_s
         self._jobs: dict[str, JobDoc] = {}
         self._turn = asyncio.Lock()
@@ -60,7 +60,7 @@ class JobBoard:
             clean()
             raise BusyError(f"{WAITING_MAX} jobs are waiting already.", advice="Let them finish, or cancel some.")
         job = JobDoc(id=secrets.token_hex(8), label=label, state="running", step="Waiting")
-        self._waiting[job.id] = self._spawn(self._run(job.id, label, work, clean))
+        self._waiting[job.id] = self._background.spawn(self._run(job.id, label, work, clean))
         self._set(job)
         return job
 
@@ -135,4 +135,4 @@ class JobBoard:
 
     def _set(self, job: JobDoc) -> None:
         self._jobs[job.id] = job
-        self._publish(JobMessage(job=job))
+        self._pages.publish(JobMessage(job=job))

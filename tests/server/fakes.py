@@ -44,6 +44,13 @@ from server.schemas import (
 )
 
 
+class Told(list[Any]):
+    """Pages that keep what they are told."""
+
+    def publish(self, message: ServerMessage) -> None:
+        self.append(message)
+
+
 def plan_state(revision: int = 1, document: PlanDoc | None = None) -> PlanState:
     return PlanState(
         plan_id="p1",
@@ -197,8 +204,8 @@ class FakeFlying:
         self.obstacles = _Asked(self.asked)
         self.published: list[tuple[str, Any]] = []
         self.agents = Agents(self)
-        self.armed = False
-        self.on_armed: Callable[[], None] = lambda: None
+        self.live = SimpleNamespace(armed=False)
+        self.uwb = SimpleNamespace(clear=lambda: self.asked.append(("clear",)), set_params=lambda params: None)
         self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
 
     def publish(self, topic: str, message: Any) -> None:

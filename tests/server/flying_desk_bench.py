@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from server.flying.flight_desk import FlightDesk
 from server.flying.work import FlightWork
+from server.heard.onboard import Aboard
 from server.library import Library
 from server.plan import demo, tasks
 from server.plan.file_tasks import make_demo_terrain
-from server.schemas import Computation, FlyState, PlanState, ServerMessage
+from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMessage
 from server.work.jobs import Lane
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
@@ -107,28 +109,31 @@ class Made:
 
 
 class Bench:
+    """Stands for all that hangs on the desk, but for the vehicle."""
+
     def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane]) -> None:
         self.vehicle, self.plan = Vehicle(), made.plan()
-        self.state: VehicleState | None = made.standing()
-        self.avoidance = AvoidanceStatus()
+        self.plan_lane = lanes[0]
+        self.live = SimpleNamespace(state=made.standing())
+        self.watch = SimpleNamespace(avoidance=AvoidanceStatus())
         self.told: list[FlyState] = []
         self.records: list[PlanRecord] = []
-        work = FlightWork(
-            made.library, self.vehicle, present_plan=lambda: self.plan, plan_lane=lanes[0], flight_lane=lanes[1]
-        )
-        self.desk = FlightDesk(
-            self.vehicle,
-            work,
-            file=file,
-            present_document=lambda: self.plan.document,
-            vehicle=lambda: self.state,
-            tell=self._tell,
-            publish_plan=self.records.append,
-            avoidance=lambda: self.avoidance,
-        )
+        me: Any = self
+        work = FlightWork(made.library, me.vehicle, me, lanes[1])
+        bus: Any = SimpleNamespace(publish=lambda topic, record: self.records.append(record))
+        self.aboard = Aboard(file)
+        self.desk = FlightDesk(me.vehicle, work, self.aboard, me, me.live, me.watch, bus, self)
         self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
 
-    def _tell(self, message: ServerMessage) -> None:
+    @property
+    def document(self) -> PlanDoc:
+        return self.plan.document
+
+    @property
+    def state(self) -> PlanState:
+        return self.plan
+
+    def publish(self, message: ServerMessage) -> None:
         assert message.type == "fly"
         self.told.append(message.fly)
 

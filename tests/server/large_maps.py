@@ -15,6 +15,7 @@ import viser
 from mapping.geometry.arrays import I32
 from server.obstacles import drawing
 from server.obstacles.drawing import PERIOD_S, MapDrawing
+from server.scene.geometry.canvas import Canvas
 from server.scene.layers.sights import MapLook, Sights
 from server.scene.mirror import ChunkKey, MapMirror, Voxels
 from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin
@@ -36,7 +37,7 @@ class Clock:
         return self.now_s
 
 
-class CountingStage:
+class CountingStage(Sights):
     """A real stage, and how many boxes stand on it."""
 
     def __init__(self, sights: Sights) -> None:
@@ -50,7 +51,7 @@ class CountingStage:
     def draw_cloud(self, source: Any, look: Any) -> None:
         raise AssertionError("maps only")
 
-    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
+    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any = None) -> None:
         raise AssertionError("maps only")
 
     def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
@@ -101,7 +102,7 @@ def painting() -> Iterator[Painter]:
     clock = Clock()
     try:
         on, placing = placed()
-        sights = Sights(server, lambda layers: None)
+        sights = Sights(server, Canvas(server))
         sights.redraw(on)
         stage = CountingStage(sights)
         with patch.object(drawing, "time", clock):

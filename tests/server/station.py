@@ -25,7 +25,8 @@ from server.schemas import (
     ServerMessage,
     Snapshot,
 )
-from server.wiring import make_workspace, open_flying
+from server.stations import Flying
+from server.workspace import Workspace
 from tests.server.running import Running, fake_flying, running
 
 PATIENCE_S = 90.0
@@ -116,8 +117,8 @@ def station(data_dir: Path, *, demo: bool = False, flies: bool = False, **overri
     The demo's vehicle meets no obstacles unless ``demo_world=True`` is given.
     """
     overrides.setdefault("demo_world", False)
-    flying = open_flying if flies else fake_flying
-    with running(data_dir, make=make_workspace, flying=flying, demo=demo, **overrides) as server:
+    flying = Flying.open if flies else fake_flying
+    with running(data_dir, make=Workspace, flying=flying, demo=demo, **overrides) as server:
         server.http.timeout = httpx.Timeout(PATIENCE_S)
         with server.socket() as socket:
             yield Station(server, socket)

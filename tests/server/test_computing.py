@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -83,7 +84,8 @@ class Bench:
 
     def __init__(self, lane: Lane, terrain_dir: Callable[[str], Path], **delays: float) -> None:
         self._changed = asyncio.Event()
-        self.computing = Computing(lane, terrain_dir=terrain_dir, changed=self._changed.set, **delays)
+        library: Any = SimpleNamespace(terrain_dir=terrain_dir)
+        self.computing = Computing(lane, library, changed=self._changed.set, **delays)
 
     async def until(self, fits: Callable[[Computation], bool]) -> Computation:
         async with asyncio.timeout(60):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -13,6 +14,7 @@ from server.heard.ground_task import Ground
 from server.heard.node_states import SIMULATED_SENSORS, Nodes
 from server.settings import load_settings
 from telemetry.topics.vehicle import RadarKind
+from tests.server.fakes import Told
 
 
 @pytest.mark.parametrize("kind", ["model", "iq"])
@@ -22,7 +24,7 @@ def test_the_sensors_node_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     async def start(name: str, arguments: Sequence[str]) -> None:
         started.append((name, arguments))
 
-    nodes = Nodes(tmp_path, tmp_path, lambda message: None, demo_radar=kind)
+    nodes = Nodes(cast(Any, None), tmp_path, tmp_path, Told(), demo_radar=kind)
     monkeypatch.setattr(nodes.supervisor, "start", start)
     asyncio.run(nodes.simulated_sensors(Ground(tmp_path / "ground.tif", 0.0, 0.0, 0.0), tmp_path / "world.json"))
     (name, arguments), = started  # fmt: skip

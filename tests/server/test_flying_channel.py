@@ -8,9 +8,10 @@ from dataclasses import replace
 
 from server.heard.channel import Channel
 from server.heard.present import Present
-from server.schemas import FlightMessage, ServerMessage, TextMessage, TrackMessage, VehicleMessage
+from server.schemas import FlightMessage, TextMessage, TrackMessage, VehicleMessage
 from telemetry.topics.messages import FlightStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
 
 STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0, position_t_mono_s=0.0)
 
@@ -20,9 +21,9 @@ class Bench:
 
     def __init__(self) -> None:
         self.now_s = 100.0
-        self.told: list[ServerMessage] = []
-        self.present = Present(self.told.append)
-        self.channel = Channel("live", self.present.tell, now_mono_s=lambda: self.now_s)
+        self.told = Told()
+        self.present = Present(self.told)
+        self.channel = Channel("live", self.present, now_mono_s=lambda: self.now_s)
 
     def vehicles(self) -> list[VehicleMessage]:
         return [message for message in self.told if isinstance(message, VehicleMessage)]
@@ -137,7 +138,7 @@ def test_a_page_that_opens_later_is_told_the_present_and_the_last_words() -> Non
 
 def test_a_closed_replay_is_forgotten_and_the_live_vehicle_is_not() -> None:
     def scenario(bench: Bench) -> None:
-        replayed = Channel("replay", bench.present.tell, now_mono_s=lambda: bench.now_s)
+        replayed = Channel("replay", bench.present, now_mono_s=lambda: bench.now_s)
         for channel in (bench.channel, replayed):
             channel.on_state(STATE)
             channel.on_text(VehicleText(0.0, 6, "Hello"))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -30,12 +31,14 @@ class Link:
             raise error
 
 
-async def _started() -> None:
-    """The link node is there."""
+class Nodes:
+    async def link(self) -> None:
+        """It is there."""
 
 
 def connections(link: Link, *configured: str) -> Connections:
-    return Connections(link, need_link=_started, server_operator=lambda: SERVER, configured=configured)
+    lease: Any = SimpleNamespace(server_operator=lambda: SERVER)
+    return Connections(cast(Any, link), cast(Any, Nodes()), lease, configured=configured)
 
 
 def status(*addresses: str, adopted: Candidate | None = None, candidates: tuple[Candidate, ...] = ()) -> LinkStatus:

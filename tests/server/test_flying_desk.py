@@ -124,7 +124,7 @@ def test_another_home_moves_the_heights(
     async def scenario() -> None:
         bench = Bench(made, tmp_path / "onboard.json", both)
         before = (await bench.desk.upload(ME, 3)).onboard.digest
-        bench.state = made.standing(north_m=14.0)
+        bench.live.state = made.standing(north_m=14.0)
         state = await bench.desk.check(ME)
         assert state.preflight is not None
         assert state.preflight.rereferenced
@@ -139,7 +139,7 @@ def test_another_home_moves_the_heights(
         assert row.state == "good"
         assert "heights were moved" in row.text
         await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
-        bench.state = made.standing(north_m=20.0)
+        bench.live.state = made.standing(north_m=20.0)
         with pytest.raises(CheckNeededError, match="was moved"):
             await bench.desk.start(ME, StartFlight(digest=state.onboard.digest or ""))
 
@@ -172,10 +172,10 @@ def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(
         bench.desk.on_link(status(digest_))
         await bench.desk.check(ME)
         # Its home is where it took off last; what counts is where it stands.
-        bench.state = replace(made.standing(), lat_deg=made.home[0] + 1e-4)
+        bench.live.state = replace(made.standing(), lat_deg=made.home[0] + 1e-4)
         with pytest.raises(CheckNeededError, match="was moved"):
             await bench.desk.start(ME, StartFlight(digest=digest_))
-        bench.state = replace(made.standing(), autopilot="px4")
+        bench.live.state = replace(made.standing(), autopilot="px4")
         with pytest.raises(NotAllowedError, match="made for ArduPilot"):
             await bench.desk.check(ME)
 
@@ -187,7 +187,7 @@ def test_what_must_be_accepted_is_not_flown_without(
 ) -> None:
     async def scenario() -> None:
         bench = Bench(made, tmp_path / "onboard.json", both)
-        bench.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
+        bench.live.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
         digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
         state = await bench.desk.check(ME)
         assert state.preflight is not None
@@ -195,7 +195,7 @@ def test_what_must_be_accepted_is_not_flown_without(
         with pytest.raises(CheckNeededError, match="GNSS"):
             await bench.desk.start(ME, StartFlight(digest=digest_))
         await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss"]))
-        bench.state = replace(made.standing(), gnss_fix="no_fix")
+        bench.live.state = replace(made.standing(), gnss_fix="no_fix")
         await bench.desk.check(ME)
         with pytest.raises(CheckNeededError, match="no fix"):
             await bench.desk.start(ME, StartFlight(digest=digest_, accept=["gnss", "battery", "rtl_height"]))
@@ -214,7 +214,7 @@ def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
         bench = Bench(made, tmp_path / "onboard.json", both)
         start = StartFlight(digest=await bench.ready())
         assert row_of(bench).text.startswith("Avoidance is off")
-        bench.avoidance = AvoidanceStatus(enabled=True, state="blind")
+        bench.watch.avoidance = AvoidanceStatus(enabled=True, state="blind")
         bench.desk.refresh()
         assert row_of(bench).state == "accept"
         shown = bench.told[-1].preflight
@@ -222,10 +222,10 @@ def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
         assert shown.rows[-1] == row_of(bench)
         with pytest.raises(CheckNeededError, match="no sensor sees ahead"):
             await bench.desk.start(ME, start)
-        bench.avoidance = replace(bench.avoidance, state="watching", eyes=(Eye("radar", 1.0, 30.0, 9.0),))
+        bench.watch.avoidance = replace(bench.watch.avoidance, state="watching", eyes=(Eye("radar", 1.0, 30.0, 9.0),))
         assert row_of(bench).state == "good"
         await bench.desk.start(ME, start)
-        bench.avoidance = replace(bench.avoidance, state="blind", eyes=())
+        bench.watch.avoidance = replace(bench.watch.avoidance, state="blind", eyes=())
         await bench.desk.start(ME, start.model_copy(update={"accept": ["avoidance"]}))
 
     runner.run(scenario())
@@ -287,7 +287,7 @@ def test_one_thing_at_a_time_but_commands_always(
         await bench.desk.command(Arm(ME))
         assert bench.vehicle.told == [Arm(ME)]
         await first
-        bench.state = None
+        bench.live.state = None
         with pytest.raises(NoVehicleError):
             await bench.desk.check(ME)
 

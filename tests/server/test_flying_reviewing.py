@@ -12,9 +12,13 @@ from server.flying.review import review
 from server.flying.review_task import Reviewed
 from server.flying.reviewing import Reviewing
 from server.heard.channel import Channel
+from server.heard.present import Present
+from server.obstacles.moving_objects import TracksWatch
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import OpenReview, PlanDoc
 from telemetry.topics.messages import ReplayStatus
 from telemetry.topics.requests import OpenRecording, ReplayRequest
+from tests.server.fakes import Told
 from tests.server.flight_logs import START_UTC_S, log_of, positions
 from tests.server.test_review import RECORDING
 
@@ -35,7 +39,7 @@ class Surroundings:
     def show_review(self, terrain_id: str | None, scene: object) -> None:
         """Nothing to see."""
 
-    async def ask(self, request: ReplayRequest) -> None:
+    async def ask_replay(self, request: ReplayRequest) -> None:
         self.asked.append(request)
 
     async def run(self, label: str, work: object) -> Any:
@@ -43,18 +47,12 @@ class Surroundings:
 
 
 def test_it_is_opened_again_by_a_node_that_has_lost_it_and_not_for_a_status_from_before() -> None:
-    around = Surroundings()
-    channel = Channel("replay", lambda message: None)
-    reviewing = Reviewing(
-        cast(Any, None),
-        cast(Any, around),
-        cast(Any, around),
-        channel,
-        ask=around.ask,
-        run=cast(Any, around.run),
-        tell=lambda message: None,
-        forget=lambda: None,
-    )
+    around: Any = Surroundings()
+    present = Present(Told())
+    watch = Watch("replay", present)
+    tracks = TracksWatch("replay", present, watch)
+    channel = Channel("replay", present)
+    reviewing = Reviewing(cast(Any, None), around, around, channel, around, around, watch, tracks, present)
 
     async def act() -> None:
         before_s = time.monotonic()

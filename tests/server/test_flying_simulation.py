@@ -46,6 +46,9 @@ class Nodes:
     def __init__(self) -> None:
         self.running: str | None = None
 
+    async def link(self) -> None:
+        """The link node is there."""
+
     async def simulator_link(self) -> str | None:
         return self.running
 
@@ -66,19 +69,19 @@ class Station:
 
     def __init__(self, folder: Path, link: Link) -> None:
         self.link, self.nodes = link, Nodes()
-        self.connections = Connections(link, need_link=self._started, server_operator=lambda: SERVER)
+        self.connections = Connections(
+            cast(Any, link), cast(Any, self.nodes), cast(Any, SimpleNamespace(server_operator=lambda: SERVER))
+        )
         self.simulation = Simulation(
             cast(Any, SimpleNamespace(terrain_dir=Path)),
             cast(Any, SimpleNamespace(document=PlanDoc(terrain_id="t"), planned_home=(37.0, 15.0))),
             cast(Any, self.nodes),
             self.connections,
+            cast(Any, None),
             cast(Any, Lane()),
             folder,
             demo_world=False,
         )
-
-    async def _started(self) -> None:
-        """The link node is there."""
 
     async def hear(self) -> None:
         await self.connections.on_status(self.link.status)

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.flying.onboard import rounded_note
 from server.heard.channel import Pace
 from server.heard.flown_track import POINTS_MAX, Track
+from server.heard.onboard import rounded_note
 from server.library.terrain_of import FlownOver, covers, terrain_of
 from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
 from telemetry.topics.messages import Rounded

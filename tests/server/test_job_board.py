@@ -32,10 +32,10 @@ class Board:
     def __init__(self, lane: Lane, background: Background, kept_after_end_s: float) -> None:
         self.told: list[JobDoc] = []
         self._news = asyncio.Event()
-        self.board = JobBoard(lane, publish=self._publish, spawn=background.spawn, kept_after_end_s=kept_after_end_s)
+        self.board = JobBoard(lane, self, background, kept_after_end_s=kept_after_end_s)
         self.cleaned: list[str] = []
 
-    def _publish(self, message: ServerMessage) -> None:
+    def publish(self, message: ServerMessage) -> None:
         assert isinstance(message, JobMessage)
         self.told.append(message.job)
         self._news.set()

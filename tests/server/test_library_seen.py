@@ -12,7 +12,7 @@ from planning.terrain.dsm import Dsm
 from server.errors import NotFoundError, NotReadyError, StorageError
 from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain, load_seen
 from server.library.terrains import store_terrain
-from server.plan.seen_task import keep_seen
+from server.plan.tasks import keep_seen
 from server.scene.mirror import MapMirror, Voxels
 from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import delta

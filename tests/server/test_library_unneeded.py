@@ -11,7 +11,7 @@ import pytest
 
 from planning.evading.seen import Columns
 from server.errors import StorageError
-from server.flying.onboard import onboard, write_onboard
+from server.heard.onboard import Aboard, onboard
 from server.library import Library
 from server.library import library as whole_library
 from server.library.history import History
@@ -76,7 +76,9 @@ def test_that_of_the_mission_on_board_stays_without_its_plan(data: Data) -> None
         0.0, "Hill", "", "", "ardupilot", data.terrain_id, "Hill", "", None, None, "", "",
         plan_json=data.document(flown).model_dump_json(),
     )  # fmt: skip
-    write_onboard(data.root / "onboard.json", onboard(record, 3, []))
+    aboard = Aboard(data.root / "onboard.json")
+    aboard.read_back(onboard(record, 3, []))
+    aboard.save()
     data.start()
     assert data.files == {flown}
     assert unused not in data.files

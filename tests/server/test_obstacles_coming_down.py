@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.topics.messages import GuidedTarget, PlanRecord
 from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings
 from telemetry.topics.requests import FlyRest, Operator
+from tests.server.fakes import Told
 from tests.server.test_obstacles_manoeuvre_task import planned, situation  # noqa: F401
 
 Planned = tuple[Dsm, PlanRecord, Path]
@@ -107,16 +109,19 @@ class Link:
 
 
 def run(answer: RestPlanned, *, comes_down: bool = True, error: Exception | None = None) -> tuple[Watch, list[Any]]:
-    watch = Watch("live", lambda message: None)
+    watch = Watch("live", Told())
     watch.on_settings(PerceptionSettings(comes_down=comes_down))
     watch.on_avoidance(HIGHER)
     link, plans = Link(watch, error), list[Any]()
 
-    async def plan(there: Any) -> RestPlanned:
+    async def plan(_task: Any, there: Any) -> RestPlanned:
         plans.append(there)
         return answer
 
-    down = ComingDown(watch, link, situation=lambda: object(), plan=plan, operator=lambda: Operator("server", 3))  # type: ignore[arg-type,return-value]
+    around: Any = SimpleNamespace(watch=watch, situation=object)
+    lane: Any = SimpleNamespace(call=plan)
+    lease: Any = SimpleNamespace(server_operator=lambda: Operator("server", 3))
+    down = ComingDown(around, cast(Any, link), lane, lease)
 
     async def whole() -> None:
         task = asyncio.ensure_future(down.run())

@@ -11,14 +11,15 @@ import pytest
 from server.obstacles import drawing
 from server.obstacles.drawing import Allowance, MapDrawing, fitting_detail
 from server.obstacles.obstacle_watch import Watch
-from server.scene.layers.sights import MapLook
+from server.scene.layers.sights import MapLook, Sights
 from server.scene.mirror import ChunkKey, MapMirror, Voxels
 from telemetry.topics.obstacles import MapName, MapOrigin
+from tests.server.fakes import Told
 from tests.server.obstacle_messages import ORIGIN, delta
 from tests.server.test_scene_obstacles import placed
 
 
-class FakeStage:
+class FakeStage(Sights):
     """Keeps what it was given; every chunk costs ``cost`` bytes."""
 
     def __init__(self, cost: int = 100) -> None:
@@ -26,15 +27,15 @@ class FakeStage:
         self.drawn: list[tuple[ChunkKey, int]] = []
         self.dropped = 0
         self.view: dict[str, Any] = {"with_ground": True, "visible": True}
-        self._drawing = placed()[0]
+        self._placed = placed()[0]
 
     def look(self, name: MapName, origin: MapOrigin | None) -> MapLook | None:
-        return None if origin is None else MapLook(self._drawing, origin, **self.view)
+        return None if origin is None else MapLook(self._placed, origin, **self.view)
 
     def draw_cloud(self, source: Any, look: Any) -> None:
         raise AssertionError("maps only")
 
-    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any) -> None:
+    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any = None) -> None:
         raise AssertionError("maps only")
 
     def draw_chunks(self, name: MapName, look: MapLook, chunks: Mapping[ChunkKey, Voxels | None]) -> int:
@@ -46,12 +47,11 @@ class FakeStage:
 
 
 class NoRoutes:
-    def routes(self) -> list[Any]:
-        return []
+    routes: tuple[Any, ...] = ()
 
 
 def made() -> MapDrawing:
-    watches = {source: Watch(source, lambda message: None) for source in ("live", "replay")}
+    watches = {source: Watch(source, Told()) for source in ("live", "replay")}
     return MapDrawing(None, watches, NoRoutes(), {})  # pyright: ignore[reportArgumentType]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.requests import Operator
 from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
 from tests.server.obstacle_messages import alert, approach
 
 ANNA = Operator("Anna", 3)
@@ -34,22 +36,19 @@ class Desk:
     """A watch with manoeuvres whose worker answers at once."""
 
     def __init__(self, *answers: Any) -> None:
-        self.told: list[Any] = []
-        self.watch = Watch("live", self.told.append)
+        self.told = Told()
+        self.watch = Watch("live", self.told)
+        self.live = SimpleNamespace(state=None)
+        self.situation: Any = lambda standing, moving: standing or moving
         self.answers = list(answers)
         self.asked: list[Any] = []
-        self.vehicle: VehicleState | None = None
-        self.manoeuvres = Manoeuvres(
-            self.watch, situation=self._situation, prepare=self._prepare, vehicle=lambda: self.vehicle
-        )
-
-    def _situation(self, standing: Any, moving: Any) -> Any:
-        return standing or moving
+        me: Any = self
+        self.manoeuvres = Manoeuvres(me, me)
 
     def request(self, manoeuvre_id: str) -> Any:
         return asyncio.run(self.manoeuvres.request(ANNA, manoeuvre_id))
 
-    async def _prepare(self, situation: Any) -> tuple[Prepared, ...]:
+    async def call(self, _prepare: Any, situation: Any) -> tuple[Prepared, ...]:
         self.asked.append(situation.id)
         answer = self.answers.pop(0)
         if isinstance(answer, Exception):
@@ -75,28 +74,28 @@ def _prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_way_that_begins_elsewhere_is_not_flown() -> None:
     desk = Desk((replace(prepared(), begins_lat_lon_deg=(37.7, 15.0)),))
-    desk.watch.on_alert(alert())
+    desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
-    desk.vehicle = VehicleState(1, 1, lat_deg=37.70005, lon_deg=15.0)
+    desk.live.state = VehicleState(1, 1, lat_deg=37.70005, lon_deg=15.0)
     assert desk.request("over-radar-1").kind == "over"
-    desk.vehicle = VehicleState(1, 1, lat_deg=37.7001, lon_deg=15.0)
+    desk.live.state = VehicleState(1, 1, lat_deg=37.7001, lon_deg=15.0)
     with pytest.raises(NotAllowedError, match="11 m from where"):
         desk.request("over-radar-1")
 
 
 def test_they_come_with_the_alert_and_go_with_it() -> None:
     desk = Desk((prepared("over"), prepared("around", possible=False)))
-    desk.watch.on_alert(alert())
+    desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     assert [doc.kind for doc in desk.watch.state.manoeuvres] == ["over", "around"]
-    assert [route.words for route in desk.manoeuvres.routes()] == ["Over", "Around"]
+    assert [route.words for route in desk.manoeuvres.routes] == ["Over", "Around"]
     assert desk.watch.state.busy == ""
     assert any(m.type == "obstacles" and m.obstacles.busy for m in desk.told)
     request = desk.request("over-radar-1")
     assert (request.operator, request.kind, request.rejoin_item, request.height_offset_m) == (ANNA, "over", 4, 6.0)
     with pytest.raises(NotAllowedError, match="cannot be flown"):
         desk.request("around-radar-1")
-    desk.watch.on_alert(alert(phase="ends"))
+    desk.manoeuvres.on_alert(alert(phase="ends"))
     assert desk.watch.state.manoeuvres == []
     with pytest.raises(NotFoundError, match="out of date"):
         desk.request("over-radar-1")
@@ -104,19 +103,19 @@ def test_they_come_with_the_alert_and_go_with_it() -> None:
 
 def test_a_worker_that_fails_costs_this_manoeuvre_only() -> None:
     desk = Desk(RuntimeError("broken"), (prepared(),))
-    desk.watch.on_alert(alert("a"))
+    desk.manoeuvres.on_alert(alert("a"))
     asyncio.run(desk.until(lambda: desk.asked == ["a"] and desk.watch.state.busy == ""))
     assert desk.watch.state.manoeuvres == []
-    desk.watch.on_alert(alert("b"))
+    desk.manoeuvres.on_alert(alert("b"))
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     assert desk.asked == ["a", "b"]
 
 
 def test_when_the_newest_is_over_the_one_before_counts() -> None:
     desk = Desk((prepared(),), (prepared(),))
-    desk.watch.on_alert(alert("a"))
-    desk.watch.on_alert(alert("b"))
-    desk.watch.on_alert(alert("b", "ends"))
+    desk.manoeuvres.on_alert(alert("a"))
+    desk.manoeuvres.on_alert(alert("b"))
+    desk.manoeuvres.on_alert(alert("b", "ends"))
     asyncio.run(desk.until(lambda: desk.asked))
     assert desk.asked == ["a"]
 
@@ -130,14 +129,14 @@ def side(east_m: float, text: str = "Turn.", *, possible: bool = True) -> Prepar
 def shown_with(*answers: Any) -> Desk:
     """The first answer is on show, the others come when it is flown."""
     desk = Desk(*answers)
-    desk.watch.on_alert(approach())
+    desk.manoeuvres.on_alert(approach())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     return desk
 
 
 def test_a_sidestep_is_made_anew_at_the_moment_it_is_flown() -> None:
     desk = shown_with((side(5.0),), (side(9.0, "Turn more."),))
-    assert desk.manoeuvres.routes()[0].kind == "sidestep"
+    assert desk.manoeuvres.routes[0].kind == "sidestep"
     request = desk.request("sidestep-t7")
     assert (request.kind, request.rejoin_item) == ("sidestep", None)
     assert desk.asked == ["t7", "t7"]
@@ -163,9 +162,9 @@ def test_a_sidestep_that_is_not_possible_any_more_is_not_flown() -> None:
 def test_what_stands_and_what_moves_are_served_together() -> None:
     pairs: list[tuple[Any, Any]] = []
     desk = Desk((prepared(), side(5.0)), (prepared(), side(5.0)))
-    desk.manoeuvres._situation = lambda *both: pairs.append(both) or both[0]  # pyright: ignore[reportPrivateUsage]
-    desk.watch.on_alert(approach())
-    desk.watch.on_alert(alert("wall"))
+    desk.situation = lambda *both: pairs.append(both) or both[0]
+    desk.manoeuvres.on_alert(approach())
+    desk.manoeuvres.on_alert(alert("wall"))
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     assert [each.id for each in pairs[0]] == ["wall", "t7"]
     assert [doc.kind for doc in desk.watch.state.manoeuvres] == ["over", "sidestep"]
@@ -174,8 +173,8 @@ def test_what_stands_and_what_moves_are_served_together() -> None:
 @pytest.mark.parametrize("kind", ["sensor", "divergence"])
 def test_what_stands_nowhere_is_not_avoided(kind: str) -> None:
     desk = Desk()
-    desk.watch.on_alert(alert(kind=kind))
-    assert desk.manoeuvres.routes() == []
+    desk.manoeuvres.on_alert(alert(kind=kind))
+    assert desk.manoeuvres.routes == []
     assert desk.asked == []
 
 
@@ -183,8 +182,8 @@ def test_while_the_vehicle_climbs_by_itself_nothing_is_prepared() -> None:
     desk = Desk()
     desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
     asked: list[str] = []
-    desk.manoeuvres._situation = lambda standing, moving: asked.append(standing.id) or standing  # pyright: ignore[reportPrivateUsage]
-    desk.watch.on_alert(alert())
+    desk.situation = lambda standing, moving: asked.append(standing.id) or standing
+    desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: asked))
     assert desk.asked == []
 
@@ -193,16 +192,16 @@ def test_while_the_vehicle_climbs_by_itself_nothing_is_prepared() -> None:
 def test_where_avoidance_stands_and_waits_ways_out_are_offered(state: str) -> None:
     desk = Desk((prepared(),))
     desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state=state))  # pyright: ignore[reportArgumentType]
-    desk.watch.on_alert(alert())
+    desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     assert len(desk.watch.state.manoeuvres) == 1
 
 
 def test_those_on_show_go_when_the_vehicle_begins_to_climb_by_itself() -> None:
     desk = Desk((prepared(),), (prepared(),))
-    desk.watch.on_alert(alert("a"))
+    desk.manoeuvres.on_alert(alert("a"))
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
-    desk.watch.on_alert(alert("b"))
+    desk.manoeuvres.on_alert(alert("b"))
     asyncio.run(desk.until(lambda: not desk.manoeuvres.prepared))
     assert desk.watch.state.manoeuvres == []

@@ -11,18 +11,23 @@ import pytest
 from mapping.sensor_frames import packed
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.section import MOST_CELLS, Looking, level_axis, placed_status, sliced
+from server.scene.layers.sights import Sights
 from server.scene.mirror import MapMirror
 from server.schemas import SectionAsked
 from telemetry.topics.looks import RadarLook
 from telemetry.topics.obstacles import MapOrigin
+from tests.server.fakes import Told
 from tests.server.obstacle_messages import ORIGIN, delta, status
 
 NORTH = level_axis(0.0)
 HERE = np.array([0.5, 0.5, 5.0])
 
 
-class Slope:
+class Slope(Sights):
     """Rises by 1 in 10 to the north; unknown beyond 30 m."""
+
+    def __init__(self) -> None:
+        """Nothing else is seen."""
 
     def ground_up_m(self, origin: MapOrigin, enu_m: np.ndarray) -> np.ndarray:
         assert origin == ORIGIN
@@ -30,7 +35,7 @@ class Slope:
 
 
 def watching() -> Watch:
-    return Watch("live", lambda message: None)
+    return Watch("live", Told())
 
 
 def mirror_of(keys: list[tuple[int, int, int]], explained: list[int] | None = None) -> MapMirror:

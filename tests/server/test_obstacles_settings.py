@@ -16,6 +16,7 @@ from server.obstacles.obstacle_watch import Watch
 from server.schemas import ObstaclesState, PerceptionSettingsBody
 from telemetry.perception import sensor_kinds
 from telemetry.topics.obstacles import PerceptionSettings
+from tests.server.fakes import Told
 
 GB = 1_000_000_000
 
@@ -26,19 +27,23 @@ class Desk:
     def __init__(self, root: Path) -> None:
         self.root, self.published = root, list[PerceptionSettings]()
         nobody = cast(Any, None)
-        watch = Watch("live", lambda message: None)
+        watch = Watch("live", Told())
         self.desk = ObstacleDesk(
             root,
             {"live": watch},
             nobody,
             nobody,
             nobody,
-            lane=nobody,
-            underway=nobody,
-            publish_settings=self.published.append,
-            server_operator=nobody,
-            looking=nobody,
+            nobody,
+            nobody,
+            nobody,
+            nobody,
+            cast(Any, self),
         )
+
+    def publish(self, topic: str, settings: PerceptionSettings) -> None:
+        """As the bus does."""
+        self.published.append(settings)
 
     def change(self, **fields: Any) -> ObstaclesState:
         return asyncio.run(self.desk.change_settings(PerceptionSettingsBody(**fields)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 from server.door.hub import key_of
@@ -13,6 +14,7 @@ from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import DEAD_S
 from server.obstacles.sensor_nodes import SensorNodes
 from server.schemas import TracksMessage
+from tests.server.fakes import Told
 from tests.server.track_messages import tracks_status
 
 
@@ -21,11 +23,10 @@ class Heard:
 
     def __init__(self) -> None:
         self.now_s = 100.0
-        self.told: list[Any] = []
+        self.told = Told()
         self.alerts: list[Any] = []
-        self.watch = TracksWatch(
-            "live", self.told.append, self.alerts.append, now_mono_s=lambda: self.now_s, now_utc_s=lambda: 5.0
-        )
+        around: Any = SimpleNamespace(on_alert=self.alerts.append)
+        self.watch = TracksWatch("live", self.told, around, now_mono_s=lambda: self.now_s, now_utc_s=lambda: 5.0)
 
 
 def test_pages_hear_ten_times_a_second_at_most() -> None:
@@ -130,9 +131,9 @@ def test_a_slow_page_gets_the_latest_of_each_source() -> None:
 
 
 def test_a_page_that_opens_later_sees_them_at_once_with_their_age_from_then_on() -> None:
-    present = Present(lambda each: None)
+    present = Present(Told())
     for source in ("live", "replay"):
-        present.tell(message(source))
+        present.publish(message(source))
     live, replay = cast(list[TracksMessage], present.messages())
     assert live.now_mono_s > 1.0
     assert replay.now_mono_s == 1.0

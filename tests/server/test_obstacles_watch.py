@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 from server.obstacles.obstacle_watch import DEAD_S, Watch
 from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
+from tests.server.fakes import Told
 from tests.server.obstacle_messages import alert, delta, status
 
 
@@ -20,9 +22,9 @@ class Clock:
 
 
 def watching(source: Any = "live") -> tuple[Watch, list[Any], Clock]:
-    told: list[Any] = []
+    told = Told()
     clock = Clock()
-    return Watch(source, told.append, now_mono_s=clock, now_utc_s=lambda: 5000.0), told, clock
+    return Watch(source, told, now_mono_s=clock, now_utc_s=lambda: 5000.0), told, clock
 
 
 def test_an_alert_is_told_at_once_before_the_list_that_holds_it() -> None:
@@ -36,9 +38,9 @@ def test_an_alert_is_told_at_once_before_the_list_that_holds_it() -> None:
 
 
 def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_sees_or_is_off() -> None:
-    told: list[Any] = []
-    flies = True
-    watch = Watch("live", told.append, now_mono_s=Clock(), now_utc_s=lambda: 5000.0, in_air=lambda: flies)
+    told = Told()
+    vehicle: Any = SimpleNamespace(in_air=True)
+    watch = Watch("live", told, vehicle, now_mono_s=Clock(), now_utc_s=lambda: 5000.0)
     sees = AvoidanceStatus(enabled=True, state="watching", sensors=("vision",))
     blind = AvoidanceStatus(enabled=True, state="blind")
     watch.on_avoidance(sees)
@@ -50,19 +52,15 @@ def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_see
     assert len([message for message in told if message.type == "alert"]) == 1
     watch.on_avoidance(sees)
     assert [message.alert.text for message in told if message.type == "alert"][-1] == "Avoidance sees again."
-    flies = False
+    vehicle.in_air = False
     watch.on_avoidance(blind)
     assert len([message for message in told if message.type == "alert"]) == 2
 
 
-def test_begin_and_end_are_passed_on_once() -> None:
+def test_an_alert_is_new_once() -> None:
     watch, _, _ = watching()
-    begun: list[str] = []
-    ended: list[str] = []
-    watch.begins, watch.ends = lambda each: begun.append(each.id), ended.append
-    for phase in ("begins", "goes_on", "goes_on", "ends"):
-        watch.on_alert(alert(phase=phase))
-    assert (begun, ended) == (["radar-1"], ["radar-1"])
+    phases = ("begins", "goes_on", "goes_on", "ends")
+    assert [watch.on_alert(alert(phase=phase)) for phase in phases] == [True, False, False, False]
 
 
 def test_statuses_go_out_at_ten_hertz_and_a_change_of_state_at_once() -> None:
@@ -157,12 +155,11 @@ def test_of_another_recording_nothing_stays() -> None:
 def test_alerts_of_a_node_that_was_started_anew_at_once_end() -> None:
     watch, _, clock = watching()
     ended: list[str] = []
-    watch.ends = ended.append
     watch.on_status(status())
     watch.on_alert(alert())
     for _ in range(7):
         clock.now_s += 1.0
         watch.on_status(status())
-        watch.tick()
+        ended += watch.tick()
     assert ended == ["radar-1"]
     assert [doc.over for doc in watch.state.alerts] == [True]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
@@ -35,13 +36,10 @@ class Table:
         self.changes: list[bool] = []
         self.notices: list[NoticeMessage] = []
         self.saved = asyncio.Event()
-        self.desk = PlanDesk(
-            library,
-            changed=self.changes.append,
-            saved=self.saved.set,
-            tell=self.notices.append,
-            retry_s=retry_s,
-        )
+        self.desk = PlanDesk(library, self, changed=self.changes.append, saved=self.saved.set, retry_s=retry_s)
+
+    def publish(self, message: Any) -> None:
+        self.notices.append(message)
 
     async def name(self, name: str) -> None:
         document = self.desk.document.model_copy(update={"name": name})

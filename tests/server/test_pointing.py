@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import cast
+from typing import Any, cast
 
 from server.plan.plan_desk import PlanDesk, Proposal
 from server.plan.pointing import Pointing
@@ -24,15 +24,19 @@ class _Desk:
 class _Hand:
     """A tool in hand, over a plan without anything."""
 
+    is_review = False
+
     def __init__(self, tool: SelectionDoc) -> None:
         self.desk, self.selection = _Desk(), tool
         self.notices: list[NoticeMessage] = []
-        self._pointing = Pointing(
-            cast(PlanDesk, self.desk),
-            selection=lambda: self.selection,
-            select=lambda selection: setattr(self, "selection", selection),
-            tell=self.notices.append,
-        )
+        me: Any = self
+        self._pointing = Pointing(cast(PlanDesk, self.desk), me, me)
+
+    def select(self, selection: SelectionDoc) -> None:
+        self.selection = selection
+
+    def publish(self, message: NoticeMessage) -> None:
+        self.notices.append(message)
 
     def click(self, *, known: bool = True) -> None:
         asyncio.run(self._pointing.on_terrain(37.73, 14.99, known=known))

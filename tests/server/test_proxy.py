@@ -78,12 +78,12 @@ def test_messages_flow_and_the_client_is_known_by_its_page(served: Running) -> N
             assert isinstance(socket.recv(timeout=10), bytes)
             socket.send(encoded(CAMERA))
             assert eventually(host.server.get_clients)
-            client_id = host.client_of_page(page_id)
-            assert client_id in host.server.get_clients()
-            assert host.page_of_client(client_id) == page_id
-            assert host.server.get_clients()[client_id].camera.position[2] == 5
-        assert eventually(lambda: host.client_of_page(page_id) is None)
-        assert host.page_of_client(client_id) is None
+            client = host.client(page_id)
+            assert client is not None
+            assert host.page_of_client(client.client_id) == page_id
+            assert client.camera.position[2] == 5
+        assert eventually(lambda: host.client(page_id) is None)
+        assert host.page_of_client(client.client_id) is None
 
 
 def test_two_pages_are_told_apart(served: Running) -> None:
@@ -91,9 +91,9 @@ def test_two_pages_are_told_apart(served: Running) -> None:
     with served.socket() as one, served.socket() as two:
         pages = [page_id_of(one), page_id_of(two)]
         with view(served, pages[1]), view(served, pages[0]):
-            assert eventually(lambda: all(host.client_of_page(page) is not None for page in pages))
-            clients = [client for page in pages if (client := host.client_of_page(page)) is not None]
-            assert [host.page_of_client(client) for client in clients] == pages
+            assert eventually(lambda: all(host.client(page) is not None for page in pages))
+            clients = [client for page in pages if (client := host.client(page)) is not None]
+            assert [host.page_of_client(client.client_id) for client in clients] == pages
 
 
 def test_hostile_messages_reach_no_callback(served: Running) -> None:

@@ -118,8 +118,8 @@ def test_no_scenario_runs_beside_a_flight(server: Running) -> None:
     until(server, lambda one: one.step == "Flying")
 
     async def arm() -> None:
-        server.flying.armed = True
-        server.flying.on_armed()
+        server.flying.live.armed = True
+        server.parts.scenarios.on_armed()
 
     server.on_loop(arm())
     ended = until(server, over)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -97,10 +97,11 @@ def test_a_page_follows_its_own_vehicle_until_it_wants_something_else() -> None:
     drawing = Drawing.of(dsm, state_over(dsm))
     assert drawing is not None
     clients: dict[str, Any] = {"anna": Client()}
-    vehicles = Vehicles(lambda _: None)
+    vehicles = Vehicles(cast(Any, SimpleNamespace(draw=lambda layers: None)))
     vehicles.redraw(drawing)
     clock = SimpleNamespace(s=0.0)
-    cameras = Cameras(clients.get, lambda: set(clients), vehicles, now_mono_s=lambda: clock.s)
+    host: Any = SimpleNamespace(client=clients.get, page_ids=lambda: set(clients))
+    cameras = Cameras(host, vehicles, now_mono_s=lambda: clock.s)
     assert not cameras.chase("anna", "live")
 
     place_m = np.array([500_040.0, 3_999_970.0, 140.0])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import viser
 
+from server.scene.geometry.canvas import Canvas
 from server.scene.geometry.stage import Drawing
 from server.scene.layers.sights import Sights
 from server.scene.layers.voxel_layers import cloud_nodes
@@ -56,7 +58,7 @@ def server() -> Iterator[viser.ViserServer]:
 def test_each_cloud_is_drawn_once_and_only_while_the_layer_is_on(server: viser.ViserServer) -> None:
     drawing, placing = placed()
     put: list[dict[str, Any]] = []
-    sights = Sights(server, put.append)
+    sights = Sights(server, cast(Any, SimpleNamespace(draw=put.append)))
     sights.redraw(showing(drawing, on=False))
     cloud = look(placing.origin, 50)
     for _ in range(3):
@@ -71,7 +73,7 @@ def test_each_cloud_is_drawn_once_and_only_while_the_layer_is_on(server: viser.V
 
 def test_the_models_ground_is_told_above_home(server: viser.ViserServer) -> None:
     drawing, placing = placed()
-    sights = Sights(server, lambda layers: None)
+    sights = Sights(server, Canvas(server))
     assert np.isnan(sights.ground_up_m(placing.origin, np.zeros((2, 3)))).all()
     sights.redraw(drawing)
     up_m = sights.ground_up_m(placing.origin, np.array([[0.0, 0.0, 77.0], [9000.0, 0.0, 0.0]]))

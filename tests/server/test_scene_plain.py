@@ -19,6 +19,7 @@ from server.scene.geometry.stage import Drawing
 from server.scene.layers.flight_layers import review_nodes
 from server.schemas import PlanDoc, SelectionDoc, ViewDoc
 from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
 from tests.server.scene_fixtures import hill, plan_over, state_over
 
 LEVEL = level_model(Mission(Home(37.7, 15.0, 812.5), ()))
@@ -59,7 +60,7 @@ def test_a_recording_is_drawn_on_it_and_the_plan_comes_back_afterwards() -> None
     lane: Any = SimpleNamespace(call=call)
 
     async def play() -> None:
-        picture = Picture(view, library, lane, changed=lambda: None, failed=lambda error: None)
+        picture = Picture(view, library, lane, Told(), changed=lambda: None)
         loop = asyncio.create_task(picture.run())
         picture.want(PlanDoc(terrain_id="hill"), SelectionDoc(), ViewDoc(), plan_over(dsm), stale=False)
         await _until(lambda: bool(drawn))
@@ -92,19 +93,16 @@ def test_a_vehicle_flies_over_plain_ground_where_no_model_is_open() -> None:
     view: Any = SimpleNamespace(show=show)
     library: Any = SimpleNamespace(orthophotos=list)
     lane: Any = SimpleNamespace()
-    home: list[tuple[float, float]] = []
 
     async def play() -> None:
-        picture = Picture(view, library, lane, changed=lambda: None, failed=lambda error: None)
-        picture.live_home = lambda: home[-1] if home else None
+        picture = Picture(view, library, lane, Told(), changed=lambda: None)
         loop = asyncio.create_task(picture.run())
         picture.want(PlanDoc(), SelectionDoc(), ViewDoc(), None, stale=False)
         await _until(lambda: len(drawn) == 1)
         assert drawn[-1][0] is None
         for place in ((37.7, 15.0), (37.70001, 15.0), (38.5, 15.0)):
-            home.append(place)
-            picture.again()
             before = len(drawn)
+            picture.on_vehicle(False, place)
             await _until(lambda before=before: len(drawn) > before)
         first, moved, elsewhere = (ground for ground, _ in drawn[1:])
         assert first is moved

@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from server.scene.layers.flight_layers import review_nodes
 from server.scene.layers.vehicle_layers import VehiclePose, scene_wxyz, track_nodes, vehicle_nodes
 from server.scene.view import SceneView
 from tests.server.scene_fixtures import exaggerated, hill, state_over
+from tests.server.test_scene_view import host_of
 
 
 def drawing() -> Drawing:
@@ -97,18 +99,8 @@ def server() -> Iterator[viser.ViserServer]:
     made.stop()
 
 
-async def _nothing(*_: object) -> None:
-    """Clicks do not matter here."""
-
-
 def view_on(server: viser.ViserServer) -> tuple[SceneView, list[object]]:
-    view = SceneView(
-        server,
-        on_terrain_click=_nothing,
-        on_poi_click=_nothing,
-        on_poi_moved=_nothing,
-        page_of_client=lambda client_id: None,
-    )
+    view = SceneView(host_of(server, lambda client_id: None), cast(Any, None))
     sent: list[object] = []
     interface = server.scene._websock_interface
     queue = interface.queue_message

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,17 @@ import viser
 
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.payload import SceneState
+from server.scene.host import SceneHost
 from server.scene.view import SceneView
 from server.schemas import SelectionDoc
 from tests.server.scene_fixtures import exaggerated, hill, plan_over, state_over
+
+
+def host_of(server: viser.ViserServer, page_of_client: Callable[[int], str | None]) -> SceneHost:
+    """A host that guards nothing, of a server that is there already."""
+    host: Any = SceneHost.__new__(SceneHost)
+    host.server, host.page_of_client = server, page_of_client
+    return host
 
 
 class Stage:
@@ -26,13 +35,12 @@ class Stage:
     def __init__(self, server: viser.ViserServer) -> None:
         self.sent: list[Any] = []
         self.events: list[tuple[Any, ...]] = []
-        self.view = SceneView(
-            server,
+        hands: Any = SimpleNamespace(
             on_terrain_click=self._report("terrain"),
             on_poi_click=self._report("poi"),
             on_poi_moved=self._report("moved"),
-            page_of_client=lambda client_id: f"page{client_id}",
         )
+        self.view = SceneView(host_of(server, lambda client_id: f"page{client_id}"), hands)
         interface = server.scene._websock_interface
         queue = interface.queue_message
         interface.queue_message = lambda message: (self.sent.append(message), queue(message))[1]  # type: ignore[method-assign]
@@ -61,7 +69,7 @@ class Stage:
     async def click_down(self, east_m: float, north_m: float) -> None:
         """A click from straight above a place of the hill."""
         origin = np.array([east_m - 40, north_m - 30, 500.0])
-        await self.view._click("page", origin, np.array([0.0, 0.0, -1.0]), 0.8)
+        await self.view._click(origin, np.array([0.0, 0.0, -1.0]), 0.8)
 
 
 @pytest.fixture
@@ -144,8 +152,8 @@ def test_a_click_comes_back_as_the_place_that_was_hit(stage: Stage, times: float
         state = replace(state_over(DSM), selection=SelectionDoc(tool="add_poi"))
         await stage.show(DSM, exaggerated(state, times))
         await stage.click_down(22.3, 44.2)
-        ((kind, page, lat, lon, known),) = stage.events
-        assert (kind, page, known) == ("terrain", "page", True)
+        ((kind, lat, lon, known),) = stage.events
+        assert (kind, known) == ("terrain", True)
         assert DSM.xy_from_lat_lon(np.array([[lat, lon]]))[0] == pytest.approx([500_022.3, 3_999_984.2], abs=1e-3)
 
     asyncio.run(play())
@@ -156,7 +164,7 @@ def test_a_click_on_what_nobody_knows_says_so(stage: Stage, east_m: float, north
     async def play() -> None:
         await stage.show(DSM, replace(state_over(DSM), selection=SelectionDoc(tool="add_poi")))
         await stage.click_down(east_m, north_m)
-        assert [event[4] for event in stage.events] == [False]
+        assert [event[3] for event in stage.events] == [False]
 
     asyncio.run(play())
 

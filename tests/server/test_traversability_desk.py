@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -19,6 +20,7 @@ from server.traversability.landing_site_task import FoundSites, find_sites
 from server.traversability.traversability_desk import TraversabilityDesk
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane
+from tests.server.fakes import Told
 
 KEPT = "hill/traversability.npz"
 SITE = LandingSiteDoc(
@@ -84,21 +86,25 @@ class FakeLibrary:
 class Desk:
     def __init__(self, root: Path) -> None:
         self.lane, self.root = FakeLane(), root
-        self.terrain_id: str | None = "hill"
-        self.view = ViewDoc(show_traversability=True)
         self.told: list[TraversabilityState] = []
         self.shown: list[Any] = []
         lane = cast(Lane, self.lane)
-        self.board = JobBoard(lane, publish=lambda message: None, spawn=asyncio.ensure_future)
+        self.board = JobBoard(lane, Told(), cast(Any, SimpleNamespace(spawn=asyncio.ensure_future)))
         self.desk = TraversabilityDesk(
             cast(Any, FakeLibrary(root)),
             self.board,
             lane,
-            terrain_id=lambda: self.terrain_id,
-            view=lambda: self.view,
-            tell=lambda message: self.told.append(cast(Any, message).traversability),
+            cast(Any, self),
             show=lambda overlay, sites: self.shown.append((overlay, sites)),
         )
+        self.terrain_id: str | None = "hill"
+        self.view = ViewDoc(show_traversability=True)
+        self.desk.on_document(self.terrain_id)
+        self.desk.on_view(self.view)
+        self.told.clear()
+
+    def publish(self, message: Any) -> None:
+        self.told.append(message.traversability)
 
     @property
     def state(self) -> TraversabilityState:
@@ -149,14 +155,14 @@ def test_the_layer_on_show_is_the_views(tmp_path: Path) -> None:
         it = Desk(tmp_path)
         await it.ready(uwb_log="walk.npz")
         count = len(it.shown)
-        it.desk.on_view()
+        it.desk.on_view(it.view)
         assert len(it.shown) == count
         it.view = it.view.model_copy(update={"traversability_layer": "probability"})
-        it.desk.on_view()
+        it.desk.on_view(it.view)
         assert len(it.shown) == count + 1
         assert it.told[-1].legend[0] == "Obstacle: under 10 %"
         it.view = it.view.model_copy(update={"show_traversability": False})
-        it.desk.on_view()
+        it.desk.on_view(it.view)
         assert it.shown[-1] == (None, ())
 
     asyncio.run(play())
@@ -222,10 +228,10 @@ def test_only_a_wish_to_forget_leaves_nothing_on_the_disk(tmp_path: Path) -> Non
     async def play() -> None:
         it = Desk(tmp_path)
         await it.ready()
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         assert it.state.state == "ready"
         it.terrain_id = "plain"
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         assert it.told[-1] == TraversabilityState()
         assert (it.shown[-1], it.files) == ((None, ()), [KEPT])
         await it.ready()
@@ -240,16 +246,16 @@ def test_what_was_worked_out_before_is_read_again_when_its_model_is_opened(tmp_p
         await Desk(tmp_path).ready()
         it = Desk(tmp_path)
         it.lane.answers.append(worked("again"))
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         await it.over()
         assert it.lane.asked == [(task.read_again, tmp_path / KEPT)]
         assert (it.state.state, it.state.text, it.state.cells) == ("ready", "again", 40)
         assert it.shown[-1][0].terrain_id == "hill"
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         assert len(it.lane.asked) == 1
         for terrain_id in ("plain", "gone", None):
             it.terrain_id = terrain_id
-            it.desk.on_document()
+            it.desk.on_document(it.terrain_id)
             assert it.state == TraversabilityState()
         assert it.files == [KEPT]
 
@@ -261,7 +267,7 @@ def test_kept_maps_that_are_damaged_are_said_and_worked_out_anew(tmp_path: Path)
         await Desk(tmp_path).ready()
         it = Desk(tmp_path)
         it.lane.answers.append(StorageError("The file is damaged.", where=KEPT))
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         await it.over()
         assert (it.state.state, it.state.cells, it.state.error and it.state.error.where) == ("failed", 0, KEPT)
         assert it.files == [KEPT]
@@ -320,7 +326,7 @@ def test_an_outcome_for_a_model_that_is_closed_by_then_is_dropped(tmp_path: Path
         it.desk.work_out(TraversabilityBody())
         await it.until(lambda: bool(it.lane.asked))
         it.terrain_id = None
-        it.desk.on_document()
+        it.desk.on_document(it.terrain_id)
         await it.over()
         assert (it.state, it.files) == (TraversabilityState(), [])
 
@@ -338,7 +344,7 @@ def test_without_a_model_or_a_log_it_says_so(tmp_path: Path) -> None:
         it.lane.answers.append(b"II*")
         assert await it.desk.layer_file("before") == b"II*"
         for gone in (None, "gone"):
-            it.terrain_id = gone
+            it.desk.on_document(gone)
             with pytest.raises((NotReadyError, NotFoundError)):
                 it.desk.clear_foliage(it.log(), "walk.npz")
             assert "upload.npz" not in it.files

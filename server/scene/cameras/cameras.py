@@ -14,6 +14,7 @@ from server.scene.cameras.labels import Screen, hidden, labels_of
 from server.scene.cameras.projection import Lens, Pose
 from server.scene.geometry.canvas import Node
 from server.scene.geometry.stage import Drawing
+from server.scene.host import SceneHost
 from server.scene.layers.vehicles import Vehicles
 from server.schemas import Source
 
@@ -25,17 +26,10 @@ _STILL_M = 0.02
 
 
 class Cameras:
-    """``client`` is the viser client of a page, None while it has none; ``pages`` are those that have one."""
-
     def __init__(
-        self,
-        client: Callable[[str], viser.ClientHandle | None],
-        pages: Callable[[], set[str]],
-        vehicles: Vehicles,
-        *,
-        now_mono_s: Callable[[], float] = time.monotonic,
+        self, host: SceneHost, vehicles: Vehicles, *, now_mono_s: Callable[[], float] = time.monotonic
     ) -> None:
-        self._client, self._pages, self._vehicles = client, pages, vehicles
+        self._host, self._vehicles = host, vehicles
         self._now_mono_s = now_mono_s
         self._chases: dict[str, tuple[Source, Chase]] = {}
         self._hidden: dict[int, dict[str, Node]] = {}
@@ -47,7 +41,7 @@ class Cameras:
 
     def chase(self, page_id: str, source: Source) -> bool:
         """Whether there is a vehicle to follow."""
-        client, pose = self._client(page_id), self._vehicles.pose(source)
+        client, pose = self._host.client(page_id), self._vehicles.pose(source)
         if client is None or pose is None:
             return False
         chase = Chase.behind(pose.heading_rad, self._now_mono_s(), aspect=client.camera.aspect)
@@ -62,7 +56,7 @@ class Cameras:
     def follow(self, drawing: Drawing) -> None:
         """Moves the cameras that follow a vehicle; those of pages that have gone are forgotten."""
         for page_id, (source, chase) in list(self._chases.items()):
-            client, pose = self._client(page_id), self._vehicles.pose(source)
+            client, pose = self._host.client(page_id), self._vehicles.pose(source)
             if client is None:
                 del self._chases[page_id]
             elif pose is not None:
@@ -90,7 +84,7 @@ class Cameras:
             return
         drawn = {node.name: node for node in nodes if node.kind == "label"}
         labels, vehicles = labels_of(nodes), self._vehicles.marks()
-        clients = [client for page_id in self._pages() if (client := self._client(page_id)) is not None]
+        clients = [client for page_id in self._host.page_ids() if (client := self._host.client(page_id)) is not None]
         for client in clients:
             if client.camera.update_timestamp:
                 self._tell(client, drawn, hidden(labels, vehicles, _screen(client)))

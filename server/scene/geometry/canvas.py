@@ -27,10 +27,19 @@ class Node:
 class Canvas:
     """The nodes that browsers have. Not thread-safe: one drawer at a time."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
         self._layers: dict[str, dict[str, Node]] = {}
         self._handles: dict[str, Any] = {}
+
+    def draw(self, layers: Mapping[str, list[Node]]) -> None:
+        """Puts all of them on show at once."""
+        if not layers:
+            return
+        with self._server.atomic():
+            for name, nodes in layers.items():
+                self.put(name, nodes)
+        self._server.flush()
 
     def put(self, layer: str, nodes: list[Node]) -> None:
         """Makes ``nodes`` the whole content of ``layer``; parents come before their children."""
@@ -54,7 +63,7 @@ class Canvas:
         handle = self._handles.get(new.name)
         if old is None or handle is None or not _assignable(old, new):
             self._remove(new.name)
-            self._handles[new.name] = getattr(self._scene, f"add_{new.kind}")(new.name, **new.props)
+            self._handles[new.name] = getattr(self._server.scene, f"add_{new.kind}")(new.name, **new.props)
             if new.ready is not None:
                 new.ready(self._handles[new.name])
             return

@@ -5,7 +5,7 @@ Maps have a canvas of their own, which is drawn from a thread: vehicles and regi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,9 +47,9 @@ class MapLook:
 class Sights:
     """``draw_chunks`` is for one thread at a time; all else belongs to the event loop."""
 
-    def __init__(self, server: viser.ViserServer, put: Callable[[dict[str, list[Node]]], None]) -> None:
-        self._server, self._put = server, put
-        self._canvas = Canvas(server.scene)
+    def __init__(self, server: viser.ViserServer, canvas: Canvas) -> None:
+        self._server, self._canvas = server, canvas
+        self._maps = Canvas(server)
         self._nodes: dict[str, list[Node]] = {}
         self._drawing: Drawing | None = None
         self._placing: EnuPlacing | None = None
@@ -102,7 +102,7 @@ class Sights:
         self._shown = {layer for layer, nodes in drawn.items() if nodes}
         changed = {layer: drawn.get(layer, []) for layer in self._shown | gone}
         if changed:
-            self._put(changed)
+            self._canvas.draw(changed)
 
     def draw_cloud(self, source: Source, look: CloudLook | None) -> None:
         """The camera's newest points; nothing travels while the layer is off."""
@@ -116,7 +116,7 @@ class Sights:
         nodes: list[Node] = []
         if drawing is not None and placing is not None:
             nodes = cloud_nodes(drawing, placing, wanted, prefix=f"/now_{source}")
-        self._put({"cloud": nodes})
+        self._canvas.draw({"cloud": nodes})
 
     def ground_up_m(self, origin: MapOrigin, enu_m: F64) -> F64:
         """(N, 3) places -> (N,) up of the surface model there, above home; NaN where it is unknown."""
@@ -149,7 +149,7 @@ class Sights:
 
     def _draw(self, name: str, nodes: list[Node]) -> None:
         with self._server.atomic():
-            self._canvas.put(name, nodes)
+            self._maps.put(name, nodes)
         if nodes:
             self._nodes[name] = nodes
         else:

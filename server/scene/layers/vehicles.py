@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import get_args
 
 import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
-from server.scene.geometry.canvas import Node
+from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.stage import Drawing
 from server.scene.layers.vehicle_layers import VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
 from server.schemas import Source
@@ -21,8 +20,8 @@ _NO_POINTS = np.zeros((0, 3))
 class Vehicles:
     """Poses and paths are in the coordinates of ``dsm``, the model on show; another model forgets them all."""
 
-    def __init__(self, put: Callable[[dict[str, list[Node]]], None]) -> None:
-        self._put = put
+    def __init__(self, canvas: Canvas) -> None:
+        self._canvas = canvas
         self._drawing: Drawing | None = None
         self._poses: dict[Source, VehiclePose | None] = dict.fromkeys(_SOURCES)
         self._tracks: dict[Source, F64] = dict.fromkeys(_SOURCES, _NO_POINTS)
@@ -46,14 +45,14 @@ class Vehicles:
         if pose is None and self._poses[source] is None:
             return
         self._poses[source] = pose
-        self._put(self._vehicle(source))
+        self._canvas.draw(self._vehicle(source))
 
     def follow(self, source: Source, points_m: F64) -> None:
         """The flown path so far, (N, 3) x, y, alt_dsm."""
         if not len(points_m) and not len(self._tracks[source]):
             return
         self._tracks[source] = points_m
-        self._put(self._track(source))
+        self._canvas.draw(self._track(source))
 
     def redraw(self, drawing: Drawing | None) -> None:
         """The frame has changed, or the model: nothing of another model is shown on this one."""
@@ -61,7 +60,7 @@ class Vehicles:
             self._poses, self._tracks = dict.fromkeys(_SOURCES), dict.fromkeys(_SOURCES, _NO_POINTS)
         self._drawing = drawing
         for source in _SOURCES:
-            self._put(self._vehicle(source) | self._track(source))
+            self._canvas.draw(self._vehicle(source) | self._track(source))
 
     def _vehicle(self, source: Source) -> dict[str, list[Node]]:
         drawn = [] if self._drawing is None else vehicle_nodes(self._drawing, source, self._poses[source])

@@ -1,0 +1,103 @@
+"""Recordings as the pages see them: started, stopped, brought in, deleted, listed anew whenever something changes.
+
+A server that starts in the middle of a flight gets the path flown so far from the recording that goes on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+
+from server.errors import InUseError, reported
+from server.flying import review_task
+from server.flying.reviewing import Reviewing
+from server.heard.channel import Channel
+from server.heard.node_states import Nodes
+from server.library.recording_list import RecordingShelf
+from server.schemas import Pages, RecorderMessage, RecordingDoc, RecordingsMessage
+from server.work.job_board import JobBoard
+from server.work.jobs import Lane
+from telemetry.topics.messages import RecorderStatus
+from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.vehicle import VehicleState
+
+log = logging.getLogger("hedgehop.flying")
+
+
+class RecordingDesk:
+    def __init__(
+        self, shelf: RecordingShelf, nodes: Nodes, board: JobBoard, reviewing: Reviewing, pages: Pages
+    ) -> None:
+        self._shelf, self._nodes, self._board, self._reviewing, self._pages = shelf, nodes, board, reviewing, pages
+        self._listing = asyncio.Lock()
+        self._look_again = False
+        self.status: RecorderStatus | None = None
+
+    async def on_status(self, status: RecorderStatus) -> None:
+        before, self.status = self.status, status
+        self._pages.publish(RecorderMessage(recorder=status))
+        changed = before is None or (before.recording, before.name) != (status.recording, status.name)
+        if changed or self._look_again:
+            # A file that has just been ended gets its last part a moment later.
+            self._look_again = changed
+            await self.refresh()
+
+    async def start(self) -> None:
+        await self._nodes.ask_recorder(StartRecording())
+
+    async def stop(self) -> None:
+        await self._nodes.ask_recorder(StopRecording())
+
+    async def docs(self) -> list[RecordingDoc]:
+        async with self._listing:
+            return await asyncio.to_thread(self._shelf.docs, being_written=self.being_written)
+
+    async def refresh(self) -> None:
+        self._pages.publish(RecordingsMessage(recordings=await self.docs()))
+
+    async def add(self, upload: Path, name: str) -> RecordingDoc:
+        """Takes in an uploaded file. Raises RecordingError when it holds no flight."""
+        try:
+            await self._board.run(f"Reading {name}", lambda lane, _: lane.call(review_task.read, upload, name))
+            doc = await asyncio.to_thread(self._shelf.add, upload, name)
+        finally:
+            await asyncio.to_thread(upload.unlink, missing_ok=True)
+        await self.refresh()
+        return doc
+
+    async def delete(self, recording_id: str) -> None:
+        """Raises NotFoundError, InUseError."""
+        name = (await asyncio.to_thread(self._shelf.path, recording_id)).name
+        if name == self.being_written:
+            raise InUseError("This recording is being written.", where=name, advice="Stop it first.")
+        if name == self._reviewing.file_name:
+            raise InUseError("This recording is open.", where=name, advice="Close the review first.")
+        await asyncio.to_thread(self._shelf.delete, recording_id)
+        await self.refresh()
+
+    @property
+    def being_written(self) -> str | None:
+        return self.status.name if self.status is not None and self.status.recording else None
+
+
+class TrackSoFar:
+    """Looks once: at the first word of the recorder."""
+
+    def __init__(self, folder: Path, channel: Channel, lane: Lane) -> None:
+        self._folder, self._channel, self._lane = folder, channel, lane
+        self._looked = False
+
+    async def on_status(self, status: RecorderStatus) -> None:
+        if self._looked:
+            return
+        self._looked = True
+        if status.recording and status.name is not None:
+            try:
+                states: list[VehicleState] = await self._lane.call(
+                    review_task.states_so_far, self._folder / status.name
+                )
+            except Exception as error:
+                log.warning("The path flown so far: %s", reported(error, log, "Reading the recording").what)
+                return
+            self._channel.prepend(states)
