@@ -292,3 +292,19 @@ def test_one_thing_at_a_time_but_commands_always(
             await bench.desk.check(ME)
 
     runner.run(scenario())
+
+
+def test_what_the_link_said_before_the_read_back_is_not_believed_after_it(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        waiting = LinkStatus(time.monotonic(), adopted=QUAD, state="live", mission_state="unknown")
+        assert (await bench.desk.upload(ME, 3)).onboard.is_open_plan
+        bench.desk.on_link(waiting)
+        assert bench.desk.state.onboard.is_open_plan
+        assert bench.aboard.record is not None
+        bench.desk.on_link(replace(waiting, t_mono_s=time.monotonic()))
+        assert bench.desk.state.onboard.state == "unknown"
+
+    runner.run(scenario())

@@ -90,7 +90,9 @@ def test_two_pages_are_told_apart(served: Running) -> None:
     host = served.parts.scene_host
     with served.socket() as one, served.socket() as two:
         pages = [page_id_of(one), page_id_of(two)]
-        with view(served, pages[1]), view(served, pages[0]):
+        with view(served, pages[1]) as second, view(served, pages[0]) as first:
+            for socket in (first, second):
+                socket.send(encoded(CAMERA))
             assert eventually(lambda: all(host.client(page) is not None for page in pages))
             clients = [client for page in pages if (client := host.client(page)) is not None]
             assert [host.page_of_client(client.client_id) for client in clients] == pages

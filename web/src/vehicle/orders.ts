@@ -1,5 +1,5 @@
 import { computed, signal } from "@preact/signals";
-import type { CheckRow, FlyState, StartFlight } from "../messages";
+import type { CheckRow, StartFlight } from "../messages";
 import { fly } from "../store/flying";
 import { order, say } from "../store/outcomes";
 import { allSent } from "../store/plan";
@@ -59,12 +59,6 @@ export const pauseFlight = () =>
 export const resumeFlight = () =>
   order({ place: NEXT, path: "/api/flight/resume", done: "The flight goes on." });
 
-async function takeFly(answer: Response | null): Promise<boolean> {
-  if (!answer) return false;
-  fly.value = (await answer.json()) as FlyState;
-  return true;
-}
-
 /** Why nothing can be uploaded, by the verdict on the open plan. */
 export function uploadObstacle(verdict: VerdictKind): string | null {
   if (verdict === "none") return "Plan a path first";
@@ -80,13 +74,12 @@ export async function uploadPlan(place: string): Promise<void> {
   await allSent();
   const revision = plan.value?.revision;
   if (revision === undefined) return;
-  const done = await takeFly(await order({ place, path: "/api/flight/upload", body: { revision } }));
-  if (done) say(place, "On board: read back and verified.");
+  // What is on board comes by the stream alone: by now the answer may be older than what was told since.
+  const answer = await order({ place, path: "/api/flight/upload", body: { revision } });
+  if (answer) say(place, "On board: read back and verified.");
 }
 
-export async function checkStart(): Promise<void> {
-  await takeFly(await order({ place: NEXT, path: "/api/flight/check" }));
-}
+export const checkStart = () => order({ place: NEXT, path: "/api/flight/check" });
 
 export async function startFlight(): Promise<void> {
   const digest = fly.value?.onboard.digest;
