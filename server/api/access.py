@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Depends, Request
 from fastapi.responses import Response
@@ -92,6 +92,10 @@ InCharge = Annotated[Operator, Depends(in_charge)]
 ERROR_RESPONSES: dict[int | str, dict[str, object]] = {
     status: {"model": ErrorDoc} for status in (401, 403, 404, 409, 413, 422, 502, 503, 504, 507)
 }
+
+
+DONE: dict[str, Any] = {"status_code": 204, "response_class": Response}
+"""Of routes that answer with nothing."""
 
 
 def answer(document: BaseModel, status_code: int = 200) -> Response:

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
 from server.schemas import FlyState, StartFlight, UploadPlan
-from telemetry.topics.requests import Arm, Disarm, Land, Pause, Resume, ReturnHome
+from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome
 
 router = APIRouter(prefix="/api/flight", dependencies=[SignedIn], tags=["flight"], responses=ERROR_RESPONSES)
-
-COMMANDS = {
-    "arm": Arm,
-    "disarm": Disarm,
-    "pause": Pause,
-    "resume": Resume,
-    "return": ReturnHome,
-    "land": Land,
-}
 
 
 @router.post("/upload", response_model=FlyState)
@@ -33,47 +26,23 @@ async def check(operator: InCharge, flying: Fly) -> Response:
     return answer(await flying.desk.check(operator))
 
 
-@router.post("/start", status_code=204)
-async def start(body: StartFlight, operator: InCharge, flying: Fly) -> Response:
+@router.post("/start", **DONE)
+async def start(body: StartFlight, operator: InCharge, flying: Fly) -> None:
     """Flies the mission that was checked; 409 when the check is missing, old, or did not go well."""
     await flying.desk.start(operator, body)
-    return Response(status_code=204)
 
 
-@router.post("/arm", status_code=204)
-async def arm(operator: InCharge, flying: Fly) -> Response:
-    return await _command("arm", operator, flying)
+def _add_command(name: str, command: Callable[[Operator], LinkRequest], description: str = "") -> None:
+    async def route(operator: InCharge, flying: Fly) -> None:
+        await flying.desk.command(command(operator))
+
+    path = f"/{name.partition('_')[0]}"
+    router.add_api_route(path, route, methods=["POST"], name=name, description=description, **DONE)
 
 
-@router.post("/disarm", status_code=204)
-async def disarm(operator: InCharge, flying: Fly) -> Response:
-    """Only on the ground."""
-    return await _command("disarm", operator, flying)
-
-
-@router.post("/pause", status_code=204)
-async def pause(operator: InCharge, flying: Fly) -> Response:
-    """The vehicle holds its position."""
-    return await _command("pause", operator, flying)
-
-
-@router.post("/resume", status_code=204)
-async def resume(operator: InCharge, flying: Fly) -> Response:
-    """Goes on with what was paused."""
-    return await _command("resume", operator, flying)
-
-
-@router.post("/return", status_code=204)
-async def return_home(operator: InCharge, flying: Fly) -> Response:
-    return await _command("return", operator, flying)
-
-
-@router.post("/land", status_code=204)
-async def land(operator: InCharge, flying: Fly) -> Response:
-    """Here and now."""
-    return await _command("land", operator, flying)
-
-
-async def _command(name: str, operator: InCharge, flying: Fly) -> Response:
-    await flying.desk.command(COMMANDS[name](operator))
-    return Response(status_code=204)
+_add_command("arm", Arm)
+_add_command("disarm", Disarm, "Only on the ground.")
+_add_command("pause", Pause, "The vehicle holds its position.")
+_add_command("resume", Resume, "Goes on with what was paused.")
+_add_command("return_home", ReturnHome)
+_add_command("land", Land, "Here and now.")

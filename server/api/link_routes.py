@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, Fly, InCharge, Session, SignedIn, answer
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, Session, SignedIn, answer
 from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, TakeLease
 
 router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["link"], responses=ERROR_RESPONSES)
@@ -23,35 +23,30 @@ async def release_lease(session: Session, flying: Fly) -> Response:
     return answer(await flying.release_lease(session))
 
 
-@router.post("/link/connect", status_code=204)
-async def connect(body: ConnectLink, operator: InCharge, flying: Fly) -> Response:
+@router.post("/link/connect", **DONE)
+async def connect(body: ConnectLink, operator: InCharge, flying: Fly) -> None:
     """Opens a connection and keeps it open, such as ``udpin:0.0.0.0:14550`` or ``tcp:192.168.1.7:5760``."""
     await flying.connections.connect(operator, body.address, adopt=body.adopt)
-    return Response(status_code=204)
 
 
-@router.post("/link/disconnect", status_code=204)
-async def disconnect(body: DisconnectLink, operator: InCharge, flying: Fly) -> Response:
+@router.post("/link/disconnect", **DONE)
+async def disconnect(body: DisconnectLink, operator: InCharge, flying: Fly) -> None:
     await flying.connections.disconnect(operator, body.address)
-    return Response(status_code=204)
 
 
-@router.post("/link/adopt", status_code=204)
-async def adopt(body: AdoptVehicle, operator: InCharge, flying: Fly) -> Response:
+@router.post("/link/adopt", **DONE)
+async def adopt(body: AdoptVehicle, operator: InCharge, flying: Fly) -> None:
     """Takes one of the vehicles that were heard as the one that is flown."""
     await flying.connections.adopt(operator, body.candidate)
-    return Response(status_code=204)
 
 
-@router.post("/link/release", status_code=204)
-async def release(operator: InCharge, flying: Fly) -> Response:
+@router.post("/link/release", **DONE)
+async def release(operator: InCharge, flying: Fly) -> None:
     """Sends nothing to the vehicle any more."""
     await flying.connections.release(operator)
-    return Response(status_code=204)
 
 
-@router.post("/link/simulator", status_code=204)
-async def simulator(operator: InCharge, flying: Fly) -> Response:
+@router.post("/link/simulator", **DONE)
+async def simulator(operator: InCharge, flying: Fly) -> None:
     """Starts a simulated vehicle at the open plan's home and connects to it."""
     await flying.simulation.start(operator)
-    return Response(status_code=204)

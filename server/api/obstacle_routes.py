@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
 from server.schemas import (
     AcknowledgeBody,
     MapFormat,
@@ -40,11 +40,10 @@ async def acknowledge(body: AcknowledgeBody, operator: InCharge, flying: Fly) ->
     return answer(await flying.obstacles.acknowledge(body))
 
 
-@router.put("/avoidance", status_code=204)
-async def set_avoidance(body: SetAvoidanceBody, operator: InCharge, flying: Fly) -> Response:
+@router.put("/avoidance", **DONE)
+async def set_avoidance(body: SetAvoidanceBody, operator: InCharge, flying: Fly) -> None:
     """409 without consent, unless the vehicle is a simulation; what came of it is told by the stream."""
     await flying.obstacles.set_avoidance(operator, body)
-    return Response(status_code=204)
 
 
 @router.put("/settings", response_model=ObstaclesState)
@@ -57,21 +56,17 @@ async def change_settings(body: PerceptionSettingsBody, operator: InCharge, flyi
     return answer(await flying.obstacles.change_settings(body))
 
 
-@router.post("/clear", status_code=204)
-async def clear(operator: InCharge, flying: Fly) -> Response:
+@router.post("/clear", **DONE)
+async def clear(operator: InCharge, flying: Fly) -> None:
     """Empties all maps."""
     del operator
     await flying.obstacles.clear()
-    return Response(status_code=204)
 
 
-@router.post("/manoeuvre/{manoeuvre_id}/fly", status_code=204)
-async def fly_manoeuvre(
-    manoeuvre_id: Annotated[str, Path(max_length=100)], operator: InCharge, flying: Fly
-) -> Response:
+@router.post("/manoeuvre/{manoeuvre_id}/fly", **DONE)
+async def fly_manoeuvre(manoeuvre_id: Annotated[str, Path(max_length=100)], operator: InCharge, flying: Fly) -> None:
     """404 for one that is out of date."""
     await flying.obstacles.fly(operator, manoeuvre_id)
-    return Response(status_code=204)
 
 
 @router.put("/seen", response_model=PlanState)

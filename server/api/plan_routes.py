@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer
+from server.api.access import DONE, ERROR_RESPONSES, SignedIn, Work, answer
 from server.api.uploads import display_name
 from server.schemas import Imported, OpenPlan, PlanEdit, PlanState, SavePlanAs, Snapshot
 
@@ -78,10 +78,9 @@ async def save_as(body: SavePlanAs, workspace: Work) -> Response:
     return answer(await workspace.plans.save_as(body.name))
 
 
-@router.delete("/plans/{plan_id}", status_code=204)
-async def delete(plan_id: str, workspace: Work) -> Response:
+@router.delete("/plans/{plan_id}", **DONE)
+async def delete(plan_id: str, workspace: Work) -> None:
     await workspace.plans.delete(plan_id)
-    return Response(status_code=204)
 
 
 @router.post(

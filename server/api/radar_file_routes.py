@@ -11,7 +11,7 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 from pydantic import RootModel
 
-from server.api.access import ERROR_RESPONSES, SignedIn, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, SignedIn, answer, parts_of
 from server.api.terrain_routes import RAW_BODY, FileName
 from server.api.uploads import display_name, stream_to_disk
 from server.errors import BadRequestError, TooLargeError
@@ -69,10 +69,9 @@ async def remove_cfg(file_id: str, request: Request) -> Response:
     return answer(await parts_of(request).radar.set_cfg(file_id, None))
 
 
-@router.delete("/files/{file_id}", status_code=204)
-async def delete(file_id: str, request: Request) -> Response:
+@router.delete("/files/{file_id}", **DONE)
+async def delete(file_id: str, request: Request) -> None:
     await parts_of(request).radar.delete(file_id)
-    return Response(status_code=204)
 
 
 @router.get("/files/{file_id}/open", response_model=RadarOpened)

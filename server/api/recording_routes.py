@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import RootModel
 
-from server.api.access import ERROR_RESPONSES, Fly, InCharge, SignedIn, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, SignedIn, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk
 from server.library.recording_list import suffix_of_recording
@@ -21,19 +21,17 @@ class Recordings(RootModel[list[RecordingDoc]]):
     """Newest first."""
 
 
-@router.post("/recorder/start", status_code=204)
-async def start(operator: InCharge, flying: Fly) -> Response:
+@router.post("/recorder/start", **DONE)
+async def start(operator: InCharge, flying: Fly) -> None:
     """Records from now on, armed or not."""
     del operator
     await flying.recording.start()
-    return Response(status_code=204)
 
 
-@router.post("/recorder/stop", status_code=204)
-async def stop(operator: InCharge, flying: Fly) -> Response:
+@router.post("/recorder/stop", **DONE)
+async def stop(operator: InCharge, flying: Fly) -> None:
     del operator
     await flying.recording.stop()
-    return Response(status_code=204)
 
 
 @router.get("/recordings", response_model=Recordings)
@@ -56,28 +54,24 @@ async def download(recording_id: str, flying: Fly) -> Response:
     return FileResponse(path, media_type="application/octet-stream", filename=path.name)
 
 
-@router.delete("/recordings/{recording_id}", status_code=204)
-async def delete(recording_id: str, flying: Fly) -> Response:
+@router.delete("/recordings/{recording_id}", **DONE)
+async def delete(recording_id: str, flying: Fly) -> None:
     """409 for the one that is being written."""
     await flying.recording.delete(recording_id)
-    return Response(status_code=204)
 
 
-@router.post("/review/open", status_code=204)
-async def open_review(body: OpenReview, flying: Fly) -> Response:
+@router.post("/review/open", **DONE)
+async def open_review(body: OpenReview, flying: Fly) -> None:
     """Reads a recording, judges it against its plan, and makes it ready to be played."""
     await flying.reviewing.open(body)
-    return Response(status_code=204)
 
 
-@router.post("/review/close", status_code=204)
-async def close_review(flying: Fly) -> Response:
+@router.post("/review/close", **DONE)
+async def close_review(flying: Fly) -> None:
     await flying.reviewing.close()
-    return Response(status_code=204)
 
 
-@router.post("/review/play", status_code=204)
-async def play(body: PlayReview, flying: Fly) -> Response:
+@router.post("/review/play", **DONE)
+async def play(body: PlayReview, flying: Fly) -> None:
     """Plays, pauses, seeks, changes speed. Nothing that is replayed can reach a vehicle."""
     await flying.reviewing.play(body)
-    return Response(status_code=204)

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from pydantic import RootModel
 
-from server.api.access import ERROR_RESPONSES, SignedIn, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, SignedIn, answer, parts_of
 from server.schemas import RunScenario, ScenarioDoc, ScenarioResultDoc, ScenarioRunDoc
 from server.studies.scenario_desk import scenario_docs
 
@@ -42,10 +42,9 @@ async def run(body: RunScenario, request: Request) -> Response:
     return answer(parts.scenarios.run(body, armed=parts.flying.live.armed), 202)
 
 
-@router.post("/runs/{run_id}/cancel", status_code=204)
-async def cancel(run_id: str, request: Request) -> Response:
+@router.post("/runs/{run_id}/cancel", **DONE)
+async def cancel(run_id: str, request: Request) -> None:
     parts_of(request).scenarios.cancel(run_id)
-    return Response(status_code=204)
 
 
 @router.get("/runs/{run_id}", response_model=ScenarioResultDoc)
@@ -54,7 +53,6 @@ async def result(run_id: str, request: Request) -> Response:
     return answer(parts_of(request).scenarios.result(run_id))
 
 
-@router.delete("/runs/{run_id}", status_code=204)
-async def delete(run_id: str, request: Request) -> Response:
+@router.delete("/runs/{run_id}", **DONE)
+async def delete(run_id: str, request: Request) -> None:
     await parts_of(request).scenarios.delete(run_id)
-    return Response(status_code=204)

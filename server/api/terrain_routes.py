@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, SignedIn, Work, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, SignedIn, Work, answer, parts_of
 from server.api.uploads import display_folder, display_name, stream_to_disk, suffix_of
 from server.errors import BadRequestError
 from server.library.terrain_picture import terrain_picture_png
@@ -71,11 +71,10 @@ async def remove_spikes(terrain_id: str, workspace: Work) -> Response:
     return answer(workspace.files.remove_spikes(terrain_id), 202)
 
 
-@router.delete("/terrains/{terrain_id}", status_code=204)
-async def delete_terrain(terrain_id: str, workspace: Work) -> Response:
+@router.delete("/terrains/{terrain_id}", **DONE)
+async def delete_terrain(terrain_id: str, workspace: Work) -> None:
     """409 while a plan uses it."""
     await workspace.terrains.delete(terrain_id)
-    return Response(status_code=204)
 
 
 @router.post("/orthophotos", response_model=JobDoc, status_code=202, openapi_extra=RAW_BODY)

@@ -12,7 +12,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from mapping.uwb import UwbParams, of_rule
-from server.api.access import ERROR_RESPONSES, Fly, SignedIn, Work, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, Fly, SignedIn, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
@@ -78,9 +78,8 @@ async def export_layer(layer: LayerName, workspace: Work) -> Response:
     return Response(data, media_type="image/tiff", headers=headers)
 
 
-@router.delete("", status_code=204)
-async def forget(workspace: Work, flying: Fly) -> Response:
+@router.delete("", **DONE)
+async def forget(workspace: Work, flying: Fly) -> None:
     """Forgets the maps, and live scans; what is being worked out is cancelled."""
     workspace.traversability.forget()
     flying.uwb.clear()
-    return Response(status_code=204)
