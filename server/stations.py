@@ -81,7 +81,7 @@ class Flying:
         self.live, self.replay = Channel("live", present), Channel("replay", present)
         self.connections = Connections(link, self.nodes, lease, configured=settings.link)
         self._obstacles = Obstacles(bus, library, workspace, self.nodes, link, self.live, aboard, lane, lease, present)
-        self.obstacles = self._obstacles.desk
+        self.obstacles, self.looking = self._obstacles.desk, self._obstacles.looking
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
         self.desk = FlightDesk(link, work, aboard, workspace, self.live, self._watch, bus, present)

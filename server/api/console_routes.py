@@ -10,8 +10,7 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Redirect
 
 from planning import __version__
 from server.api.access import SignedIn, parts_of, session_of
-from server.api.session_routes import inline_policy
-from server.api.templates import render
+from server.api.session_routes import inline_policy, render
 from server.errors import NotFoundError, SignInError
 
 router = APIRouter(include_in_schema=False)

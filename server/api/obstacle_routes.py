@@ -37,7 +37,7 @@ MEDIA_TYPES: dict[MapFormat, str] = {
 async def acknowledge(body: AcknowledgeBody, operator: InCharge, flying: Fly) -> Response:
     """One alert, or all: it stays latched until it is over as well."""
     del operator
-    return answer(await flying.obstacles.acknowledge(body))
+    return answer(await flying.obstacles.acknowledge(body.alert_id))
 
 
 @router.put("/avoidance", **DONE)
@@ -79,13 +79,13 @@ async def plan_with_seen(body: PlanWithSeen, operator: InCharge, flying: Fly) ->
 @router.get("/section", response_model=SectionDoc)
 async def section(flying: Fly, asked: Annotated[SectionAsked, Query()]) -> Response:
     """A vertical slice through the maps where the vehicle is, or was at the replay's time."""
-    return answer(await flying.obstacles.section(asked))
+    return answer(await flying.looking.section(asked))
 
 
 @router.get("/targets", response_model=RadarTargetsDoc)
 async def targets(flying: Fly, source: Annotated[Source, Query()] = "live") -> Response:
     """All targets of the radar's newest frame, kept by its gate or not."""
-    return answer(await flying.obstacles.targets(source))
+    return answer(await flying.looking.targets(source))
 
 
 @router.get("/map/{name}.{kind}", response_class=Response)

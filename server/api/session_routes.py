@@ -1,4 +1,4 @@
-"""Signing in and out."""
+"""Signing in and out, and the few pages that are not the console: everything put into them is escaped."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ import asyncio
 import base64
 import hashlib
 import re
+from functools import lru_cache
+from pathlib import Path
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from server.api.access import cookie_name, parts_of, session_of
-from server.api.templates import render
 from server.door.auth import session_key
 from server.errors import SignInError, status_of
 from server.schemas import SignIn
 
 router = APIRouter(tags=["session"])
+
+_TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
 
 
 @router.get("/login", include_in_schema=False)
@@ -66,6 +70,15 @@ async def sign_out(request: Request) -> Response:
 def sign_in_page(request: Request, message: str, status_code: int) -> Response:
     page = render("signin.html", message=message, has_password=parts_of(request).auth.has_password)
     return HTMLResponse(page, status_code, {"content-security-policy": inline_policy(page)})
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    return Environment(loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined)
+
+
+def render(template: str, **values: object) -> str:
+    return _environment().get_template(template).render(**values)
 
 
 def inline_policy(page: str) -> str:

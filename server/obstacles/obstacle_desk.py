@@ -16,19 +16,15 @@ from server.obstacles.keeping import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import rest_of_plan
-from server.obstacles.section import Looking, map_file
+from server.obstacles.section import map_file
 from server.obstacles.surroundings import Surroundings
 from server.plan.plan_requests import PlanRequests
 from server.schemas import (
-    AcknowledgeBody,
     MapFormat,
     ObstaclesState,
     PerceptionSettingsBody,
     PlanState,
     PlanWithSeen,
-    RadarTargetsDoc,
-    SectionAsked,
-    SectionDoc,
     SetAvoidanceBody,
     Source,
 )
@@ -56,7 +52,6 @@ class ObstacleDesk:
         watches: Mapping[Source, Watch],
         manoeuvres: Manoeuvres,
         around: Surroundings,
-        looking: Looking,
         link: LinkClient,
         plans: PlanRequests,
         lane: Lane,
@@ -64,8 +59,7 @@ class ObstacleDesk:
         bus: Bus,
     ) -> None:
         self._root, self._watches, self._manoeuvres, self._around = root, watches, manoeuvres, around
-        self._looking, self._link, self._plans, self._lane = looking, link, plans, lane
-        self._lease, self._bus = lease, bus
+        self._link, self._plans, self._lane, self._lease, self._bus = link, plans, lane, lease, bus
         self._live = watches["live"]
         self._avoid_when_adopted = False
         """Of the demo's simulated vehicle: it climbs over what stands in its way."""
@@ -92,8 +86,8 @@ class ObstacleDesk:
         self._kept = replace(self._kept, **brakes)
         self._set(replace(self._live.settings, **brakes))
 
-    async def acknowledge(self, body: AcknowledgeBody) -> ObstaclesState:
-        self._live.acknowledge(body.alert_id)
+    async def acknowledge(self, alert_id: str | None) -> ObstaclesState:
+        self._live.acknowledge(alert_id)
         return self._live.state
 
     async def set_avoidance(self, operator: Operator, body: SetAvoidanceBody) -> None:
@@ -152,13 +146,6 @@ class ObstacleDesk:
         return await self._plans.plan_with_seen(
             maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
-
-    async def section(self, asked: SectionAsked) -> SectionDoc:
-        """Through the maps as they are now."""
-        return await asyncio.to_thread(self._looking.section, asked)
-
-    async def targets(self, source: Source) -> RadarTargetsDoc:
-        return self._looking.targets(source)
 
     async def exported(self, source: Source, name: MapName, kind: MapFormat) -> bytes:
         """Raises NotReadyError while the map is empty."""

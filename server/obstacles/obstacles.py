@@ -68,12 +68,12 @@ class Obstacles:
         self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres, self.tracks)
+        self.looking = Looking(self.watches, workspace.sights)
         self.desk = ObstacleDesk(
             library.root,
             self.watches,
             self._manoeuvres,
             around,
-            Looking(self.watches, workspace.sights),
             link,
             workspace.plans,
             lane,

@@ -5,6 +5,7 @@ And the radar's newest targets in its own frame (fig. 12), and maps as files. Al
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Mapping, Sequence
 
@@ -30,8 +31,11 @@ class Looking:
     def __init__(self, watches: Mapping[Source, Watch], grounds: Sights | None) -> None:
         self._watches, self._grounds = watches, grounds
 
-    def section(self, asked: SectionAsked) -> SectionDoc:
-        """Where the vehicle is, or was at the replay's time. Takes milliseconds: for a thread."""
+    async def section(self, asked: SectionAsked) -> SectionDoc:
+        """Where the vehicle is, or was at the replay's time. Takes milliseconds."""
+        return await asyncio.to_thread(self._section, asked)
+
+    def _section(self, asked: SectionAsked) -> SectionDoc:
         watch, thickness_m, reach_m = self._watches[asked.source], asked.thickness_m, asked.reach_m
         found = SectionDoc(across=asked.across, thickness_m=thickness_m, reach_m=reach_m)
         status = placed_status(list(watch.statuses.values()))
@@ -58,7 +62,7 @@ class Looking:
         up_m = self._grounds.ground_up_m(origin, at + s_m[:, None] * axis)
         return s_m.round(2).tolist(), [round(float(up), 2) if math.isfinite(up) else None for up in up_m]
 
-    def targets(self, source: Source) -> RadarTargetsDoc:
+    async def targets(self, source: Source) -> RadarTargetsDoc:
         look = self._watches[source].radar_look
         if look is None:
             return RadarTargetsDoc()

@@ -127,12 +127,9 @@ from server.schemas.stream import (
 from server.schemas.strict_model import PROTOCOL_VERSION, Strict
 from server.schemas.study_docs import (
     ChartDoc,
-    RadarDetectionDoc,
     RadarFileDoc,
     RadarFrame,
-    RadarMap,
     RadarOpened,
-    RadarParametersDoc,
     RadarReading,
     RunScenario,
     ScenarioDoc,

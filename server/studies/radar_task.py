@@ -20,15 +20,8 @@ from mapping.geometry.arrays import F64
 from mapping.radar.chain import RadarChain, Spectra
 from planning.errors import DescribedError
 from server.errors import BadRequestError
-from server.schemas import (
-    RadarDetectionDoc,
-    RadarFileDoc,
-    RadarFrame,
-    RadarMap,
-    RadarOpened,
-    RadarParametersDoc,
-    RadarReading,
-)
+from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading
+from server.schemas.study_docs import RadarDetectionDoc, RadarMap, RadarParametersDoc
 from server.studies.radar_facts import detection_rows, parameters
 from server.work.jobs import Progress
 from telemetry.sensors.adc.adc_file import AnyFrame

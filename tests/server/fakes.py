@@ -201,7 +201,7 @@ class FakeFlying:
         self.lease = Lease(library.root / "lease.json")
         self.hub = hub
         self.asked: list[tuple[Any, ...]] = []
-        self.obstacles = _Asked(self.asked)
+        self.obstacles = self.looking = _Asked(self.asked)
         self.published: list[tuple[str, Any]] = []
         self.agents = Agents(self)
         self.live = SimpleNamespace(armed=False)

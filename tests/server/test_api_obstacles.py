@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from server.schemas import AcknowledgeBody, PerceptionSettingsBody, PlanWithSeen, SectionAsked, SetAvoidanceBody
+from server.schemas import PerceptionSettingsBody, PlanWithSeen, SectionAsked, SetAvoidanceBody
 from tests.server.running import PASSWORD, Running
 
 CHANGES: list[tuple[str, str, dict[str, Any]]] = [
@@ -54,7 +54,7 @@ def test_the_one_in_charge_is_heard(
     assert ask(pilot, change).is_success
     name, *arguments = served.flying.asked[0]
     bodies = {
-        "acknowledge": AcknowledgeBody(),
+        "acknowledge": None,
         "set_avoidance": SetAvoidanceBody(enabled=True),
         "change_settings": PerceptionSettingsBody(radar_depth_m=20.0),
         "plan_with_seen": PlanWithSeen(seen=True),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from dataclasses import replace
 
@@ -78,10 +79,10 @@ def test_the_slice_is_where_the_vehicle_is_with_the_models_ground() -> None:
     watch.mirrors["radar"].fold(delta([(0, 10, 4)]))
     watch.mirrors["vision_flight"].fold(delta([(0, 11, 4)], sensor="vision_flight", resolution_m=0.5))
     looking = Looking({"live": watch}, Slope())
-    nothing = looking.section(SectionAsked())
+    nothing = asyncio.run(looking.section(SectionAsked()))
     assert (nothing.text, nothing.maps) == ("No sensor tells where the vehicle is.", [])
     watch.on_status(status())
-    found = looking.section(SectionAsked())
+    found = asyncio.run(looking.section(SectionAsked()))
     assert (found.vehicle_up_m, found.heading_deg, found.text) == (5.0, 0.0, "")
     assert {m.name: m.s_m for m in found.maps} == {"radar": [10.0], "vision_flight": [6.0]}
     ground = dict(zip(found.ground_s_m, found.ground_up_m, strict=True))
@@ -99,11 +100,11 @@ def test_the_place_is_the_radars_before_the_cameras_and_never_an_unplaced_one() 
 def test_the_radars_targets_come_with_their_gate() -> None:
     watch = watching()
     looking = Looking({"live": watch}, None)
-    assert looking.targets("live").t_mono_s is None
+    assert asyncio.run(looking.targets("live")).t_mono_s is None
     xyz = np.array([[1.0, 20.0, 2.0], [-30.0, 5.0, 0.0]])
     watch.on_radar_look(RadarLook(7.0, 1007.0, packed(xyz), bytes([1, 0]), math.radians(45), 0.0, 0.3, 1.5, 125.0))
-    found = looking.targets("live")
+    found = asyncio.run(looking.targets("live"))
     assert (found.right_m, found.ahead_m, found.kept) == ([1.0, -30.0], [20.0, 5.0], [True, False])
     assert found.azimuth_deg == pytest.approx(45.0)
     watch.forget()
-    assert looking.targets("live").t_mono_s is None
+    assert asyncio.run(looking.targets("live")).t_mono_s is None

@@ -37,7 +37,6 @@ class Desk:
             nobody,
             nobody,
             nobody,
-            nobody,
             cast(Any, self),
         )
 

@@ -13,7 +13,8 @@ import pytest
 
 from mapping.radar.params import AWR1843, POSITION2GO
 from server.door.guard import UPLOADS
-from server.schemas import RadarFileDoc, RadarFrame, RadarMap, RadarOpened
+from server.schemas import RadarFileDoc, RadarFrame, RadarOpened
+from server.schemas.study_docs import RadarMap
 from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.server.running import Running, running
 from tests.server.station import ok
