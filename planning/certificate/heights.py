@@ -15,9 +15,9 @@ from numba import njit
 
 from mapping.geometry.arrays import F64
 from planning.certificate.nearest import STACK
-from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, below, block_box, edge_distance, leaf_end
 from planning.certificate.quads import part_inside
-from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
+from planning.terrain.cells.lattice import block_around, is_rectangular, quad_of
 
 
 def height_range(pyramid: MaxPyramid, start_m: F64, end_m: F64) -> tuple[F64, F64]:
@@ -102,8 +102,7 @@ def _meets(box, ax, ay, dx, dy):
 
 @njit(cache=True, nogil=True)
 def _range_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, lowest, highest):
-    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
-    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    stop_row, stop_column, bend = leaf_end(elevation_m, lattice, row0, col0)
     for r in range(row0, stop_row):
         for c in range(col0, stop_column):
             if not _meets(block_around(lattice, bend, r, c, r + 1, c + 1), ax, ay, dx, dy):
@@ -132,7 +131,7 @@ def _ranges_over_quads(elevation_m, layout, lattice, boxes_m, start_m, end_m, lo
         while size > 0:
             size -= 1
             level, i, j = node[size, 0], node[size, 1], node[size, 2]
-            offset, rows, cols = layout[level, 0], layout[level, 1], layout[level, 2]
+            offset, cols = layout[level, 0], layout[level, 2]
             if not _meets(block_box(lattice, boxes_m, offset, cols, level, i, j), ax, ay, dx, dy):
                 continue
             if level == 0:
@@ -140,9 +139,9 @@ def _ranges_over_quads(elevation_m, layout, lattice, boxes_m, start_m, end_m, lo
                     elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, az, dx, dy, dz, lowest, highest
                 )
                 continue
-            rows, cols = layout[level - 1, 1], layout[level - 1, 2]
-            for ci in range(2 * i, min(rows, 2 * i + 2)):
-                for cj in range(2 * j, min(cols, 2 * j + 2)):
+            _, _, child_rows, child_cols = below(layout, level, i, j)
+            for ci in child_rows:
+                for cj in child_cols:
                     node[size, 0], node[size, 1], node[size, 2] = level - 1, ci, cj
                     size += 1
         lowest_m[k] = lowest

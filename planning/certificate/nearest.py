@@ -20,9 +20,9 @@ import numpy as np
 from numba import get_num_threads, njit, prange, set_num_threads
 
 from mapping.geometry.arrays import F64
-from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
-from planning.certificate.quads import quad_distance_sq
-from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, below, block_box, column_top, edge_distance, leaf_end
+from planning.certificate.quads import quad_distance_sq, zero_between
+from planning.terrain.cells.lattice import block_around, is_rectangular, quad_of
 
 STACK = 256
 """Four children for each of up to 60 levels: more than any model needs."""
@@ -107,12 +107,7 @@ def column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
     low, high = _narrowed(low, high, top, az, dz, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
     at_low = _half_slope(low, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
     at_high = _half_slope(high, ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)
-    if at_low >= 0.0:
-        t = low
-    elif at_high <= 0.0:
-        t = high
-    else:  # the slope is a straight line between the two and passes zero
-        t = low - at_low * (high - low) / (at_high - at_low)
+    t = zero_between(low, high, at_low, at_high)
     bx, by = _beyond(ax + t * dx, x0, x1), _beyond(ay + t * dy, y0, y1)
     above = max(0.0, az + t * dz - top)
     return bx * bx + by * by + above * above, t
@@ -122,13 +117,10 @@ def column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top):
 def _nearest_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, best_sq, best_t):
     lowest = min(az, az + dz)
     rectangular = is_rectangular(lattice)
-    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
-    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    stop_row, stop_column, bend = leaf_end(elevation_m, lattice, row0, col0)
     for r in range(row0, stop_row):
         for c in range(col0, stop_column):
-            top = np.float64(elevation_m[r, c])
-            if not np.isfinite(top):
-                top = np.inf
+            top = column_top(elevation_m, r, c)
             above = lowest - top
             if above > 0.0 and above * above >= best_sq:
                 continue
@@ -162,10 +154,10 @@ def _nearest(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, az, dx, dy
                 elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, az, dx, dy, dz, best_sq, best_t
             )
             continue
-        offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
+        offset, cols, child_rows, child_cols = below(layout, level, i, j)
         first = size
-        for ci in range(2 * i, min(rows, 2 * i + 2)):
-            for cj in range(2 * j, min(cols, 2 * j + 2)):
+        for ci in child_rows:
+            for cj in child_cols:
                 top = np.float64(maxima_m[offset + ci * cols + cj])
                 x0, y0, x1, y1 = block_box(lattice, boxes_m, offset, cols, level - 1, ci, cj)
                 sq, _ = column_distance_sq(ax, ay, az, dx, dy, dz, x0, y0, x1, y1, top)

@@ -135,3 +135,25 @@ def edge_distance(lattice, rows, columns, x, y):
         return max(0.0, min(min(x, columns * lattice.width_m - x), min(y, rows * lattice.height_m - y)))
     row, column = place_of(lattice, x, y)
     return np.inf if 0.0 < row < rows and 0.0 < column < columns else 0.0
+
+
+@njit(cache=True, inline="always")
+def column_top(elevation_m, row, column):
+    """Of one cell's column: an unknown cell reaches up forever."""
+    top = np.float64(elevation_m[row, column])
+    return top if np.isfinite(top) else np.inf
+
+
+@njit(cache=True, inline="always")
+def leaf_end(elevation_m, lattice, row0, column0):
+    """(past-the-last row, past-the-last column, bend) of the cells of a leaf."""
+    row = min(elevation_m.shape[0], row0 + LEAF_PX)
+    column = min(elevation_m.shape[1], column0 + LEAF_PX)
+    return row, column, bend_range(lattice, row0, column0, row, column)
+
+
+@njit(cache=True, inline="always")
+def below(layout, level, i, j):
+    """Offset and columns of the level below a block's, and the rows and columns of its blocks there."""
+    offset, rows, columns = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
+    return offset, columns, range(2 * i, min(rows, 2 * i + 2)), range(2 * j, min(columns, 2 * j + 2))

@@ -56,6 +56,16 @@ def _narrowed(low, high, distance, speed, ax, ay, az, dx, dy, dz, quad, top):
     return low, high
 
 
+@njit(cache=True, inline="always")
+def zero_between(low, high, at_low, at_high):
+    """Where in [low, high] a slope passes zero that is a straight line between the two; the nearer end if nowhere."""
+    if at_low >= 0.0:
+        return low
+    if at_high <= 0.0:
+        return high
+    return low - at_low * (high - low) / (at_high - at_low)
+
+
 @njit(cache=True, nogil=True)
 def quad_distance_sq(ax, ay, az, dx, dy, dz, quad, top):
     """(smallest squared distance, t) of a + t d, t in [0, 1], to one column; ``top`` may be +inf."""
@@ -73,12 +83,7 @@ def quad_distance_sq(ax, ay, az, dx, dy, dz, quad, top):
         low, high = _narrowed(low, high, az - top, dz, ax, ay, az, dx, dy, dz, quad, top)
     at_low = _half_slope(low, ax, ay, az, dx, dy, dz, quad, top)
     at_high = _half_slope(high, ax, ay, az, dx, dy, dz, quad, top)
-    if at_low >= 0.0:
-        t = low
-    elif at_high <= 0.0:
-        t = high
-    else:  # the slope is a straight line between the two and passes zero
-        t = low - at_low * (high - low) / (at_high - at_low)
+    t = zero_between(low, high, at_low, at_high)
     ox, oy = away(quad, ax + t * dx, ay + t * dy)
     above = max(0.0, az + t * dz - top)
     return ox * ox + oy * oy + above * above, t

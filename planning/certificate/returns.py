@@ -22,9 +22,9 @@ from numba import njit, prange
 
 from mapping.geometry.arrays import F64
 from planning.certificate.nearest import STACK, column_distance_sq
-from planning.certificate.pyramid import LEAF_PX, MaxPyramid, block_box, edge_distance
+from planning.certificate.pyramid import LEAF_PX, MaxPyramid, below, block_box, column_top, edge_distance, leaf_end
 from planning.certificate.quads import quad_distance_sq
-from planning.terrain.cells.lattice import bend_range, block_around, is_rectangular, quad_of
+from planning.terrain.cells.lattice import block_around, is_rectangular, quad_of
 
 _THIN = 1e-9
 """A triangle flatter than this share of its length is judged by its sides alone: it has no inside to speak of."""
@@ -140,13 +140,10 @@ def _asked_by_quad(ax, ay, bx, by, hx, hy, quad, top, clearance_m):
 @njit(cache=True, nogil=True)
 def _leaf_altitude(elevation_m, row0, col0, lattice, ax, ay, bx, by, hx, hy, clearance_m, needed):
     rectangular = is_rectangular(lattice)
-    stop_row, stop_column = min(elevation_m.shape[0], row0 + LEAF_PX), min(elevation_m.shape[1], col0 + LEAF_PX)
-    bend = bend_range(lattice, row0, col0, stop_row, stop_column)
+    stop_row, stop_column, bend = leaf_end(elevation_m, lattice, row0, col0)
     for r in range(row0, stop_row):
         for c in range(col0, stop_column):
-            top = np.float64(elevation_m[r, c])
-            if not np.isfinite(top):
-                top = np.inf
+            top = column_top(elevation_m, r, c)
             if top + clearance_m <= needed:
                 continue
             x0, y0, x1, y1 = block_around(lattice, bend, r, c, r + 1, c + 1)
@@ -181,10 +178,10 @@ def _needed_altitude(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, bx
                 elevation_m, i * LEAF_PX, j * LEAF_PX, lattice, ax, ay, bx, by, hx, hy, clearance_m, needed
             )
             continue
-        offset, rows, cols = layout[level - 1, 0], layout[level - 1, 1], layout[level - 1, 2]
+        offset, cols, child_rows, child_cols = below(layout, level, i, j)
         first = size
-        for ci in range(2 * i, min(rows, 2 * i + 2)):
-            for cj in range(2 * j, min(cols, 2 * j + 2)):
+        for ci in child_rows:
+            for cj in child_cols:
                 top = np.float64(maxima_m[offset + ci * cols + cj])
                 if top + clearance_m <= needed:
                     continue

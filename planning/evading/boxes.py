@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.arrays import F64
+from planning.certificate.quads import zero_between
 
 
 def nearest_box(
@@ -57,13 +58,7 @@ def segment_box_sq(a, d, low, high):
                     right = t
                 else:
                     left = t
-    at_left, at_right = _half_slope(left, a, d, low, high), _half_slope(right, a, d, low, high)
-    if at_left >= 0.0:
-        t = left
-    elif at_right <= 0.0:
-        t = right
-    else:  # the slope is a straight line between the two and passes zero
-        t = left - at_left * (right - left) / (at_right - at_left)
+    t = zero_between(left, right, _half_slope(left, a, d, low, high), _half_slope(right, a, d, low, high))
     sq = 0.0
     for k in range(3):
         p = a[k] + t * d[k]

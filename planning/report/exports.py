@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from planning.request import effective_profile
 from planning.route.camera import gsd_cm
 from planning.terrain.dsm import SurfaceModel
 
-FILES = (
+FileName = Literal[
     "trajectory.csv",
     "trajectory.kml",
     "mission.waypoints",
@@ -26,7 +26,8 @@ FILES = (
     "mission.geojson",
     "certificate.json",
     "report.html",
-)
+]
+FILES: tuple[FileName, ...] = get_args(FileName)
 
 
 def export_file(

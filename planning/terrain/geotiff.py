@@ -9,7 +9,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 from secrets import token_hex
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from pyproj import CRS
@@ -39,61 +39,46 @@ __all__ = [
 ]
 
 
-def read_dsm(
-    path: str | os.PathLike[str],
-    *,
-    crs: str | None = None,
-    z_scale: float | None = None,
-    vertical_datum: str | None = None,
-    limits: RasterLimits | None = None,
-    remove_spikes: bool = False,
-    progress: Progress | None = None,
-) -> Dsm:
+class ReadOptions(TypedDict, total=False):
+    """How a surface model's file is to be understood, what it may ask for, and who wants to hear of it."""
+
+    crs: str | None
+    """Declares or overrides what the file says, as does ``vertical_datum``."""
+    z_scale: float | None
+    """Metres per stored unit: 0.01 for centimetres."""
+    vertical_datum: str | None
+    limits: RasterLimits | None
+    progress: Progress | None
+    """May raise to cancel."""
+
+
+def read_dsm(path: str | os.PathLike[str], *, remove_spikes: bool = False, **how: Unpack[ReadOptions]) -> Dsm:
     """A surface model in metres from a GeoTIFF or ESRI ASCII grid: (H, W) heights in the file's own vertical datum.
 
-    ``read_dsm_reported`` says what the options mean. Raises RasterError, with what to do.
+    Projected metres stay as they are, feet become metres in their places. Degrees and grids whose metres are not true
+    go to the local UTM zone, rotated or oblong cells become squares, no height is lost on the way
+    (``planning.terrain.cells.squares``); the file's own cells stay with the model for whatever must be exact
+    (``Dsm.cells``). Raises a RasterError that says what to do.
     """
-    dsm, _ = _read(path, _declared(crs, z_scale, vertical_datum, limits), progress)
+    dsm, _ = _read(path, how)
     return without_spikes(dsm, find_spikes(dsm)) if remove_spikes else dsm
 
 
 def read_dsm_reported(
-    path: str | os.PathLike[str],
-    *,
-    crs: str | None = None,
-    z_scale: float | None = None,
-    vertical_datum: str | None = None,
-    limits: RasterLimits | None = None,
-    remove_spikes: bool = False,
-    progress: Progress | None = None,
+    path: str | os.PathLike[str], *, remove_spikes: bool = False, **how: Unpack[ReadOptions]
 ) -> tuple[Dsm, ReadReport]:
-    """A surface model in metres, and what was found and done.
-
-    ``crs`` and ``vertical_datum`` declare or override what the file says; ``z_scale`` is metres per
-    stored unit (0.01 for centimetres). Projected metres stay as they are, feet become metres in their
-    places. Degrees and grids whose metres are not true go to the local UTM zone, rotated or oblong cells become
-    squares, no height is lost on the way (``planning.terrain.cells.squares``); the file's own cells stay with the model
-    for whatever must be exact (``Dsm.cells``). ``progress`` may raise to cancel.
-    Raises a RasterError that says what to do.
-    """
-    dsm, report = _read(path, _declared(crs, z_scale, vertical_datum, limits), progress)
+    """As ``read_dsm``, and what was found and done."""
+    dsm, report = _read(path, how)
+    progress = how.get("progress")
     spikes = find_spikes(dsm, progress=(lambda share: progress("spikes", share)) if progress else None)
     if remove_spikes:
         dsm = without_spikes(dsm, spikes)
     return dsm, replace(report, spikes=spikes, spikes_removed=remove_spikes and bool(spikes))
 
 
-def open_dsm(
-    path: str | os.PathLike[str],
-    *,
-    crs: str | None = None,
-    z_scale: float | None = None,
-    vertical_datum: str | None = None,
-    limits: RasterLimits | None = None,
-    progress: Progress | None = None,
-) -> DsmFile:
+def open_dsm(path: str | os.PathLike[str], **how: Unpack[ReadOptions]) -> DsmFile:
     """The surface model of ``read_dsm``, of a large file only the parts that are asked for; isolated spikes stay."""
-    return DsmFile(Path(path), _declared(crs, z_scale, vertical_datum, limits), progress)
+    return DsmFile(Path(path), _declared(how), how.get("progress"))
 
 
 def read_orthophoto(
@@ -152,17 +137,16 @@ def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
             written.unlink(missing_ok=True)
 
 
-def _declared(
-    crs: str | None, z_scale: float | None, vertical_datum: str | None, limits: RasterLimits | None
-) -> Declared:
+def _declared(how: ReadOptions) -> Declared:
+    z_scale = how.get("z_scale")
     if z_scale is not None and not (np.isfinite(z_scale) and z_scale > 0):
         raise ParameterError(f"The height scale must be greater than 0, got {z_scale}.", where="z_scale")
-    return Declared(crs, z_scale, vertical_datum, limits or RasterLimits())
+    return Declared(how.get("crs"), z_scale, how.get("vertical_datum"), how.get("limits") or RasterLimits())
 
 
-def _read(path: str | os.PathLike[str], declared: Declared, progress: Progress | None) -> tuple[Dsm, ReadReport]:
-    source = Path(path)
-    read = read_surface(source, declared, all_of, first_look=True, progress=progress)
+def _read(path: str | os.PathLike[str], how: ReadOptions) -> tuple[Dsm, ReadReport]:
+    source, progress = Path(path), how.get("progress")
+    read = read_surface(source, _declared(how), all_of, first_look=True, progress=progress)
     assert read.stored is not None
     return assemble(read.stored, read.plan, read.stats, sha256=read.sha256, where=source.name, progress=progress)
 

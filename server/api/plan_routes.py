@@ -7,22 +7,14 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
+from planning.report.exports import FileName
 from server.api.access import DONE, ERROR_RESPONSES, SignedIn, Work, answer
 from server.api.uploads import display_name
 from server.schemas import Imported, OpenPlan, PlanEdit, PlanState, SavePlanAs, Snapshot
 
 router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["plan"], responses=ERROR_RESPONSES)
 
-ExportFile = Literal[
-    "trajectory.csv",
-    "trajectory.kml",
-    "mission.waypoints",
-    "mission.plan",
-    "mission.geojson",
-    "certificate.json",
-    "report.html",
-    "all.zip",
-]
+ExportFile = Literal[FileName, "all.zip"]
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
     "kml": "application/vnd.google-earth.kml+xml",
