@@ -1,4 +1,7 @@
-"""Scenario: a corner reflector 68 m ahead and 3 m higher, seen in lateral flight (Miccinesi 2022, figs 10-15)."""
+"""Scenarios: what a radar maps (Miccinesi 2022): a corner reflector 68 m ahead and 3 m higher, a wood, and a ruin.
+
+The reflector is seen in lateral flight (figs 10-15); wood and ruined building are figs 16-21.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,14 @@ from mapping.radar.targets import Gate, Variant, in_gate, polar, to_enu
 from mapping.sensor_frames import rows
 from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.curves import Chart, series
-from telemetry.simulation.scenarios.stage.map_against_world import clusters_of, spread, within
-from telemetry.simulation.scenarios.stage.result import (
-    Figure,
-    MapFigures,
-    ScenarioRequest,
-    ScenarioResult,
+from telemetry.simulation.scenarios.stage.map_against_world import (
+    clusters_of,
+    radar_figures,
+    spread,
+    vision_figures,
+    within,
 )
+from telemetry.simulation.scenarios.stage.result import Figure, MapFigures, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
 from telemetry.simulation.simulator.sensors.body import of_truth
@@ -33,6 +37,7 @@ FAR_M, NEAR_M = (60.0, 76.0), 40.0
 LEVEL_WITHIN_M = 0.4
 DRAWN_M = 12.0
 """Around the reflector, from above."""
+WOOD, RUIN = "wood", "ruined-building"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +52,7 @@ class ReflectorReturns:
     """(N, 3) In the world's frame, as each variant of fig. 15 puts it."""
 
 
-def run(wanted: ScenarioRequest) -> ScenarioResult:
+def run_reflector(wanted: ScenarioRequest) -> ScenarioResult:
     scene = scenes.corner_reflector()
     setup = setup_of(scene, wanted, NAME, sensors=("radar",))
     flown = flown_of(setup, wanted)
@@ -175,3 +180,24 @@ def _level(returns: ReflectorReturns) -> Bools:
 
 def _share(hits: Bools) -> float:
     return float(hits.mean()) if len(hits) else 0.0
+
+
+def run_wood(wanted: ScenarioRequest) -> ScenarioResult:
+    return _mapped(WOOD, scenes.wood(wanted.seed), wanted)
+
+
+def run_ruin(wanted: ScenarioRequest) -> ScenarioResult:
+    return _mapped(RUIN, scenes.ruined_building(wanted.seed), wanted)
+
+
+def _mapped(name: str, scene: scenes.ScenarioScene, wanted: ScenarioRequest) -> ScenarioResult:
+    setup = setup_of(scene, wanted, name)
+    flown = flown_of(setup, wanted)
+    radar, vision = radar_figures(flown, setup), vision_figures(flown, setup)
+    figures = (
+        Figure("contacts", float(flown.contact), most=0.0),
+        Figure("precision of the radar map", radar.precision or 0.0),
+        Figure("recall of the radar map", radar.recall or 0.0),
+    )
+    flight = flown.result("mapping flight", radar=radar, vision=vision, figures=figures)
+    return ScenarioResult(name, wanted.seed, (flight,))
