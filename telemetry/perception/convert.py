@@ -7,9 +7,8 @@ from collections.abc import Mapping
 
 from mapping.geometry.frames import LocalFrame
 from mapping.perceiving.alerts import AlertEvent
-from mapping.perceiving.frame_result import SearchedRegion
 from mapping.perceiving.obstacles import Found
-from telemetry.topics.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Region, Sensor
+from telemetry.topics.obstacles import Count, MapOrigin, Obstacle, ObstacleAlert, Sensor
 
 
 def frame_of(origin: MapOrigin) -> LocalFrame:
@@ -20,19 +19,6 @@ def counts(dropped: Mapping[str, int]) -> tuple[Count, ...]:
     """Most first."""
     found = sorted(((count, what) for what, count in dropped.items() if count > 0), key=lambda c: (-c[0], c[1]))
     return tuple(Count(what, count) for count, what in found)
-
-
-def region_of(region: SearchedRegion) -> Region:
-    return Region(
-        region.enu_m,
-        region.heading_rad,
-        region.depth_m,
-        region.fov_rad,
-        region.height_m,
-        region.occupied,
-        region.nearest_m,
-        region.hidden_m,
-    )
 
 
 def obstacle_of(found: Found, frame: LocalFrame | None) -> Obstacle:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from dataclasses import asdict
 from statistics import median
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -10,10 +11,10 @@ from mapping.geometry.frames import LocalFrame
 from mapping.perceiving.alerts import AlertEvent
 from mapping.perceiving.flight_map import FlightMap
 from mapping.perceiving.frame_result import FrameResult
-from telemetry.perception.convert import alert_of, counts, obstacle_of, region_of
+from telemetry.perception.convert import alert_of, counts, obstacle_of
 from telemetry.perception.sensor_kinds import SensorKind
 from telemetry.perception.whereabouts import Whereabouts
-from telemetry.topics.obstacles import Basis, FlightMapStatus, MissionConflict, ObstacleAlert, PerceptionStatus
+from telemetry.topics.obstacles import Basis, FlightMapStatus, MissionConflict, ObstacleAlert, PerceptionStatus, Region
 
 _LATENCIES = 50
 _SAY_BEGUN_S = 10.0
@@ -88,7 +89,7 @@ class Teller:
             map_bytes=the_map.size_bytes,
             map_revision=the_map.revision,
             origin=where.origin,
-            region=None if result.region is None else region_of(result.region),
+            region=None if result.region is None else Region(**asdict(result.region)),
             corridor_m=result.corridor_m,
             corridor_occupied=result.corridor_occupied,
             obstacles=tuple(obstacle_of(found, frame) for found in result.obstacles),

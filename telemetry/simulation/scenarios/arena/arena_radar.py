@@ -9,9 +9,10 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, Bools
 from mapping.perceiving.radar_evidence import EvidenceParams
-from mapping.sensor_frames import RadarFrame, packed, rows
+from mapping.sensor_frames import RadarFrame, rows
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
+from telemetry.simulation.simulator.sensors.body import radar_frame
 from telemetry.simulation.simulator.sensors.iq import IqRadarSensor
 from telemetry.simulation.simulator.sensors.iq_model import POSITION2GO_IQ
 from telemetry.topics.track_settings import TrackerSettings
@@ -56,7 +57,7 @@ class Position2GoModel:
         """As a sensor's frame: on its axis' level, each as strong as 1 m2 is to the radar that flies live."""
         range_m, bearing_rad, speed_m_s = detections.T
         xyz_m = np.column_stack([range_m * np.sin(bearing_rad), range_m * np.cos(bearing_rad), np.zeros(len(range_m))])
-        return _frame(truth, number, xyz_m, speed_m_s, _snr_db(np.ones(len(range_m)), range_m))
+        return radar_frame(truth, number, xyz_m, speed_m_s, _snr_db(np.ones(len(range_m)), range_m))
 
     def sees(self, range_m: F64, bearing_rad: F64) -> Bools:
         return (np.abs(bearing_rad) <= self.half_fov_rad) & (range_m >= self.nearest_m) & (range_m <= self.farthest_m)
@@ -111,15 +112,10 @@ class SampledPosition2Go:
         range_m = np.linalg.norm(xyz_m, axis=1)
         area_m2 = 10 ** (snr_db / 10) / beam.rated_snr * (range_m / beam.range_m) ** 4
         speed_m_s = rows(found.radial_speed_m_s, 1)[:, 0].astype(np.float64)
-        return _frame(truth, found.number, xyz_m, speed_m_s, _snr_db(area_m2, range_m))
+        return radar_frame(truth, found.number, xyz_m, speed_m_s, _snr_db(area_m2, range_m))
 
 
 def _snr_db(area_m2: F64, range_m: F64) -> F64:
     rated = EvidenceParams()
     away = np.maximum(range_m, 0.1)
     return rated.rated_snr_db + 10 * np.log10(np.maximum(area_m2, 1e-9)) + 40 * np.log10(rated.rated_range_m / away)
-
-
-def _frame(truth: SimTruth, number: int, xyz_m: F64, speed_m_s: F64, snr_db: F64) -> RadarFrame:
-    columns = (packed(xyz_m), packed(speed_m_s), packed(snr_db))
-    return RadarFrame(truth.t_mono_s, truth.t_utc_s, number, "simulated", *columns)

@@ -1,12 +1,14 @@
-"""From the vehicle's body (x right, y forward, z up) to east, north, up, at the attitude that it really has."""
+"""Sensors on the body (x right, y forward, z up): its turn to east, north, up as it really is, and a radar's frame."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F64
+from mapping.sensor_frames import RadarFrame, packed
 from telemetry.topics.vehicle import SimTruth
 
 
@@ -23,6 +25,12 @@ def rotation_enu_body(roll_rad: float, pitch_rad: float, heading_rad: float) -> 
 
 def of_truth(truth: SimTruth) -> F64:
     return rotation_enu_body(truth.roll_rad, truth.pitch_rad, truth.heading_rad)
+
+
+def radar_frame(truth: SimTruth, number: int, xyz_m: F64, speed_m_s: ArrayLike, snr_db: ArrayLike) -> RadarFrame:
+    """What a radar measured there, in the body's frame."""
+    columns = (packed(xyz_m), packed(speed_m_s), packed(snr_db))
+    return RadarFrame(truth.t_mono_s, truth.t_utc_s, number, "simulated", *columns)
 
 
 def quaternion_wxyz(rotation: F64) -> tuple[float, float, float, float]:

@@ -13,9 +13,9 @@ import numpy as np
 from mapping.geometry.arrays import C64
 from mapping.radar.chain import RadarChain
 from mapping.radar.detections import Detections
-from mapping.sensor_frames import RadarFrame, packed
+from mapping.sensor_frames import RadarFrame
 from telemetry.simulation.simulator.scene.world import World
-from telemetry.simulation.simulator.sensors.body import of_truth, rotation_enu_body
+from telemetry.simulation.simulator.sensors.body import of_truth, radar_frame, rotation_enu_body
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, IqModel
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled, strongest
 from telemetry.simulation.simulator.sensors.radar_echoes import echoes
@@ -62,15 +62,7 @@ class IqRadarSensor:
 
     def _told(self, truth: SimTruth, found: Detections) -> RadarFrame:
         xyz_m = found.xyz_m @ self._body_radar.T + self._mount_m
-        return RadarFrame(
-            t_mono_s=truth.t_mono_s,
-            t_utc_s=truth.t_utc_s,
-            number=self._published,
-            source="simulated",
-            xyz_m=packed(xyz_m),
-            radial_speed_m_s=packed(found.radial_speed_m_s),
-            snr_db=packed(found.snr_db),
-        )
+        return radar_frame(truth, self._published, xyz_m, found.radial_speed_m_s, found.snr_db)
 
 
 def noise(shape: tuple[int, int, int], random: np.random.Generator) -> C64:

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.sensor_frames import RadarFrame, packed
+from mapping.sensor_frames import RadarFrame
 from telemetry.simulation.simulator.scene.world import World
-from telemetry.simulation.simulator.sensors.body import of_truth
+from telemetry.simulation.simulator.sensors.body import of_truth, radar_frame
 from telemetry.simulation.simulator.sensors.radar_cells import Scatterers, detect
 from telemetry.simulation.simulator.sensors.radar_echoes import NEAREST_M, echoes
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
@@ -45,15 +45,7 @@ class RadarSensor:
         found = _joined([real, self._side_lobes(real), self._false_alarms()])
         xyz_m, speed_m_s = self._measured(found)
         self._published += 1
-        return RadarFrame(
-            t_mono_s=truth.t_mono_s,
-            t_utc_s=truth.t_utc_s,
-            number=self._published,
-            source="simulated",
-            xyz_m=packed(xyz_m),
-            radial_speed_m_s=packed(speed_m_s),
-            snr_db=packed(10 * np.log10(found.power)),
-        )
+        return radar_frame(truth, self._published, xyz_m, speed_m_s, 10 * np.log10(found.power))
 
     def _real(self, truth: SimTruth) -> _Targets:
         body_enu = of_truth(truth)
