@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mapping.errors import RadarDataError
-from mapping.radar.params import FmcwParams
+from mapping.radar.params import LIGHT_M_S, FmcwParams
 from telemetry.sensors.ti_mmwave.cfg_commands import Command
 
-C_M_S = 299_792_458.0
 USABLE_RANGE = 0.8
 """Of the range at which the beat reaches the sample rate: TI's figure for the receiver's filter."""
 _AZIMUTH_TX = (0, 2)
@@ -61,7 +60,7 @@ class TiConfig:
     def wavelength_m(self) -> float:
         """In the middle of the samples."""
         middle_s = self.adc_start_s + self.samples / self.sample_rate_hz / 2
-        return C_M_S / (self.start_frequency_hz + self.slope_hz_per_s * middle_s)
+        return LIGHT_M_S / (self.start_frequency_hz + self.slope_hz_per_s * middle_s)
 
     @property
     def chirp_interval_s(self) -> float:
@@ -70,11 +69,11 @@ class TiConfig:
 
     @property
     def range_cell_m(self) -> float:
-        return C_M_S / (2 * self.bandwidth_hz)
+        return LIGHT_M_S / (2 * self.bandwidth_hz)
 
     @property
     def farthest_m(self) -> float:
-        return USABLE_RANGE * self.sample_rate_hz * C_M_S / (2 * self.slope_hz_per_s)
+        return USABLE_RANGE * self.sample_rate_hz * LIGHT_M_S / (2 * self.slope_hz_per_s)
 
     @property
     def velocity_cell_m_s(self) -> float:

@@ -143,15 +143,16 @@ class Autopilot(SimulatedPilot):
         if not isinstance(self.mode, Guided) or not self.flying:
             return "failed"
         self.mode.follow(self, goal_neu, v_neu)
-        if heading_rad is not None:
-            self.turn_to(heading_rad)
-        return "accepted"
+        return self._turned(heading_rad)
 
     def fly_at(self, v_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
         """Only in GUIDED and in the air."""
         if not isinstance(self.mode, Guided) or not self.flying:
             return "failed"
         self.mode.fly_at(self, v_neu)
+        return self._turned(heading_rad)
+
+    def _turned(self, heading_rad: float | None) -> Answer:
         if heading_rad is not None:
             self.turn_to(heading_rad)
         return "accepted"

@@ -261,8 +261,7 @@ class Path:
         self.start_neu = s = stopping_point(shaped, pilot.axes())
         self._track = LegTrack(s, pilot.parameters["WPNAV_RADIUS"] / 100)
         p = shaped.p_neu
-        self._offset = Shaped((p[0] - s[0], p[1] - s[1], p[2] - s[2]), shaped.v_neu)
-        self._offset.accel_neu = shaped.accel_neu
+        self._offset = Shaped((p[0] - s[0], p[1] - s[1], p[2] - s[2]), shaped.v_neu, shaped.accel_neu)
         self._arriving = True
         self._flow = 1.0
         self.paused = False
@@ -327,12 +326,7 @@ def _scale(p: Vec3, v: Vec3, at: Vec3) -> float:
 
 def shaped_from(pilot: SimulatedPilot) -> Shaped:
     """A target that goes on from the present one, or stands where the vehicle stands."""
-    if not pilot.flying:
-        return Shaped(pilot.p_neu)
-    p, v, a = pilot.target
-    shaped = Shaped(p, v)
-    shaped.accel_neu = a
-    return shaped
+    return Shaped(*pilot.target) if pilot.flying else Shaped(pilot.p_neu)
 
 
 def step_towards(shaped: Shaped, goal_neu: Vec3, pilot: SimulatedPilot, dt_s: float) -> Motion:

@@ -11,6 +11,7 @@ from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.leg_curves import Motion
 from telemetry.simulation.simulator.autopilot.mission_steps import MissionSteps, Step
+from telemetry.simulation.simulator.autopilot.shaping import limited
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
 POSITION_PER_S = 1.0
@@ -44,22 +45,17 @@ class PositionControl:
     ) -> Vec3:
         """Acceleration to ask of the airframe, from the target's motion and the estimated one."""
         (pt, vt, at), (mn, me, mu) = target, self._memory
-        cn, ce = _limited(
+        cn, ce = limited(
             POSITION_PER_S * (pt[0] - p_neu[0]), POSITION_PER_S * (pt[1] - p_neu[1]), FASTEST_CORRECTION_M_S
         )
         en, ee = vt[0] + cn - v_neu[0], vt[1] + ce - v_neu[1]
         eu = vt[2] + max(-1.5, min(1.5, HEIGHT_PER_S * (pt[2] - p_neu[2]))) - v_neu[2]
-        mn, me = _limited(mn + VELOCITY_MEMORY_PER_S2 * en * dt_s, me + VELOCITY_MEMORY_PER_S2 * ee * dt_s, MEMORY_M_S2)
+        mn, me = limited(mn + VELOCITY_MEMORY_PER_S2 * en * dt_s, me + VELOCITY_MEMORY_PER_S2 * ee * dt_s, MEMORY_M_S2)
         mu = max(-MEMORY_M_S2, min(MEMORY_M_S2, mu + CLIMB_MEMORY_PER_S2 * eu * dt_s))
         self._memory = (mn, me, mu)
         most = GRAVITY_M_S2 * math.tan(max_tilt_rad)
-        north, east = _limited(at[0] + VELOCITY_PER_S * en + mn, at[1] + VELOCITY_PER_S * ee + me, most)
+        north, east = limited(at[0] + VELOCITY_PER_S * en + mn, at[1] + VELOCITY_PER_S * ee + me, most)
         return north, east, at[2] + CLIMB_PER_S * eu + mu
-
-
-def _limited(x: float, y: float, most: float) -> tuple[float, float]:
-    size = math.hypot(x, y)
-    return (x, y) if size <= most else (x * most / size, y * most / size)
 
 
 @dataclass(frozen=True, slots=True)

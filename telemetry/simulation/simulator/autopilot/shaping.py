@@ -9,6 +9,7 @@ import math
 from dataclasses import replace
 
 from planning.flight_time.scurve import Axes
+from telemetry.simulation.simulator.autopilot.leg_curves import REST
 from telemetry.simulation.simulator.neu_frame import Vec3
 
 JERK_M_S3 = 5.0
@@ -48,10 +49,8 @@ def controlled(error: float, per_s: float, limit: float) -> float:
 class Shaped:
     """Position, velocity and acceleration of a target, north east up."""
 
-    def __init__(self, p_neu: Vec3, v_neu: Vec3 = (0.0, 0.0, 0.0)) -> None:
-        self.p_neu = p_neu
-        self.v_neu = v_neu
-        self.accel_neu: Vec3 = (0.0, 0.0, 0.0)
+    def __init__(self, p_neu: Vec3, v_neu: Vec3 = REST, accel_neu: Vec3 = REST) -> None:
+        self.p_neu, self.v_neu, self.accel_neu = p_neu, v_neu, accel_neu
 
     def towards(self, goal_neu: Vec3, axes: Axes, dt_s: float) -> None:
         """One step to a place, as straight as the limits of climb allow."""
@@ -67,7 +66,7 @@ class Shaped:
 
     def moving(self, v_neu: Vec3, axes: Axes, dt_s: float) -> None:
         """One step at this velocity, or as fast as the limits allow."""
-        north, east = _limited(v_neu[0], v_neu[1], axes.speed_m_s)
+        north, east = limited(v_neu[0], v_neu[1], axes.speed_m_s)
         self._step((north, east), max(-axes.descent_m_s, min(axes.climb_m_s, v_neu[2])), axes, dt_s)
 
     def sinking(self, over_neu: Vec3, speed_m_s: float, axes: Axes, dt_s: float) -> None:
@@ -106,7 +105,7 @@ class Shaped:
         (an, ae, au), (vn, ve, vu), (n, e, u) = self.accel_neu, self.v_neu, self.p_neu
         north, east = _flat_wish(flat_m_s, (flat_m_s[0] - vn, flat_m_s[1] - ve), axes.accel_m_s2)
         up = _between(_wish(up_m_s - vu, axes.vertical_accel_m_s2), axes.vertical_accel_m_s2)
-        dn, de = _limited(north - an, east - ae, JERK_M_S3 * dt_s)
+        dn, de = limited(north - an, east - ae, JERK_M_S3 * dt_s)
         step = JERK_M_S3 * dt_s
         an, ae, au = an + dn, ae + de, au + _between(up - au, step)
         vn, ve, vu = vn + an * dt_s, ve + ae * dt_s, vu + au * dt_s
@@ -147,11 +146,11 @@ def _flat_wish(
     accel = _wish(size, accel_m_s2)
     north, east = accel * change_m_s[0] / size, accel * change_m_s[1] / size
     if speed < 1e-9:
-        return _limited(north, east, accel_m_s2)
+        return limited(north, east, accel_m_s2)
     un, ue = goal_m_s[0] / speed, goal_m_s[1] / speed
     along, across = north * un + east * ue, east * un - north * ue
     if abs(across) >= abs(along):
-        return _limited(north, east, accel_m_s2)
+        return limited(north, east, accel_m_s2)
     across = _between(across, CORNER_SHARE * accel_m_s2)
     along = _between(along, math.sqrt(accel_m_s2**2 - across**2))
     return along * un - across * ue, along * ue + across * un
@@ -161,15 +160,14 @@ def _between(value: float, most: float) -> float:
     return max(-most, min(most, value))
 
 
-def _limited(north: float, east: float, most: float) -> tuple[float, float]:
+def limited(north: float, east: float, most: float) -> tuple[float, float]:
     size = math.hypot(north, east)
     return (north, east) if size <= most else (north * most / size, east * most / size)
 
 
 def stopping_point(shaped: Shaped, axes: Axes) -> Vec3:
     """Where a target that brakes now comes to rest."""
-    ahead = Shaped(shaped.p_neu, shaped.v_neu)
-    ahead.accel_neu = shaped.accel_neu
+    ahead = Shaped(*shaped.motion)
     for _ in range(LONGEST_STOP):
         if ahead.at_rest:
             break

@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from mapping.radar.params import LIGHT_M_S
 from telemetry.simulation.simulator.scene.motion import Motion
 
-WAVELENGTH_M = 299_792_458.0 / 77.5e9
+WAVELENGTH_M = LIGHT_M_S / 77.5e9
 """Of the radar that corner reflectors are made for."""
 
 Above = Literal["ground", "origin"]
