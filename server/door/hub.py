@@ -118,10 +118,6 @@ class Hub:
         return self._pages.get(page_id)
 
     @property
-    def page_ids(self) -> list[str]:
-        return list(self._pages)
-
-    @property
     def session_keys(self) -> list[str]:
         """Of the pages that are open, the one that has been open longest first."""
         return [page.session_key for page in self._pages.values()]
@@ -208,12 +204,14 @@ class Hub:
                 return
 
     async def _receiver(self, websocket: WebSocket, page: Page, on_message: OnMessage) -> None:
-        bucket = _Bucket()
+        bucket = Bucket(RATE_PER_S, BURST, time.monotonic())
         while True:
             received = await websocket.receive()
             if received["type"] == "websocket.disconnect":
                 return
-            if not bucket.take():
+            allowed = bucket.left(time.monotonic()) >= 1.0
+            bucket.spend(1.0)
+            if not allowed:
                 log.warning("Page %s sent too many messages and was dropped.", page.page_id)
                 page.cut_off(CLOSE_POLICY)
                 return
@@ -263,18 +261,20 @@ def _unreadable(error: ValueError) -> schemas.NoticeMessage:
     return schemas.NoticeMessage(level="error", error=doc)
 
 
-class _Bucket:
-    """A token bucket: ``RATE_PER_S`` messages for ever, ``BURST`` at once."""
+class Bucket:
+    """A token bucket on a clock that the caller reads: ``rate_per_s`` for ever, ``burst`` at once; may be overdrawn."""
 
-    def __init__(self) -> None:
-        self._tokens = BURST
-        self._at_mono_s = time.monotonic()
+    def __init__(self, rate_per_s: float, burst: float, now_s: float) -> None:
+        self._rate_per_s, self._burst = rate_per_s, burst
+        self._tokens, self._at_s = burst, now_s
 
-    def take(self) -> bool:
-        now = time.monotonic()
-        self._tokens = min(BURST, self._tokens + RATE_PER_S * (now - self._at_mono_s)) - 1
-        self._at_mono_s = now
-        return self._tokens >= 0
+    def left(self, now_s: float) -> float:
+        self._tokens = min(self._burst, self._tokens + self._rate_per_s * max(0.0, now_s - self._at_s))
+        self._at_s = now_s
+        return self._tokens
+
+    def spend(self, count: float) -> None:
+        self._tokens -= count
 
 
 async def _wait(gone: asyncio.Event, session_remaining_s: float, page: Page) -> None:

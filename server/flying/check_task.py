@@ -24,8 +24,8 @@ from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from server.library.documents import clearance_of, demands_from_doc, seen_in
 from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain
+from server.library.shelf import utc_now
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
-from server.work.clocks import utc_now
 from server.work.jobs import Progress
 from telemetry.topics.messages import Item, OnboardMission, PlanRecord
 from telemetry.topics.vehicle import VehicleState

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from planning.following.below import below_required
@@ -13,6 +12,7 @@ from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from server.flying.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
 from server.flying.review_flight import Flight, placed_flight
+from server.library.shelf import iso_utc
 from server.schemas.flight_docs import RecordingDoc
 from server.schemas.review_docs import ReviewDoc, ReviewSeries
 from telemetry.recording.flight_log import FlightLog
@@ -130,8 +130,3 @@ def recording_of(log: FlightLog, path: Path) -> RecordingDoc:
         plan_name=log.plan.name if log.plan else "",
         fault=" ".join(log.faults),
     )
-
-
-def iso_utc(t_utc_s: float) -> str:
-    """ISO 8601 with milliseconds and Z."""
-    return datetime.fromtimestamp(t_utc_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

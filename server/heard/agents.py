@@ -4,26 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, UwbScan
 from server.errors import BusyError
 from telemetry.agent.intake import Frame, Intake
-from telemetry.topics.messages import Published, Topic, VehicleText
+from telemetry.bus import Bus
+from telemetry.topics.messages import Topic, VehicleText
 
 AGENTS_MAX = 4
-
-
-class Publisher(Protocol):
-    """The part of the bus that is used here."""
-
-    def publish(self, topic: str, message: Published) -> None: ...
 
 
 class Agents:
     """Frames of all agents go the same way; the perception nodes tell their sources apart."""
 
-    def __init__(self, bus: Publisher) -> None:
+    def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._connected: list[Intake] = []
 

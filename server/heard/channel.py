@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from server.door.hub import Bucket
 from server.heard.flown_track import Track
 from server.heard.plan_follower import Follower
 from server.schemas import (
@@ -38,7 +39,7 @@ class Channel:
     ) -> None:
         self._source: Source = source
         self._pages, self._now_mono_s = pages, now_mono_s
-        self._pace = Pace(RATE_HZ, burst=BURST)
+        self._pace = Bucket(RATE_HZ, BURST, 0.0)
         self._waiting: asyncio.TimerHandle | None = None
         self._told_mono_s = float("-inf")
         self.follower = Follower()
@@ -70,8 +71,9 @@ class Channel:
         if begins and self._source == "live":
             self.restart_track()
         moved = before is None or before.position_t_mono_s != state.position_t_mono_s
-        wait_s = self._pace.wait_s(self._now_mono_s()) if moved else QUIET_S
+        wait_s = max(0.0, 1.0 - self._pace.left(self._now_mono_s())) / RATE_HZ if moved else QUIET_S
         if wait_s == 0.0:
+            self._pace.spend(1.0)
             self._publish()
         elif self._waiting is None:
             self._waiting = asyncio.get_running_loop().call_later(wait_s, self._publish)
@@ -126,20 +128,3 @@ class Channel:
         self._pages.publish(
             VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow)
         )
-
-
-class Pace:
-    """A token bucket on a clock that the caller reads."""
-
-    def __init__(self, rate_hz: float, *, burst: float) -> None:
-        self._rate_hz, self._burst = rate_hz, burst
-        self._tokens, self._at_mono_s = burst, 0.0
-
-    def wait_s(self, now_mono_s: float) -> float:
-        """Until the next message may go; 0: it goes now, and counts."""
-        self._tokens = min(self._burst, self._tokens + self._rate_hz * max(0.0, now_mono_s - self._at_mono_s))
-        self._at_mono_s = now_mono_s
-        if self._tokens >= 1.0:
-            self._tokens -= 1.0
-            return 0.0
-        return (1.0 - self._tokens) / self._rate_hz

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from server.errors import BadRequestError, NotFoundError
 from server.library.library import Library
+from server.library.shelf import iso_utc
 from server.library.terrain_of import FlownOver, terrain_of
 from server.library.whole_files import check_id, storage_errors, sync_directory
 from server.schemas import RecordingDoc
@@ -77,7 +78,7 @@ class RecordingShelf:
             id=recording_id_of(path.name),
             name=path.name,
             kind=KINDS[path.suffix.lower()],
-            started_utc=_iso_utc(info.start_utc_s if info.start_utc_s is not None else _changed_utc_s(path)),
+            started_utc=iso_utc(info.start_utc_s if info.start_utc_s is not None else _changed_utc_s(path)),
             duration_s=info.duration_s,
             bytes=info.size_bytes,
             vehicle=info.vehicle,
@@ -140,7 +141,3 @@ def _key(path: Path) -> tuple[str, int, int]:
 
 def _changed_utc_s(path: Path) -> float:
     return max(0, _key(path)[2]) / 1e9
-
-
-def _iso_utc(t_utc_s: float) -> str:
-    return datetime.fromtimestamp(t_utc_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -136,7 +137,12 @@ def write_manifest(folder: Path, manifest: BaseModel) -> None:
 
 
 def utc_now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return iso_utc(time.time())
+
+
+def iso_utc(t_utc_s: float) -> str:
+    """ISO 8601 with milliseconds and Z."""
+    return datetime.fromtimestamp(t_utc_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _damaged(folder: Path, what: str) -> StorageError:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from server.door.hub import Bucket
 from server.errors import reported
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.moving_objects import TracksWatch
@@ -51,21 +52,6 @@ class _Picture:
     sent_bytes: int = 0
 
 
-class Allowance:
-    """Bytes that may be sent: a bucket that fills steadily and may be overdrawn once."""
-
-    def __init__(self, now_s: float) -> None:
-        self._bytes, self._at_s = BURST_BYTES, now_s
-
-    def allows(self, now_s: float) -> bool:
-        self._bytes = min(BURST_BYTES, self._bytes + RATE_BYTES_S * (now_s - self._at_s))
-        self._at_s = now_s
-        return self._bytes > 0
-
-    def spend(self, count: int) -> None:
-        self._bytes -= count
-
-
 class MapDrawing:
     """``run`` draws until it is cancelled. While a replay has maps they are drawn instead of the live ones."""
 
@@ -78,7 +64,7 @@ class MapDrawing:
     ) -> None:
         self._stage, self._watches, self._manoeuvres, self._tracks = stage, watches, manoeuvres, tracks
         self._pictures = {name: _Picture() for name in MAP_NAMES}
-        self._allowance = Allowance(time.monotonic())
+        self._allowance = Bucket(RATE_BYTES_S, BURST_BYTES, time.monotonic())
         self._told_s = 0.0
         self._source: Source = "live"
 
@@ -152,7 +138,7 @@ class MapDrawing:
     ) -> None:
         now_s = time.monotonic()
         for key in _due(picture, vehicle_enu_m, now_s)[:CHUNKS_PER_TURN]:
-            if not self._allowance.allows(time.monotonic()):
+            if not self._allowance.left(time.monotonic()) > 0:
                 return
             del picture.waiting[key]
             picture.drawn_s[key] = now_s

@@ -17,13 +17,13 @@ from planning.terrain.dsm import Dsm
 from server.errors import ConflictError, NotReadyError
 from server.library import Library
 from server.library.documents import missing, with_points
+from server.library.shelf import utc_now
 from server.plan import tasks
 from server.plan.computing import Computing
 from server.plan.picture import Picture
 from server.plan.plan_desk import PlanDesk
 from server.scene.mirror import Voxels
 from server.schemas import Imported, Pages, PlanDoc, PlanEdit, PlanState
-from server.work.clocks import utc_now
 from server.work.jobs import Lane
 
 ALL = "all.zip"

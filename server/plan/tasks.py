@@ -245,7 +245,6 @@ def _gsd_range_cm(plan: Plan) -> tuple[float | None, float | None]:
 def plan_scene(plan: Plan) -> PlanScene:
     path, line, worst = plan.path, plan.line, plan.certificate.worst
     keep = kept_within(path.s_m, path.alt_dsm_m, PATH_TOLERANCE_M, must_keep=path.vertex)
-    pois = [int(sample) for sample, poi in zip(path.vertex, path.vertex_poi, strict=True) if poi is not None]
     return PlanScene(
         safe_surface=relief(plan.surfaces, path),
         path_m=np.column_stack([path.xy_m[keep], path.alt_dsm_m[keep]]),
@@ -257,7 +256,6 @@ def plan_scene(plan: Plan) -> PlanScene:
         required_clearance_m=plan.certificate.required_clearance_m,
         home_m=np.array([*line.home_xy_m, line.home_alt_dsm_m]),
         takeoff_alt_dsm_m=line.takeoff_alt_dsm_m,
-        poi_m=np.column_stack([path.xy_m[pois], path.alt_dsm_m[pois]]),
     )
 
 

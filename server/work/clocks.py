@@ -1,9 +1,8 @@
-"""The one place that asks for the time of day, and the seconds of each step of a job, read off its reports."""
+"""The seconds of each step of a job, read off its reports."""
 
 from __future__ import annotations
 
 import time
-from datetime import UTC, datetime
 
 from planning.plan import CERTIFICATE_STEP, PATH_STEP, SURFACE_STEP
 from server.work.jobs import Progress
@@ -39,8 +38,3 @@ class StepTimer:
         if self._key is not None:
             self._seconds[self._key] += now - self._since
         self._since = now
-
-
-def utc_now() -> str:
-    """ISO 8601 with milliseconds and Z."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

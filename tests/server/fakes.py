@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 from server.door.hub import Hub
 from server.door.lease import Lease
@@ -203,7 +203,7 @@ class FakeFlying:
         self.asked: list[tuple[Any, ...]] = []
         self.obstacles = self.looking = _Asked(self.asked)
         self.published: list[tuple[str, Any]] = []
-        self.agents = Agents(self)
+        self.agents = Agents(cast(Any, self))
         self.live = SimpleNamespace(armed=False)
         self.uwb = SimpleNamespace(clear=lambda: self.asked.append(("clear",)), set_params=lambda params: None)
         self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)

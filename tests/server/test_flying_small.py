@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.heard.channel import Pace
+from server.door.hub import Bucket
 from server.heard.flown_track import POINTS_MAX, Track
 from server.heard.onboard import rounded_note
 from server.library.terrain_of import FlownOver, covers, terrain_of
@@ -21,20 +21,23 @@ STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0)
 
 @given(st.lists(st.floats(0.0, 0.2), min_size=50, max_size=300))
 def test_no_second_has_more_messages_than_the_rate_and_its_burst(gaps: list[float]) -> None:
-    pace, now, sent = Pace(20.0, burst=5.0), 100.0, []
+    pace, now, sent = Bucket(20.0, 5.0, 0.0), 100.0, []
     for gap in gaps:
         now += gap
-        if pace.wait_s(now) == 0.0:
+        if pace.left(now) >= 1.0:
+            pace.spend(1.0)
             sent.append(now)
     assert all(sum(at <= t < at + 1.0 for t in sent) <= 25 for at in sent)
 
 
-def test_the_wait_is_just_long_enough() -> None:
-    pace = Pace(20.0, burst=1.0)
-    assert pace.wait_s(10.0) == 0.0
-    wait_s = pace.wait_s(10.01)
-    assert 0.0 < wait_s <= 0.05
-    assert pace.wait_s(10.01 + wait_s + 1e-9) == 0.0
+def test_a_bucket_fills_up_again_but_not_beyond_its_burst() -> None:
+    bucket = Bucket(4.0, 12.0, 0.0)
+    bucket.spend(16.0)
+    assert bucket.left(0.5) == -2.0
+    assert bucket.left(1.5) == 2.0
+    assert bucket.left(1e6) == 12.0
+    bucket.spend(13.0)
+    assert bucket.left(1e6) < 0
 
 
 def test_a_long_path_is_thinned_and_keeps_its_ends() -> None:

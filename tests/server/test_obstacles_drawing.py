@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from server.obstacles import drawing
-from server.obstacles.drawing import Allowance, MapDrawing, fitting_detail
+from server.obstacles.drawing import MapDrawing, fitting_detail
 from server.obstacles.obstacle_watch import Watch
 from server.scene.layers.sights import MapLook, Sights
 from server.scene.mirror import ChunkKey, MapMirror, Voxels
@@ -93,16 +93,6 @@ def test_beyond_the_allowance_the_rest_waits(monkeypatch: pytest.MonkeyPatch) ->
     stage.drawn.clear()
     maps.draw(stage, "radar", mirror)
     assert stage.drawn == []
-
-
-def test_an_allowance_fills_up_again_but_not_beyond_its_burst() -> None:
-    allowance = Allowance(0.0)
-    allowance.spend(int(drawing.BURST_BYTES + drawing.RATE_BYTES_S))
-    assert not allowance.allows(0.5)
-    assert allowance.allows(1.5)
-    assert allowance.allows(1e6)
-    allowance.spend(int(drawing.BURST_BYTES + 1))
-    assert not allowance.allows(1e6)
 
 
 def test_a_map_of_too_many_boxes_is_drawn_coarser(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,8 @@ from server.cli.shared.options import ModelOptions, PlanOptions, of_vehicle, par
 from server.cli.shared.output import answer, end_progress, harmless, progress, say_notes
 from server.cli.shared.terrain_given import open_model
 from server.cli.shared.verdict import verdict_lines
-from server.work.clocks import StepTimer, utc_now
+from server.library.shelf import utc_now
+from server.work.clocks import StepTimer
 
 
 def vehicle_of(options: PlanOptions) -> VehicleProfile:

@@ -64,8 +64,6 @@ class PlanScene:
     home_m: F64
     """(3,)"""
     takeoff_alt_dsm_m: float
-    poi_m: F64
-    """(P, 3) points of interest at flight height; P is 0 for a survey"""
 
 
 @dataclass(frozen=True, slots=True)
