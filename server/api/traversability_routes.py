@@ -11,7 +11,6 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
 
-from mapping.uwb import UwbParams, of_rule
 from server.api.access import DONE, ERROR_RESPONSES, Fly, SignedIn, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
@@ -22,20 +21,6 @@ class UwbClear(UwbRule):
     """Of a radar log that is sent."""
 
     name: Annotated[str, Field(max_length=1000)]
-
-
-def uwb_params(asked: UwbRule) -> UwbParams:
-    """Raises ParameterError for numbers that contradict each other."""
-    return of_rule(
-        asked.rule,
-        most_occupied=asked.p_o,
-        free_before=asked.p_c2,
-        free_behind=asked.p_c3,
-        least_headroom=asked.c_th,
-        nearest_m=asked.nearest_m,
-        farthest_m=asked.farthest_m,
-        prior=asked.prior,
-    )
 
 
 router = APIRouter(
@@ -52,7 +37,7 @@ async def work_out(body: TraversabilityBody, workspace: Work) -> Response:
 @router.post("/uwb", response_model=JobDoc, status_code=202, openapi_extra=RAW_BODY)
 async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbClear, Query()]) -> Response:
     """A UWB radar log as raw bytes: what it shows to be foliage is cleared."""
-    params, shown = uwb_params(asked), display_name(asked.name)
+    params, shown = asked.params(), display_name(asked.name)
     upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(shown)))
     return answer(workspace.traversability.clear_foliage(upload, shown, params), 202)
 
@@ -60,7 +45,7 @@ async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbC
 @router.put("/uwb/live", response_model=TraversabilityState)
 async def fuse_live(workspace: Work, flying: Fly, asked: Annotated[UwbRule, Query()]) -> Response:
     """How the scans of a radar that scans now are fused, those before as well."""
-    flying.uwb.set_params(uwb_params(asked))
+    flying.uwb.set_params(asked.params())
     return answer(workspace.traversability.state)
 
 

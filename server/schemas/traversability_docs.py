@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mapping.uwb import UwbParams
+from mapping.uwb import Rule, UwbParams, of_rule
 from planning.ground.traversable import FINEST_M
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict
@@ -99,7 +99,7 @@ class TraversabilityBody(Strict):
 class UwbRule(Strict):
     """How a radar log is fused; numbers that are left out are the paper's (Ahtiainen, section III)."""
 
-    rule: Literal["explained", "paper"] = "explained"
+    rule: Rule = "explained"
     """explained: an echo that a likely obstacle accounts for says little of other cells; paper: all are to blame."""
     p_o: Annotated[float, Field(gt=0.5, lt=1), Asked(0.51, 0.99, initial=_UWB.most_occupied)] | None = None
     p_c2: Annotated[float, Field(gt=0, lt=0.5), Asked(0.01, 0.49, initial=_UWB.free_before)] | None = None
@@ -109,6 +109,19 @@ class UwbRule(Strict):
     nearest_m: Annotated[float, Field(gt=0, le=50), Asked(min=0.5, initial=_UWB.nearest_m)] | None = None
     farthest_m: Annotated[float, Field(gt=0, le=100), Asked(min=1, initial=_UWB.farthest_m)] | None = None
     prior: Annotated[float, Field(gt=0.5, lt=1), Asked(0.51, 0.99, initial=_UWB.prior)] | None = None
+
+    def params(self) -> UwbParams:
+        """Raises ParameterError for numbers that contradict each other."""
+        return of_rule(
+            self.rule,
+            most_occupied=self.p_o,
+            free_before=self.p_c2,
+            free_behind=self.p_c3,
+            least_headroom=self.c_th,
+            nearest_m=self.nearest_m,
+            farthest_m=self.farthest_m,
+            prior=self.prior,
+        )
 
 
 class LandingSitesBody(Strict):

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from planning.ground.landing_sites import LandingSite
-from planning.ground.traversable import site_places, sites_near
+from planning.ground.landing_sites import LandingSite, LandingSites
+from planning.ground.traversable import TraversableGround, site_places, sites_near
 from server.schemas import LandingSiteDoc, LandingSitesBody
 from server.traversability.maps import read_maps
 from server.work.jobs import Progress
@@ -24,10 +24,13 @@ def find_sites(source: Path, body: LandingSitesBody, *, report: Progress) -> Fou
     report("Looking for landing sites", None)
     ground = read_maps(source).ground
     found = sites_near(ground, (body.lat_deg, body.lon_deg), body.rotor_span_m, body.radius_m)
+    return FoundSites(described(ground, found), found.no_site)
+
+
+def described(ground: TraversableGround, found: LandingSites) -> tuple[LandingSiteDoc, ...]:
+    """What is told of each."""
     places = site_places(ground, found).tolist()
-    return FoundSites(
-        tuple(_described(site, *place) for site, place in zip(found.sites, places, strict=True)), found.no_site
-    )
+    return tuple(_described(site, *place) for site, place in zip(found.sites, places, strict=True))
 
 
 def _described(site: LandingSite, lat_deg: float, lon_deg: float, alt_dsm_m: float) -> LandingSiteDoc:

@@ -101,11 +101,15 @@ def read_again(source: Path, *, report: Progress) -> Worked:
 def layer_file(source: Path, layer: LayerName, *, report: Progress) -> bytes:
     """A GeoTIFF on the map's grid: share of the limit (0 to 1), probability, or seconds; NaN unknown."""
     report("Writing the layer", None)
-    maps = read_maps(source)
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"{layer}.tif"
-        write_dsm(target, replace(maps.ground.dsm, elevation_m=_values(maps, layer), vertical_datum=None))
+        write_layer(target, read_maps(source), layer)
         return target.read_bytes()
+
+
+def write_layer(path: Path, maps: Maps, layer: LayerName) -> None:
+    """A GeoTIFF on the map's grid. Raises NotReadyError for a layer of the radar's before there is a log."""
+    write_dsm(path, replace(maps.ground.dsm, elevation_m=_values(maps, layer), vertical_datum=None))
 
 
 def _values(maps: Maps, layer: LayerName) -> F32:
