@@ -53,7 +53,7 @@ def agent(
     )
     source = source_of(taken_from)
     asyncio.run(_run(made, source))
-    _answer(made, source, as_json=as_json)
+    _answer(made.counts, source, as_json=as_json)
 
 
 def _check(voxel_m: float, limit_kb_s: float) -> None:
@@ -129,31 +129,25 @@ async def _tell(made: Agent, source: Source) -> None:
         rate = f"{(counts.report.bytes_per_s if counts.report else 0.0) / 1000:.0f} kB/s"
         state = f"no connection: {counts.trouble}" if counts.trouble else rate
         say(f"{counts.sent} frames sent, {counts.skipped} left out, {state}")
-        _say_losses(counts)
-        _say_source(source)
+        for line in _details(counts, source):
+            say(line)
 
 
-def _say_losses(counts: AgentCounts) -> None:
-    """What of the frames did not arrive, where there is any."""
+def _details(counts: AgentCounts, source: Source) -> Iterator[str]:
+    """What of the frames did not arrive, where there is any, and how the source does."""
     if counts.points_not_finite or counts.points_out_of_reach:
-        say(
+        yield (
             f"points left out of clouds: {counts.points_not_finite} without numbers, {counts.points_out_of_reach} "
             f"beyond {REACH_M:.0f} m"
         )
     if counts.report is not None and counts.report.refused:
-        say(f"refused by the ground station: {counts.report.refused}; the last: {counts.refused_why}")
+        yield f"refused by the ground station: {counts.report.refused}; the last: {counts.refused_why}"
     if counts.not_understood:
-        say(f"not understood of the ground station's messages: {counts.not_understood}; is it of another version?")
+        yield f"not understood of the ground station's messages: {counts.not_understood}; is it of another version?"
+    yield from (str(status) for status in (source.radar, source.lines) if status is not None)
 
 
-def _say_source(source: Source) -> None:
-    for status in (source.radar, source.lines):
-        if status is not None:
-            say(str(status))
-
-
-def _answer(made: Agent, source: Source, *, as_json: bool) -> None:
-    counts = made.counts
+def _answer(counts: AgentCounts, source: Source, *, as_json: bool) -> None:
     report = counts.report or Report(0, 0, 0, 0, 0.0, "")
     if as_json:
         print_json(_summary(counts, report, source))
@@ -162,8 +156,8 @@ def _answer(made: Agent, source: Source, *, as_json: bool) -> None:
         f"{counts.sent} frames sent ({counts.sent_bytes / 1e6:.1f} MB), {counts.skipped} left out; the ground "
         f"station took {report.received}, {report.late} of them late, and refused {report.refused}."
     )
-    _say_losses(counts)
-    _say_source(source)
+    for line in _details(counts, source):
+        say(line)
 
 
 def _summary(counts: AgentCounts, report: Report, source: Source) -> dict[str, Any]:
