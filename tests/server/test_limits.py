@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import get_args
 
 import pytest
+import typer
 import typer.main
 from pydantic import BaseModel, ValidationError
 from typer.core import TyperGroup
@@ -95,7 +96,9 @@ def test_planning_takes_what_the_console_asks_for(part: str, name: str, value: f
 def test_the_command_line_has_the_documents_defaults(command: str, docs: tuple[type[BaseModel], ...]) -> None:
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
-    options = {option.name: option.default for option in group.commands[command].params if option.default is not None}
+    found = group.get_command(typer.Context(group), command)
+    assert found is not None
+    options = {option.name: option.default for option in found.params if option.default is not None}
     fields = {name: field for doc in docs for name, field in doc.model_fields.items()}
     shared = {name for name in options if name in fields and fields[name].default is not None}
     assert shared
