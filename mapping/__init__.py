@@ -18,6 +18,7 @@ degrees for latitude and longitude. Errors are ``MappingError``s: what is wrong,
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -33,15 +34,6 @@ if TYPE_CHECKING:
     from mapping.traversability import Traversability, traversability_map
     from mapping.uwb.clearing import UwbClearing, UwbPose
     from mapping.voxels.map import VoxelMap
-else:
-
-    def __getattr__(name: str) -> object:
-        """From its module when it is first asked for: whoever wants one thing does not wait for all."""
-        module = next((module for module, names in _NAMES.items() if name in names), None)
-        if module is None:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(module, __name__), name)
-
 
 __all__ = [
     "AWR1843",
@@ -79,3 +71,19 @@ _NAMES = {
     ".uwb.clearing": ("UwbClearing", "UwbPose"),
     ".voxels.map": ("VoxelMap",),
 }
+
+
+def lazily(package: str, names: Mapping[str, tuple[str, ...]]) -> Callable[[str], object]:
+    """A package's ``__getattr__``: from its module when it is first asked for, so that one thing waits for no other."""
+
+    def get(name: str) -> object:
+        module = next((module for module, of_it in names.items() if name in of_it), None)
+        if module is None:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(module, package), name)
+
+    return get
+
+
+if not TYPE_CHECKING:
+    __getattr__ = lazily(__name__, _NAMES)

@@ -21,9 +21,9 @@ what to do.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from mapping import lazily
 from mapping.version import __version__
 
 if TYPE_CHECKING:
@@ -39,15 +39,6 @@ if TYPE_CHECKING:
     from planning.route.survey import survey_lines
     from planning.terrain.dsm import Dsm
     from planning.terrain.geotiff import read_dsm
-else:
-
-    def __getattr__(name: str) -> object:
-        """From its module when it is first asked for: whoever wants one thing does not wait for all."""
-        module = next((module for module, names in _NAMES.items() if name in names), None)
-        if module is None:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(module, __name__), name)
-
 
 __all__ = [
     "FILES",
@@ -87,3 +78,6 @@ _NAMES = {
     ".terrain.dsm": ("Dsm",),
     ".terrain.geotiff": ("read_dsm",),
 }
+
+if not TYPE_CHECKING:
+    __getattr__ = lazily(__name__, _NAMES)
