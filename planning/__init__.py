@@ -28,11 +28,12 @@ from mapping.version import __version__
 
 if TYPE_CHECKING:
     from planning.certificate.clearance import certify
+    from planning.certificate.model import Certificate, ClearanceParams
     from planning.errors import PlanningError
     from planning.formats.detect import read_flight
     from planning.missions.flown import flown_line
     from planning.missions.vehicle_profile import load_profile, path_params
-    from planning.model import Certificate, ClearanceParams, MissionParams, Poi, SurfaceParams
+    from planning.model import MissionParams, Poi, SurfaceParams
     from planning.plan import Plan, plan_mission
     from planning.report.exports import FILES, export_file
     from planning.request import PlanRequest, survey_request
@@ -70,7 +71,8 @@ _NAMES = {
     ".formats.detect": ("read_flight",),
     ".missions.flown": ("flown_line",),
     ".missions.vehicle_profile": ("load_profile", "path_params"),
-    ".model": ("Certificate", "ClearanceParams", "MissionParams", "Poi", "SurfaceParams"),
+    ".certificate.model": ("Certificate", "ClearanceParams"),
+    ".model": ("MissionParams", "Poi", "SurfaceParams"),
     ".plan": ("Plan", "plan_mission"),
     ".report.exports": ("FILES", "export_file"),
     ".request": ("PlanRequest", "survey_request"),

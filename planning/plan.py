@@ -14,6 +14,7 @@ import numpy as np
 
 from planning.certificate.clearance import certify
 from planning.certificate.home_stand import DROP_M
+from planning.certificate.model import BetterHome, Certificate
 from planning.errors import MissionError
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.formats import qgc_plan, wpl
@@ -23,18 +24,7 @@ from planning.missions.feasibility import Feasibility, feasibility_of, photos_ro
 from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
-from planning.model import (
-    BetterHome,
-    Certificate,
-    FlownLine,
-    Home,
-    Mission,
-    MissionParams,
-    SampledPath,
-    Surfaces,
-    Timing,
-    VehicleProfile,
-)
+from planning.model import FlownLine, Home, Mission, MissionParams, SampledPath, Surfaces, Timing, VehicleProfile
 from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, was_enough
 from planning.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import MIN_SEGMENT_M, sampled_path

@@ -24,6 +24,7 @@ from planning.certificate.as_json import certificate_json
 from planning.certificate.heights import height_range
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
 from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
+from planning.certificate.model import Certificate, ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (
@@ -38,15 +39,7 @@ from planning.certificate.reasons import (
 from planning.certificate.returns import NEAR_M, SLOPE, return_altitude, return_altitudes
 from planning.certificate.unjudged import unjudged_reasons
 from planning.errors import MissionError, ParameterError
-from planning.model import (
-    Certificate,
-    ClearanceParams,
-    FlownLine,
-    HomeStand,
-    LegClearance,
-    Reason,
-    WorstPoint,
-)
+from planning.model import FlownLine
 from planning.terrain.cells.cells import Layout
 from planning.terrain.dsm import SCALE_TOLERANCE, Dsm, SurfaceModel, true_cells
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from planning.certificate.home_ground import HomeGround, home_ground
 from planning.certificate.home_search import Standing, ground_around, nearest_standing
-from planning.model import SET_DOWN_M, BetterHome, ClearanceParams, FlownLine, HomeStand
+from planning.certificate.model import SET_DOWN_M, BetterHome, ClearanceParams, HomeStand
+from planning.model import FlownLine
 from planning.terrain.dsm import SurfaceModel
 
 DROP_M = 0.3

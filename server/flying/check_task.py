@@ -15,11 +15,12 @@ import numpy as np
 
 from mapping.perceiving.braking import Braking
 from planning.certificate.as_json import certificate_json
+from planning.certificate.model import Certificate, ClearanceParams
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.margins.words import rounded_down, rounded_up
 from planning.missions.vehicle_profile import parse_profile
-from planning.model import Certificate, ClearanceParams, Mission
+from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from server.library.documents import clearance_of, demands_from_doc, seen_in

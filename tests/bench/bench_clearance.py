@@ -19,7 +19,8 @@ from scipy.spatial import KDTree
 
 from planning.certificate.clearance import certify, places_along
 from planning.certificate.home_ground import home_ground
-from planning.model import ClearanceParams, FlownLine
+from planning.certificate.model import ClearanceParams
+from planning.model import FlownLine
 from planning.terrain.cells.squares import squares
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm

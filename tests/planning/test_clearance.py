@@ -12,9 +12,10 @@ from affine import Affine
 from pyproj import CRS, Geod
 
 from planning.certificate.clearance import certificate_json, certify
+from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError, ParameterError
 from planning.missions.vehicle_terms import budget_of
-from planning.model import Certificate, ClearanceParams, FlownLine, Unjudged, VehicleProfile
+from planning.model import FlownLine, Unjudged, VehicleProfile
 from planning.terrain.dsm import Dsm
 
 WEST, NORTH = 500_000.0, 5_000_100.0

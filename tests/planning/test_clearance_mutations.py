@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from planning.certificate.clearance import certify
+from planning.certificate.model import ClearanceParams
 from planning.missions.flown import flown_line
-from planning.model import ClearanceParams, FlownLine, Home, Mission, MissionItem
+from planning.model import FlownLine, Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from tests.planning.test_clearance import NORTH, PARAMS, WEST, dsm_of
 from tests.reference import clearance as oracle

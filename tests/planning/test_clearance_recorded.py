@@ -14,10 +14,11 @@ from pyproj import CRS, Proj
 from scipy import ndimage
 
 from planning.certificate.clearance import certify, places_along
+from planning.certificate.model import ClearanceParams
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
 from planning.missions.flown import flown_line
-from planning.model import ClearanceParams, Home, Mission, MissionItem
+from planning.model import Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from tests.reference import clearance as oracle
 

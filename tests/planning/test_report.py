@@ -6,8 +6,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from planning.certificate.model import Certificate, LegClearance, Reason, WorstPoint
 from planning.missions.feasibility import feasibility_of
-from planning.model import Certificate, FlownLine, LegClearance, Reason, SurfaceParams, VehicleProfile, WorstPoint
+from planning.model import FlownLine, SurfaceParams, VehicleProfile
 from planning.report.page import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
 from planning.route.survey_coverage import SurveyCoverage

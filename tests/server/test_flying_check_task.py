@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from planning.model import Certificate, HomeStand
+from planning.certificate.model import Certificate, HomeStand
 from planning.plan import plan_mission
 from server.flying import check_task
 from server.library.documents import demands_from_doc

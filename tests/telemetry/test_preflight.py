@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.certificate.clearance import certify
+from planning.certificate.model import ClearanceParams
 from planning.missions.flown import flown_line
-from planning.model import ClearanceParams, Home, Mission, MissionItem, VehicleProfile
+from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
 from telemetry.flight.preflight.checks import Row

@@ -11,11 +11,12 @@ import numpy as np
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_stand import ground_at
+from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.missions.flown import AMSL_FRAMES, flown_line
-from planning.model import Certificate, ClearanceParams, Firmware, Home, Mission, VehicleProfile
+from planning.model import Firmware, Home, Mission, VehicleProfile
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from planning.terrain.vertical_datum import is_amsl

@@ -1,0 +1,144 @@
+"""What is demanded of a flown line, and the certificate with its parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from mapping.geometry.arrays import F64
+from planning.margins.budget import ClearanceBudget
+
+SET_DOWN_M = 0.1
+"""What is planned holds for a vehicle that stands up to so far beside the planned home."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearanceParams:
+    """What the certificate demands."""
+
+    required_clearance_m: float
+    vehicle_radius_m: float
+    position_error_m: float
+    rtl_height_m: float
+    """Above home, as set in the autopilot."""
+    max_height_above_ground_m: float | None = None
+    budget: ClearanceBudget | None = None
+    """What the required clearance is for; None: it is not known, and the line is taken to be flown exactly."""
+    set_down_m: float = SET_DOWN_M
+    """How far from home's place the vehicle may be set down, beside its position error."""
+    home_known_dsm_m: tuple[float, float] | None = None
+    """(lowest, highest) that the ground at home may be, where the vehicle tells it better than the surface model."""
+
+    @property
+    def following_m(self) -> float:
+        """Radius of the tube around the line for which the certificate is made."""
+        return 0.0 if self.budget is None else self.budget.value_m("following")
+
+
+@dataclass(frozen=True, slots=True)
+class WorstPoint:
+    """The place on the flown line where it comes nearest to the surface model."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_rel_home_m: float
+    leg: int
+    """Index of the leg in ``FlownLine``."""
+    s_m: float
+    x_m: float
+    y_m: float
+    alt_dsm_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LegClearance:
+    leg: int
+    item: int
+    min_distance_m: float
+    min_vertical_m: float
+    at_s_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a mission is not certified, and what would mend it."""
+
+    code: str
+    text: str
+    mend: str
+
+
+@dataclass(frozen=True, slots=True)
+class BetterHome:
+    """The nearest place where home would do, or do better."""
+
+    lat_deg: float
+    lon_deg: float
+    away_m: float
+    bearing_deg: float
+    """From home, clockwise from north."""
+    drop_m: float
+    """How much lower than its own cell a vehicle there may stand."""
+    does: bool
+    """The line keeps its required clearance from there as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class HomeStand:
+    """How high a vehicle at home may really stand: all heights are counted from there."""
+
+    alt_dsm_m: float
+    """What the line counts on."""
+    low_dsm_m: float
+    """Lowest that it may be; NaN where the surface model does not know all the ground in reach."""
+    high_dsm_m: float
+    drop_m: float
+    """By how much the whole line may be lower than planned; NaN when not known."""
+    reach_m: float
+    """Vehicle radius + position error + how far beside home the vehicle may be set down."""
+    told_by: Literal["model", "vehicle"]
+    min_distance_m: float
+    """Smallest 3-D distance of the line lowered by ``drop_m``; NaN when that is not known."""
+    better: BetterHome | None = None
+    """Only where home does not do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """The proof of clearance of one flown line against one surface model."""
+
+    certified: bool
+    min_distance_m: float
+    """Smallest 3-D distance to any cell as a solid column; 0 inside one. Take-off and landing columns left out."""
+    min_vertical_m: float
+    """Smallest height above the cell below; negative inside terrain; -inf over unknown cells."""
+    required_clearance_m: float
+    worst: WorstPoint
+    legs: tuple[LegClearance, ...]
+    rtl_height_needed_m: float
+    """Above home, smallest height from which every way home is clear wherever home may really stand; inf over
+    unknown terrain."""
+    home_column_clear: bool
+    """A vehicle can stand at home and start from there."""
+    max_height_above_ground_m: float
+    reasons: tuple[Reason, ...]
+    trend_s_m: F64
+    """(M,) places along the line"""
+    trend_distance_m: F64
+    """(M,) 3-D distance to the surface model there"""
+    assumptions: dict[str, object] = field(default_factory=dict)
+    budget: ClearanceBudget | None = None
+    """What the required clearance is for, term by term."""
+    home: HomeStand | None = None
+
+    @property
+    def kept_m(self) -> float:
+        """Smallest 3-D distance from the lowest ground that the vehicle may stand on at home, where that is known."""
+        low_m = math.inf if self.home is None else self.home.min_distance_m
+        return self.min_distance_m if math.isnan(low_m) else min(self.min_distance_m, low_m)
+
+    @property
+    def following_m(self) -> float:
+        """Radius of the tube around the line that is proved."""
+        return 0.0 if self.budget is None else self.budget.value_m("following")
