@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 from planning.mav_cmd import MavCmd
 from telemetry.mavlink.orders import LAND_MODES, MISSION_MODES, RETURN_MODES
-from telemetry.topics.messages import FlightStatus, OnboardMission
+from telemetry.topics.messages import FlightPhase, FlightStatus, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
-Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
 GOING_HOME_COMMANDS = frozenset({MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.NAV_LAND, MavCmd.DO_LAND_START})
 """MAV_CMD of RTL, LAND and DO_LAND_START."""
 UNDER_WAY = frozenset({"arming", "taking_off", "flying", "paused", "returning"})
@@ -116,7 +114,7 @@ class FlightKeeper:
         else:
             self.status = replace(self.status, phase="interrupted", broke_off_at=broke_off_at)
 
-    def _phase(self, phase: Phase) -> None:
+    def _phase(self, phase: FlightPhase) -> None:
         if self.status.phase != phase:
             self.status = replace(self.status, phase=phase)
 

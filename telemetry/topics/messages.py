@@ -64,6 +64,7 @@ class Topic(StrEnum):
 
 
 REPLAY_PREFIX = "replay/"
+FlightPhase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +230,7 @@ class FlightStatus:
     """What Hedgehop itself is doing with the vehicle."""
 
     way: Literal["none", "auto", "guided"] = "none"
-    phase: Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"] = "idle"
+    phase: FlightPhase = "idle"
     target: int | None = None
     """Item of the mission that is flown to, 1 is the first."""
     targets: int | None = None

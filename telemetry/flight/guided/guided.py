@@ -22,11 +22,10 @@ from telemetry.flight.guided.script_watches import ModeWatch, Punctuality, Stand
 from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
-from telemetry.topics.messages import FlightStatus, GuidedTarget
+from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
 from telemetry.topics.requests import StartGuided
 from telemetry.topics.vehicle import VehicleState
 
-Phase = Literal["idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"]
 TAKEOFF_TOLERANCE_M = 0.3
 OFF_THE_GROUND_M = 0.5
 RETURN_AGAIN_S = 2.0
@@ -60,7 +59,7 @@ class GuidedScript:
         """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
         self._watch, self._punctuality = ModeWatch(), Punctuality()
-        self.phase: Phase = "idle"
+        self.phase: FlightPhase = "idle"
         self.hint = ""
         self.broke_off_at: int | None = None
         self._index = 0
