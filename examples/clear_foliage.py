@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mapping import Traversability, UwbClearing, UwbPose, traversability_map
-from mapping.uwb import Cleared
+from mapping.uwb.clearing import Cleared
 from planning import read_dsm
 from planning.ground.traversable import cleared_ground, traversable_ground
 from telemetry.sensors.uwb_log import read_uwb_log

@@ -18,16 +18,6 @@ from planning.evading.keep_clear import Room, Seen, Surface
 from planning.evading.line import LineAhead
 from planning.evading.model import AvoidanceParams, Manoeuvre, NoWay
 
-__all__ = [
-    "AvoidanceParams",
-    "Manoeuvre",
-    "NoWay",
-    "Seen",
-    "Surface",
-    "around",
-    "over",
-]
-
 BEYOND_M = 20.0
 """Distances are exact up to so much beyond what must be kept."""
 HIGHER_M = (0.0, 2.5, 5.0, 10.0)

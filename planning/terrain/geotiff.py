@@ -27,17 +27,6 @@ from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without_spikes
 
-__all__ = [
-    "DsmFile",
-    "RasterLimits",
-    "ReadReport",
-    "open_dsm",
-    "read_dsm",
-    "read_dsm_reported",
-    "read_orthophoto",
-    "write_dsm",
-]
-
 
 class ReadOptions(TypedDict, total=False):
     """How a surface model's file is to be understood, what it may ask for, and who wants to hear of it."""

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mapping.uwb import Rule, UwbParams, of_rule
+from mapping.uwb.params import Rule, UwbParams, of_rule
 from planning.ground.traversable import FINEST_M
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict

@@ -14,7 +14,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from mapping.traversability import Traversability
-from mapping.uwb import Cleared
+from mapping.uwb.clearing import Cleared
 from planning.ground.traversable import TraversableGround
 from planning.terrain.dsm import Dsm
 from server.errors import StorageError

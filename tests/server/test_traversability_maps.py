@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mapping.errors import CapacityError
-from mapping.uwb import Cleared, UwbGeometry, of_rule
+from mapping.uwb.clearing import Cleared
+from mapping.uwb.params import UwbGeometry, of_rule
 from planning.errors import FormatError
 from planning.ground.traversable import UwbScans, traversable_ground
 from planning.terrain.geotiff import read_dsm

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mapping.uwb import Cleared, UwbParams
+from mapping.uwb.clearing import Cleared
+from mapping.uwb.params import UwbParams
 from planning.errors import ParameterError
 from planning.ground.traversable import cleared_ground, traversable_ground
 from planning.terrain.geotiff import read_dsm

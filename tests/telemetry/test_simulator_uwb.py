@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.uwb import Thresholds
+from mapping.uwb.thresholds import Thresholds
 from telemetry.simulation.scenarios.foliage.foliage_calibration import PRINTED, fig_6, lawn_thresholds, table_ii
 from telemetry.simulation.simulator.sensors.uwb import UwbModel, UwbRadar, transmission
 from telemetry.simulation.simulator.sensors.uwb_scene import Foliage, Target, chords, screen, uwb_scene

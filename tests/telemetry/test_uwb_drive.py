@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapping.uwb import UwbGeometry
+from mapping.uwb.params import UwbGeometry
 from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.perception.uwb_drive import UwbDrive, read_scans, recorded_scans

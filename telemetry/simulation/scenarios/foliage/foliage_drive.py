@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from mapping.uwb import UwbPose
+from mapping.uwb.clearing import UwbPose
 from telemetry.simulation.scenarios.foliage.foliage_trials import CLEAR_SPOTS, OBSTACLES, before
 
 SPEED_M_S, SCAN_S = 1.0, 0.1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.uwb import UwbParams
+from mapping.uwb.params import UwbParams
 from telemetry.simulation.scenarios.foliage.foliage_drive import lawn_drive
 from telemetry.simulation.scenarios.foliage.foliage_figures import (
     PAPERS_RULE,

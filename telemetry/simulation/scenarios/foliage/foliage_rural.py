@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from mapping.geometry.arrays import Bools
 from mapping.traversability import traversability_map
-from mapping.uwb import Cleared, UwbPose
+from mapping.uwb.clearing import Cleared, UwbPose
 from telemetry.simulation.scenarios.foliage.foliage_drive import drive
 from telemetry.simulation.scenarios.foliage.foliage_figures import Drive, cleared_by, driven
 from telemetry.simulation.scenarios.foliage.foliage_trials import CELL_M, Site, disc_cells
