@@ -1,6 +1,6 @@
 """Review: one recording is open at a time, judged by a worker and played by the replay node.
 
-What is replayed is only looked at: nothing here knows the way to the link node.
+What is replayed is only looked at: nothing here can command a vehicle.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from planning.errors import PlanningError
 from planning.missions.vehicle_profile import parse_profile
 from server.door.lease import Lease
 from server.errors import NotReadyError, reported
-from server.obstacles.keeping import changed, read_settings, write_settings
+from server.obstacles.kept_settings import changed, read_settings, write_settings
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import rest_of_plan

@@ -10,7 +10,7 @@ import pytest
 
 from mapping.errors import CapacityError
 from server.errors import status_of
-from server.obstacles.keeping import read_settings
+from server.obstacles.kept_settings import read_settings
 from server.obstacles.obstacle_desk import ObstacleDesk
 from server.obstacles.obstacle_watch import Watch
 from server.schemas import ObstaclesState, PerceptionSettingsBody

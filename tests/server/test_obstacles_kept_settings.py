@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from server.obstacles.keeping import FILE, changed, read_settings, write_settings
+from server.obstacles.kept_settings import FILE, changed, read_settings, write_settings
 from server.schemas import PerceptionSettingsBody
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
