@@ -46,7 +46,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
-from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic
+from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.vehicle import VehicleState
 
@@ -54,6 +54,9 @@ log = logging.getLogger("hedgehop.flying")
 
 RUNTIME_FOLDER = "run"
 ALIVE_EVERY_S = 1.0
+_LINK_FAILS = 1, "The link has failed: no command reaches the vehicle. Take the pilot's transmitter."
+_LINK_IS_BACK = 5, "The link answers again."
+"""Each with its MAV_SEVERITY."""
 
 
 class Flying:
@@ -131,6 +134,7 @@ class Flying:
             self.nodes.supervisor.run(),
             self._beat(),
             self._hear_of_plan(),
+            self._hear_of_nodes(),
             self._scenery.run(),
             self._followed.run(),
             *self.uwb.loops(),
@@ -184,6 +188,20 @@ class Flying:
             self.desk.refresh()
             self._followed.look()
             self._obstacles.on_plan()
+
+    async def _hear_of_nodes(self) -> None:
+        """The link that flies for the operator fails, or is back: said at once, with what to do."""
+        answered = True
+        while True:
+            await self.nodes.changed.wait()
+            self.nodes.changed.clear()
+            answers = self.nodes.link_answers
+            if answers == answered:
+                continue
+            answered = answers
+            self._watch.on_link_process(answers=answers)
+            if self.live.armed:
+                self.live.on_text(VehicleText(time.time(), *(_LINK_IS_BACK if answers else _LINK_FAILS)))
 
     # What is heard
 

@@ -33,6 +33,13 @@ class Nodes:
         self._bus, self._runtime_dir, self._recordings_dir, self._pages = bus, runtime_dir, recordings_dir, pages
         self._demo_radar = demo_radar
         self.supervisor = Supervisor(runtime_dir, changed=self._changed)
+        self.changed = asyncio.Event()
+        """Set whenever a node's state is another."""
+
+    @property
+    def link_answers(self) -> bool:
+        """False while it hangs or is being started again; true before it is first wanted, too."""
+        return not any(n.name == LINK and n.state in ("silent", "restarting") for n in self.supervisor.states)
 
     async def simulator_link(self) -> str | None:
         """Where the simulated vehicle sends to, if one runs."""
@@ -97,3 +104,4 @@ class Nodes:
     def _changed(self, nodes: Sequence[NodeState]) -> None:
         docs = [NodeDoc(name=n.name, state=n.state, restarts=n.restarts, text=n.text) for n in nodes]
         self._pages.publish(NodesMessage(nodes=docs))
+        self.changed.set()

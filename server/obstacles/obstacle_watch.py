@@ -44,6 +44,11 @@ RATE_HZ = 10.0
 """Of a sensor's status to the pages."""
 DEAD_S = 3.0
 """Nodes say at least once a second how they are."""
+_NOBODY_WATCHES = {
+    "blind": "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself.",
+    "lost": "Avoidance is gone with the link: nothing brakes by itself. Take the pilot's transmitter.",
+}
+"""Of each state of avoidance in which nobody may believe that it watches, what is said in flight."""
 
 
 class Watch:
@@ -77,7 +82,9 @@ class Watch:
         self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
         """Set when parts of a map are missing here."""
         self.settings = PerceptionSettings()
-        self.avoidance = AvoidanceStatus()
+        self.avoidance = self._heard_avoidance = AvoidanceStatus()
+        """``avoidance``: as it is shown; the link that is to avoid may have failed since it was heard."""
+        self._link_answers = True
         self.manoeuvres: Sequence[ManoeuvreDoc] = ()
         self.seen_in_plan = 0
         self.busy = self.stays_higher = ""
@@ -119,27 +126,29 @@ class Watch:
         return is_new
 
     def on_avoidance(self, status: AvoidanceStatus) -> None:
-        before, self.avoidance = self.avoidance, status
+        before, self._heard_avoidance = self.avoidance, status
+        self.avoidance = status
+        if status.enabled and not self._link_answers:
+            self.avoidance = replace(status, state="lost", text=_NOBODY_WATCHES["lost"])
         self._tell_blindness(before)
         self.refresh()
 
+    def on_link_process(self, *, answers: bool) -> None:
+        """It avoids obstacles: what it said last holds no longer than it answers."""
+        self._link_answers = answers
+        self.on_avoidance(self._heard_avoidance)
+
     def _tell_blindness(self, before: AvoidanceStatus) -> None:
-        """In flight nobody may believe that avoidance watches while it sees nothing."""
-        if (
-            self._blind is None
-            and self.avoidance.state == "blind"
-            and self._vehicle is not None
-            and self._vehicle.in_air
-        ):
+        text = _NOBODY_WATCHES.get(self.avoidance.state)
+        if (blind := self._blind) is not None and blind.text != text:
+            over = "is off" if not self.avoidance.enabled else "does not watch" if text else "sees again"
+            self._blind = None
+            self._tell_own(replace(blind, phase="ends", text=f"Avoidance {over}."))
+        if self._blind is None and text and self._vehicle is not None and self._vehicle.in_air:
             sensor: Sensor = before.sensors[0] if before.sensors else "radar"
             now_s = self._now_mono_s()
-            text = "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself."
             self._blind = ObstacleAlert(f"blind-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
             self._tell_own(self._blind)
-        elif self._blind is not None and self.avoidance.state != "blind":
-            over = "sees again" if self.avoidance.enabled else "is off"
-            blind, self._blind = self._blind, None
-            self._tell_own(replace(blind, phase="ends", text=f"Avoidance {over}."))
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         self.settings = settings

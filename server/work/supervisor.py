@@ -13,7 +13,7 @@ from typing import Any, Literal
 from planning import __version__
 from server.work.node_process import NodeProcess, bound_log
 from telemetry import nodes
-from telemetry.bus.liveness import HUNG_S, Liveness, Silence
+from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 from telemetry.bus.sockets import private_directory
 
@@ -149,7 +149,7 @@ class Supervisor:
         """Until the process has ended. Returns True if it had to, because it was started for something else."""
         since_s = asyncio.get_running_loop().time()
         # Only the link must never be busy with anything for long.
-        liveness = Liveness(busy_s=HUNG_S) if node.name == "link" else Liveness()
+        liveness = Liveness(busy_s=HUNG_S, start_s=STARVED_S) if node.name == "link" else Liveness()
         hung = ""
         while not process.has_ended():
             if facts := process.facts():

@@ -34,7 +34,7 @@ _ANSWERS: dict[type, Any] = {
 class LinkClient:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._liveness = Liveness(hung_s=HUNG_S, busy_s=HUNG_S)
+        self._liveness = Liveness(hung_s=HUNG_S, busy_s=HUNG_S, start_s=HUNG_S)
 
     @overload
     async def call(self, request: Upload) -> UploadReport: ...

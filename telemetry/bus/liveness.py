@@ -8,8 +8,11 @@ from pathlib import Path
 
 from telemetry.bus.node_lock import NodeFacts
 
-SILENT_S, HUNG_S, BUSY_S, STARVED_S = 1.0, 3.0, 180.0, 15.0
-"""Without a proof: said; given up; given up though it works hard; given up though it waits for a processor or disk."""
+SILENT_S, HUNG_S, STARVED_S, START_S, BUSY_S = 1.0, 3.0, 15.0, 60.0, 180.0
+"""Without a proof: said; given up; given up though it waits for a processor or a disk; given up before its first one,
+while it loads what it needs; given up though it works hard."""
+_WORKS, _WORKS_HARD = 0.1, 0.5
+"""Processor time used while silent, as a share of that time: of one that hangs next to none."""
 _ASLEEP_S = 1.0
 """An observer that has not looked for so long was itself stopped, and all others with it perhaps."""
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -26,32 +29,50 @@ class Silence:
 class Liveness:
     """Of one node, looked at every moment by one observer on the clock of ``time.monotonic``."""
 
-    def __init__(self, *, hung_s: float = HUNG_S, busy_s: float = BUSY_S) -> None:
-        """``busy_s``: as ``hung_s``, of a node that uses a processor all the while."""
-        self._hung_s, self._busy_s = hung_s, busy_s
-        self._proof = (0, 0.0)
+    def __init__(self, *, hung_s: float = HUNG_S, busy_s: float = BUSY_S, start_s: float = START_S) -> None:
+        """``busy_s``: as ``hung_s``, of a node that works hard all the while; ``start_s``: until its first proof."""
+        self._hung_s, self._busy_s, self._start_s = hung_s, busy_s, start_s
+        self._pid, self._proofs, self._proved_s = 0, 0, 0.0
         self._cpu_s = self._looked_s = self._awake_s = 0.0
 
     def look(self, facts: NodeFacts, now_s: float) -> Silence:
         if now_s - self._looked_s > _ASLEEP_S:
             self._awake_s = now_s
         self._looked_s = now_s
-        proof = (facts.pid, facts.proved_t_mono_s)
-        if proof != self._proof:
-            self._proof, self._cpu_s = proof, _state_of(facts.pid)[1]
+        if facts.pid != self._pid:
+            self._pid, self._proofs, self._proved_s = facts.pid, 0, 0.0
+        if facts.proved_t_mono_s != self._proved_s:
+            self._proved_s, self._cpu_s = facts.proved_t_mono_s, _cpu_s(facts.pid)
+            self._proofs += 1
         silent_s = now_s - max(facts.proved_t_mono_s, self._awake_s)
         if silent_s < min(SILENT_S, self._hung_s):
             return Silence()
-        state, cpu_s = _state_of(facts.pid)
-        is_busy = cpu_s - self._cpu_s >= 0.5 * silent_s
-        patience_s = self._busy_s if is_busy else STARVED_S if state in ("R", "D") else self._hung_s
-        return Silence(silent_s, silent_s >= patience_s)
+        return Silence(silent_s, silent_s >= self._patience_s(silent_s))
+
+    def _patience_s(self, silent_s: float) -> float:
+        share = (_cpu_s(self._pid) - self._cpu_s) / silent_s
+        if share >= _WORKS_HARD:
+            return self._busy_s
+        if self._proofs <= 1 and self._start_s > self._hung_s:  # the first one is that of its lock
+            return self._start_s
+        return STARVED_S if share >= _WORKS or _is_waiting(self._pid) else self._hung_s
 
 
-def _state_of(pid: int) -> tuple[str, float]:
-    """The main thread's state as ``ps`` shows it, and the processor time of all threads; unknown: asleep, none."""
+def _cpu_s(pid: int) -> float:
+    """Processor time of all its threads; 0 when the process is gone."""
+    fields = _fields(Path(f"/proc/{pid}/stat"))
+    return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S if fields else 0.0
+
+
+def _is_waiting(pid: int) -> bool:
+    """Whether any of its threads could go on if it were given a processor, or what it asked of a disk."""
+    threads = (_fields(path / "stat") for path in Path(f"/proc/{pid}/task").glob("*"))
+    return any(fields and fields[0] in ("R", "D") for fields in threads)
+
+
+def _fields(file: Path) -> list[str]:
+    """From the state on, as ``man 5 proc`` lists them; empty when it is gone."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return file.read_text().rpartition(")")[2].split()
     except OSError:
-        return "S", 0.0
-    return fields[0], (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
+        return []

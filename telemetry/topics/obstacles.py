@@ -321,12 +321,12 @@ class AvoidanceStatus:
     """The link node's: what is done about obstacles by itself."""
 
     enabled: bool = False
-    state: Literal["off", "blind", "watching", "holding", "climbing", "offset", "manoeuvre", "released", "ceiling"] = (
-        "off"
-    )
-    """blind: it is on, but no sensor sees ahead; holding: braked, because frames or poses are too old; ceiling: it may
-    not climb any further and holds; offset: goes on in GUIDED, higher than planned; released: the pilot has taken over,
-    it stays off for this flight."""
+    state: Literal[
+        "off", "blind", "lost", "watching", "holding", "climbing", "offset", "manoeuvre", "released", "ceiling"
+    ] = "off"
+    """blind: it is on, but no sensor sees ahead; lost: the server's word while the link node does not answer; holding:
+    braked, because frames or poses are too old; ceiling: it may not climb any further and holds; offset: goes on in
+    GUIDED, higher than planned; released: the pilot has taken over, it stays off for this flight."""
     text: str = ""
     height_offset_m: float = 0.0
     largest_speed_m_s: float | None = None

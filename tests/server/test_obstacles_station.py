@@ -143,5 +143,23 @@ def test_another_resolution_begins_the_radars_map_anew(flying: Station) -> None:
     )
 
 
+def test_a_link_that_hangs_takes_avoidance_with_it_and_gives_it_back(flying: Station) -> None:
+    facts = running_node(_runtime(flying), "link")
+    assert facts is not None
+    os.kill(facts.pid, signal.SIGSTOP)
+    lost = obstacles(flying, lambda state: state.avoidance.state == "lost")
+    assert any("transmitter" in each.alert.text for each in lost.alerts)
+    flying.until(lambda m: m.type == "text" and "no command reaches the vehicle" in m.text.text, LONG_S)
+    refused = flying.http.post("/api/flight/pause")
+    assert refused.status_code == 503
+    assert "The link does not answer" in refused.json()["what"] or "not running" in refused.json()["what"]
+    flying.until(lambda m: m.type == "nodes" and any(n.name == "link" and n.restarts for n in m.nodes), LONG_S)
+    back = obstacles(flying, lambda state: state.avoidance.state not in ("lost", "off"))
+    assert back.avoidance.enabled
+    again = running_node(_runtime(flying), "link")
+    assert again is not None
+    assert again.pid != facts.pid
+
+
 def _runtime(page: Station) -> Path:
     return page.server.settings.data_dir / "run"

@@ -57,6 +57,28 @@ def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_see
     assert len([message for message in told if message.type == "alert"]) == 2
 
 
+def test_avoidance_is_gone_with_the_link_process_and_back_with_its_word() -> None:
+    told = Told()
+    vehicle: Any = SimpleNamespace(in_air=True)
+    watch = Watch("live", told, vehicle, now_mono_s=Clock(), now_utc_s=lambda: 5000.0)
+    watch.on_link_process(answers=False)
+    assert watch.state.avoidance.state == "off", "it was off before"
+    watch.on_link_process(answers=True)
+    sees = AvoidanceStatus(enabled=True, state="watching", sensors=("radar",))
+    watch.on_avoidance(sees)
+    watch.on_link_process(answers=False)
+    assert watch.state.avoidance.state == "lost"
+    (gone,) = [each.alert for each in watch.state.alerts]
+    assert (gone.kind, gone.phase) == ("sensor", "begins")
+    assert "transmitter" in gone.text
+    watch.on_link_process(answers=True)
+    assert watch.state.avoidance == sees
+    assert [message.alert.phase for message in told if message.type == "alert"] == ["begins", "ends"]
+    watch.on_link_process(answers=False)
+    watch.on_avoidance(AvoidanceStatus())
+    assert watch.state.avoidance.state == "off", "what comes up without it is off, whatever was on before"
+
+
 def test_an_alert_is_new_once() -> None:
     watch, _, _ = watching()
     phases = ("begins", "goes_on", "goes_on", "ends")

@@ -288,7 +288,9 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(folder: Path, h
             since_s = time.monotonic()
             await watched.supervisor.start("link", ["--busy"] if how == "busy" else [])
             if how == "stopped":
-                os.kill((await watched.running("link")).pid, signal.SIGSTOP)
+                facts = await watched.running("link")
+                await until(lambda: proved_s(folder) > facts.proved_t_mono_s)
+                os.kill(facts.pid, signal.SIGSTOP)
             await until(lambda: (s := watched.state("link")) is not None and s.state == "silent")
             first = running_node(folder, "link")
             again = await watched.running("link", restarts=1)
@@ -308,6 +310,7 @@ def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path) -> None:
         async with supervised(folder) as watched:
             await watched.supervisor.start("link", [])
             facts = await watched.running("link")
+            await until(lambda: proved_s(folder) > facts.proved_t_mono_s)
             os.kill(facts.pid, signal.SIGSTOP)
             await until(lambda: (s := watched.state("link")) is not None and s.state == "silent")
             os.kill(facts.pid, signal.SIGCONT)
@@ -315,3 +318,9 @@ def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path) -> None:
             await watched.supervisor.stop("link")
 
     run(whole)
+
+
+def proved_s(folder: Path) -> float:
+    """When the link proved last that it works."""
+    facts = running_node(folder, "link")
+    return 0.0 if facts is None else facts.proved_t_mono_s

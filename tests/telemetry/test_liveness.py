@@ -2,68 +2,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import subprocess
+import sys
+import time
 
 import pytest
 
 from telemetry.bus import liveness
-from telemetry.bus.liveness import BUSY_S, HUNG_S, SILENT_S, STARVED_S, Liveness
+from telemetry.bus.liveness import BUSY_S, HUNG_S, SILENT_S, START_S, STARVED_S, Liveness
 from telemetry.bus.node_lock import NodeFacts
 
 PROVED_S = 1000.0
 
 
+class Process:
+    """What the system says of it: its processor time, and whether it waits for a processor or a disk."""
+
+    def __init__(self) -> None:
+        self.cpu_s, self.waits = 0.0, False
+
+
 @pytest.fixture
-def process(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, float], None]:
-    """What the system says of every process from now on: its state, and its processor time in s."""
-    said: list[object] = ["S", 0.0]
-    monkeypatch.setattr(liveness, "_state_of", lambda _: tuple(said))
-
-    def say(state: str, cpu_s: float) -> None:
-        said[:] = [state, cpu_s]
-
-    return say
+def process(monkeypatch: pytest.MonkeyPatch) -> Process:
+    made = Process()
+    monkeypatch.setattr(liveness, "_cpu_s", lambda _: made.cpu_s)
+    monkeypatch.setattr(liveness, "_is_waiting", lambda _: made.waits)
+    return made
 
 
 def facts(proved_s: float = PROVED_S) -> NodeFacts:
     return NodeFacts("link", 7, (), "1", replaceable=False, proved_t_mono_s=proved_s)
 
 
-def given_up_s(observer: Liveness, process: Callable[[str, float], None], state: str, cpu_share: float) -> float:
-    """How long after its last proof a node is given up."""
-    process(state, 0.0)
+def given_up_s(observer: Liveness, process: Process, cpu_share: float = 0.0, *, works: bool = True) -> float:
+    """How long after its last proof a node is given up; ``works``: it has begun its work before."""
+    if works:
+        observer.look(facts(PROVED_S - 0.5), PROVED_S - 0.1)
     for tenth in range(3000):
         silent_s = tenth / 10
+        process.cpu_s = cpu_share * silent_s
         if observer.look(facts(), PROVED_S + silent_s).is_hung:
             return silent_s
-        process(state, cpu_share * (silent_s + 0.1))
     raise AssertionError("never")
 
 
 @pytest.mark.parametrize(
-    ("state", "cpu_share", "limit_s"),
+    ("cpu_share", "waits", "limit_s"),
     [
-        ("S", 0.0, HUNG_S),  # waits for what never comes
-        ("T", 0.0, HUNG_S),  # stopped
-        ("R", 0.1, STARVED_S),  # would run, but others do
-        ("D", 0.0, STARVED_S),  # waits for a disk
-        ("R", 0.9, BUSY_S),  # works on something long
+        (0.0, False, HUNG_S),  # waits for what never comes, or was stopped
+        (0.0, True, STARVED_S),  # would go on, but others have the processor or the disk
+        (0.2, False, STARVED_S),  # works, with what little the others leave
+        (0.9, True, BUSY_S),  # works on something long
     ],
 )
-def test_patience_goes_by_what_it_does(
-    process: Callable[[str, float], None], state: str, cpu_share: float, limit_s: float
-) -> None:
-    assert given_up_s(Liveness(), process, state, cpu_share) == pytest.approx(limit_s, abs=0.15)
+def test_patience_goes_by_what_it_does(process: Process, cpu_share: float, waits: bool, limit_s: float) -> None:
+    process.waits = waits
+    assert given_up_s(Liveness(), process, cpu_share) == pytest.approx(limit_s, abs=0.15)
 
 
-def test_the_link_may_not_be_busy_for_long(process: Callable[[str, float], None]) -> None:
-    assert given_up_s(Liveness(busy_s=HUNG_S), process, "R", 0.9) == pytest.approx(HUNG_S, abs=0.15)
+def test_before_its_first_proof_it_may_load_what_it_needs(process: Process) -> None:
+    assert given_up_s(Liveness(), process, works=False) == pytest.approx(START_S, abs=0.15)
 
 
-def test_silence_is_told_before_it_is_too_long_and_ends_with_the_next_proof(
-    process: Callable[[str, float], None],
-) -> None:
-    process("S", 0.0)
+def test_the_link_may_not_be_busy_for_long(process: Process) -> None:
+    assert given_up_s(Liveness(busy_s=HUNG_S), process, 0.9) == pytest.approx(HUNG_S, abs=0.15)
+
+
+def test_of_a_real_process_it_is_known_whether_it_works() -> None:
+    began_s = liveness._cpu_s(os.getpid())
+    until_s = time.process_time() + 0.05
+    while time.process_time() < until_s:
+        pass
+    assert liveness._cpu_s(os.getpid()) > began_s
+    assert liveness._is_waiting(os.getpid()), "this thread runs"
+    sleeping = subprocess.Popen([sys.executable, "-c", "print(flush=True); input()"], stdin=-1, stdout=-1)
+    with sleeping:
+        assert sleeping.stdout is not None
+        sleeping.stdout.readline()
+        deadline_s = time.monotonic() + 30
+        while liveness._is_waiting(sleeping.pid):
+            assert time.monotonic() < deadline_s
+        sleeping.kill()
+    assert liveness._cpu_s(sleeping.pid) == 0.0
+    assert not liveness._is_waiting(sleeping.pid)
+
+
+def test_silence_is_told_before_it_is_too_long_and_ends_with_the_next_proof(process: Process) -> None:
     observer = Liveness()
     silences = [observer.look(facts(), PROVED_S + t / 10) for t in range(20)]
     assert [s.silent_s > 0 for s in silences] == [t / 10 >= SILENT_S for t in range(20)]
@@ -71,8 +96,7 @@ def test_silence_is_told_before_it_is_too_long_and_ends_with_the_next_proof(
     assert observer.look(facts(PROVED_S + 2.0), PROVED_S + 2.1).silent_s == 0
 
 
-def test_an_observer_that_was_stopped_itself_blames_nobody(process: Callable[[str, float], None]) -> None:
-    process("S", 0.0)
+def test_an_observer_that_was_stopped_itself_blames_nobody(process: Process) -> None:
     observer = Liveness()
     observer.look(facts(), PROVED_S + 0.1)
     assert observer.look(facts(), PROVED_S + 60.0).silent_s == 0

@@ -175,7 +175,7 @@ export const USUAL_CAMERA: CameraDoc = {
 /** The link node's: what is done about obstacles by itself. */
 export interface AvoidanceStatus {
   enabled: boolean;
-  state: "off" | "blind" | "watching" | "holding" | "climbing" | "offset" | "manoeuvre" | "released" | "ceiling";
+  state: "off" | "blind" | "lost" | "watching" | "holding" | "climbing" | "offset" | "manoeuvre" | "released" | "ceiling";
   text: string;
   height_offset_m: number;
   largest_speed_m_s: number | null;

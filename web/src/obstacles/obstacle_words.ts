@@ -106,6 +106,7 @@ export interface AvoidanceWords {
 const AVOIDANCE: Record<AvoidanceStatus["state"], AvoidanceWords> = {
   off: { word: "Off", level: "neutral", note: "You steer clear yourself." },
   blind: { word: "No eyes", level: "bad", note: "No sensor sees ahead: nothing brakes by itself." },
+  lost: { word: "Lost", level: "bad", note: "The link has failed: nothing brakes by itself." },
   watching: { word: "Watching", level: "neutral", note: "Climbs by itself over what it sees ahead." },
   holding: { word: "Holding", level: "bad", note: "Braked: what sensors or position say is too old." },
   climbing: { word: "Climbing", level: "near", note: "Until the way ahead is clear." },
