@@ -2,7 +2,7 @@
 
 State (plan, library, view, selection, cursor, each job, each vehicle, each sensor) is latest-wins: a newer message
 takes the place of the one still waiting. Notices, alerts and the vehicle's own words must arrive: each waits on its
-own, and a page that lets the queue fill up is cut off, as is one that does not take a message within five seconds. It
+own, and a page that lets the queue fill up is cut off, as is one that takes nothing for five seconds. It
 reconnects and starts from a fresh snapshot. What a page changes for all is answered behind the new state, so that it
 can tell older states from its own.
 """
@@ -30,14 +30,15 @@ log = logging.getLogger("hedgehop.hub")
 
 PAGES_MAX = 200
 WAITING_MAX = 256
-SEND_TIMEOUT_S = 5.0
+SEND_TIMEOUT_S = 60.0
+"""A large message over a slow line takes long; a line that takes nothing is cut much sooner (``slow_lines``)."""
 MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
 CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
 
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
-_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera")
+_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera", "ping")
 
 OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
 
@@ -222,6 +223,10 @@ class Hub:
             message = parse(text)
         except ValueError as error:
             self.send(page.page_id, _unreadable(error))
+            return
+        if isinstance(message, schemas.Ping):
+            clock = schemas.ClockMessage(page_ms=message.page_ms, now_mono_s=time.monotonic())
+            self.send(page.page_id, clock)
             return
         try:
             await on_message(page.page_id, message)

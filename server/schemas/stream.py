@@ -67,6 +67,14 @@ class AnsweredMessage(Message):
     change: int
 
 
+class ClockMessage(Message):
+    """The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came."""
+
+    type: Literal["clock"] = "clock"
+    page_ms: float
+    now_mono_s: float
+
+
 class JobMessage(Message):
     type: Literal["job"] = "job"
     job: JobDoc
@@ -233,6 +241,7 @@ ServerMessage = Annotated[
     | ViewMessage
     | SelectionMessage
     | AnsweredMessage
+    | ClockMessage
     | JobMessage
     | CursorMessage
     | VehicleMessage
@@ -315,7 +324,14 @@ class HoldCamera(Strict):
     held: bool
 
 
+class Ping(Strict):
+    """Every second: the answer tells the page that the server works, how far away it is, and what its clock says."""
+
+    type: Literal["ping"] = "ping"
+    page_ms: Annotated[float, Field(ge=0, le=1e15)]
+
+
 ClientMessage = Annotated[
-    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera,
+    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera | Ping,
     Field(discriminator="type"),
 ]

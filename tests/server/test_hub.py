@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any, cast
 
@@ -242,6 +243,19 @@ def test_unreadable_messages_are_told_and_the_stream_goes_on(text: str, words: s
         assert words in socket.sent[1]["error"]["what"]
         assert [message for _, message in bench.heard] == [HoverProfile(s_m=1.5)]
         assert socket.close_code is None
+
+    run(scenario)
+
+
+def test_a_ping_is_answered_with_the_servers_clock_and_goes_no_further() -> None:
+    async def scenario(bench: Bench) -> None:
+        socket, before_s = await bench.join(), time.monotonic()
+        socket.says('{"type": "ping", "page_ms": 1234.5}')
+        await settled()
+        assert socket.types() == ["snapshot", "clock"]
+        assert socket.sent[1]["page_ms"] == 1234.5
+        assert before_s <= socket.sent[1]["now_mono_s"] <= time.monotonic()
+        assert bench.heard == []
 
     run(scenario)
 

@@ -159,6 +159,9 @@ export const LIMITS = {
   SetSelection: {
     change: { min: 0, max: 9_007_199_254_740_991 },
   },
+  Ping: {
+    page_ms: { min: 0, max: 1_000_000_000_000_000.0 },
+  },
 } as const;
 
 export const CHECK_FRESH_S = 120;
@@ -1786,6 +1789,14 @@ export interface AnsweredMessage {
   change: number;
 }
 
+/** The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came. */
+export interface ClockMessage {
+  v: 1;
+  type: "clock";
+  page_ms: number;
+  now_mono_s: number;
+}
+
 export interface JobMessage {
   v: 1;
   type: "job";
@@ -1994,6 +2005,12 @@ export interface HoldCamera {
   held: boolean;
 }
 
+/** Every second: the answer tells the page that the server works, how far away it is, and what its clock says. */
+export interface Ping {
+  type: "ping";
+  page_ms: number;
+}
+
 export type ServerMessage =
   | Snapshot
   | PlanMessage
@@ -2001,6 +2018,7 @@ export type ServerMessage =
   | ViewMessage
   | SelectionMessage
   | AnsweredMessage
+  | ClockMessage
   | JobMessage
   | CursorMessage
   | VehicleMessage
@@ -2031,4 +2049,5 @@ export type ClientMessage =
   | SetView
   | SetSelection
   | FrameView
-  | HoldCamera;
+  | HoldCamera
+  | Ping;

@@ -1,4 +1,5 @@
 import { LOST_S, STALE_S, type VehicleMessage, type VehicleState } from "../messages";
+import { serverNow_s } from "./server_clock";
 
 /** A message about the vehicle and when, by this page's clock, it came. */
 export interface Heard {
@@ -27,14 +28,15 @@ const newest = (state: VehicleState) =>
 
 /**
  * Seconds since a group's last message came; null when none ever did. Live values go on aging while nothing
- * arrives. A recording's clock stands still with it: its values are as old as they are behind the newest.
+ * arrives, and what waited on a slow line is as old as the server's clock says. A recording's clock stands still with it: its values are as old as they are behind the newest.
  */
 export function age_s(heard: Heard | null, group: Group, now_ms: number): number | null {
   const state = heard?.message.state;
   const at_s = state?.[CLOCKS[group]];
   if (!heard || !state || at_s == null) return null;
   if (heard.message.source === "replay") return Math.max(0, newest(state) - at_s);
-  return Math.max(0, heard.message.now_mono_s - at_s + Math.max(0, now_ms - heard.received_ms) / 1000);
+  const least_s = heard.message.now_mono_s + Math.max(0, now_ms - heard.received_ms) / 1000;
+  return Math.max(0, Math.max(least_s, serverNow_s(now_ms) ?? least_s) - at_s);
 }
 
 export function isStale(heard: Heard | null, group: Group, now_ms: number): boolean {

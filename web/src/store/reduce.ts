@@ -6,6 +6,7 @@ import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
+import { takeClock } from "./server_clock";
 import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
@@ -35,6 +36,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "answered":
       takeAnswer(message.change);
+      return;
+    case "clock":
+      takeClock(message, performance.now());
       return;
     case "job":
       state.jobs.value = new Map(state.jobs.value).set(message.job.id, message.job);
