@@ -13,7 +13,7 @@ from typing import Any, Literal
 from planning import __version__
 from server.work.node_process import NodeProcess, bound_log
 from telemetry import nodes
-from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence
+from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence, silence_counts
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 from telemetry.bus.sockets import private_directory
 
@@ -154,7 +154,7 @@ class Supervisor:
         while not process.has_ended():
             if facts := process.facts():
                 silence = liveness.look(facts, time.monotonic())
-                if silence.is_hung:
+                if silence.is_hung and await silence_counts(self._runtime_dir):
                     hung = f" after it had not answered for {silence.silent_s:.0f} s"
                     log.error("The %s node hangs and is killed.", node.name)
                     process.kill()

@@ -7,7 +7,7 @@ import time
 from typing import Any, overload
 
 from telemetry.bus import Bus
-from telemetry.bus.liveness import Liveness
+from telemetry.bus.liveness import Liveness, silence_counts
 from telemetry.bus.node_lock import running_node
 from telemetry.errors import BusError
 from telemetry.topics.messages import OnboardMission, UploadReport
@@ -55,15 +55,17 @@ class LinkClient:
         try:
             while not asking.done():
                 await asyncio.wait((asking,), timeout=LOOK_EVERY_S)
-                self._check_alive(asking)
+                await self._check_alive(asking)
             return asking.result()
         finally:
             asking.cancel()
 
-    def _check_alive(self, asking: asyncio.Future[Any]) -> None:
+    async def _check_alive(self, asking: asyncio.Future[Any]) -> None:
         """A node that hangs answers nothing for as long as anybody waits."""
         facts = None if asking.done() else running_node(self._bus.runtime_dir, NAME)
-        if facts is not None and self._liveness.look(facts, time.monotonic()).is_hung:
+        if facts is None or not self._liveness.look(facts, time.monotonic()).is_hung:
+            return
+        if await silence_counts(self._bus.runtime_dir):
             raise BusError(
                 "The link does not answer. It is ended and started again.",
                 advice=f"{TRANSMITTER} What was asked may still be done: look before you repeat.",

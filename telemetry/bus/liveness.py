@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,6 +58,14 @@ class Liveness:
         if self._proofs <= 1 and self._start_s > self._hung_s:  # the first one is that of its lock
             return self._start_s
         return STARVED_S if share >= _WORKS or _is_waiting(self._pid) else self._hung_s
+
+
+async def silence_counts(runtime_dir: Path) -> bool:
+    """Whether the disk takes proofs, and soon: of one that is read-only or broken no silence tells anything."""
+    with contextlib.suppress(TimeoutError, OSError):
+        await asyncio.wait_for(asyncio.to_thread(os.utime, runtime_dir), SILENT_S)
+        return True
+    return False
 
 
 def _cpu_s(pid: int) -> float:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import subprocess
 import sys
+import threading
 import time
+from pathlib import Path
 
 import pytest
 
-from telemetry.bus import liveness
+from telemetry.bus import liveness, node_lock
 from telemetry.bus.liveness import BUSY_S, HUNG_S, SILENT_S, START_S, STARVED_S, Liveness
-from telemetry.bus.node_lock import NodeFacts
+from telemetry.bus.node_lock import NodeFacts, NodeLock
 
 PROVED_S = 1000.0
 
@@ -101,3 +104,23 @@ def test_an_observer_that_was_stopped_itself_blames_nobody(process: Process) -> 
     observer.look(facts(), PROVED_S + 0.1)
     assert observer.look(facts(), PROVED_S + 60.0).silent_s == 0
     assert not observer.look(facts(), PROVED_S + 60.5).is_hung
+
+
+def test_where_no_proof_can_be_kept_no_silence_counts(tmp_path: Path) -> None:
+    assert asyncio.run(liveness.silence_counts(tmp_path))
+    assert not asyncio.run(liveness.silence_counts(tmp_path / "gone"))
+
+
+def test_a_node_that_proves_waits_for_no_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stalled, goes_on = threading.Event(), threading.Event()
+
+    def stalls(*_: object, **__: object) -> None:
+        stalled.set()
+        assert goes_on.wait(60)
+
+    with NodeLock(tmp_path, "link", ()) as lock:
+        monkeypatch.setattr(node_lock.os, "utime", stalls)
+        lock.prove_alive()
+        assert stalled.wait(60)
+        lock.prove_alive()
+        goes_on.set()
