@@ -10,7 +10,6 @@ from contextlib import closing
 import uvicorn
 from fastapi import FastAPI
 
-from server.door.slow_lines import PromptWebSocket, keep_little_back
 from server.errors import ServerError, StartError
 from server.library import Library
 from server.settings import Settings
@@ -22,6 +21,7 @@ from telemetry.mavlink.address import parse_address
 
 WEBSOCKET_LIMIT_BYTES = 1024**2
 """From browsers; what goes to them has no limit."""
+STALLED_AFTER_MS = 30_000
 SHUTDOWN_S = 5
 
 
@@ -68,7 +68,6 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         server_header=False,
         # Meshes deflate slowly and little: a 36 MB one took 2.2 s with, 0.3 s without.
         ws_per_message_deflate=False,
-        ws=PromptWebSocket,
         ws_max_size=WEBSOCKET_LIMIT_BYTES,
         timeout_graceful_shutdown=SHUTDOWN_S,
     )
@@ -80,7 +79,9 @@ def bound_socket(host: str, port: int) -> socket.socket:
     listening = socket.socket(family, socket.SOCK_STREAM)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        keep_little_back(listening)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            # Connections inherit it: a browser that takes no bytes any more does not hold its buffers for ever.
+            listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, STALLED_AFTER_MS)
         listening.bind((host, port))
     except OSError as error:
         listening.close()
