@@ -17,14 +17,6 @@ const NO_ANSWER: ErrorDoc = {
   advice: "Check that it is still running; the page keeps trying.",
 };
 
-/** Of an order that was still under way when the server fell silent. */
-export const gaveUp = (where: string): ErrorDoc => ({
-  code: "no_answer",
-  what: "The server has fallen silent; nobody knows whether this was done.",
-  where,
-  advice: "Take the pilot's transmitter if the vehicle must act now.",
-});
-
 function isErrorDoc(body: unknown): body is ErrorDoc {
   return typeof body === "object" && body !== null && "what" in body && typeof body.what === "string";
 }

@@ -13,11 +13,7 @@ export interface SocketEvents {
 }
 
 const SIGN_IN_CLOSE_CODE = 4401;
-const GIVEN_UP_CODE = 1006;
 const PING_EVERY_MS = 1000;
-/** Pings go unanswered for so long: the server, or the way to it, is lost; and then given up and tried anew. */
-const SILENT_MS = 3000;
-const GIVEN_UP_MS = 10_000;
 const FIRST_RETRY_MS = 300;
 const LONGEST_RETRY_MS = 5000;
 
@@ -31,10 +27,6 @@ export function retryDelay_ms(attempt: number, random: number): number {
 export class Stream {
   private socket: WebSocket | null = null;
   private attempt = 0;
-  private heard_ms = 0;
-  private looked_ms = 0;
-  private isOpen = false;
-  private isSilent = false;
 
   constructor(
     private readonly url: string,
@@ -44,41 +36,12 @@ export class Stream {
   connect(): void {
     const socket = new WebSocket(this.url);
     this.socket = socket;
-    this.hear();
-    const beat = setInterval(() => {
-      if (this.look()) return;
-      // Its close would wait for the server's.
-      socket.onmessage = socket.onclose = null;
-      socket.close();
-      ended(GIVEN_UP_CODE);
-    }, PING_EVERY_MS);
-    const ended = (code: number) => {
-      clearInterval(beat);
-      this.closed(code);
-    };
     socket.onmessage = (event) => this.read(event.data);
-    socket.onclose = (event) => ended(event.code);
-  }
-
-  /** A server that hangs keeps its sockets open: only its silence tells. False: it is given up. */
-  private look(): boolean {
-    const now_ms = performance.now();
-    // A page that was asleep itself has not been listening.
-    if (now_ms - this.looked_ms > 2 * PING_EVERY_MS) this.heard_ms = now_ms;
-    this.looked_ms = now_ms;
-    const silent_ms = now_ms - this.heard_ms;
-    if (silent_ms >= GIVEN_UP_MS) return false;
-    if (silent_ms >= SILENT_MS && this.isOpen && !this.isSilent) {
-      this.isSilent = true;
-      this.events.link("lost");
-    }
-    this.send({ type: "ping", page_ms: now_ms });
-    return true;
-  }
-
-  private hear(): void {
-    this.heard_ms = this.looked_ms = performance.now();
-    this.isSilent = false;
+    const beat = setInterval(() => this.send({ type: "ping", page_ms: performance.now() }), PING_EVERY_MS);
+    socket.onclose = (event) => {
+      clearInterval(beat);
+      this.closed(event.code);
+    };
   }
 
   /** Messages of a lost link are dropped: they are pointers and view settings, stale by the time it is back. */
@@ -100,11 +63,8 @@ export class Stream {
       this.events.unreadable(`protocol version ${message.v}; this page speaks ${PROTOCOL_VERSION}`);
       return;
     }
-    const isBack = this.isSilent;
-    this.hear();
-    if (message.type === "snapshot" || isBack) {
+    if (message.type === "snapshot") {
       this.attempt = 0;
-      this.isOpen = true;
       this.events.link("open");
     }
     this.events.message(message);
@@ -112,7 +72,6 @@ export class Stream {
 
   private closed(code: number): void {
     this.socket = null;
-    this.isOpen = false;
     if (code === SIGN_IN_CLOSE_CODE) {
       this.events.signIn();
       return;

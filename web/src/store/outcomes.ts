@@ -1,5 +1,5 @@
 import { signal } from "@preact/signals";
-import { asErrorDoc, gaveUp, request } from "../net/api";
+import { asErrorDoc, request } from "../net/api";
 import { setError } from "./state";
 
 /** What a command came to, by the place on the page where it was given. */
@@ -28,14 +28,6 @@ function setPending(place: string, isPending: boolean): void {
   pending.value = next;
 }
 
-let waiting = new AbortController();
-
-/** Nothing is heard of the server any more: nobody is left to wait for an answer that may never come. */
-export function giveUpOrders(): void {
-  waiting.abort();
-  waiting = new AbortController();
-}
-
 interface Order {
   /** Where its outcome appears. */
   place: string;
@@ -50,14 +42,13 @@ interface Order {
 export async function order({ place, path, body, method = "POST", done }: Order): Promise<Response | null> {
   setPending(place, true);
   say(place, null);
-  const { signal } = waiting;
   try {
-    const answer = await request(method, path, body, signal);
+    const answer = await request(method, path, body);
     setError(place, null);
     if (done) say(place, done);
     return answer;
   } catch (error) {
-    setError(place, signal.aborted ? gaveUp(place) : asErrorDoc(error));
+    setError(place, asErrorDoc(error));
     return null;
   } finally {
     setPending(place, false);

@@ -3,7 +3,6 @@ import type { ClientMessage, FrameView, SelectionDoc, ViewDoc } from "../message
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
 import { receive } from "./reduce";
-import { giveUpOrders } from "./outcomes";
 import { nextChange } from "./shared";
 import { cursor, link, notifyText, selection, view } from "./state";
 
@@ -11,9 +10,7 @@ const stream = new Stream(streamUrl(location), {
   message: receive,
   link: (state) => {
     link.value = state;
-    if (state !== "lost") return;
-    cursor.value = null;
-    giveUpOrders();
+    if (state === "lost") cursor.value = null;
   },
   signIn: goToSignIn,
   unreadable: (why) => notifyText("error", `The server sent ${why}.`, "Reload the page."),
