@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from io import BytesIO
 from pathlib import Path
@@ -266,5 +267,7 @@ def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
     rows = page.get_by_test_id("corner-row")
     if rows.count() < wanted:
         page.mouse.click(*place)
-        page.wait_for_timeout(1200)
+        # A view that draws slowly answers late; a second click on the same place would be another corner.
+        with contextlib.suppress(AssertionError):
+            expect(rows).to_have_count(wanted, timeout=20_000)
     return rows.count() == wanted
