@@ -129,7 +129,9 @@ class Watch:
         before, self._heard_avoidance = self.avoidance, status
         self.avoidance = status
         if status.enabled and not self._link_answers:
-            self.avoidance = replace(status, state="lost", text=_NOBODY_WATCHES["lost"])
+            self.avoidance = replace(
+                status, state="lost", text=_NOBODY_WATCHES["lost"], largest_speed_m_s=None, sensors=(), eyes=()
+            )
         self._tell_blindness(before)
         self.refresh()
 

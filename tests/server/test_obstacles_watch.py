@@ -64,10 +64,11 @@ def test_avoidance_is_gone_with_the_link_process_and_back_with_its_word() -> Non
     watch.on_link_process(answers=False)
     assert watch.state.avoidance.state == "off", "it was off before"
     watch.on_link_process(answers=True)
-    sees = AvoidanceStatus(enabled=True, state="watching", sensors=("radar",))
+    sees = AvoidanceStatus(enabled=True, state="watching", sensors=("radar",), largest_speed_m_s=5.8)
     watch.on_avoidance(sees)
     watch.on_link_process(answers=False)
     assert watch.state.avoidance.state == "lost"
+    assert watch.state.avoidance.largest_speed_m_s is None, "it sees far enough for no speed"
     (gone,) = [each.alert for each in watch.state.alerts]
     assert (gone.kind, gone.phase) == ("sensor", "begins")
     assert "transmitter" in gone.text
