@@ -77,7 +77,7 @@ class Flying:
         self._present = present = Present(hub)
         self._lane = lane = Lane("flight")
         runtime_dir, board = library.root / RUNTIME_FOLDER, workspace.board
-        link, aboard = LinkClient(bus), Aboard(library.root / "onboard.json")
+        link, aboard = LinkClient(bus, lease.issue_above), Aboard(library.root / "onboard.json")
         self.shelf = RecordingShelf(library)
         self.nodes = Nodes(bus, runtime_dir, self.shelf.folder, present, demo_radar=settings.demo_radar)
         self.agents = Agents(bus)

@@ -5,7 +5,8 @@ TelemetryError
 ├── ConnectionFailedError  a port in use, gone or forbidden; a host that does not answer
 ├── NoVehicleError         no vehicle adopted, or the link to it is lost
 ├── NotAllowedError        not the operator in charge, or a command that does not fit the present state
-│   └── MissionUnknownError    what is on board has not been read back and found to be the plan
+│   ├── MissionUnknownError    what is on board has not been read back and found to be the plan
+│   └── OvertakenError         a fencing token lower than one that the link has seen
 ├── RefusedError           the vehicle said no: its result and its own words
 ├── SilentError            the vehicle did not answer
 ├── TransferError          a mission that did not get across whole
@@ -45,6 +46,10 @@ class NotAllowedError(TelemetryError):
 
 class MissionUnknownError(NotAllowedError):
     code = "mission_unknown"
+
+
+class OvertakenError(NotAllowedError):
+    code = "overtaken"
 
 
 class RefusedError(TelemetryError):

@@ -4,21 +4,26 @@ Whoever has no page any more, and commands nothing either, loses it to a page th
 browser that comes back must not find another one in charge.
 
 The token only ever grows, across restarts too: it counts milliseconds since 1970, or one more than the last one if
-the clock went back. Whoever held the lease before has a lower token, and the link node refuses it.
+the clock went back. Whoever held the lease before has a lower token, and the link node refuses it. Where the clock went
+back by more than a day, both begin anew. A token that the link has seen and that was not issued here is a stranger's:
+the one in charge gets a higher one.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from server.errors import NotInChargeError
 from server.library.whole_files import write_atomically
 from server.schemas import LeaseDoc
-from telemetry.topics.requests import Operator
+from telemetry.topics.requests import Operator, highest_possible_token
+
+log = logging.getLogger("hedgehop.flying")
 
 SERVER_NAME = "Hedgehop"
 """What the server calls itself when it opens the connections it was started with."""
@@ -46,6 +51,8 @@ class Lease:
     ) -> None:
         self._file, self._clock_utc_s, self._now_mono_s = file, clock_utc_s, now_mono_s
         self._token, self._holder = self._read()
+        self._since_token = self._token
+        """The first one of who is in charge, or of nobody."""
         self._seen_mono_s = now_mono_s()
 
     @property
@@ -101,11 +108,20 @@ class Lease:
             who = "Nobody is" if holder is None else f"{holder.name} is"
             raise NotInChargeError(f"{who} in charge of the vehicle.", advice="Press Take control first.")
         self._seen_mono_s = self._now_mono_s()
-        return Operator(holder.name, self._token)
+        return Operator(holder.name, self._issued())
 
     def server_operator(self) -> Operator:
         """For what the server itself asks of the link node: never against the one in charge."""
-        return Operator(SERVER_NAME, self._token)
+        return Operator(SERVER_NAME, self._issued())
+
+    def issue_above(self, operator: Operator, highest: int) -> Operator | None:
+        """For an operator whom the link refused for this higher token; None when control really has been passed on."""
+        if not self._since_token <= operator.token <= self._token:
+            return None
+        if highest > self._token:
+            log.warning("A program that is not this server has commanded the vehicle: token %d.", highest)
+            self._issue(highest + 1)
+        return replace(operator, token=self._issued())
 
     def save(self) -> None:
         """Raises StorageError; nothing is lost but that a restart forgets who was in charge."""
@@ -114,14 +130,28 @@ class Lease:
         write_atomically(self._file, json.dumps(kept).encode())
 
     def _next_token(self) -> None:
-        self._token = max(self._token + 1, int(1000 * self._clock_utc_s()))
+        self._issue(self._token + 1)
+        self._since_token = self._token
+
+    def _issued(self) -> int:
+        """Not higher than the link may take, if the clock has been set back since."""
+        if self._token > highest_possible_token(self._clock_utc_s()):
+            self._next_token()
+        return self._token
+
+    def _issue(self, at_least: int) -> None:
+        now_utc_s = self._clock_utc_s()
+        now = int(1000 * now_utc_s)
+        self._token = max(at_least, now) if at_least <= highest_possible_token(now_utc_s) else now
 
     def _read(self) -> tuple[int, Holder | None]:
-        now = int(1000 * self._clock_utc_s())
+        now_utc_s = self._clock_utc_s()
+        now = int(1000 * now_utc_s)
         try:
             kept = json.loads(self._file.read_text(encoding="utf-8"))
             holder = None if kept["holder"] is None else Holder(*(str(part) for part in kept["holder"]))
-            return max(int(kept["token"]) + 1, now), holder
+            token = int(kept["token"]) + 1
+            return max(token, now) if token <= highest_possible_token(now_utc_s) else now, holder
         except (FileNotFoundError, ValueError, TypeError, KeyError):
             # A damaged file costs pressing a button, never a refused start.
             return now, None

@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, overload
 
 from telemetry.bus import Bus
 from telemetry.bus.liveness import Liveness, silence_counts
 from telemetry.bus.node_lock import running_node
-from telemetry.errors import BusError
+from telemetry.errors import BusError, OvertakenError
 from telemetry.topics.messages import OnboardMission, UploadReport
-from telemetry.topics.requests import Connect, Download, LinkRequest, ReadParameters, StartAuto, StartGuided, Upload
+from telemetry.topics.requests import (
+    Connect,
+    Download,
+    HighestToken,
+    LinkRequest,
+    Operator,
+    ReadParameters,
+    StartAuto,
+    StartGuided,
+    Upload,
+)
 
 NAME = "link"
 COMMAND_S = 30.0
@@ -23,17 +35,21 @@ UPLOAD_S, UPLOAD_PER_ITEM_S = 240.0, 5.0
 APPEARS_S = 0.5
 """A link node that is there is found by then; only ``Connect`` waits for one that is being started."""
 HUNG_S, LOOK_EVERY_S = 0.9, 0.1
+OVERTAKEN_TRIES = 5
 TRANSMITTER = "Take the transmitter if the vehicle must act now."
 _ANSWERS: dict[type, Any] = {
     Upload: UploadReport,
     Download: OnboardMission,
     ReadParameters: dict[str, float | None],
+    HighestToken: int,
 }
+IssueAbove = Callable[[Operator, int], Operator | None]
+"""The same operator with a token above this one, which no server has issued; None: it has, to somebody else."""
 
 
 class LinkClient:
-    def __init__(self, bus: Bus) -> None:
-        self._bus = bus
+    def __init__(self, bus: Bus, issue_above: IssueAbove = lambda operator, highest: None) -> None:
+        self._bus, self._issue_above = bus, issue_above
         self._liveness = Liveness(hung_s=HUNG_S, busy_s=HUNG_S, start_s=HUNG_S)
 
     @overload
@@ -45,7 +61,23 @@ class LinkClient:
     @overload
     async def call(self, request: LinkRequest) -> Any: ...
     async def call(self, request: LinkRequest) -> Any:
-        """Raises what the link raised; BusError when the node is not there or died over it."""
+        """Raises what the link raised; BusError when the node is not there or died over it.
+
+        Who is in charge is not refused over a token that a stranger on the bus made up.
+        """
+        for _ in range(OVERTAKEN_TRIES):
+            try:
+                return await self._call(request)
+            except OvertakenError:
+                if isinstance(request, ReadParameters | HighestToken):
+                    raise
+                operator = self._issue_above(request.operator, await self._call(HighestToken()))
+                if operator is None:
+                    raise
+                request = replace(request, operator=operator)
+        return await self._call(request)
+
+    async def _call(self, request: LinkRequest) -> Any:
         answer, appears_s = _ANSWERS.get(type(request), type(None)), APPEARS_S
         if isinstance(request, Connect):
             appears_s = COMMAND_S

@@ -6,7 +6,7 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any, NamedTuple
 
-from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.errors import NotAllowedError, NoVehicleError, OvertakenError
 from telemetry.link.link import Link
 from telemetry.link.piloting import Pilot
 from telemetry.topics import requests
@@ -15,22 +15,34 @@ from telemetry.topics import requests
 class OperatorRight:
     """Requests of an operator whose lease was taken over are refused.
 
-    Knows the highest fencing token it has seen; ``highest`` outlives a restart of the node.
+    Knows the highest fencing token it has seen, which outlives a restart of the node. No token can shut out all that
+    come after it: one far ahead of the clock is not taken, nor kept when the clock has been set back behind it.
     """
 
     def __init__(self, highest: int = 0) -> None:
-        self.highest = highest
+        self._highest = highest
         self.name = ""
 
+    @property
+    def highest(self) -> int:
+        if self._highest > requests.highest_possible_token():
+            self._highest = 0
+        return self._highest
+
     def check(self, operator: requests.Operator) -> None:
-        """Raises NotAllowedError for a token lower than the highest one."""
+        """Raises OvertakenError for a token lower than the highest one, NotAllowedError for an impossible one."""
         if operator.token < self.highest:
             by = f" by {self.name}" if self.name and self.name != operator.name else ""
-            raise NotAllowedError(
+            raise OvertakenError(
                 f"{operator.name or 'This session'} is not in charge any more: control was taken over{by}.",
                 advice="Take control again before you command the vehicle.",
             )
-        self.highest, self.name = operator.token, operator.name
+        if operator.token > requests.highest_possible_token():
+            raise NotAllowedError(
+                f"{operator.name or 'This session'} gave a token that no server issues: it is far ahead of the clock.",
+                advice="Take control in the console.",
+            )
+        self._highest, self.name = operator.token, operator.name
 
 
 class _Command(NamedTuple):
@@ -67,6 +79,7 @@ class Answering:
             requests.Upload: self._upload,
             requests.Download: self._download,
             requests.ReadParameters: self._read_parameters,
+            requests.HighestToken: self._highest_token,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
             requests.SetAvoidance: self._set_avoidance,
@@ -75,7 +88,7 @@ class Answering:
         }
 
     async def answer(self, request: requests.LinkRequest) -> object:
-        if not isinstance(request, requests.ReadParameters):
+        if not isinstance(request, requests.ReadParameters | requests.HighestToken):
             self._right.check(request.operator)
         if (command := _COMMANDS.get(type(request))) is not None:
             return await self._command(request, command)
@@ -121,6 +134,10 @@ class Answering:
     async def _read_parameters(self, request: requests.ReadParameters) -> object:
         transfers = self._link.need_session().transfers
         return await transfers.read_parameters(request.names)
+
+    async def _highest_token(self, request: requests.HighestToken) -> int:
+        del request
+        return self._right.highest
 
     async def _start_auto(self, request: requests.StartAuto) -> None:
         session = self._link.need_session()

@@ -1,16 +1,26 @@
 """What may be asked of the link, perception, recorder and replay nodes, and by whom. All are frozen dataclasses.
 
 ``Operator.token`` is the fencing token of the server's lease: the link node refuses every request that changes
-anything on a vehicle when its token is lower than the highest one it has seen.
+anything on a vehicle when its token is lower than the highest one it has seen. Tokens count milliseconds since 1970, so
+that none can be far ahead of the clock: one that is would shut out all that come after it, and is refused.
 """
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Literal
 
 from telemetry.topics.messages import GuidedTarget, Item
 from telemetry.topics.obstacles import AvoidBy
+
+TOKEN_AHEAD_MS = 24 * 3600 * 1000
+"""A clock may be set back by so much without anything being noticed of it."""
+
+
+def highest_possible_token(now_utc_s: float | None = None) -> int:
+    """For whoever issues tokens and whoever checks them, both by the clock of this machine."""
+    return int(1000 * (time.time() if now_utc_s is None else now_utc_s)) + TOKEN_AHEAD_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +85,11 @@ class ReadParameters:
     """-> dict[str, float | None]; None for what the vehicle does not have"""
 
     names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HighestToken:
+    """Which one the link has seen: whoever issues them issues a higher one. -> int"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +191,7 @@ LinkRequest = (
     | Upload
     | Download
     | ReadParameters
+    | HighestToken
     | Arm
     | Disarm
     | StartAuto

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from server.door.lease import GONE_S, Lease
 from server.errors import NotInChargeError, status_of
+from telemetry.topics.requests import Operator, highest_possible_token
 
 ANNA, BEN = "a" * 64, "b" * 64
 
@@ -114,7 +115,30 @@ def test_a_damaged_file_costs_pressing_a_button(tmp_path: Path, text: str) -> No
     assert lease.take_if_free(ANNA)
 
 
-@given(st.lists(st.tuples(st.sampled_from(["take", "release"]), st.sampled_from([ANNA, BEN]), st.floats(0, 4e9))))
+def test_a_clock_set_back_by_years_does_not_leave_tokens_that_no_link_takes(tmp_path: Path) -> None:
+    now, file = [2e9], tmp_path / "lease.json"
+    lease = Lease(file, clock_utc_s=lambda: now[0])
+    lease.take(ANNA, "Anna")
+    lease.save()
+    now[0] = 1e9
+    for each in (lease, Lease(file, clock_utc_s=lambda: now[0])):
+        assert each.operator(ANNA).token <= highest_possible_token(now[0])
+
+
+def test_a_token_that_nobody_issued_is_topped_for_who_is_in_charge_alone(tmp_path: Path) -> None:
+    lease = Lease(tmp_path / "lease.json")
+    lease.take(ANNA, "Anna")
+    anna = lease.operator(ANNA)
+    topped = lease.issue_above(anna, anna.token + 9)
+    assert topped is not None
+    assert topped == Operator("Anna", anna.token + 10)
+    assert lease.operator(ANNA) == topped
+    assert lease.issue_above(anna, anna.token + 9) == topped  # of two commands at once, the second
+    lease.take(BEN, "Ben")
+    assert lease.issue_above(topped, lease.operator(BEN).token) is None
+
+
+@given(st.lists(st.tuples(st.sampled_from(["take", "release"]), st.sampled_from([ANNA, BEN]), st.floats(0, 80_000))))
 def test_every_change_of_hands_raises_the_token(steps: list[tuple[str, str, float]]) -> None:
     now = [0.0]
     lease = Lease(Path("unused-and-missing") / "lease.json", clock_utc_s=lambda: now[0])

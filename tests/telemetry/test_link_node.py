@@ -85,12 +85,12 @@ async def stand_for_a_server(bus: Bus) -> None:
 
 
 @contextlib.asynccontextmanager
-async def station(folder: Path) -> AsyncIterator[tuple[Node, LinkClient]]:
+async def station(folder: Path, **options: Any) -> AsyncIterator[tuple[Node, LinkClient]]:
     node = Node(folder)
     async with await Bus.open(node.runtime, "server") as bus:
         tasks = [asyncio.create_task(part) for part in (node.listen(bus), stand_for_a_server(bus))]
         try:
-            yield node, LinkClient(bus)
+            yield node, LinkClient(bus, **options)
         finally:
             node.end()
             for task in tasks:
