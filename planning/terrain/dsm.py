@@ -19,7 +19,7 @@ from planning.terrain.cells.squares import squares
 LARGE_PX = 4_000_000
 """A model with more cells is read and looked at in part; a smaller one whole."""
 SCALE_TOLERANCE = 0.01
-"""Largest deviation of the CRS's metre from the true one."""
+"""Largest deviation of the CRS's metre from the true one; national grids and UTM stay below 0.002."""
 
 
 class SurfaceModel(ABC):

@@ -13,6 +13,7 @@ from typer import Argument, Option
 from planning.errors import ParameterError, PoiError
 from planning.formats.poi_files import read_pois, warn_swapped
 from planning.formats.safe_text import clean_name
+from planning.limits import LONGEST_LOITER_S
 from planning.model import Poi
 from planning.request import PlanRequest
 from planning.route.poi import check_pois
@@ -101,8 +102,12 @@ def _with_loiter(pois: Sequence[Poi], loiter_s: float | None) -> tuple[Poi, ...]
     """The points, those without a waiting time with this one."""
     if loiter_s is None:
         return tuple(pois)
-    if not 0 <= loiter_s < 86_400:
-        raise ParameterError(f"A wait of {loiter_s:g} s is not possible.", where="--loiter-s", advice="Give seconds.")
+    if not 0 <= loiter_s <= LONGEST_LOITER_S:
+        raise ParameterError(
+            f"A wait of {loiter_s:g} s is not possible.",
+            where="--loiter-s",
+            advice=f"Give seconds, at most {LONGEST_LOITER_S:,.0f}.",
+        )
     return tuple(poi if poi.loiter_s > 0 else replace(poi, loiter_s=loiter_s) for poi in pois)
 
 

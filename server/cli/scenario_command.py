@@ -24,7 +24,7 @@ def scenario(
     world: Annotated[
         Path | None, Option(metavar="FILE", help="Objects of your own (JSON) instead of the scenario's.")
     ] = None,
-    seed: Annotated[int, Option(min=0, help="Of the scene, the sensors' noise and the wind.")] = 0,
+    seed: Annotated[int, Option(min=0, max=10_000, help="Of the scene, the sensors' noise and the wind.")] = 0,
     seeds: Annotated[int, Option(min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
     radar: Annotated[RadarKind | None, Option(help="arena: by what it would report, or from its samples on.")] = None,
     figures: Annotated[

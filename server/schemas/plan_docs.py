@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from planning.limits import FEWEST_ITEMS
+from planning.limits import FEWEST_ITEMS, LONGEST_LOITER_S
 from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.route.camera import LOOKS_DOWN_DEG
 from server.schemas.strict_model import Asked, Latitude, Longitude, Metres, Name, Strict
@@ -21,7 +21,7 @@ class PoiDoc(Strict):
     lat_deg: Latitude
     lon_deg: Longitude
     name: Name = ""
-    loiter_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 0.0
+    loiter_s: Annotated[float, Field(ge=0, le=LONGEST_LOITER_S, allow_inf_nan=False)] = 0.0
 
 
 class PlaceDoc(Strict):

@@ -129,7 +129,7 @@ def recorded_scans(path: Path) -> UwbScans:
         if Topic.UWB_SCAN not in recording.topics():
             what = f"The recording holds no scans of a UWB radar ({Topic.UWB_SCAN})."
             raise RecordingError(what, where=path.name, advice="Choose another recording, or a .npz log.")
-        drive = UwbDrive()
+        drive = UwbDrive(most_bytes=MOST_BYTES)
         for entry in recording.entries((Topic.UWB_SCAN, Topic.VEHICLE)):
             match entry.message:
                 case UwbScan():
@@ -137,6 +137,12 @@ def recorded_scans(path: Path) -> UwbScans:
                 case VehicleState():
                     drive.on_state(entry.message)
         drive.finish()
+    if drive.is_full:
+        raise RecordingError(
+            f"The recording holds more than {MOST_BYTES // 1000**2} MB of scans of a UWB radar.",
+            where=path.name,
+            advice="Record less at once: one map of what has been driven so far is made of all scans together.",
+        )
     if not len(drive):
         raise RecordingError(
             f"None of its {drive.unplaced} UWB scans can be placed: no position or attitude was known then.",

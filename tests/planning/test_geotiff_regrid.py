@@ -134,6 +134,15 @@ def test_metres_that_are_not_true_are_reprojected(tmp_path: Path) -> None:
     assert any("off on the ground" in warning for warning in report.warnings)
 
 
+def test_metres_too_untrue_to_be_certified_are_reprojected(tmp_path: Path) -> None:
+    """Eleven degrees west of its zone's meridian a UTM metre is 1.2 % too long."""
+    east_m = 500_000 - 1_000_000
+    path = write_raster(tmp_path / "x.tif", hill(), crs="EPSG:32633", transform=Affine(1, 0, east_m, 0, -1, 4.17e6))
+    dsm, report = read_dsm_reported(path)
+    assert dsm.crs.to_epsg() == 32631
+    assert any("1.2% off on the ground" in warning for warning in report.warnings), report.warnings
+
+
 @pytest.mark.parametrize(
     ("west_deg", "lat_deg", "epsg"), [(179.9998, -17, 32701), (-180.0003, -17, 32760), (359.5, 51, 32630)]
 )

@@ -89,6 +89,7 @@ OPTIONS = [
     ("--gimbal-pitch-deg", "999", "parameter", "pitch is 999"),
     ("--camera-trigger-m", "0", "parameter", "between photos is 0"),
     ("--loiter-s", "-1", "parameter", "A wait of -1 s"),
+    ("--loiter-s", "3601", "parameter", "A wait of 3601 s"),
     ("--profile", "no-such", "format", "no readable vehicle profile"),
     ("--crs", "nonsense", "raster_no_crs", '"nonsense" is no known'),
     ("--z-scale", "0", "parameter", "height scale"),

@@ -11,6 +11,7 @@ import pytest
 from mapping.uwb.params import UwbGeometry
 from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
+from telemetry.perception import uwb_drive
 from telemetry.perception.uwb_drive import UwbDrive, read_scans, recorded_scans
 from tests.telemetry.recordings import write_flight
 from tests.telemetry.uwb_drives import on_the_bus, scan_of, state_of, write_recording
@@ -88,6 +89,12 @@ def test_a_recording_gives_the_same_scans_back(tmp_path: Path) -> None:
     assert np.array_equal(found.heading_rad, live.heading_rad)
     assert np.array_equal(found.intensity, live.intensity)
     assert read_scans(tmp_path / "drive.mcap", "drive.mcap").geometry == log().geometry
+
+
+def test_a_recording_of_more_scans_than_are_kept_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uwb_drive, "MOST_BYTES", 39 * 16 * 4)
+    with pytest.raises(RecordingError, match="more than 0 MB of scans"):
+        recorded_scans(write_recording(tmp_path / "long.mcap", log()))
 
 
 def test_recordings_without_scans_or_without_places_say_so(tmp_path: Path) -> None:

@@ -10,10 +10,9 @@ from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from planning.errors import MissingCrsError, RasterFormatError
+from planning.terrain.dsm import SCALE_TOLERANCE
 from planning.terrain.rasters.header import RasterHeader
 
-_MOST_DISTORTION = 0.02
-"""Of a projection's metres against metres on the ground; national grids and UTM stay below 0.002."""
 _FOOT_M, _US_FOOT_M = 0.3048, 1200 / 3937
 _UNIT_TAGS_M = {
     "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
@@ -167,7 +166,7 @@ def why_reproject(horizontal: CRS, lon: float, lat: float) -> str | None:
         return "degrees"
     factors = Proj(horizontal).get_factors(lon, lat)
     scale = max(abs(factors.meridional_scale - 1.0), abs(factors.parallel_scale - 1.0))
-    return f"metres that are {scale:.0%} off on the ground" if scale > _MOST_DISTORTION else None
+    return f"metres that are {scale:.1%} off on the ground" if scale > SCALE_TOLERANCE else None
 
 
 def unit_m(horizontal: CRS) -> float:
