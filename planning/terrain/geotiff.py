@@ -23,6 +23,7 @@ from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_georeference, check_size
+from planning.terrain.rasters.memory_at_hand import watched
 from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without_spikes
@@ -58,8 +59,8 @@ def read_dsm_reported(
 ) -> tuple[Dsm, ReadReport]:
     """As ``read_dsm``, and what was found and done."""
     dsm, report = _read(path, how)
-    progress = how.get("progress")
-    spikes = find_spikes(dsm, progress=(lambda share: progress("spikes", share)) if progress else None)
+    progress = watched(how.get("progress"), where=Path(path).name)
+    spikes = find_spikes(dsm, progress=lambda share: progress("spikes", share))
     if remove_spikes:
         dsm = without_spikes(dsm, spikes)
     return dsm, replace(report, spikes=spikes, spikes_removed=remove_spikes and bool(spikes))
@@ -111,6 +112,7 @@ def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
             "job": "write_grid",
             "source": str(heights),
             "target": str(written.absolute()),
+            "writable": [str(directory), str(target.parent.absolute())],
             "shape": dsm.elevation_m.shape,
             "transform": tuple(dsm.transform)[:6],
             "crs_wkt": _compound(dsm.crs, dsm.vertical_datum).to_wkt(),
@@ -134,7 +136,8 @@ def _declared(how: ReadOptions) -> Declared:
 
 
 def _read(path: str | os.PathLike[str], how: ReadOptions) -> tuple[Dsm, ReadReport]:
-    source, progress = Path(path), how.get("progress")
+    source = Path(path)
+    progress = watched(how.get("progress"), where=source.name)
     read = read_surface(source, _declared(how), all_of, first_look=True, progress=progress)
     assert read.stored is not None
     return assemble(read.stored, read.plan, read.stats, sha256=read.sha256, where=source.name, progress=progress)

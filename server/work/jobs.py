@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from planning.confinement import plain_environment
 from server.errors import BusyError, JobCancelledError, WorkerDiedError
 
 Progress = Callable[[str, float | None], None]
@@ -40,6 +41,7 @@ class _Worker:
             [sys.executable, "-c", _MAIN, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
+            env=plain_environment(),
             pass_fds=[handle],
         )
         theirs.close()

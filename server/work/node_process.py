@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from planning.confinement import plain_environment
 from telemetry.bus.node_lock import NodeFacts, running_node
 
 LOG_BYTES = 2_000_000
@@ -38,7 +39,7 @@ class NodeProcess:
         pid = os.posix_spawn(
             sys.executable,
             [sys.executable, "-m", f"{package}.{name}", *arguments],
-            _environment(),
+            plain_environment(),
             file_actions=[
                 (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
                 (os.POSIX_SPAWN_OPEN, 1, str(log), flags, 0o600),
@@ -119,8 +120,3 @@ def _inheritable() -> list[int]:
             if fd > 2 and os.get_inheritable(fd):
                 fds.append(fd)
     return fds
-
-
-def _environment() -> dict[str, str]:
-    """Nodes need none of the server's settings, its password least of all."""
-    return {name: value for name, value in os.environ.items() if not name.startswith("HEDGEHOP_")}

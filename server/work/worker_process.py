@@ -12,6 +12,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from planning.confinement import confine
 from planning.errors import DescribedError
 from server.errors import WorkerDiedError
 
@@ -25,6 +26,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         os.nice(niceness)
+    # It starts programs of its own: the decoders of rasters.
+    confine(runs_programs=True)
     serve(Connection(handle), parent_pid)
 
 

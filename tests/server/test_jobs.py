@@ -1,10 +1,14 @@
 import asyncio
+import errno
 import os
+import socket
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from planning.confinement import what_holds
 from planning.errors import PoiError
 from server.errors import BusyError, JobCancelledError, WorkerDiedError
 from server.work.jobs import Lane
@@ -174,3 +178,28 @@ def test_a_worker_does_not_load_what_only_the_server_needs():
         return await lane.call(_modules)
 
     assert not {"viser", "uvicorn", "typer"} & set(asyncio.run(_with_lane(use)))
+
+
+def _secrets_and_connections(port, *, report):
+    tried = []
+    for family, address in ((socket.AF_INET, ("127.0.0.1", port)), (socket.AF_UNIX, "\0nobody")):
+        try:
+            socket.socket(family).connect(address)
+            tried.append("connected")
+        except OSError as error:
+            tried.append(error.errno)
+    try:
+        theirs = Path(f"/proc/{os.getppid()}/environ").read_bytes()
+    except OSError:
+        theirs = b""
+    return os.environ.get("HEDGEHOP_PASSWORD"), tried, b"hunter2hunter2" in theirs
+
+
+def test_a_worker_has_no_secrets_and_no_connections(monkeypatch):
+    monkeypatch.setenv("HEDGEHOP_PASSWORD", "hunter2hunter2")
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = listening.getsockname()[1]
+        password, tried, seen = asyncio.run(_with_lane(lambda lane: lane.call(_secrets_and_connections, port)))
+    assert password is None
+    assert not seen
+    assert tried == [errno.EPERM, errno.EPERM] or not what_holds().calls

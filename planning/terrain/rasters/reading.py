@@ -17,6 +17,12 @@ from planning.terrain.rasters import sandbox
 from planning.terrain.rasters.header import RasterHeader, RasterLimits
 from planning.terrain.rasters.heights import HeightStats
 from planning.terrain.rasters.magic import driver_of
+from planning.terrain.rasters.memory_at_hand import (
+    BYTES_PER_PX,
+    BYTES_PER_SQUARE,
+    check_memory,
+    watched,
+)
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 
 Progress = Callable[[str, float], None]
@@ -96,13 +102,20 @@ def read_surface(
         )
         asked.append(wanted(header))
         box = asked[0]
+        if box is not None:
+            check_memory(_need_bytes(plans[0], box), shape=(box.rows, box.columns), where=source.name)
         pixels = None if box is None else [box.row0, box.column0, box.rows, box.columns]
         return {"pixels": pixels, "digest": first_look, "sample": first_look and pixels is None}
 
     with sandbox.private_directory() as directory:
         job = raster_job("read_grid", source, directory)
         answer = sandbox.run_job(
-            job, directory=directory, limits=declared.limits, where=source.name, on_header=order, progress=progress
+            job,
+            directory=directory,
+            limits=declared.limits,
+            where=source.name,
+            on_header=order,
+            progress=watched(progress, where=source.name),
         )
         stored, box = None, asked[0]
         if box is not None:
@@ -115,6 +128,15 @@ def read_surface(
 def all_of(header: RasterHeader) -> Pixels:
     """Every pixel."""
     return Pixels(0, 0, header.height_px, header.width_px)
+
+
+def _need_bytes(plan: SurfacePlan, box: Pixels) -> int:
+    cells = box.rows * box.columns
+    if plan.placing is None:
+        return BYTES_PER_PX * cells
+    whole = plan.header.height_px * plan.header.width_px
+    rows, columns = plan.grid[1] if plan.grid else (plan.header.height_px, plan.header.width_px)
+    return BYTES_PER_SQUARE * (cells + rows * columns * cells // whole)
 
 
 def raster_job(name: str, source: Path, directory: Path) -> dict[str, Any]:

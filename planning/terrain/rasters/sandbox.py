@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from planning.confinement import plain_environment
 from planning.errors import NoElevationError, RasterError, RasterFormatError, RasterTooLargeError
 from planning.terrain.rasters.header import RasterLimits
 
@@ -39,7 +40,6 @@ _GDAL = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
 }
-_FOREIGN_SETTINGS = ("GDAL_", "CPL_", "VSI_", "AWS_", "GTIFF_", "PYTHONWARNINGS")
 
 
 @contextmanager
@@ -75,7 +75,8 @@ def run_job(
         worker = _start(directory, stderr)
         clock = _Deadline(worker, limits.header_s)
         try:
-            _send(worker, {**job, "memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1})
+            bounds = {"memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1}
+            _send(worker, {"writable": [str(directory)], **job, **bounds})
             for message in _messages(worker):
                 kind = message.pop("type")
                 if kind == "header":
@@ -112,7 +113,8 @@ def _start(directory: Path, stderr: IO[bytes]) -> subprocess.Popen[bytes]:
 
 
 def _environment() -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(_FOREIGN_SETTINGS)}
+    kept = plain_environment()
+    kept.pop("PYTHONWARNINGS", None)  # what the libraries warn of is no error of the file's
     paths = [str(_ROOT), *filter(None, [kept.get("PYTHONPATH")])]
     return {**kept, **_GDAL, "PYTHONPATH": os.pathsep.join(paths)}
 

@@ -14,7 +14,10 @@ import sys
 import threading
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, TextIO
+
+from planning.confinement import confine, confine_files
 
 Json = dict[str, Any]
 
@@ -29,6 +32,7 @@ def main() -> None:
     try:
         from planning.terrain.rasters import decode  # after the limits: GDAL registers its drivers on import
 
+        confine_files(readable=_readable(job), writable=[Path(path) for path in job["writable"]])
         decode.JOBS[job["job"]](job, send, partial(_ask, send))
     except Exception as error:
         send("error", **_explain(error, job["job"]))
@@ -63,6 +67,18 @@ def _confine(job: Json) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + 1))
     resource.setrlimit(resource.RLIMIT_AS, (job["memory_bytes"], job["memory_bytes"]))
+    confine(runs_programs=False)
+
+
+def _readable(job: Json) -> list[Path]:
+    """The file, and what Python and GDAL may still load: their own folders and the system's."""
+    from mapping.geometry import arrays
+
+    floors = [Path(__file__).resolve().parents[2], Path(arrays.__file__).resolve().parents[1]]
+    installed = [path for path in sys.path if Path(path) != floors[0].parent]
+    data = [os.environ[name] for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ]
+    theirs = [sys.prefix, sys.base_prefix, *installed, *data, "/usr", "/lib", "/lib64", "/etc", "/dev/null"]
+    return [Path(job["source"]).resolve(), *floors, *map(Path, theirs)]
 
 
 def _explain(error: Exception, job: str) -> Json:
