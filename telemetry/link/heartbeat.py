@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -46,11 +47,16 @@ def heartbeat() -> Message:
 
 
 class Heartbeat:
-    """Beats once a second on its own task. ``send`` returns whether anyone was sent one."""
+    """Beats once a second, and at once when asked, on its own task. ``send`` returns whether anyone was sent one."""
 
     def __init__(self, send: Callable[[Message], bool], may_beat: Callable[[], bool]) -> None:
         self._send, self._may_beat = send, may_beat
         self._meter = RateMeter()
+        self._wanted = asyncio.Event()
+
+    def beat_now(self) -> None:
+        """A way to a vehicle is open that was not: after a restart of this node it has waited long enough."""
+        self._wanted.set()
 
     def hz(self, now_s: float) -> float:
         return self._meter.hz(now_s)
@@ -63,4 +69,8 @@ class Heartbeat:
                 self._meter.count(loop.time())
             # After a pause of the whole process one beat follows, not all that were missed.
             due_s = max(due_s + PERIOD_S, loop.time())
-            await asyncio.sleep(due_s - loop.time())
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(due_s):  # wait_for of Python 3.11 may lose a cancellation
+                    await self._wanted.wait()
+                due_s = loop.time()
+            self._wanted.clear()

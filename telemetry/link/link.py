@@ -58,6 +58,8 @@ class Link:
         self._told_flight: FlightStatus | None = None
         self._told_avoidance: AvoidanceStatus | None = None
         self._settings: PerceptionSettings | None = None
+        self._expected: Candidate | None = None
+        """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
         self._again: tuple[Candidate, AvoidBy] | None = None
         """The vehicle for which avoidance was on when the node before this one ended."""
         self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell)
@@ -72,7 +74,7 @@ class Link:
         self.peers.adopt_first_of(text, wanted=adopt, only=only)
         if text in self.lines:
             return
-        line = Line(parsed, heard=self._heard, gone=self._gone, changed=self._tell, clock=time.monotonic)
+        line = Line(parsed, heard=self._heard, gone=self._gone, changed=self._connection_changed, clock=time.monotonic)
         self.lines[text] = line
         self._running[text] = self.spawn(line.connection.run())
         self._tell()
@@ -96,6 +98,7 @@ class Link:
         line = self.lines[candidate.address]
         self.session = Session(candidate, line, self._around, self._ranges, self._settings)
         self.session.begin()
+        self._expected = None
         again, self._again = self._again, None
         if again is not None and _is_same(again[0], candidate):
             self.session.avoid_again(again[1])
@@ -107,6 +110,11 @@ class Link:
             return None if self._again is None else self._again[1]
         return self.session.pilot.avoidance.avoids_by
 
+    def expect(self, vehicle: Candidate | None) -> None:
+        """None: it was not heard again for so long that it counts as gone."""
+        if self.session is None:
+            self._expected = vehicle
+
     def avoid_again(self, vehicle: Candidate, by: AvoidBy) -> None:
         """As soon as this vehicle is heard again: it was on when the node before this one ended."""
         self._again = (vehicle, by)
@@ -115,6 +123,7 @@ class Link:
         if self.session is not None:
             self.session.close()
         if forget_wish:
+            self._expected = None
             self.peers.release()
         self.session = None
         self._tell()
@@ -171,6 +180,10 @@ class Link:
         if self.session is not None:
             self.session.pilot.avoidance.on_settings(settings)
 
+    def _connection_changed(self) -> None:
+        self._heartbeat.beat_now()
+        self._tell()
+
     def _gone(self, line: Line, peer: Peer) -> None:
         self.peers.gone(line.text, peer)
 
@@ -179,16 +192,16 @@ class Link:
     def _beat(self, message: Message) -> bool:
         """To the far ends that the operator has named, and to the adopted vehicle; to nobody else."""
         session, anyone = self.session, False
+        vehicle = self._expected if session is None else session.vehicle.candidate
         for line in self.lines.values():
-            adopted = session if session is not None and session.vehicle.line is line else None
-            peer = None if adopted is None else adopted.vehicle.candidate.peer
+            peer = vehicle.peer if vehicle is not None and vehicle.address == line.text else None
             if peer is None and not line.address.names_far_end:
                 continue
             frame = line.send(message, peer)
             if frame is not None:
                 anyone = True
-                if adopted is not None:
-                    adopted.on_sent(frame)
+                if session is not None and session.vehicle.line is line:
+                    session.on_sent(frame)
         return anyone
 
     @property

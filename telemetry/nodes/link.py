@@ -76,6 +76,7 @@ class LinkNode:
     async def take_up(self, memory: Memory, links: list[str]) -> None:
         """What the node before this one had; then what this one was started with."""
         adopted = memory.adopted
+        self._link.expect(adopted)
         for wanted in memory.connections:
             was_there = adopted is not None and adopted.address == wanted.address
             only = (adopted.system_id, adopted.component_id) if adopted is not None and was_there else None
@@ -128,6 +129,8 @@ class LinkNode:
         adopted = link.peers.adopted
         if adopted is None and self._is_expected:
             adopted = self._memory.adopted
+        elif adopted is None:
+            self._link.expect(None)
         memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.avoids_by)
         if memory != self._memory:
             self._memory = memory

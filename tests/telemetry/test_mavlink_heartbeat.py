@@ -2,7 +2,7 @@
 
 import asyncio
 
-from telemetry.link.heartbeat import HOLD_S, Grace, Heartbeat
+from telemetry.link.heartbeat import HOLD_S, PERIOD_S, Grace, Heartbeat
 
 GRACE_S = 10.0
 
@@ -48,6 +48,27 @@ def test_a_server_that_came_back_and_went_again_means_another_hold() -> None:
     assert holds(grace, 10.1, 10.1)
     assert not holds(grace, 0.1, 20.0)
     assert holds(grace, 10.1, 30.0)
+
+
+def test_it_beats_at_once_when_a_way_opens_and_once_a_second_from_then_on() -> None:
+    async def whole() -> None:
+        beats_s: list[float] = []
+        loop = asyncio.get_running_loop()
+        heart = Heartbeat(lambda _: beats_s.append(loop.time()) is None, lambda: True)
+        task = asyncio.create_task(heart.run())
+        while not beats_s:
+            await asyncio.sleep(0)
+        heart.beat_now()
+        while len(beats_s) < 2:
+            await asyncio.sleep(0)
+        while len(beats_s) < 3:
+            await asyncio.sleep(0.01)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        assert beats_s[1] - beats_s[0] < PERIOD_S / 2
+        assert beats_s[2] - beats_s[1] >= PERIOD_S - 0.01
+
+    asyncio.run(whole())
 
 
 def test_only_beats_that_were_sent_are_counted() -> None:

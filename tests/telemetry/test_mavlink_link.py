@@ -20,7 +20,7 @@ from telemetry.errors import (
     RecordingFullError,
     RefusedError,
 )
-from telemetry.topics.messages import CommandRecord, LinkStatus
+from telemetry.topics.messages import Candidate, CommandRecord, LinkStatus
 from telemetry.topics.requests import (
     Adopt,
     Arm,
@@ -92,6 +92,27 @@ def test_after_a_release_nothing_is_sent_any_more() -> None:
             await until(lambda: len(bench.of(LinkStatus)) > released + 3)
             assert vehicle.heard == []
             assert (bench.status.state, bench.status.adopted) == ("none", None)
+
+    run(whole)
+
+
+def test_the_vehicle_of_the_node_before_gets_its_heartbeat_before_it_says_anything() -> None:
+    async def whole() -> None:
+        port = free_port()
+        vehicle, other = UdpVehicle(port), UdpVehicle(port)
+        before = Candidate("old", f"udpin:127.0.0.1:{port}", f"127.0.0.1:{vehicle.port}", 1, 1, "ardupilot", 2)
+        async with console() as bench:
+            bench.link.expect(before)
+            await bench.handle(Connect(ME, before.address, True))
+            await until(lambda: len(vehicle.of("HEARTBEAT")) >= 2)
+            assert (vehicle.kinds(), other.heard, bench.status.adopted) == ({"HEARTBEAT"}, [], None)
+            bench.link.expect(None)
+            silent_since = len(bench.of(LinkStatus))
+            vehicle.heard.clear()
+            await until(lambda: len(bench.of(LinkStatus)) > silent_since + 3)
+            assert vehicle.heard == []
+        vehicle.close()
+        other.close()
 
     run(whole)
 

@@ -87,8 +87,8 @@ class UdpIn(_Udp):
         self.receiver.received(peer, data)
 
     def send(self, data: bytes, peer: Peer | None = None) -> bool:
-        addr = self._peers.get(peer) if peer else None
-        return addr is not None and self._send_to(data, addr)
+        """Also to one that has not been heard here: the node before this one knew where its vehicle is."""
+        return peer is not None and self._send_to(data, self._peers.get(peer) or _addr(peer))
 
 
 class UdpOut(_Udp):
@@ -104,3 +104,8 @@ class UdpOut(_Udp):
 
     def send(self, data: bytes, peer: Peer | None = None) -> bool:
         return self._send_to(data, None)
+
+
+def _addr(peer: Peer) -> tuple[str, int]:
+    host, _, port = peer.rpartition(":")
+    return host.strip("[]"), int(port)
