@@ -16,6 +16,7 @@ from telemetry.link.onboard import OnBoard
 from telemetry.link.quality import RoundTripClock, SequenceQuality
 from telemetry.link.streams import StreamRequests
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing
 from telemetry.mavlink.commands import CommandRun
 from telemetry.mavlink.conversation import BootClock
 from telemetry.mavlink.orders import Order, Orders
@@ -26,6 +27,8 @@ from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 from telemetry.topics.vehicle import Autopilot, VehicleState
 
 FAST_LINK_BAUD = 400_000
+ALERT = 1
+"""MAV_SEVERITY"""
 SIMULATION = b"hedgehop"
 """What Hedgehop's own simulated vehicle says for its firmware's version; others have a hash of their sources there."""
 
@@ -43,7 +46,10 @@ class Telling:
 
 
 class AdoptedVehicle:
-    def __init__(self, candidate: Candidate, line: Line, telling: Telling, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, candidate: Candidate, line: Line, telling: Telling, clock: Callable[[], float], *, flies: bool = False
+    ) -> None:
+        """``flies``: a flight of it is under way, as the node before this one knew."""
         now_s = clock()
         self.candidate, self.line = candidate, line
         self.target = (candidate.system_id, candidate.component_id)
@@ -63,6 +69,7 @@ class AdoptedVehicle:
         slow = line.address.kind == "serial" and line.address.baud < FAST_LINK_BAUD
         self._streams = StreamRequests(self.target, candidate.autopilot, slow=slow, now_s=now_s)
         self._quality, self._round_trip = SequenceQuality(), RoundTripClock()
+        self.believing, self._doubted = Believing(flies=flies), False
         self._boot, self._texts = BootClock(), Texts()
         self._next_state: asyncio.Future[None] | None = None
 
@@ -100,9 +107,10 @@ class AdoptedVehicle:
     def round_trip_s(self) -> float | None:
         return self._round_trip.round_trip_s
 
-    def moved(self, candidate: Candidate) -> None:
-        """It sends from another port now."""
-        self.candidate = candidate
+    def moved(self, candidate: Candidate, line: Line) -> None:
+        """It sends from another port now, as the operator says."""
+        self.candidate, self.line = candidate, line
+        self.send_first()
 
     def send_first(self) -> None:
         """A heartbeat at once: some vehicles answer nobody whose heartbeat they have not heard."""
@@ -115,9 +123,20 @@ class AdoptedVehicle:
         if frame is not None:
             self._telling.sent(frame)
 
-    def on_message(self, message: Message, t_utc_s: float) -> None:
-        """Any message of its system; those of its other components are only shown to the machines."""
-        now_s = self._clock()
+    def on_message(self, message: Message, t_utc_s: float) -> tuple[Message, ...]:
+        """Any message of its system; those of its other components are only shown to the machines.
+
+        What of it is believed by now: this message, none, or one from before as well.
+        """
+        now_s, believed = self._clock(), (message,)
+        if message.get_srcComponent() == self.target[1]:
+            believed = self.believing.hear(self.state, message, now_s)
+            self._tell_doubt(now_s)
+        for each in believed:
+            self._believe(each, now_s, t_utc_s)
+        return believed
+
+    def _believe(self, message: Message, now_s: float, t_utc_s: float) -> None:
         if message.get_srcComponent() == self.target[1]:
             self._on_own(message, now_s)
         new = reduce(self.state, message, t_mono_s=now_s, t_utc_s=t_utc_s)
@@ -173,12 +192,18 @@ class AdoptedVehicle:
         if message.get_type() == "AUTOPILOT_VERSION":
             self.capabilities = message.capabilities
             self.is_simulation = bytes(message.flight_custom_version) == SIMULATION
-        if self._boot.has_restarted(message):
+        if message.get_type() in CLOCKED and self._boot.has_restarted(message):
             self._restarted(now_s)
         if self.onboard.on_message(message, now_s):
             self._telling.unsure()
         for severity, text in self._texts.on_message(message, now_s):
             self._telling.text(severity, text)
+
+    def _tell_doubt(self, now_s: float) -> None:
+        """Once for each time: a real crash disarms in the air, too."""
+        before, self._doubted = self._doubted, self.believing.doubts_motors(now_s)
+        if self._doubted and not before:
+            self._telling.text(ALERT, MOTORS_DOUBTED)
 
     def _on_state(self, state: VehicleState, now_s: float) -> None:
         self.state = state

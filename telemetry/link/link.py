@@ -10,14 +10,13 @@ import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
-from operator import attrgetter
 from typing import Any
 
 from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.link.audit import AUTOPILOT, Audit, CommandLog
 from telemetry.link.heartbeat import Grace, Heartbeat
 from telemetry.link.line import Line
-from telemetry.link.peers import Peers, Source
+from telemetry.link.peers import Peers, Source, is_same_vehicle
 from telemetry.link.publishing import StatePublisher, StatusTeller
 from telemetry.link.session import Around, Session
 from telemetry.mavlink.actions import Message
@@ -67,8 +66,8 @@ class Link:
 
     # Connections and the vehicle.
 
-    async def connect(self, address: str, *, adopt: bool, only: tuple[int, int] | None = None) -> None:
-        """Opens a connection and keeps it open; ``only``: adopt no other system and component."""
+    async def connect(self, address: str, *, adopt: bool, only: Candidate | None = None) -> None:
+        """Opens a connection and keeps it open; ``only``: adopt no other vehicle."""
         parsed = parse_address(address)
         text = parsed.text
         self.peers.adopt_first_of(text, wanted=adopt, only=only)
@@ -93,6 +92,9 @@ class Link:
     def adopt(self, candidate: Candidate) -> None:
         if self.session is not None and self.session.vehicle.candidate == candidate:
             return
+        if self.session is not None and candidate == self.peers.again(time.monotonic()):
+            self._go_on_from(self.session, candidate)
+            return
         self.release(forget_wish=False)
         self.peers.adopt(candidate, time.monotonic())
         line = self.lines[candidate.address]
@@ -100,8 +102,14 @@ class Link:
         self.session.begin()
         self._expected = None
         again, self._again = self._again, None
-        if again is not None and _is_same(again[0], candidate):
+        if again is not None and is_same_vehicle(again[0], candidate):
             self.session.avoid_again(again[1])
+
+    def _go_on_from(self, session: Session, candidate: Candidate) -> None:
+        """The vehicle that was lost is heard from elsewhere: what it flies, and what it was asked, stays."""
+        self.peers.adopt(candidate, time.monotonic())
+        session.vehicle.moved(candidate, self.lines[candidate.address])
+        self._tell()
 
     @property
     def avoids_by(self) -> AvoidBy | None:
@@ -157,9 +165,7 @@ class Link:
         session = self.session
         if session is None:
             return
-        if verdict in ("adopted", "moved"):
-            if verdict == "moved" and self.peers.adopted is not None:
-                session.vehicle.moved(self.peers.adopted)
+        if verdict == "adopted":
             session.on_message(message, now_s, t_utc_s)
         elif verdict == "stranger" and line is session.vehicle.line:
             session.vehicle.on_foreign(message)
@@ -245,7 +251,8 @@ class Link:
             heartbeat_hz=self._heartbeat.hz(asyncio.get_running_loop().time()),
             mission_state=vehicle.onboard.state if vehicle else "unknown",
             mission_digest=vehicle.onboard.digest if vehicle else None,
-            warnings=self.peers.warnings(now_s),
+            again=self.peers.again(now_s),
+            warnings=(*(vehicle.believing.warnings(now_s) if vehicle else ()), *self.peers.warnings(now_s)),
         )
 
     def _tell(self) -> None:
@@ -268,12 +275,6 @@ class Link:
         self.release()
         for task in self._own_tasks:
             task.cancel()
-
-
-def _is_same(before: Candidate, now: Candidate) -> bool:
-    """Whatever port it sends from now."""
-    parts = attrgetter("address", "system_id", "component_id")
-    return parts(before) == parts(now)
 
 
 @contextlib.asynccontextmanager

@@ -15,14 +15,13 @@ from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance
 from telemetry.link.missions import JoinMission, ReadMission, check_same_mission, set_speeds, start_mission
 from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, guided_way
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.topics.requests import FlyManoeuvre, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
-IN_THE_AIR = ("taking_off", "in_air", "landing")
-LOW_M = 1.0
 SUPERSEDED = "Another command was given."
 FOREIGN_MISSION = (
     "The mission on board is not the one that was started any more: another ground station has written to it."
@@ -70,8 +69,10 @@ class Pilot:
 
     @property
     def flies_mission(self) -> bool:
-        """Whether replacing the mission on board would change what is being flown."""
+        """Whether replacing the mission on board would change what is being flown, as far as is known."""
         state = self.vehicle.state
+        if state.heartbeat_t_mono_s is None:
+            return self.flight.is_under_way  # by what the node before this one knew
         in_mission = state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
         return self.flight.status.phase == "arming" or (state.armed and (in_mission or self.flight.is_under_way))
 
@@ -137,7 +138,7 @@ class Pilot:
         await self.vehicle.obey(self.vehicle.orders.arm())
 
     async def disarm(self) -> None:
-        if self._is_in_the_air:
+        if is_in_the_air(self.vehicle.state):
             raise NotAllowedError("The vehicle is in the air: its motors are not stopped.", advice="Land it first.")
         self._end_current()
         await self.vehicle.obey(self.vehicle.orders.disarm())
@@ -276,7 +277,7 @@ class Pilot:
             raise NotAllowedError(what, advice="Start it at an item that it has.")
 
     def _check_on_ground(self) -> None:
-        if self.vehicle.state.armed and self._is_in_the_air:
+        if self.vehicle.state.armed and is_in_the_air(self.vehicle.state):
             raise NotAllowedError("The vehicle is already flying.", advice="Land it first, or resume what is paused.")
 
     async def _start_auto(self, request: StartAuto, accepted: Accepted) -> None:
@@ -297,18 +298,10 @@ class Pilot:
     def _start_ended(self, why: str) -> None:
         if self.flight.status.phase != "arming":
             return  # it is on its way, and seen to be
-        if self.vehicle.state.armed and self._is_in_the_air:
+        if self.vehicle.state.armed and is_in_the_air(self.vehicle.state):
             self.flight.broke_off_start(why)
         else:
             self.flight.cancel(why)
-
-    @property
-    def _is_in_the_air(self) -> bool:
-        """By its height where the vehicle does not say."""
-        state = self.vehicle.state
-        if state.landed is None:
-            return state.alt_rel_home_m is not None and state.alt_rel_home_m >= LOW_M
-        return state.landed in IN_THE_AIR
 
     async def _mission_mode(self, accepted: Accepted) -> None:
         await self.vehicle.obey(self.vehicle.orders.mission_mode())

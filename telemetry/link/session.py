@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from telemetry.errors import TelemetryError
-from telemetry.link.adopted import AdoptedVehicle, Telling
+from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
 from telemetry.link.piloting import Pilot
@@ -28,8 +28,6 @@ from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
 
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
-ALERT = 1
-"""MAV_SEVERITY"""
 AVOIDS_AGAIN = (
     "The link has restarted: nothing avoided obstacles meanwhile. Avoidance is on again. Look where the vehicle is."
 )
@@ -59,7 +57,7 @@ class Session:
             sent=self.on_sent,
             ordered=self._on_order,
         )
-        self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic)
+        self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic, flies=around.flight.is_under_way)
         self.transfers = Transfers(self.vehicle, lambda status: around.publish(Topic.TRANSFER, status))
         self.pilot = Pilot(
             self.vehicle,
@@ -95,7 +93,10 @@ class Session:
         """Any of the vehicle's system."""
         frame = RawFrame(t_utc_s, False, self.vehicle.line.text, bytes(message.get_msgbuf()))
         self._around.publish(Topic.RAW, frame)
-        self.vehicle.on_message(message, t_utc_s)
+        for believed in self.vehicle.on_message(message, t_utc_s):
+            self._on_believed(believed, now_s, t_utc_s)
+
+    def _on_believed(self, message: Message, now_s: float, t_utc_s: float) -> None:
         heading_rad = self.vehicle.state.heading_rad
         ranges = self._ranges.on_message(message, heading_rad=heading_rad, t_mono_s=now_s, t_utc_s=t_utc_s)
         if ranges is not None:

@@ -79,8 +79,9 @@ class LinkNode:
         self._link.expect(adopted)
         for wanted in memory.connections:
             was_there = adopted is not None and adopted.address == wanted.address
-            only = (adopted.system_id, adopted.component_id) if adopted is not None and was_there else None
-            await self._link.connect(wanted.address, adopt=wanted.adopt or was_there, only=only)
+            await self._link.connect(
+                wanted.address, adopt=wanted.adopt or was_there, only=adopted if was_there else None
+            )
         for address in links:
             if address not in self._link.lines:
                 await self._link.connect(address, adopt=True)

@@ -147,6 +147,8 @@ class LinkStatus:
     """Of the mission that a read-back found on board."""
     warnings: tuple[str, ...] = ()
     """Such as a second vehicle with the same id."""
+    again: Candidate | None = None
+    """Has the numbers of the adopted vehicle, which has fallen silent, and is heard from elsewhere: perhaps it."""
 
 
 @dataclass(frozen=True, slots=True)

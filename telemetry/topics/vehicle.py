@@ -11,6 +11,7 @@ from typing import Literal
 
 Autopilot = Literal["ardupilot", "px4", "other"]
 Landed = Literal["on_ground", "taking_off", "in_air", "landing"]
+IN_THE_AIR: frozenset[Landed] = frozenset({"taking_off", "in_air", "landing"})
 GnssFix = Literal["none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed"]
 RadarKind = Literal["model", "iq"]
 """Of a simulated radar. model: targets, with errors drawn to the table of the real one's; iq: samples of its

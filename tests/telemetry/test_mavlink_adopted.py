@@ -104,8 +104,10 @@ def test_after_a_restart_the_mission_is_unknown_and_streams_are_asked_for_again(
     known(bench)
     bench.vehicle.on_tick()
     bench.wire.sent.clear()
-    bench.now_s += 0.5
-    bench.hear(attitude(300))
+    for t_boot_ms in (300, 900, 1500):  # a moment, until nobody can be sending beside it
+        assert bench.vehicle.onboard.state == "none"
+        bench.now_s += 0.6
+        bench.hear(attitude(t_boot_ms))
     assert bench.vehicle.onboard.state == "unknown"
     assert bench.unsure == 1
     bench.vehicle.on_tick()

@@ -205,6 +205,9 @@ def test_a_silent_vehicle_is_lost_and_a_command_says_so() -> None:
                 await bench.handle(Arm(ME))
             assert [s.state for s in bench.of(LinkStatus) if s.state == "stale"]
             async with radio(port):  # from another port of the same host
+                await until(lambda: bench.status.again is not None)
+                assert bench.status.state == "lost"
+                await bench.handle(Adopt(ME, bench.status.again.id))
                 await bench.live()
 
     run(whole)

@@ -1,5 +1,7 @@
 """Who becomes the vehicle, who stays a stranger, and whose messages never mix in."""
 
+import pytest
+
 from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, Peers, Source
 from tests.telemetry.frames import attitude, ground_station_heartbeat, heard, heartbeat
 
@@ -12,9 +14,13 @@ def at(peer: str = "10.0.0.2:4000", *, address: str = UDP, system: int = 1, comp
 
 
 def adopted(now_s: float = 0.0) -> Peers:
+    return adopted_at(HERE, now_s)
+
+
+def adopted_at(source: Source, now_s: float = 0.0) -> Peers:
     peers = Peers()
-    peers.hear(HERE, heard(heartbeat()), now_s)
-    candidate = peers.find(HERE.id, now_s)
+    peers.hear(source, heard(heartbeat()), now_s)
+    candidate = peers.find(source.id, now_s)
     assert candidate is not None
     peers.adopt(candidate, now_s)
     return peers
@@ -44,9 +50,20 @@ def test_the_first_autopilot_is_wanted_where_that_was_asked_for() -> None:
     peers.adopt_first_of(UDP, wanted=True)
     assert peers.wants(HERE, message)
     assert not peers.wants(at(address="tcp:x:1"), message)
-    peers.adopt_first_of(UDP, wanted=True, only=(7, 1))
-    assert not peers.wants(HERE, message)
-    assert peers.wants(at(system=7), message)
+
+
+def test_after_a_restart_only_the_vehicle_that_was_there_is_taken_by_itself_from_where_it_was() -> None:
+    message, before = heard(heartbeat()), adopted().adopted
+    peers = Peers()
+    peers.adopt_first_of(UDP, wanted=True, only=before)
+    assert peers.wants(HERE, message)
+    assert not peers.wants(at(system=7), message)
+    assert not peers.wants(at("10.0.0.2:4001"), message)
+    called = "tcpin:0.0.0.0:5760"
+    was = adopted_at(at("10.0.0.2:4000", address=called)).adopted
+    peers.adopt_first_of(called, wanted=True, only=was)
+    assert peers.wants(at("10.0.0.2:4001", address=called), message)
+    assert not peers.wants(at("10.0.0.9:4000", address=called), message)
 
 
 def test_what_was_released_is_not_adopted_again_by_itself() -> None:
@@ -96,22 +113,41 @@ def test_a_vehicle_with_another_id_is_a_candidate_without_a_warning() -> None:
     assert peers.warnings(1.0) == ()
 
 
-def test_a_vehicle_that_was_lost_may_come_back_from_another_port_of_its_host() -> None:
-    peers, again = adopted(), at("10.0.0.2:4001")
-    assert peers.hear(again, heard(heartbeat()), 1.0) == "stranger"
-    assert peers.hear(again, heard(heartbeat()), 5.0) == "moved"
+@pytest.mark.parametrize("peer", ["10.0.0.2:4001", "10.0.0.9:4000"])
+def test_a_vehicle_that_was_lost_is_taken_up_from_elsewhere_by_the_operator_only(peer: str) -> None:
+    peers, elsewhere = adopted(), at(peer)
+    assert peers.hear(elsewhere, heard(heartbeat()), 1.0) == "stranger"
+    assert peers.again(1.0) is None
+    for now_s in (5.0, 6.0, 7.0):
+        assert peers.hear(elsewhere, heard(heartbeat()), now_s) == "stranger"
+        assert peers.hear(elsewhere, heard(attitude()), now_s) == "imposter"
     assert peers.adopted is not None
-    assert peers.adopted.peer == "10.0.0.2:4001"
-    assert peers.hear(HERE, heard(attitude()), 5.1) == "imposter"
+    assert peers.adopted.peer == HERE.peer
+    again = peers.again(7.0)
+    assert again is not None
+    assert again.peer == peer
+    assert peers.warnings(7.0) == ()
+    peers.adopt(again, 7.0)
+    assert peers.hear(HERE, heard(attitude()), 7.1) == "imposter"
+    assert peers.again(7.1) is None
 
 
-def test_not_from_another_host_or_connection() -> None:
+def test_a_vehicle_that_is_heard_again_is_not_asked_for() -> None:
     peers = adopted()
-    assert peers.hear(at("10.0.0.9:4000"), heard(heartbeat()), 9.0) == "stranger"
-    assert peers.hear(at(address="tcpin:0.0.0.0:5760"), heard(heartbeat()), 9.0) == "stranger"
+    peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 5.0)
+    assert peers.again(5.0) is not None
+    peers.hear(HERE, heard(heartbeat()), 5.1)
+    assert peers.again(5.2) is None
 
 
-def test_after_hanging_up_it_may_come_back_at_once() -> None:
+def test_another_number_is_another_vehicle() -> None:
+    peers = adopted()
+    peers.hear(at(system=2), heard(heartbeat(), system=2), 9.0)
+    assert peers.again(9.0) is None
+
+
+def test_after_hanging_up_it_is_asked_for_at_once() -> None:
     peers = adopted()
     peers.gone(UDP, HERE.peer)
-    assert peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 0.1) == "moved"
+    assert peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 0.1) == "stranger"
+    assert peers.again(0.1) is not None

@@ -270,6 +270,7 @@ export interface LinkStatus {
   mission_state: "unknown" | "none" | "verified";
   mission_digest: string | null;
   warnings: string[];
+  again: Candidate | null;
 }
 
 /** Of the map frame. */

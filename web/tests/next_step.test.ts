@@ -40,6 +40,13 @@ describe("the next step", () => {
     expect(nextStep(facts({ link: linkStatus({ adopted: null, connections }) })).id).toBe("wait");
   });
 
+  it("is to say, in flight too, whether who is heard from elsewhere is the silent vehicle", () => {
+    const link = linkStatus({ again: { id: "b" } as never });
+    expect(nextStep(facts({ link })).id).toBe("again");
+    expect(nextStep(facts({ link, flight: phase("flying"), inAir: true })).id).toBe("again");
+    expect(nextStep(facts({ link, mine: false })).id).toBe("take_control");
+  });
+
   it("of an observer is to take control", () => {
     expect(nextStep(facts({ mine: false })).id).toBe("take_control");
     expect(nextStep(facts({ mine: false, flight: phase("flying"), inAir: true })).id).toBe("take_control");

@@ -43,6 +43,22 @@ function LinkWarnings() {
   );
 }
 
+/** Only the operator can tell whether it is the one that fell silent: nothing is sent to it until then. */
+function HeardElsewhere() {
+  const again = linkStatus.value?.status.again;
+  if (!again) return null;
+  return (
+    <div class="callout link-warning" role="alert" data-testid="heard-elsewhere">
+      <Icon name="warning" />
+      <p>
+        Your vehicle is silent. A vehicle with its number {again.system_id} is heard from{" "}
+        <strong>{again.peer || again.address}</strong>. If your radio or your companion computer has just
+        restarted, press “It is this vehicle” below. If not, use the pilot's transmitter.
+      </p>
+    </div>
+  );
+}
+
 /** From the connection to the flight, with the ways past what is ahead and the next step at its lower edge. */
 export function FlyLeft() {
   // A vehicle that is there needs the least room: its connection closes once it is used.
@@ -51,6 +67,7 @@ export function FlyLeft() {
     <>
       <div class="panel-scroll">
         <ReviewOpen />
+        <HeardElsewhere />
         <LinkWarnings />
         <ConnectionSection key={adopted.value && !hasTrouble ? "used" : "open"} />
         {isInAir.value && <FlightSection />}

@@ -58,6 +58,10 @@ function Primary({ step }: { step: Step }) {
       const first = linkStatus.value?.status.candidates[0];
       return plain("Use this vehicle", "drone", () => first && void adopt(first.id));
     }
+    case "again": {
+      const again = linkStatus.value?.status.again;
+      return plain("It is this vehicle", "drone", () => again && void adopt(again.id));
+    }
     case "take_control":
       return (
         <HoldButton

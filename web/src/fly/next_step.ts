@@ -27,7 +27,7 @@ export interface Facts {
 
 /** The one thing to do next; `why` says why it cannot be done yet, or what it waits for. */
 export type Step =
-  | { id: "simulator" | "adopt" | "take_control"; why?: string }
+  | { id: "simulator" | "adopt" | "again" | "take_control"; why?: string }
   | { id: "upload" | "check" | "start" | "pause" | "resume"; why?: string }
   | { id: "wait"; why: string };
 
@@ -74,6 +74,8 @@ export function nextStep(facts: Facts): Step {
   const { link, transfer, fly } = facts;
   if (!facts.mine) return { id: "take_control" };
   if (!link?.adopted) return connecting(link);
+  // The vehicle may be flying without anybody who can command it: nothing comes before that.
+  if (link.again) return { id: "again" };
   if (transfer?.phase === "sending" || transfer?.phase === "reading_back" || fly?.busy) {
     return { id: "wait", why: fly?.busy || "Talking to the vehicle" };
   }
