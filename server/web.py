@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from planning import __version__
+from planning.confinement import what_holds
 from planning.errors import DescribedError
 from server.api import (
     console_routes,
@@ -48,6 +49,7 @@ from server.schemas import NoticeMessage
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
 from server.studies.scenario_desk import ScenarioDesk
+from server.work.loop_lag import LoopLag
 from server.work.task_group import Background
 
 if TYPE_CHECKING:
@@ -123,7 +125,7 @@ async def _lifespan(
             app.state.start_error = error
             raise
         app.state.parts = parts
-        for loop in (*parts.workspace.loops(), *parts.flying.loops(demo=demo)):
+        for loop in (parts.loop_lag.run(), *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
             background.spawn(loop)
         try:
             yield
@@ -157,13 +159,14 @@ async def _open(
     radar, scenarios = await asyncio.to_thread(_open_studies, library, hub, background)
     stack.push_async_callback(radar.close)
     stack.push_async_callback(scenarios.close)
+    log.info("%s", what_holds())
     flying = await open_flying(settings, library, hub, workspace, scenarios)
     stack.push_async_callback(flying.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
-    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios)
+    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag())
 
 
 def _open_studies(library: Library, hub: Hub, background: Background) -> tuple[RadarDesk, ScenarioDesk]:

@@ -17,6 +17,7 @@ from server.library import Library
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc
 from server.settings import Settings
+from server.work.loop_lag import LoopLag
 from telemetry.topics.requests import Operator
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class Parts:
     flying: Flying
     radar: RadarDesk
     scenarios: ScenarioDesk
+    loop_lag: LoopLag
 
 
 def parts_of(connection: HTTPConnection) -> Parts:

@@ -9,19 +9,32 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
 
 from planning import __version__
+from planning.confinement import what_holds
 from server.api.access import SignedIn, parts_of, session_of
 from server.api.session_routes import inline_policy, render
 from server.errors import NotFoundError, SignInError
+from server.schemas.health_docs import HealthDoc, LoopDoc
 
 router = APIRouter(include_in_schema=False)
 
 _FOR_EVER = "public, max-age=31536000, immutable"
 
 
-@router.get("/api/health", include_in_schema=True, tags=["health"])
-async def health() -> dict[str, str]:
-    """Answers without a session."""
-    return {"status": "ok", "version": __version__}
+@router.get("/api/health", include_in_schema=True, response_model_exclude_none=True, tags=["health"])
+async def health(request: Request) -> HealthDoc:
+    """Answers without a session; who has one learns how the station is."""
+    try:
+        session_of(request)
+    except SignInError:
+        return HealthDoc(version=__version__)
+    lag = parts_of(request).loop_lag.lag
+    loop = LoopDoc(
+        p99_ms=1000 * lag.p99_s,
+        longest_ms=1000 * lag.longest_s,
+        longest_utc=lag.longest_utc,
+        since_utc=lag.since_utc,
+    )
+    return HealthDoc(version=__version__, loop=loop, confinement=str(what_holds()))
 
 
 @router.get("/")

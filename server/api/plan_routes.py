@@ -8,8 +8,8 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from planning.report.exports import FileName
-from server.api.access import DONE, ERROR_RESPONSES, SignedIn, Work, answer
-from server.api.uploads import display_name
+from server.api.access import DONE, ERROR_RESPONSES, SignedIn, Work, answer, parts_of
+from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import Imported, OpenPlan, PlanEdit, PlanState, SavePlanAs, Snapshot
 
 router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["plan"], responses=ERROR_RESPONSES)
@@ -84,7 +84,9 @@ async def import_points(
     request: Request, workspace: Work, filename: Annotated[str, Query(max_length=1000)]
 ) -> Response:
     """Points or a polygon from the raw bytes of a CSV, GeoJSON, KML, .waypoints or .plan file."""
-    return answer(await workspace.plans.import_points(display_name(filename), await request.body()))
+    name = display_name(filename)
+    upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(name)))
+    return answer(await workspace.plans.import_points(name, upload))
 
 
 @router.post("/plan/shortest_order", response_model=PlanState)

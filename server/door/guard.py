@@ -23,7 +23,8 @@ from server.settings import Settings
 
 log = logging.getLogger("hedgehop.http")
 
-JSON_LIMIT_BYTES = 8 * 1024**2
+JSON_LIMIT_BYTES = 2 * 1024**2
+"""A plan of 5000 points is half of it; the loop that reads it passes on what vehicles say."""
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 CHUNK_TIMEOUT_S = 30.0
 DRAIN_LIMIT_BYTES = 64 * 1024**2

@@ -13,7 +13,7 @@ from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import Dsm
 from server.library.edits import new_poi_id
 from server.library.planned_on import planned_on
-from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc
+from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc, SurveyDoc
 from telemetry.topics.messages import PlanRecord
 
 
@@ -86,17 +86,24 @@ def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:
     )
 
 
-def with_points(document: PlanDoc, points: PoiFile) -> PlanDoc:
-    """The document with a file's points, or its polygon, in place of its own."""
+def doc_of_points(points: PoiFile) -> PlanDoc:
+    """A document of nothing but a file's points, or its polygon."""
     if points.polygon is not None and not points.pois:
         corners = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in points.polygon]
-        survey = document.survey.model_copy(update={"polygon": corners})
-        return document.model_copy(update={"survey": survey, "source": "survey"})
+        return PlanDoc(survey=SurveyDoc(polygon=corners), source="survey")
     pois = [
         PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
         for p in points.pois
     ]
-    return document.model_copy(update={"pois": pois, "source": "pois", "planned_on": planned_on(points.mission)})
+    return PlanDoc(pois=pois, planned_on=planned_on(points.mission))
+
+
+def with_points(document: PlanDoc, found: PlanDoc) -> PlanDoc:
+    """The document with the points of ``doc_of_points``, or their polygon, in place of its own."""
+    if found.source == "survey":
+        survey = document.survey.model_copy(update={"polygon": found.survey.polygon})
+        return document.model_copy(update={"survey": survey, "source": "survey"})
+    return document.model_copy(update={"pois": found.pois, "source": "pois", "planned_on": found.planned_on})
 
 
 def missing(document: PlanDoc) -> str:

@@ -1,4 +1,4 @@
-"""What the file lane's worker does: reads rasters, cleans them, generates the demo; results go to the library."""
+"""What workers do with files: points and rasters are read, spikes removed, the demo generated."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from planning.errors import DescribedError, PlanningError
+from pydantic import ValidationError
+
+from planning.errors import DescribedError, FormatError, PlanningError
+from planning.formats.poi_files import looks_swapped, read_pois
 from planning.ground.demo_hillside import demo_dsm, small_hill
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
 from planning.terrain.spikes import Spike, find_spikes
 from planning.terrain.spikes import remove_spikes as without
+from server.errors import error_doc
+from server.library.documents import doc_of_points
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, store_terrain
-from server.schemas import OrthophotoDoc, SpikeDoc, TerrainDoc
+from server.schemas import OrthophotoDoc, PlanDoc, SpikeDoc, TerrainDoc
 from server.work.jobs import Progress
 
 _STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
@@ -64,6 +69,23 @@ def import_terrain(
     report("Storing", None)
     spikes = () if found.spikes_removed else found.spikes
     return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
+
+
+def read_points(
+    upload: Path, filename: str, terrain_dir: Path | None, *, report: Progress
+) -> tuple[PlanDoc, tuple[str, ...]]:
+    """A file's points as a document, and remarks. Raises FormatError, PoiError."""
+    report("Reading points", None)
+    points = read_pois(filename, upload.read_bytes())
+    try:
+        document = doc_of_points(points)
+    except ValidationError as error:
+        fault = error_doc(error)
+        raise FormatError(fault.what, where=f"{filename}, {fault.where}", advice="Split or correct the file.") from None
+    if terrain_dir is not None and looks_swapped(points.pois, load_terrain(terrain_dir)):
+        swapped = "Latitude and longitude seem swapped: exchanged, these points lie on the surface model."
+        return document, (*points.warnings, swapped)
+    return document, points.warnings
 
 
 def import_orthophoto(

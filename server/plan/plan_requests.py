@@ -6,19 +6,19 @@ import asyncio
 import io
 import zipfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planning.errors import PoiError
-from planning.formats.poi_files import looks_swapped, read_pois
 from planning.report.exports import FILES
 from planning.terrain.dsm import Dsm
 from server.errors import ConflictError, NotReadyError
 from server.library import Library
 from server.library.documents import missing, with_points
 from server.library.shelf import utc_now
-from server.plan import tasks
+from server.plan import file_tasks, tasks
 from server.plan.computing import Computing
 from server.plan.picture import Picture
 from server.plan.plan_desk import PlanDesk
@@ -92,15 +92,16 @@ class PlanRequests:
         await self._desk.delete(plan_id)
         self._pages.publish(self._library.message())
 
-    async def import_points(self, filename: str, data: bytes) -> Imported:
-        """Replaces the points, or the polygon, by those of a file. Raises FormatError, PoiError."""
-        points = await asyncio.to_thread(read_pois, filename, data)
-        warnings = list(points.warnings)
-        dsm = self._picture.dsm
-        if dsm is not None and await asyncio.to_thread(looks_swapped, points.pois, dsm):
-            warnings.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
-        await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, points)))
-        return Imported(state=self.state, warnings=warnings)
+    async def import_points(self, filename: str, upload: Path) -> Imported:
+        """Replaces the points, or the polygon, by those of an uploaded file. Raises FormatError, PoiError."""
+        terrain_id = self._desk.document.terrain_id
+        terrain_dir = None if self._picture.dsm is None or not terrain_id else self._library.terrain_dir(terrain_id)
+        try:
+            found, warnings = await self._lane.call(file_tasks.read_points, upload, filename, terrain_dir)
+        finally:
+            await asyncio.to_thread(upload.unlink, missing_ok=True)
+        await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, found)))
+        return Imported(state=self.state, warnings=list(warnings))
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""

@@ -128,8 +128,9 @@ class FakeWorkspace:
             raise NotReadyError("There is no finished plan.", advice="Wait.")
         return b"<!doctype html><script>alert(1)</script>"
 
-    async def import_points(self, filename: str, data: bytes) -> Imported:
-        self.uploads[filename] = data
+    async def import_points(self, filename: str, upload: Path) -> Imported:
+        self.uploads[filename] = upload.read_bytes()
+        upload.unlink()
         document = PlanDoc(pois=[PoiDoc(id="a", lat_deg=1, lon_deg=2)])
         return Imported(state=plan_state(2, document), warnings=[])
 

@@ -67,3 +67,11 @@ def test_help_is_served_to_those_who_are_signed_in(tmp_path: Path) -> None:
         with server.stranger() as client:
             answer = client.get("/help/index.html")
             assert (answer.status_code, answer.headers["location"]) == (303, "/signin")
+
+
+def test_who_is_signed_in_learns_how_late_the_loop_is_and_what_is_confined(served: Running) -> None:
+    with served.stranger() as client:
+        assert client.get("/api/health").json().keys() == {"status", "version"}
+    health = served.http.get("/api/health").json()
+    assert 0 <= health["loop"]["p99_ms"] <= health["loop"]["longest_ms"]
+    assert "decoders" in health["confinement"]

@@ -12,7 +12,14 @@ from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polyg
 from planning.missions.vehicle_profile import load_profile, shipped_profiles
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
-from server.library.documents import doc_from_profile, missing, profile_from_doc, request_from_doc, with_points
+from server.library.documents import (
+    doc_from_profile,
+    doc_of_points,
+    missing,
+    profile_from_doc,
+    request_from_doc,
+    with_points,
+)
 from server.library.planned_on import on_another_model, other_model
 from server.schemas import (
     CameraDoc,
@@ -35,14 +42,14 @@ CORNERS = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygo
 def test_imported_points_remember_the_model_that_they_were_planned_on() -> None:
     mission = plan_mission(replace(DSM, name="spring.tif"), request_from_doc(PlanDoc(pois=POIS), DSM)).mission
     found = read_pois("mission.waypoints", write_wpl(mission).encode())
-    document = with_points(PlanDoc(terrain_id="t"), found)
+    document = with_points(PlanDoc(terrain_id="t"), doc_of_points(found))
     assert other_model(document, DSM) == ""
     raised = replace(DSM.with_elevation(DSM.elevation_m + 2.0), sha256="ab" * 32, name="autumn.tif")
     said = other_model(document, raised)
     assert '"autumn.tif" (SHA-256 abababab)' in said
     assert '"spring.tif" (SHA-256' in said
     assert "home's ground is 2.00 m higher here" in said
-    assert with_points(document, PoiFile(found.pois)).planned_on is None
+    assert with_points(document, doc_of_points(PoiFile(found.pois))).planned_on is None
 
 
 def test_a_plan_that_is_given_another_model_remembers_its_first() -> None:
@@ -116,11 +123,11 @@ def test_a_survey_brings_its_lines_and_photo_distance() -> None:
 
 def test_points_and_polygons_of_files() -> None:
     pois = (Poi(1.0, 2.0, "A", 3.0), Poi(4.0, 5.0))
-    taken = with_points(PlanDoc(source="survey"), PoiFile(pois))
+    taken = with_points(PlanDoc(source="survey"), doc_of_points(PoiFile(pois)))
     assert (taken.source, [(p.name, p.loiter_s) for p in taken.pois]) == ("pois", [("A", 3.0), ("", 0.0)])
     assert len({p.id for p in taken.pois}) == 2
     corners = ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
-    drawn = with_points(PlanDoc(pois=POIS), PoiFile((), polygon=corners))
+    drawn = with_points(PlanDoc(pois=POIS), doc_of_points(PoiFile((), polygon=corners)))
     assert (drawn.source, drawn.pois) == ("survey", POIS)
     assert [(c.lat_deg, c.lon_deg) for c in drawn.survey.polygon] == list(corners)
 

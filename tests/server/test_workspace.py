@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import threading
 import time
 import zipfile
+from collections.abc import Callable
 
 import pytest
 
+from planning.formats.poi_files import read_pois
 from planning.ground.demo_hillside import demo_pois
+from server.door.guard import IMPORT_LIMIT_BYTES
 from server.plan.demo import PLAN_NAME, TERRAIN_NAME
 from server.schemas import (
     CursorMessage,
@@ -241,3 +245,41 @@ def test_the_answer_to_an_edit(demo: Station, capsys: pytest.CaptureFixture[str]
         seconds.append(round(time.perf_counter() - started, 3))
     with capsys.disabled():
         print(f"\nedit to result: {seconds} s")
+
+
+def test_a_large_file_of_points_does_not_hold_up_the_loop(demo: Station) -> None:
+    """Beside it, in one run: the same file read by a thread of the server's process."""
+    demo.answer()
+    feature = '{"type": "Feature", "geometry": {"type": "Point", "coordinates": [9, %d]}, "properties": {"note": "%s"}}'
+    features = ",".join(feature % (k % 80, "x" * 90) for k in range(95_000))
+    data = f'{{"type": "FeatureCollection", "features": [{features}]}}'.encode()
+    assert 15e6 < len(data) < IMPORT_LIMIT_BYTES
+
+    def send() -> None:
+        answer = demo.http.post(
+            "/api/plan/import",
+            params={"filename": "large.geojson"},
+            content=data,
+            headers={"Content-Type": "application/octet-stream"},
+        )
+        assert (answer.status_code, answer.json()["code"]) == (422, "format")
+        assert "5000" in answer.json()["what"]
+
+    in_thread_s = demo.server.on_loop(longest_gap_s(lambda: read_pois("large.geojson", data)))
+    # Whatever else the machine does may come in between once, not each time.
+    in_worker_s = min(demo.server.on_loop(longest_gap_s(send)) for _ in range(3))
+    print(f"longest gap: {in_thread_s:.3f} s while a thread read it, {in_worker_s:.3f} s while a worker did")
+    assert in_worker_s < in_thread_s / 2
+    assert not demo.uploads_left()
+
+
+async def longest_gap_s(work: Callable[[], object]) -> float:
+    """Between two turns of this loop, while a thread does the work."""
+    working = asyncio.create_task(asyncio.to_thread(work))
+    longest_s, before_s = 0.0, time.monotonic()
+    while not working.done():
+        await asyncio.sleep(0.002)
+        now_s = time.monotonic()
+        longest_s, before_s = max(longest_s, now_s - before_s), now_s
+    await working
+    return longest_s

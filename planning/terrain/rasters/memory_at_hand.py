@@ -7,10 +7,11 @@ from pathlib import Path
 
 from planning.errors import RasterTooLargeError
 
-BYTES_PER_PX = 10
-"""Of a model read as a whole, with its spikes looked for: 8.3 were measured at 400 million pixels."""
-BYTES_PER_SQUARE = 40
-"""Where cells are brought to other squares, for each square and each cell."""
+BYTES_PER_PX = 14
+"""Of a model read as a whole, with its spikes looked for: 10 were measured at 36 million pixels, and 4 are those of the
+temporary file, whose folder may lie in memory too."""
+BYTES_PER_SQUARE = 20
+"""Where cells are brought to other squares, for each cell and each square: 15 were measured."""
 RESERVE_BYTES = 512 * 2**20
 """Stays free for the vehicle's link, the recorder and the server while a file is read."""
 

@@ -1,0 +1,46 @@
+"""How late the loop is, by made-up clocks and by a loop that really is held up; and what an import does to it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+
+import pytest
+
+from server.work.loop_lag import LONG_S, TICK_S, LoopLag
+
+
+def test_what_comes_late_is_counted_and_what_comes_early_is_not() -> None:
+    now = [0.0]
+    meter = LoopLag(now_s=lambda: now[0])
+    for late_s in [0.0] * 98 + [-0.005, 0.05]:
+        now[0] += TICK_S + late_s
+        meter.note(now[0])
+    assert meter.lag.longest_s == pytest.approx(0.05)
+    assert meter.lag.p99_s == pytest.approx(0.05)
+    meter.note(now[0] + TICK_S)
+    assert meter.lag.longest_utc
+
+
+def hold_up_the_loop(seconds: float) -> None:
+    ends = time.monotonic() + seconds
+    while time.monotonic() < ends:
+        pass
+
+
+def test_what_holds_the_loop_up_is_named_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    async def use() -> LoopLag:
+        meter = LoopLag()
+        measuring = asyncio.create_task(meter.run())
+        await asyncio.sleep(2 * TICK_S)
+        hold_up_the_loop(4 * LONG_S)
+        await asyncio.sleep(2 * TICK_S)
+        measuring.cancel()
+        return meter
+
+    with caplog.at_level(logging.WARNING, "hedgehop.loop"):
+        meter = asyncio.run(use())
+    assert meter.lag.longest_s > 2 * LONG_S
+    assert "hold_up_the_loop" in caplog.text
+    assert __file__ in caplog.text
