@@ -7,7 +7,7 @@ export const LIMITS = {
   PoiDoc: {
     lat_deg: { min: -90, max: 90 },
     lon_deg: { min: -180, max: 180 },
-    loiter_s: { min: 0, max: 3_600, initial: 0.0 },
+    loiter_s: { min: 0, max: 3_600.0, initial: 0.0 },
   },
   PlaceDoc: {
     lat_deg: { min: -90, max: 90 },
