@@ -18,11 +18,12 @@ describe("the status bar", () => {
       level: "bad",
     });
     expect(linkWords(linkStatus(), 5.2, "lost").text).toBe("Link lost");
-    expect(linkWords(linkStatus(), 1.2, "live", true)).toEqual({
+    expect(linkWords(linkStatus(), 1.2, "live", "link")).toEqual({
       text: "Link failed",
       note: "1\u00a0s",
       level: "bad",
     });
+    expect(linkWords(linkStatus(), 1.2, "live", "server").text).toBe("No server");
     expect(linkWords(linkStatus({ quality: 0.4 }), 0.1).level).toBe("near");
     expect(linkWords(linkStatus({ adopted: null, state: "none" }), null).text).toBe("No vehicle");
     expect(linkWords(null, null).text).toBe("No vehicle");

@@ -1,10 +1,9 @@
 import { useEffect, useRef } from "preact/hooks";
 import type uPlot from "uplot";
 import { metres } from "../format";
-import { isStale } from "../store/ages";
-import { now_ms } from "../store/clock";
 import { heard, tracks, trackVersion } from "../store/flying";
 import { theme } from "../store/prefs";
+import { isOld } from "../store/reach";
 import { aheadOf } from "../obstacles/ahead";
 import { conflictWhere } from "../obstacles/obstacle_words";
 import { watching } from "../store/obstacles";
@@ -73,10 +72,9 @@ function Marker({ plot }: { plot: uPlot }) {
     left: `${plot.over.offsetLeft + x}px`,
     top: `${plot.over.offsetTop + Math.min(clientHeight, Math.max(0, y))}px`,
   };
-  const isOld = isStale(from, "position", now_ms.value);
   return (
     <span
-      class={`vehicle-marker ${isOld ? "old" : ""}`}
+      class={`vehicle-marker ${isOld("live", "position") ? "old" : ""}`}
       style={style}
       title={`Vehicle, ${metres(follow.alt_rel_home_m)} above home`}
       data-testid="vehicle-marker"

@@ -1,8 +1,9 @@
 import { useState } from "preact/hooks";
 import type { Candidate, ConnectionStatus } from "../messages";
 import { count, number } from "../format";
-import { adopted, isInAir, lease, linkStatus, vehicle } from "../store/flying";
+import { adopted, isInAir, lease, linkState, linkStatus, silence_s, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { failed, whyNotAsk, whyNotCommand } from "../store/reach";
 import { Button } from "../ui/Button";
 import { ErrorPanel } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
@@ -67,7 +68,7 @@ function AddressForm() {
       <button
         type="submit"
         class="button"
-        disabled={!lease.value.mine || address.trim() === "" || pending.value.has(PLACE)}
+        disabled={whyNotCommand.value !== null || address.trim() === "" || pending.value.has(PLACE)}
         data-testid="link-connect"
       >
         <Icon name="plug" /> {pending.value.has(PLACE) ? "Connecting…" : "Connect"}
@@ -95,7 +96,7 @@ function ConnectionRow({ connection }: { connection: ConnectionStatus }) {
           class="small"
           icon="cross"
           title={`Close ${address}`}
-          disabled={!lease.value.mine || isInAir.value}
+          disabled={whyNotCommand.value !== null || isInAir.value}
           testid="link-disconnect"
           onClick={() => void disconnect(address)}
         />
@@ -119,7 +120,7 @@ function Candidates({ found }: { found: readonly Candidate[] }) {
             </span>
             <Button
               testid="adopt"
-              disabled={!lease.value.mine || isInAir.value}
+              disabled={whyNotCommand.value !== null || isInAir.value}
               onClick={() => void adopt(candidate.id)}
             >
               Use
@@ -145,8 +146,8 @@ function Adopted({ used }: { used: Candidate }) {
       </span>
       <Button
         kind="quiet"
-        disabled={!lease.value.mine || isInAir.value}
-        title={isInAir.value ? "Not in the air" : "Send nothing to it any more"}
+        disabled={whyNotCommand.value !== null || isInAir.value}
+        title={whyNotCommand.value ?? (isInAir.value ? "Not in the air" : "Send nothing to it any more")}
         testid="release"
         onClick={() => void release()}
       >
@@ -165,7 +166,7 @@ function NoVehicle({ waits }: { waits: boolean }) {
         <Button
           icon="drone"
           testid="start-simulator"
-          disabled={pending.value.has(PLACE) || !lease.value.mine}
+          disabled={pending.value.has(PLACE) || whyNotCommand.value !== null}
           onClick={() => void startSimulator(PLACE)}
         >
           Start the simulator
@@ -180,7 +181,7 @@ export function ConnectionSection() {
   const status = linkStatus.value?.status ?? null;
   const used = adopted.value;
   const summary = used
-    ? linkWords(status, null).text
+    ? linkWords(status, silence_s.value, linkState.value, failed.value).text
     : count(status?.candidates.length ?? 0, "vehicle") + " heard";
   return (
     <Section
@@ -208,7 +209,13 @@ export function ConnectionSection() {
         <AddressForm />
       )}
       {lease.value.mine && used && (
-        <button type="button" class="link" data-testid="give-control" onClick={() => void giveControl()}>
+        <button
+          type="button"
+          class="link"
+          disabled={whyNotAsk.value !== null}
+          data-testid="give-control"
+          onClick={() => void giveControl()}
+        >
           Hand over control
         </button>
       )}

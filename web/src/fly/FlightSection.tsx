@@ -1,6 +1,7 @@
 import { bytes, duration } from "../format";
-import { adopted, flight, isInAir, lease, recorded_s, recorder, vehicle } from "../store/flying";
+import { adopted, flight, isInAir, recorded_s, recorder, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { whyNotAsk, whyNotCommand, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
 import { Done, ErrorPanel, Outcome } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
@@ -12,37 +13,37 @@ const PLACE = "flight";
 
 function Actions() {
   const state = vehicle.value;
-  const mine = lease.value.mine;
-  const common = { place: PLACE, disabled: !mine };
+  const why = whyNotCommand.value;
   return (
     <div class="row wrap minor-actions">
       {state?.armed ? (
         <>
           <HoldButton
-            {...common}
+            place={PLACE}
             label="Land"
             icon="land"
-            disabled={!mine || !isInAir.value}
-            title="Come down here and now"
+            disabled={why !== null || !isInAir.value}
+            title={why ?? "Come down here and now"}
             testid="land"
             onHold={() => void land()}
           />
           <HoldButton
-            {...common}
+            place={PLACE}
             label="Disarm"
             icon="power"
-            disabled={!mine || isInAir.value}
-            title={isInAir.value ? "Only on the ground" : "Stop the motors"}
+            disabled={why !== null || isInAir.value}
+            title={why ?? (isInAir.value ? "Only on the ground" : "Stop the motors")}
             testid="disarm"
             onHold={() => void disarm()}
           />
         </>
       ) : (
         <HoldButton
-          {...common}
+          place={PLACE}
           label="Arm"
           icon="power"
-          title="Switch the motors on; Start does it by itself"
+          disabled={why !== null}
+          title={why ?? "Switch the motors on; Start does it by itself"}
           testid="arm"
           onHold={() => void arm()}
         />
@@ -66,7 +67,7 @@ function Recorder() {
           </span>
         </span>
         <Button
-          disabled={!lease.value.mine || pending.value.has("recorder")}
+          disabled={whyNotAsk.value !== null || pending.value.has("recorder")}
           testid={status?.recording ? "record-stop" : "record-start"}
           onClick={() => void (status?.recording ? stopRecording() : startRecording())}
         >
@@ -83,9 +84,15 @@ function Recorder() {
 export function FlightSection() {
   if (!adopted.value) return null;
   const phase = flight.live.value?.phase ?? "idle";
-  const summary = phase === "interrupted" ? "broken off" : armedWord(vehicle.value).toLowerCase();
+  const word = phase === "interrupted" ? "broken off" : armedWord(vehicle.value).toLowerCase();
   return (
-    <Section id={PLACE} title="Vehicle" icon="drone" summary={summary} startsOpen>
+    <Section
+      id={PLACE}
+      title="Vehicle"
+      icon="drone"
+      summary={whyUnheard.value ? "not known now" : word}
+      startsOpen
+    >
       <Actions />
       <Done place={PLACE} />
       <Recorder />

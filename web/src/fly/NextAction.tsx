@@ -2,6 +2,7 @@ import { openReview, recordings } from "../store/review";
 import { goTo } from "../store/view";
 import { flight, fly, isInAir, lease, linkStatus, recorder, transfer, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { failed, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { Outcome } from "../ui/Outcome";
@@ -29,7 +30,8 @@ function startLabel(): string {
   return from ? `Resume at item ${from}` : "Start";
 }
 
-function Primary({ step }: { step: Step }) {
+/** `isCut`: nothing that is asked here comes to the vehicle. */
+function Primary({ step, isCut }: { step: Step; isCut: boolean }) {
   const why = "why" in step ? step.why : undefined;
   const isPending = pending.value.has(NEXT);
   // Another step is another button (its key): a press that is meant for one never lands on the next.
@@ -44,7 +46,7 @@ function Primary({ step }: { step: Step }) {
       kind="primary"
       class="wide"
       icon={icon}
-      disabled={disabled || isPending}
+      disabled={disabled || isCut || isPending}
       testid={`next-${step.id}`}
       onClick={act}
     >
@@ -71,6 +73,7 @@ function Primary({ step }: { step: Step }) {
           label="Take control"
           icon="user"
           place={LEASE}
+          disabled={failed.value === "server"}
           testid="next-take_control"
           onHold={() => void takeControl()}
         />
@@ -88,7 +91,7 @@ function Primary({ step }: { step: Step }) {
           label={startLabel()}
           icon="play"
           place={NEXT}
-          disabled={why !== undefined}
+          disabled={why !== undefined || isCut}
           testid="next-start"
           onHold={() => void startFlight()}
         />
@@ -147,7 +150,8 @@ const presentStep = (): Step =>
 /** The next step of the flight, at the bottom of the left panel. */
 export function NextAction() {
   const step = presentStep();
-  const why = "why" in step && step.id !== "wait" ? step.why : "";
+  const cut = step.id === "take_control" ? null : whyUnheard.value;
+  const why = cut ?? ("why" in step && step.id !== "wait" ? step.why : "");
   const hint = flight.live.value?.hint ?? "";
   const observer = step.id === "take_control" && lease.value.holder;
   return (
@@ -158,7 +162,7 @@ export function NextAction() {
       {hint && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}
       {observer && <p class="muted action-hint">{lease.value.holder} is in charge. You see everything.</p>}
-      <Primary step={step} />
+      <Primary step={step} isCut={cut !== null} />
     </footer>
   );
 }

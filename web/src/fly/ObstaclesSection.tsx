@@ -1,8 +1,8 @@
 import { metres } from "../format";
 import { LIMITS, type PerceptionSettings, type PerceptionSettingsBody } from "../messages";
-import { lease } from "../store/flying";
 import { hasSensors, obstacles } from "../store/obstacles";
 import { pending } from "../store/outcomes";
+import { whyNotAsk } from "../store/reach";
 import { Done } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
 import { NumberFields, type NumberSpec } from "../ui/NumberField";
@@ -56,7 +56,7 @@ function Fields({ fields, settings }: FieldsProps) {
         fields={fields}
         limits={LIMITS.PerceptionSettingsBody}
         values={settings}
-        disabled={!lease.value.mine}
+        disabled={whyNotAsk.value !== null}
         group="perception"
         onChange={(key, value) => change({ [key]: value })}
       />
@@ -66,7 +66,7 @@ function Fields({ fields, settings }: FieldsProps) {
 
 /** What is searched ahead, and how radar targets are placed. */
 function Searched({ settings }: { settings: PerceptionSettings }) {
-  const disabled = !lease.value.mine;
+  const disabled = whyNotAsk.value !== null;
   return (
     <>
       <Fields fields={FIELDS} settings={settings} />
@@ -103,7 +103,7 @@ function Clear() {
       label="Empty the maps"
       icon="trash"
       place={MAPS}
-      disabled={!lease.value.mine}
+      disabled={whyNotAsk.value !== null}
       title="Everything seen so far is forgotten; recordings keep it"
       testid="clear-maps"
       onHold={() => void clearMaps()}

@@ -1,7 +1,8 @@
 import { count, number } from "../format";
 import type { OnboardDoc, Rounded } from "../messages";
-import { adopted, fly, isInAir, lease } from "../store/flying";
+import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { whyNotCommand, whyUnheard } from "../store/reach";
 import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -65,7 +66,7 @@ function State({ onboard }: { onboard: OnboardDoc }) {
 /** An older plan may be flown as well, after the same check; a mission from elsewhere may not. */
 function NotThePlan({ onboard }: { onboard: OnboardDoc }) {
   if (onboard.state !== "verified" || onboard.is_open_plan) return null;
-  const busy = pending.value.has(NEXT) || !lease.value.mine || isInAir.value;
+  const busy = pending.value.has(NEXT) || whyNotCommand.value !== null || isInAir.value;
   return (
     <div class="callout wrap-row" data-testid="not-the-plan">
       <Icon name="warning" />
@@ -96,7 +97,13 @@ export function OnboardSection() {
       id="onboard"
       title="On board"
       icon="route"
-      summary={onboard.is_open_plan ? "the open plan, verified" : SUMMARIES[onboard.state]}
+      summary={
+        whyUnheard.value
+          ? "as last read"
+          : onboard.is_open_plan
+            ? "the open plan, verified"
+            : SUMMARIES[onboard.state]
+      }
       startsOpen
     >
       <State onboard={onboard} />

@@ -1,7 +1,8 @@
 import { clock, metres } from "../format";
 import type { CheckRow, PreflightDoc } from "../messages";
-import { adopted, fly, isInAir, lease } from "../store/flying";
+import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { whyNotCommand, whyUnheard } from "../store/reach";
 import { Button, Segmented } from "../ui/Button";
 import { Icon, type IconName } from "../ui/Icon";
 import { Section } from "../ui/Section";
@@ -38,15 +39,17 @@ const TITLES: Record<CheckRow["code"], string> = {
 };
 
 function Row({ row }: { row: CheckRow }) {
-  const { icon, word } = MARKS[row.state];
+  // What was good then may no longer be.
+  const state = whyUnheard.value ? "unknown" : row.state;
+  const { icon, word } = MARKS[state];
   const isAccepted = isAcceptable(row.code) && accepted.value.has(row.code);
   return (
-    <li class={`check-row ${row.state}`} data-testid="check-row" data-code={row.code} data-state={row.state}>
+    <li class={`check-row ${state}`} data-testid="check-row" data-code={row.code} data-state={state}>
       <Icon name={icon} />
       <div>
         <p class="check-head">
           <strong>{TITLES[row.code]}</strong>
-          <span class="check-word">{row.state === "accept" && isAccepted ? "Accepted" : word}</span>
+          <span class="check-word">{state === "accept" && isAccepted ? "Accepted" : word}</span>
         </p>
         <p>{row.text}</p>
         {row.mend && <p class="mend">{row.mend}</p>}
@@ -54,7 +57,7 @@ function Row({ row }: { row: CheckRow }) {
           <Check
             label={row.code === "avoidance" ? "I fly without it, or slowed" : "I accept this"}
             checked={isAccepted}
-            disabled={!lease.value.mine}
+            disabled={whyNotCommand.value !== null}
             testid={`accept-${row.code}`}
             onChange={(yes) => isAcceptable(row.code) && accept(row.code, yes)}
           />
@@ -121,7 +124,7 @@ export function PreflightSection() {
       id="preflight"
       title="Before the start"
       icon="check"
-      summary={isInAir.value ? "in the air" : summaryOf(preflight)}
+      summary={whyUnheard.value ? "not known now" : isInAir.value ? "in the air" : summaryOf(preflight)}
       startsOpen={!isInAir.value}
       isUrgent={!isInAir.value && needsAttention(preflight)}
     >
@@ -134,11 +137,14 @@ export function PreflightSection() {
             ))}
           </ul>
           <div class="row">
-            <span class="muted">{preflight.checked_utc && `Checked at ${clock(preflight.checked_utc)}`}</span>
+            <span class="muted">
+              {preflight.checked_utc &&
+                `${whyUnheard.value ? "Known only as of" : "Checked at"} ${clock(preflight.checked_utc)}`}
+            </span>
             <span class="spring" />
             <Button
               testid="check-again"
-              disabled={!lease.value.mine || isInAir.value || pending.value.has(NEXT)}
+              disabled={whyNotCommand.value !== null || isInAir.value || pending.value.has(NEXT)}
               onClick={() => void checkStart()}
             >
               Check again
@@ -159,14 +165,21 @@ export function PreflightSection() {
           testid="way"
           value={wayToFly.value}
           options={[
-            { value: "auto", label: "AUTO", title: "The autopilot flies the mission on board" },
+            {
+              value: "auto",
+              label: "AUTO",
+              title: whyNotCommand.value ?? "The autopilot flies the mission on board",
+              disabled: whyNotCommand.value !== null,
+            },
             {
               value: "guided",
               label: "GUIDED",
-              title: goesOn
-                ? "A flight that broke off goes on in AUTO"
-                : "Hedgehop hands over one waypoint at a time",
-              disabled: goesOn,
+              title:
+                whyNotCommand.value ??
+                (goesOn
+                  ? "A flight that broke off goes on in AUTO"
+                  : "Hedgehop hands over one waypoint at a time"),
+              disabled: goesOn || whyNotCommand.value !== null,
             },
           ]}
           onChange={(next) => (way.value = next)}

@@ -1,9 +1,10 @@
 import { useState } from "preact/hooks";
 import { withUnit } from "../format";
 import type { AvoidanceStatus } from "../messages";
-import { lease, nodes, vehicle } from "../store/flying";
+import { nodes, vehicle } from "../store/flying";
 import { obstacles } from "../store/obstacles";
-import { link, setError } from "../store/state";
+import { whyNotAsk, whyNotCommand } from "../store/reach";
+import { setError } from "../store/state";
 import { Button } from "../ui/Button";
 import { Check } from "../ui/fields";
 import { HoldButton } from "../ui/HoldButton";
@@ -13,11 +14,6 @@ import { AVOIDANCE, setPerception, switchAvoidance, wantsConsent } from "./obsta
 import { avoidanceWords, isTooFast } from "./obstacle_words";
 
 const isSimulated = () => nodes.value.some((node) => node.name === "simulator" && node.state === "running");
-
-function whyNot(): string | null {
-  if (link.value === "lost") return "The server cannot be reached";
-  return lease.value.mine ? null : "You observe: take control first";
-}
 
 type AvoidBy = AvoidanceStatus["by"];
 
@@ -51,7 +47,7 @@ function How({ by, onChange }: { by: AvoidBy; onChange: (by: AvoidBy) => void })
 /** A real vehicle leaves its mission by itself only if somebody has said in words that it may. */
 function Consent({ by, onDone }: { by: AvoidBy; onDone: () => void }) {
   const [agrees, setAgrees] = useState(false);
-  const why = whyNot();
+  const why = whyNotCommand.value;
   const grant = async () => {
     if (await switchAvoidance(true, by, true)) onDone();
   };
@@ -87,7 +83,7 @@ function Consent({ by, onDone }: { by: AvoidBy; onDone: () => void }) {
 }
 
 function Switch({ isOn, by, ask }: { isOn: boolean; by: AvoidBy; ask: () => void }) {
-  const why = whyNot();
+  const why = whyNotCommand.value;
   if (isOn) {
     return (
       <Button
@@ -145,7 +141,7 @@ function AfterClimb() {
       <Check
         label="Comes down after a climb, once certified past what was seen"
         checked={settings.comes_down}
-        disabled={whyNot() !== null}
+        disabled={whyNotAsk.value !== null}
         testid="comes-down"
         onChange={(comes_down) => void setPerception({ comes_down }, AVOIDANCE)}
       />

@@ -1,8 +1,7 @@
 import { clearance, metres, withUnit } from "../format";
 import type { ManoeuvreDoc } from "../messages";
-import { lease } from "../store/flying";
 import { alerts, obstacles } from "../store/obstacles";
-import { link } from "../store/state";
+import { whyNotCommand } from "../store/reach";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon, type IconName } from "../ui/Icon";
 import { matching } from "../ui/media";
@@ -21,12 +20,6 @@ const WORDS: Record<Kind, Words> = {
   around: { title: "Around it", action: "Fly around", icon: "redo" },
   sidestep: { title: "Sidestep", action: "Sidestep", icon: "sidestep" },
 };
-
-/** Why nothing can be commanded from here now. */
-function obstacleToFlying(): string | null {
-  if (link.value === "lost") return "The server cannot be reached";
-  return lease.value.mine ? null : "You observe: take control first";
-}
 
 /** Out of the way of what moves: level, so what it does says more than how high it climbs. */
 function SidestepFacts({ doc }: { doc: ManoeuvreDoc }) {
@@ -66,7 +59,7 @@ function Facts({ doc }: { doc: ManoeuvreDoc }) {
 function ManoeuvreCard({ card }: { card: Card }) {
   const { kind, doc } = card;
   const { title, action, icon } = WORDS[kind];
-  const why = obstacleToFlying();
+  const why = whyNotCommand.value;
   const isPossible = doc?.possible ?? false;
   return (
     <li

@@ -1,6 +1,6 @@
 import { useState } from "preact/hooks";
 import { LIMITS, type PerceptionSettings, type PerceptionSettingsBody } from "../messages";
-import { lease } from "../store/flying";
+import { whyNotAsk } from "../store/reach";
 import { setError } from "../store/state";
 import { Button } from "../ui/Button";
 import { ErrorBox } from "../ui/Outcome";
@@ -37,7 +37,7 @@ function Anew({ body, giveUp }: { body: PerceptionSettingsBody; giveUp: () => vo
           label="Begin anew"
           icon="check"
           place={MAP_SETTINGS}
-          disabled={!lease.value.mine}
+          disabled={whyNotAsk.value !== null}
           testid="begin-anew"
           onHold={() => void ask()}
         />
@@ -52,7 +52,7 @@ function Anew({ body, giveUp }: { body: PerceptionSettingsBody; giveUp: () => vo
 /** The vehicle that obstacles are kept from, and the maps' voxels and memory. */
 export function MapSettings({ settings }: { settings: PerceptionSettings }) {
   const [wanted, setWanted] = useState<AnotherMap>({});
-  const disabled = !lease.value.mine;
+  const disabled = whyNotAsk.value !== null;
   const memory_bytes = wanted.memory_limit_bytes ?? settings.memory_limit_bytes;
   const want = (more: AnotherMap) => setWanted({ ...wanted, ...more });
   const giveUp = () => {

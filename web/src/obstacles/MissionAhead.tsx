@@ -1,10 +1,11 @@
 import { latLon, metres, number } from "../format";
 import { CopyPlace } from "../ui/CopyPlace";
-import { isInAir, lease, type Source } from "../store/flying";
+import { isInAir, type Source } from "../store/flying";
 import { goTo } from "../store/view";
 import { hasSensors, watching } from "../store/obstacles";
 import { pending } from "../store/outcomes";
-import { document_, link } from "../store/state";
+import { whyNotAsk } from "../store/reach";
+import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
@@ -63,8 +64,7 @@ const PARTS: readonly { part: SeenPart; label: string; title: string }[] = [
 function PlanAgainstSeen() {
   const isIn = document_.value?.seen_id != null;
   const isBusy = pending.value.has(SEEN);
-  const why = link.value === "lost" ? "The server cannot be reached" : null;
-  const cannot = why ?? (lease.value.mine ? null : "You observe: take control first");
+  const cannot = whyNotAsk.value;
   return (
     <>
       <Button

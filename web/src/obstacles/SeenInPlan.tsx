@@ -1,6 +1,6 @@
 import { count } from "../format";
-import { lease } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { whyNotAsk } from "../store/reach";
 import { document_, result } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -21,10 +21,8 @@ export function SeenInPlan() {
         : path and certificate keep clear of it. What only the radar has seen may be higher than that.
       </p>
       <Button
-        disabled={pending.value.has(SEEN) || !lease.value.mine}
-        title={
-          lease.value.mine ? "Back to the surface model as it was read" : "You observe: take control first"
-        }
+        disabled={pending.value.has(SEEN) || whyNotAsk.value !== null}
+        title={whyNotAsk.value ?? "Back to the surface model as it was read"}
         testid="take-seen-out"
         onClick={() => void planWithSeen(false)}
       >

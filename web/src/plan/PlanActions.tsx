@@ -1,5 +1,6 @@
-import { adopted, fly, isInAir, lease } from "../store/flying";
+import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { whyNotCommand } from "../store/reach";
 import { Button } from "../ui/Button";
 import { ErrorBox, Outcome } from "../ui/Outcome";
 import { TransferBar } from "../vehicle/TransferBar";
@@ -10,7 +11,7 @@ const PLACE = "upload";
 
 /** Why the plan cannot go to the vehicle now. */
 function refusal(): string | null {
-  if (!lease.value.mine) return "You observe: take control to upload";
+  if (whyNotCommand.value) return whyNotCommand.value;
   if (isInAir.value) return "Not while the vehicle is in the air";
   return uploadRefusal();
 }

@@ -9,12 +9,9 @@ import {
   modeWord,
   nodeWord,
 } from "../vehicle/vehicle_words";
-import { isStale } from "../store/ages";
-import { now_ms } from "../store/clock";
 import {
   adopted,
   hasLinkFailed,
-  heard,
   latched,
   lease,
   linkState,
@@ -26,8 +23,8 @@ import {
   vehicle,
 } from "../store/flying";
 import { pending } from "../store/outcomes";
+import { failed, isOld, whyNotCommand, whyUnheard } from "../store/reach";
 import { isReplaying, review } from "../store/review";
-import { link } from "../store/state";
 import { severityWord } from "../store/texts";
 import { Chip } from "../ui/Chip";
 import { HoldButton } from "../ui/HoldButton";
@@ -37,19 +34,11 @@ import { goTo, viewId } from "../store/view";
 
 /** Known to be disarmed just now. In doubt the vehicle may be in the air. */
 function isParked(): boolean {
-  return vehicle.value?.armed === false && !isStale(heard.live.value, "heartbeat", now_ms.value);
+  return vehicle.value?.armed === false && !isOld("live", "heartbeat");
 }
-
-const NO_SERVER = "No connection: use the pilot's transmitter";
-const NO_LINK = "The link has failed: use the pilot's transmitter";
 
 /** Why the vehicle cannot be stopped or called home from this page; null: it can. */
-function whyNot(): string | null {
-  if (link.value !== "open") return NO_SERVER;
-  if (hasLinkFailed.value) return NO_LINK;
-  if (!lease.value.mine) return "You observe: take control first";
-  return isParked() ? "The vehicle is disarmed" : null;
-}
+const whyNot = () => whyNotCommand.value ?? (isParked() ? "The vehicle is disarmed" : null);
 
 /** Always at the same place while a vehicle is connected: stop where you are, and come back. */
 function Safety() {
@@ -80,9 +69,9 @@ function Safety() {
         testid="return-home"
         onHold={() => void returnHome()}
       />
-      {(why === NO_SERVER || why === NO_LINK) && (
+      {whyUnheard.value && (
         <span class="safety-why" role="alert" data-testid="safety-why">
-          {why}
+          {whyUnheard.value}
         </span>
       )}
       <div class="safety-says">
@@ -94,17 +83,15 @@ function Safety() {
 
 function VehicleChips() {
   const state = vehicle.value;
-  const live = heard.live.value;
   const status = linkStatus.value?.status ?? null;
-  const words = linkWords(status, silence_s.value, linkState.value, hasLinkFailed.value);
-  const old = (group: "heartbeat" | "battery" | "gnss") => isStale(live, group, now_ms.value);
+  const words = linkWords(status, silence_s.value, linkState.value, failed.value);
   return (
     <>
       <Chip
         icon="drone"
         text={modeWord(state)}
         note={state?.armed ? "armed" : "disarmed"}
-        stale={old("heartbeat")}
+        stale={isOld("live", "heartbeat")}
         level={state?.critical ? "bad" : "neutral"}
         testid="chip-mode"
         class="mode"
@@ -121,7 +108,7 @@ function VehicleChips() {
         icon="satellite"
         text={fixWord(state)}
         note={state?.satellites == null ? "" : String(state.satellites)}
-        stale={old("gnss")}
+        stale={isOld("live", "gnss")}
         level={fixLevel(state)}
         testid="chip-gnss"
         class="gnss"
@@ -130,7 +117,7 @@ function VehicleChips() {
       <Chip
         icon="battery"
         text={batteryWord(state)}
-        stale={old("battery")}
+        stale={isOld("live", "battery")}
         level={batteryLevel(state)}
         testid="chip-battery"
         class="battery"
@@ -227,6 +214,7 @@ function Operator() {
           label="Take control"
           icon="user"
           place={LEASE}
+          disabled={failed.value === "server"}
           title={holder ? `Takes the command from ${holder}` : "You will command the vehicle"}
           testid="take-control"
           onHold={() => void takeControl()}

@@ -1,6 +1,6 @@
 import { LIMITS, type PerceptionSettings, type TrackerSettings, type VelocitySettings } from "../messages";
 import { setPerception } from "../obstacles/obstacle_orders";
-import { lease } from "../store/flying";
+import { whyNotAsk } from "../store/reach";
 import { NumberFields, type NumberSpec } from "../ui/NumberField";
 import { Check, SelectField } from "../ui/fields";
 
@@ -53,7 +53,7 @@ const STATES: readonly { value: TrackerSettings["coordinates"]; label: string }[
 
 /** How moving and standing objects are followed, and what velocities past them keep to. */
 export function TrackSettings({ settings: { tracker, velocities } }: { settings: PerceptionSettings }) {
-  const disabled = !lease.value.mine;
+  const disabled = whyNotAsk.value !== null;
   return (
     <>
       <h3>Velocities past objects</h3>

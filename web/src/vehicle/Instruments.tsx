@@ -1,8 +1,8 @@
 import { withUnit } from "../format";
-import { age_s, isStale, type Group } from "../store/ages";
+import { age_s, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
-import { hasLinkFailed, heard, linkState, silence_s, type Source } from "../store/flying";
-import { link } from "../store/state";
+import { heard, linkState, silence_s, type Source } from "../store/flying";
+import { failed, isOld } from "../store/reach";
 import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
 import { Attitude } from "./Attitude";
@@ -12,17 +12,16 @@ import { Tiles } from "./Tiles";
 
 /** "3 s old" for what is greyed, nothing for what is fresh. */
 function ageOf(source: Source, group: Group): { isOld: boolean; age: string } {
-  const from = heard[source].value;
-  const isOld = isStale(from, group, now_ms.value);
-  const seconds = age_s(from, group, now_ms.value);
-  return { isOld, age: isOld && seconds !== null ? `${withUnit(Math.floor(seconds), "s")} old` : "" };
+  const old = isOld(source, group);
+  const seconds = age_s(heard[source].value, group, now_ms.value);
+  return { isOld: old, age: old && seconds !== null ? `${withUnit(Math.floor(seconds), "s")} old` : "" };
 }
 
-const isLost = () => link.value === "lost" || linkState.value === "lost" || hasLinkFailed.value;
+const isLost = () => failed.value !== null || linkState.value === "lost";
 
 function lostWords(): [what: string, then: string] {
-  if (link.value === "lost") return ["This page has lost the server", "It keeps trying."];
-  if (hasLinkFailed.value)
+  if (failed.value === "server") return ["This page has lost the server", "It keeps trying."];
+  if (failed.value === "link")
     return ["The link has failed", "It is started again. Take the pilot's transmitter."];
   return ["Communication lost", "Last values below. The vehicle follows its failsafe."];
 }

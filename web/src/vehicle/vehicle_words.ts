@@ -1,3 +1,4 @@
+import type { Failed } from "../store/reach";
 import type { LinkStatus, VehicleState } from "../messages";
 import { DASH, number, percent, withUnit } from "../format";
 
@@ -60,17 +61,19 @@ export interface LinkWords {
   level: Level;
 }
 
+const FAILED: Record<Failed, string> = { server: "No server", link: "Link failed" };
+
 /** What the link is worth: quality and round trip, or how long it has been silent. */
 export function linkWords(
   status: LinkStatus | null,
   silence_s: number | null,
   state: LinkStatus["state"] = status?.state ?? "none",
-  hasFailed = false,
+  failed: Failed | null = null,
 ): LinkWords {
   if (!status || state === "none" || !status.adopted)
     return { text: "No vehicle", note: "", level: "neutral" };
   const silent = silence_s === null ? "" : withUnit(Math.floor(silence_s), "s");
-  if (hasFailed) return { text: "Link failed", note: silent, level: "bad" };
+  if (failed) return { text: FAILED[failed], note: silent, level: "bad" };
   if (state === "lost") return { text: "Link lost", note: silent, level: "bad" };
   if (state === "stale") return { text: "Silent", note: silent, level: "near" };
   const note = status.round_trip_s === null ? "" : withUnit(status.round_trip_s * 1000, "ms");

@@ -1,0 +1,82 @@
+"""What a page says and offers while what stands between it and the vehicle has failed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
+
+from server.schemas import NodeDoc, NodesMessage
+from tests.e2e.stations import SimulatedVehicle, Station
+from tests.e2e.steps import connect, open_demo, upload
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+
+
+class Stream:
+    """Between the pages and the server: passes everything on, until it is told otherwise."""
+
+    def __init__(self, context: BrowserContext) -> None:
+        self._page_side: WebSocketRoute | None = None
+        self._left_out: frozenset[str] = frozenset()
+        context.route_web_socket(re.compile(r"/ws$"), self._opened)
+
+    def link_is(self, state: str) -> None:
+        """Of the process that commands the vehicle, whatever it is in truth."""
+        assert self._page_side is not None
+        self._left_out = frozenset({"nodes"})
+        node = NodeDoc(name="link", state=state, restarts=0, text="")
+        self._page_side.send(NodesMessage(nodes=[node]).model_dump_json())
+
+    def _opened(self, page_side: WebSocketRoute) -> None:
+        self._page_side = page_side
+        server = page_side.connect_to_server()
+
+        def pass_on(text: str | bytes) -> None:
+            if json.loads(text)["type"] not in self._left_out:
+                page_side.send(text)
+
+        server.on_message(pass_on)
+
+
+@pytest.fixture
+def stream(page: Page) -> Iterator[Stream]:
+    return Stream(page.context)
+
+
+def test_while_the_link_has_failed_nothing_is_offered_that_it_would_do(
+    station: Station, page: Page, stream: Stream, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, station)
+    connect(page, vehicle)
+    connection = page.locator("[data-section=connection]")
+    expect(connection).to_contain_text("%")
+    expect(page.get_by_test_id("next-upload")).to_be_enabled()
+
+    stream.link_is("silent")
+    expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
+    expect(connection).to_contain_text("Link failed")
+    expect(connection).not_to_contain_text("%")
+    for command in ("next-upload", "arm", "hold-position", "return-home"):
+        expect(page.get_by_test_id(command)).to_be_disabled()
+    expect(page.get_by_test_id("next-action")).to_contain_text("The link has failed")
+    for chip in ("chip-mode", "chip-gnss", "chip-battery"):
+        expect(page.get_by_test_id(chip)).to_have_class(re.compile(r"\bold\b"))
+    expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
+    page.get_by_test_id("tab-plan").click()
+    expect(page.get_by_test_id("upload")).to_be_disabled()
+
+    stream.link_is("running")
+    expect(page.get_by_test_id("upload")).to_be_enabled()
+    upload(page)
+    page.get_by_test_id("next-check").click()
+    good = page.locator("[data-testid=check-row][data-state=good]")
+    expect(good.first).to_be_visible()
+    stream.link_is("restarting")
+    expect(good).to_have_count(0)
+    expect(page.get_by_test_id("check-again")).to_be_disabled()
+    for way in ("way-auto", "way-guided"):
+        expect(page.get_by_test_id(way)).to_be_disabled()

@@ -1,0 +1,37 @@
+import { computed } from "@preact/signals";
+import { isStale, type Group } from "./ages";
+import { now_ms } from "./clock";
+import { hasLinkFailed, heard, lease, type Source } from "./flying";
+import { link } from "./state";
+
+/** How far this page's word reaches, and why no farther. Every control says it with these sentences. */
+
+export type Failed = "server" | "link";
+
+/** What stands between this page and the vehicle and has failed; null: nothing is known to have. */
+export const failed = computed<Failed | null>(() => {
+  if (link.value !== "open") return "server";
+  return hasLinkFailed.value ? "link" : null;
+});
+
+const FAILURES: Record<Failed, string> = {
+  server: "No connection: use the pilot's transmitter",
+  link: "The link has failed: use the pilot's transmitter",
+};
+
+/** Why nothing that is asked here comes to the vehicle, whoever asks it. */
+export const whyUnheard = computed(() => (failed.value === null ? null : FAILURES[failed.value]));
+
+const whyObserving = computed(() => (lease.value.mine ? null : "You observe: take control first"));
+
+/** Why the server does nothing that only whoever is in charge may ask of it; null: it does. */
+export const whyNotAsk = computed(() =>
+  failed.value === "server" ? "The server cannot be reached" : whyObserving.value,
+);
+
+/** Why the vehicle cannot be commanded from this page; null: it can. */
+export const whyNotCommand = computed(() => whyUnheard.value ?? whyObserving.value);
+
+/** Whether a value may no longer be so: it is old, or what would tell that it is has failed. */
+export const isOld = (source: Source, group: Group): boolean =>
+  (source === "live" && failed.value !== null) || isStale(heard[source].value, group, now_ms.value);

@@ -1,0 +1,60 @@
+import { beforeEach, describe, expect, it } from "vitest";
+import { now_ms } from "../src/store/clock";
+import { heard, lease, linkStatus, nodes, takeFlying } from "../src/store/flying";
+import { failed, isOld, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
+import { link } from "../src/store/state";
+import { linkStatus as status, vehicleMessage } from "./flight_samples";
+
+const linkNode = (state: string) => [{ name: "link", state, restarts: 0, text: "" }] as never;
+
+beforeEach(() => {
+  now_ms.value = 0;
+  link.value = "open";
+  lease.value = { ...lease.value, holder: "Anna", mine: true };
+  nodes.value = linkNode("running");
+  heard.live.value = heard.replay.value = linkStatus.value = null;
+  takeFlying({ v: 1, type: "link", link: status() }, 0);
+  takeFlying(vehicleMessage(), 0);
+  takeFlying(vehicleMessage({ source: "replay" }), 0);
+});
+
+describe("how far this page's word reaches", () => {
+  it("is to the vehicle, for whoever is in charge", () => {
+    expect([failed.value, whyUnheard.value, whyNotAsk.value, whyNotCommand.value]).toEqual([
+      null,
+      null,
+      null,
+      null,
+    ]);
+    lease.value = { ...lease.value, mine: false };
+    expect(whyNotCommand.value).toContain("You observe");
+    expect(whyNotAsk.value).toContain("You observe");
+    expect(whyUnheard.value).toBeNull();
+  });
+
+  it.each(["silent", "restarting"])(
+    "ends at a link that is %s, though the server still does as asked",
+    (state) => {
+      nodes.value = linkNode(state);
+      expect(failed.value).toBe("link");
+      expect(whyNotCommand.value).toContain("transmitter");
+      expect(whyNotAsk.value).toBeNull();
+    },
+  );
+
+  it.each(["lost", "connecting"] as const)("ends at a server to which the page is %s", (state) => {
+    link.value = state;
+    nodes.value = linkNode("silent");
+    expect(failed.value).toBe("server");
+    expect(whyNotCommand.value).toContain("transmitter");
+    expect(whyNotAsk.value).toContain("server");
+  });
+
+  it("makes every live value old at once when it ends, and no recording's", () => {
+    expect([isOld("live", "position"), isOld("replay", "position")]).toEqual([false, false]);
+    nodes.value = linkNode("silent");
+    expect([isOld("live", "position"), isOld("replay", "position")]).toEqual([true, false]);
+    nodes.value = linkNode("running");
+    expect(isOld("live", "battery")).toBe(false);
+  });
+});
