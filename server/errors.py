@@ -11,6 +11,7 @@ ServerError
 │   ├── NotReadyError          an export without a finished plan
 │   ├── NotCertifiedError      a plan without a certificate is not uploaded
 │   ├── CheckNeededError       a start without a fresh check of what is on board and where the vehicle stands
+│   ├── LateError              a command that comes later than it is good for
 │   ├── InUseError             deleting what something else needs
 │   └── JobCancelledError      somebody cancelled the job
 ├── BadRequestError        a query or body that makes no sense
@@ -97,6 +98,10 @@ class NotCertifiedError(ConflictError):
 
 class CheckNeededError(ConflictError):
     code = "check_needed"
+
+
+class LateError(ConflictError):
+    code = "late"
 
 
 class InUseError(ConflictError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ from starlette.requests import HTTPConnection
 
 from server.door.auth import Auth, session_key
 from server.door.hub import Hub
-from server.errors import SignInError
+from server.errors import BadRequestError, LateError, SignInError
 from server.library import Library
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc
@@ -81,8 +82,24 @@ def session_key_of(request: Request) -> str:
 
 
 def in_charge(request: Request) -> Operator:
-    """What a command of this session carries; raises ``NotInChargeError``."""
+    """What a command of this session carries; raises ``NotInChargeError``, and ``LateError`` for one that is late."""
+    _check_in_time(request.headers.get("hedgehop-good-until", ""))
     return parts_of(request).flying.lease.operator(session_key_of(request))
+
+
+def _check_in_time(good_until: str) -> None:
+    """While a server hangs, what pages ask of it waits in its sockets; meanwhile somebody took the transmitter."""
+    try:
+        late_s = time.monotonic() - float(good_until or "inf")
+    except ValueError:
+        raise BadRequestError(
+            f"Hedgehop-Good-Until is {good_until[:40]!r}, which is no time.",
+            advice="Give a time of the clock of all t_mono_s, in seconds, or leave it out.",
+        ) from None
+    if late_s > 0:
+        raise LateError(
+            f"This came {late_s:.0f} s too late and was not done.", advice="Give it again if it is still wanted."
+        )
 
 
 SignedIn = Depends(signed_in)

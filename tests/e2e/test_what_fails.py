@@ -22,6 +22,8 @@ class Stream:
     def __init__(self, context: BrowserContext) -> None:
         self._page_side: WebSocketRoute | None = None
         self._left_out: frozenset[str] = frozenset()
+        self.is_silent = False
+        """As a server that hangs: its sockets stay open."""
         context.route_web_socket(re.compile(r"/ws$"), self._opened)
 
     def link_is(self, state: str) -> None:
@@ -36,7 +38,7 @@ class Stream:
         server = page_side.connect_to_server()
 
         def pass_on(text: str | bytes) -> None:
-            if json.loads(text)["type"] not in self._left_out:
+            if not self.is_silent and json.loads(text)["type"] not in self._left_out:
                 page_side.send(text)
 
         server.on_message(pass_on)
@@ -80,3 +82,31 @@ def test_while_the_link_has_failed_nothing_is_offered_that_it_would_do(
     expect(page.get_by_test_id("check-again")).to_be_disabled()
     for way in ("way-auto", "way-guided"):
         expect(page.get_by_test_id(way)).to_be_disabled()
+
+
+def test_a_server_that_is_silent_is_said_and_nobody_waits_for_its_answers(
+    station: Station, page: Page, stream: Stream, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, station)
+    connect(page, vehicle)
+    arm = page.get_by_test_id("arm")
+    page.context.route("**/api/flight/arm", lambda route: None)
+    for _ in range(2):  # as assistive technology does
+        arm.evaluate("button => button.click()")
+    expect(page.get_by_test_id("section-flight")).to_contain_text("No answer yet: it is not known whether this arrived")
+    expect(arm).to_have_attribute("aria-disabled", "false")
+
+    stream.is_silent = True
+    expect(page.get_by_test_id("link-state")).to_contain_text("silent")
+    expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
+    expect(page.get_by_test_id("link-lost")).to_contain_text("The server is silent")
+    expect(page.get_by_test_id("chip-link")).to_contain_text("No server")
+    expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
+    for command in ("next-upload", "arm", "hold-position", "return-home"):
+        expect(page.get_by_test_id(command)).to_be_disabled()
+
+    stream.is_silent = False
+    expect(page.get_by_test_id("link-state")).to_contain_text("Connected")
+    expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
+    expect(page.get_by_test_id("safety-why")).to_have_count(0)
+    expect(arm).to_be_enabled()

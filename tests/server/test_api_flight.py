@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 
 import httpx
@@ -157,3 +158,16 @@ def test_what_the_vehicle_says_reaches_the_page(
 def test_bodies_that_make_no_sense(served: Running, pilot: httpx.Client, path: str, body: dict[str, object]) -> None:
     answer = pilot.post(path, json=body)
     assert (answer.status_code, answer.json()["code"], served.flying.asked) == (422, "invalid", [])
+
+
+def test_a_command_that_waited_for_longer_than_it_is_good_for_is_not_done(served: Running, pilot: httpx.Client) -> None:
+    late = pilot.post("/api/flight/return", headers={"Hedgehop-Good-Until": f"{time.monotonic() - 12:.3f}"})
+    assert (late.status_code, late.json()["code"]) == (409, "late")
+    assert "12 s too late and was not done" in late.json()["what"]
+    wrong = pilot.post("/api/flight/return", headers={"Hedgehop-Good-Until": "noon"})
+    assert wrong.status_code == 422
+    assert "noon" in wrong.json()["what"]
+    assert served.flying.asked == []
+    for good_until in (f"{time.monotonic() + 60:.3f}", ""):
+        assert pilot.post("/api/flight/return", headers={"Hedgehop-Good-Until": good_until}).status_code == 204
+    assert len(served.flying.asked) == 2

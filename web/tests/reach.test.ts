@@ -42,7 +42,7 @@ describe("how far this page's word reaches", () => {
     },
   );
 
-  it.each(["lost", "connecting"] as const)("ends at a server to which the page is %s", (state) => {
+  it.each(["silent", "lost", "connecting"] as const)("ends at a server to which the page is %s", (state) => {
     link.value = state;
     nodes.value = linkNode("silent");
     expect(failed.value).toBe("server");

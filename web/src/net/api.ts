@@ -17,6 +17,9 @@ const NO_ANSWER: ErrorDoc = {
   advice: "Check that it is still running; the page keeps trying.",
 };
 
+/** For answers that take work; nobody waits for ever for a server that hangs. */
+const LIMIT_MS = 120_000;
+
 function isErrorDoc(body: unknown): body is ErrorDoc {
   return typeof body === "object" && body !== null && "what" in body && typeof body.what === "string";
 }
@@ -58,16 +61,25 @@ const CANCELLED: ErrorDoc = { ...NO_ANSWER, code: "cancelled", what: "Cancelled.
 /** Whether somebody no longer wanted the answer: nothing to tell anyone. */
 export const isCancelled = (error: unknown) => error instanceof ApiError && error.doc.code === "cancelled";
 
-/** One request to our server; returns the answer if it is a good one. `signal` gives it up. */
+export interface Asking {
+  /** Gives it up. */
+  signal?: AbortSignal;
+  limit_ms?: number;
+  headers?: Readonly<Record<string, string>>;
+}
+
+/** One request to our server; returns the answer if it is a good one. */
 export async function request(
   method: string,
   path: string,
   body?: unknown,
-  signal: AbortSignal | null = null,
+  { signal, limit_ms = LIMIT_MS, headers = {} }: Asking = {},
 ): Promise<Response> {
-  const init: RequestInit = { method, credentials: "same-origin", signal };
+  const limit = AbortSignal.timeout(limit_ms);
+  const init: RequestInit = { method, credentials: "same-origin", headers };
+  init.signal = signal ? AbortSignal.any([signal, limit]) : limit;
   if (method !== "GET") {
-    init.headers = { "Content-Type": "application/json" };
+    init.headers = { "Content-Type": "application/json", ...headers };
     init.body = JSON.stringify(body ?? {});
   }
   const response = await fetch(path, init).catch(() => {
@@ -82,9 +94,9 @@ export async function requestJson<T>(
   method: string,
   path: string,
   body?: unknown,
-  signal: AbortSignal | null = null,
+  asking: Asking = {},
 ): Promise<T> {
-  const response = await request(method, path, body, signal);
+  const response = await request(method, path, body, asking);
   return (await response.json()) as T;
 }
 

@@ -1,7 +1,8 @@
 import type { ClientMessage, ServerMessage } from "../messages";
 import { PROTOCOL_VERSION } from "../messages";
 
-export type LinkState = "connecting" | "open" | "lost";
+/** silent: the stream is open, and nothing comes, though the page asks every second. */
+export type LinkState = "connecting" | "open" | "silent" | "lost";
 
 export interface SocketEvents {
   message: (message: ServerMessage) => void;
@@ -13,7 +14,11 @@ export interface SocketEvents {
 }
 
 const SIGN_IN_CLOSE_CODE = 4401;
+const LOOK_EVERY_MS = 500;
 const PING_EVERY_MS = 1000;
+const SILENT_MS = 3000;
+/** A page that has not looked for so long was itself stopped, and has not been listening. */
+const ASLEEP_MS = 1500;
 const FIRST_RETRY_MS = 300;
 const LONGEST_RETRY_MS = 5000;
 
@@ -27,6 +32,10 @@ export function retryDelay_ms(attempt: number, random: number): number {
 export class Stream {
   private socket: WebSocket | null = null;
   private attempt = 0;
+  private heard_ms = 0;
+  private looked_ms = 0;
+  private pinged_ms = 0;
+  private state: LinkState = "connecting";
 
   constructor(
     private readonly url: string,
@@ -36,8 +45,9 @@ export class Stream {
   connect(): void {
     const socket = new WebSocket(this.url);
     this.socket = socket;
+    socket.onopen = () => this.ping(performance.now());
     socket.onmessage = (event) => this.read(event.data);
-    const beat = setInterval(() => this.send({ type: "ping", page_ms: performance.now() }), PING_EVERY_MS);
+    const beat = setInterval(() => this.look(performance.now()), LOOK_EVERY_MS);
     socket.onclose = (event) => {
       clearInterval(beat);
       this.closed(event.code);
@@ -51,7 +61,29 @@ export class Stream {
     return true;
   }
 
+  /**
+   * A server that hangs keeps its sockets open: only its silence tells. The stream is not closed for that, because what
+   * was on its way still comes when the server, or the line to it, goes on.
+   */
+  private look(now_ms: number): void {
+    if (now_ms - this.looked_ms > ASLEEP_MS) this.heard_ms = now_ms;
+    this.looked_ms = now_ms;
+    if (this.state === "open" && now_ms - this.heard_ms >= SILENT_MS) this.becomes("silent");
+    if (now_ms - this.pinged_ms > PING_EVERY_MS - LOOK_EVERY_MS / 2) this.ping(now_ms);
+  }
+
+  private ping(now_ms: number): void {
+    this.pinged_ms = now_ms;
+    this.send({ type: "ping", page_ms: now_ms });
+  }
+
+  private becomes(state: LinkState): void {
+    this.state = state;
+    this.events.link(state);
+  }
+
   private read(data: unknown): void {
+    this.heard_ms = performance.now();
     let message: ServerMessage;
     try {
       message = JSON.parse(String(data)) as ServerMessage;
@@ -63,10 +95,8 @@ export class Stream {
       this.events.unreadable(`protocol version ${message.v}; this page speaks ${PROTOCOL_VERSION}`);
       return;
     }
-    if (message.type === "snapshot") {
-      this.attempt = 0;
-      this.events.link("open");
-    }
+    if (message.type === "snapshot") this.attempt = 0;
+    if (message.type === "snapshot" || this.state === "silent") this.becomes("open");
     this.events.message(message);
   }
 
@@ -76,7 +106,7 @@ export class Stream {
       this.events.signIn();
       return;
     }
-    this.events.link("lost");
+    this.becomes("lost");
     setTimeout(() => this.connect(), retryDelay_ms(this.attempt, Math.random()));
     this.attempt += 1;
   }

@@ -44,6 +44,7 @@ export async function switchAvoidance(
     place: AVOIDANCE,
     method: "PUT",
     path: "/api/obstacles/avoidance",
+    moves: true,
     body,
     done,
   });
@@ -66,6 +67,7 @@ export const flyManoeuvre = (id: string, kind: ManoeuvreDoc["kind"]) =>
   order({
     place: MANOEUVRE,
     path: `/api/obstacles/manoeuvre/${encodeURIComponent(id)}/fly`,
+    moves: true,
     done: FLOWN[kind],
   });
 

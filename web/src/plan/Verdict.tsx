@@ -35,7 +35,7 @@ export function VerdictShape({ kind, size = 22 }: { kind: VerdictKind; size?: nu
 
 export const verdict = () => verdictOf(plan.value, isFresh.value);
 export function verdictWord(kind: VerdictKind): string {
-  if (kind === "computing" && link.value === "lost") return "No connection";
+  if (kind === "computing" && (link.value === "lost" || link.value === "silent")) return "No connection";
   const isNeither = kind === "not_certified" && result.value?.feasible === false;
   return isNeither ? "NOT CERTIFIED, NOT FEASIBLE" : WORDS[kind];
 }

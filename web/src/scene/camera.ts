@@ -22,10 +22,13 @@ export function chase(): void {
   if (followed.value) frame("chase", followed.value);
 }
 
+/** A server that is silent for a while has not forgotten where this page's camera is. */
+const isConnected = computed(() => link.value === "open" || link.value === "silent");
+
 /** On the way into Fly, and when its vehicle appears there; on the way out the plan is looked at again. */
 export function startFollowing(): void {
   effect(() => {
-    const flies = viewId.value === "fly" && pageId.value !== null && link.value === "open";
+    const flies = viewId.value === "fly" && pageId.value !== null && isConnected.value;
     if (flies && followed.value === "live") frame("chase", "live");
     else if (!flies && follows.peek()) frame("plan");
   });

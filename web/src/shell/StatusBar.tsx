@@ -25,9 +25,16 @@ function Brand() {
   );
 }
 
+const LINK_WORDS = {
+  open: "Connected",
+  connecting: "Connecting…",
+  silent: "The server is silent",
+  lost: "Connection lost – retrying",
+} as const;
+
 function LinkBadge() {
   const state = link.value;
-  const text = { open: "Connected", connecting: "Connecting…", lost: "Connection lost – retrying" }[state];
+  const text = LINK_WORDS[state];
   return (
     <span class={`link-badge ${state}`} role="status" data-testid="link-state">
       <span class="dot" aria-hidden="true" />

@@ -1,5 +1,7 @@
 import { signal } from "@preact/signals";
+import type { ErrorDoc } from "../messages";
 import { asErrorDoc, request } from "../net/api";
+import { serverIn_s } from "./server_clock";
 import { setError } from "./state";
 
 /** What a command came to, by the place on the page where it was given. */
@@ -28,6 +30,31 @@ function setPending(place: string, isPending: boolean): void {
   pending.value = next;
 }
 
+/** So long somebody who needs the vehicle to act now waits for an answer before they are told that there is none. */
+const PATIENCE_MS = 3000;
+/** What comes to the server later than that is not done any more: by then somebody may have taken the transmitter. */
+const GOOD_FOR_S = 5;
+
+const unknown = (what: string, moves: boolean): ErrorDoc => ({
+  code: "no_answer",
+  what: `${what}: it is not known whether this arrived.`,
+  where: "",
+  advice: moves
+    ? "Take the pilot's transmitter if the vehicle must act now."
+    : "See what became of it when the server answers again.",
+});
+
+let waiting = new AbortController();
+
+/** The server answers nothing any more: nobody is left to wait for an answer that may never come. */
+export function giveUpOrders(): void {
+  waiting.abort();
+  waiting = new AbortController();
+}
+
+/** The last order of each place: a late answer to one before it is nobody's any more. */
+const last = new Map<string, object>();
+
 interface Order {
   /** Where its outcome appears. */
   place: string;
@@ -36,23 +63,41 @@ interface Order {
   method?: "POST" | "PUT" | "DELETE";
   /** What to say once it is done. */
   done?: string;
+  /** The vehicle acts on it: somebody waits, with the pilot's transmitter at hand. */
+  moves?: boolean;
 }
 
 /** Gives one command to the server; returns its answer, or null when it failed, which the place then says. */
-export async function order({ place, path, body, method = "POST", done }: Order): Promise<Response | null> {
+export async function order(given: Order): Promise<Response | null> {
+  const { place, path, body, method = "POST", done, moves = false } = given;
+  const { signal } = waiting;
+  const isLast = () => last.get(place) === given;
+  const settle = (error: ErrorDoc | null) => {
+    if (!isLast()) return;
+    setPending(place, false);
+    setError(place, error);
+  };
+  last.set(place, given);
   setPending(place, true);
   say(place, null);
+  // It goes on being waited for: a late answer takes the place of these words.
+  const patience = moves ? setTimeout(() => settle(unknown("No answer yet", moves)), PATIENCE_MS) : undefined;
   try {
-    const answer = await request(method, path, body);
-    setError(place, null);
-    if (done) say(place, done);
+    const answer = await request(method, path, body, { signal, headers: goodUntil() });
+    settle(null);
+    if (done && isLast()) say(place, done);
     return answer;
   } catch (error) {
-    setError(place, asErrorDoc(error));
+    settle(signal.aborted ? unknown("The server does not answer", moves) : asErrorDoc(error));
     return null;
   } finally {
-    setPending(place, false);
+    clearTimeout(patience);
   }
+}
+
+function goodUntil(): Record<string, string> {
+  const until_s = serverIn_s(GOOD_FOR_S, performance.now());
+  return until_s === null ? {} : { "Hedgehop-Good-Until": until_s.toFixed(3) };
 }
 
 /** A request without an answer to keep; its error appears at `place`. */

@@ -7,6 +7,7 @@ import { editedPlace, notifyText, setError, setPlan } from "./state";
 export const queue = new EditQueue();
 
 const RETRY_MS = 1000;
+const EDIT_LIMIT_MS = 15_000;
 /** No answer, or one that says "not now". */
 const RETRIED = new Set([0, 502, 503, 504]);
 let timer: ReturnType<typeof setTimeout> | undefined;
@@ -64,7 +65,7 @@ function pump(): void {
 
 async function send(body: object, place: string): Promise<void> {
   try {
-    queue.accepted(await requestJson<PlanState>("PUT", "/api/plan", body));
+    queue.accepted(await requestJson<PlanState>("PUT", "/api/plan", body, { limit_ms: EDIT_LIMIT_MS }));
   } catch (error) {
     if (error instanceof ApiError && error.doc.code === "stale") await mergeStale(place);
     else if (error instanceof ApiError && RETRIED.has(error.status)) return retry();

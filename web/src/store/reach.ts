@@ -14,13 +14,17 @@ export const failed = computed<Failed | null>(() => {
   return hasLinkFailed.value ? "link" : null;
 });
 
-const FAILURES: Record<Failed, string> = {
+const FAILURES = {
+  silent: "The server is silent: use the pilot's transmitter",
   server: "No connection: use the pilot's transmitter",
   link: "The link has failed: use the pilot's transmitter",
-};
+} as const;
 
 /** Why nothing that is asked here comes to the vehicle, whoever asks it. */
-export const whyUnheard = computed(() => (failed.value === null ? null : FAILURES[failed.value]));
+export const whyUnheard = computed(() => {
+  if (failed.value === null) return null;
+  return FAILURES[link.value === "silent" ? "silent" : failed.value];
+});
 
 const whyObserving = computed(() => (lease.value.mine ? null : "You observe: take control first"));
 

@@ -6,7 +6,7 @@ import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
-import { takeClock } from "./server_clock";
+import { forgetClock, takeClock } from "./server_clock";
 import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
@@ -17,6 +17,7 @@ export function receive(message: ServerMessage): void {
   confirm(message);
   switch (message.type) {
     case "snapshot":
+      forgetClock();
       // At once: nobody sees the new library beside the old plan.
       batch(() => takeSnapshot(message));
       forgetUnconfirmed();

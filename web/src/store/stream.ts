@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import type { ClientMessage, FrameView, SelectionDoc, ViewDoc } from "../messages";
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
+import { giveUpOrders } from "./outcomes";
 import { receive } from "./reduce";
 import { nextChange } from "./shared";
 import { cursor, link, notifyText, selection, view } from "./state";
@@ -10,7 +11,9 @@ const stream = new Stream(streamUrl(location), {
   message: receive,
   link: (state) => {
     link.value = state;
-    if (state === "lost") cursor.value = null;
+    if (state === "open") return;
+    cursor.value = null;
+    giveUpOrders();
   },
   signIn: goToSignIn,
   unreadable: (why) => notifyText("error", `The server sent ${why}.`, "Reload the page."),

@@ -43,7 +43,7 @@ interface Question {
 async function answered<T>({ address, place, signal }: Question, take: (answer: T) => void): Promise<void> {
   busySince_ms.value = performance.now();
   try {
-    const answer = await requestJson<T>("GET", address, undefined, signal);
+    const answer = await requestJson<T>("GET", address, undefined, { signal });
     if (signal.aborted) return;
     setError(place, null);
     take(answer);

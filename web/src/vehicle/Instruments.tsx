@@ -3,6 +3,7 @@ import { age_s, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, linkState, silence_s, type Source } from "../store/flying";
 import { failed, isOld } from "../store/reach";
+import { link } from "../store/state";
 import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
 import { Attitude } from "./Attitude";
@@ -20,7 +21,10 @@ function ageOf(source: Source, group: Group): { isOld: boolean; age: string } {
 const isLost = () => failed.value !== null || linkState.value === "lost";
 
 function lostWords(): [what: string, then: string] {
-  if (failed.value === "server") return ["This page has lost the server", "It keeps trying."];
+  if (link.value === "silent")
+    return ["The server is silent", "Nothing below is new. Take the pilot's transmitter."];
+  if (failed.value === "server")
+    return ["This page has lost the server", "It keeps trying. Take the pilot's transmitter."];
   if (failed.value === "link")
     return ["The link has failed", "It is started again. Take the pilot's transmitter."];
   return ["Communication lost", "Last values below. The vehicle follows its failsafe."];

@@ -45,19 +45,20 @@ const FLIGHT = "flight";
 export const NEXT = "next";
 
 export const holdPosition = () =>
-  order({ place: SAFETY, path: "/api/flight/pause", done: "The vehicle holds its position." });
+  order({ place: SAFETY, path: "/api/flight/pause", moves: true, done: "The vehicle holds its position." });
 export const returnHome = () =>
-  order({ place: SAFETY, path: "/api/flight/return", done: "The vehicle returns home." });
+  order({ place: SAFETY, path: "/api/flight/return", moves: true, done: "The vehicle returns home." });
 
-export const arm = () => order({ place: FLIGHT, path: "/api/flight/arm", done: "Armed." });
-export const disarm = () => order({ place: FLIGHT, path: "/api/flight/disarm", done: "Disarmed." });
+export const arm = () => order({ place: FLIGHT, path: "/api/flight/arm", moves: true, done: "Armed." });
+export const disarm = () =>
+  order({ place: FLIGHT, path: "/api/flight/disarm", moves: true, done: "Disarmed." });
 export const land = () =>
-  order({ place: FLIGHT, path: "/api/flight/land", done: "The vehicle lands here and now." });
+  order({ place: FLIGHT, path: "/api/flight/land", moves: true, done: "The vehicle lands here and now." });
 
 export const pauseFlight = () =>
-  order({ place: NEXT, path: "/api/flight/pause", done: "Paused: it holds its position." });
+  order({ place: NEXT, path: "/api/flight/pause", moves: true, done: "Paused: it holds its position." });
 export const resumeFlight = () =>
-  order({ place: NEXT, path: "/api/flight/resume", done: "The flight goes on." });
+  order({ place: NEXT, path: "/api/flight/resume", moves: true, done: "The flight goes on." });
 
 /** Why nothing can be uploaded, by the verdict on the open plan. */
 export function uploadObstacle(verdict: VerdictKind): string | null {
