@@ -10,6 +10,7 @@ from contextlib import closing
 import uvicorn
 from fastapi import FastAPI
 
+from server.door.slow_lines import PageWebSocket
 from server.errors import ServerError, StartError
 from server.library import Library
 from server.settings import Settings
@@ -68,6 +69,7 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         server_header=False,
         # Meshes deflate slowly and little: a 36 MB one took 2.2 s with, 0.3 s without.
         ws_per_message_deflate=False,
+        ws=PageWebSocket,
         ws_max_size=WEBSOCKET_LIMIT_BYTES,
         timeout_graceful_shutdown=SHUTDOWN_S,
     )

@@ -2,7 +2,7 @@
 
 State (plan, library, view, selection, cursor, each job, each vehicle, each sensor) is latest-wins: a newer message
 takes the place of the one still waiting. Notices, alerts and the vehicle's own words must arrive: each waits on its
-own, and a page that lets the queue fill up is cut off, as is one that does not take a message within five seconds. It
+own, and a page that lets the queue fill up is cut off, as is one that takes nothing for five seconds. It
 reconnects and starts from a fresh snapshot. What a page changes for all is answered behind the new state, so that it
 can tell older states from its own.
 """
@@ -30,7 +30,8 @@ log = logging.getLogger("hedgehop.hub")
 
 PAGES_MAX = 200
 WAITING_MAX = 256
-SEND_TIMEOUT_S = 5.0
+SEND_TIMEOUT_S, CLOSE_TIMEOUT_S = 120.0, 5.0
+"""A large message over a slow line takes long; a line that takes nothing is cut much sooner (``slow_lines``)."""
 MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
@@ -293,5 +294,5 @@ async def _close(websocket: WebSocket, code: int) -> None:
     if WebSocketState.DISCONNECTED in (websocket.application_state, websocket.client_state):
         return
     with contextlib.suppress(RuntimeError, WebSocketDisconnect, TimeoutError):
-        async with asyncio.timeout(SEND_TIMEOUT_S):
+        async with asyncio.timeout(CLOSE_TIMEOUT_S):
             await websocket.close(code)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from typing import Literal
 
 import pytest
 from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
@@ -26,7 +26,7 @@ class Stream:
         """As a server that hangs: its sockets stay open."""
         context.route_web_socket(re.compile(r"/ws$"), self._opened)
 
-    def link_is(self, state: str) -> None:
+    def link_is(self, state: Literal["running", "silent", "restarting"]) -> None:
         """Of the process that commands the vehicle, whatever it is in truth."""
         assert self._page_side is not None
         self._left_out = frozenset({"nodes"})
@@ -45,7 +45,7 @@ class Stream:
 
 
 @pytest.fixture
-def stream(page: Page) -> Iterator[Stream]:
+def stream(page: Page) -> Stream:
     return Stream(page.context)
 
 
