@@ -11,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from server.door.slow_lines import PageWebSocket
+from server.door.tls import Tls
 from server.errors import ServerError, StartError
 from server.library import Library
 from server.settings import Settings
@@ -31,9 +32,10 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     configure_logging(settings.log_level)
     for address in settings.link:
         parse_address(address)
+    tls = Tls.of(settings)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
-        app = create_app(settings, library, Workspace, Flying.open, demo=demo)
-        server = AnnouncingServer(app, settings)
+        app = create_app(settings, library, Workspace, Flying.open, demo=demo, tls=tls)
+        server = AnnouncingServer(app, settings, tls)
         server.run(sockets=[listening])
         if not server.started:
             fault = getattr(app.state, "start_error", None)
@@ -43,26 +45,35 @@ def run(settings: Settings, *, demo: bool = False) -> None:
 class AnnouncingServer(uvicorn.Server):
     """Prints the sign-in link once the console answers."""
 
-    def __init__(self, app: FastAPI, settings: Settings) -> None:
-        super().__init__(server_config(app, settings))
-        self._app, self._settings = app, settings
+    def __init__(self, app: FastAPI, settings: Settings, tls: Tls | None = None) -> None:
+        super().__init__(server_config(app, settings, tls))
+        self._app, self._settings, self._tls = app, settings, tls
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if self.started:
             sys.stdout.write(f"Hedgehop is ready. Open this link, which signs you in once:\n  {self.link()}\n")
+            if self._tls is not None and (offer := self._tls.offer(self._settings)):
+                sys.stdout.write(f"Other devices come to trust this station at:\n  {offer.page}\n")
             sys.stdout.flush()
 
     def link(self) -> str:
         token = self._app.state.parts.auth.new_link_token()
-        return f"http://{_reachable(self._settings.host)}:{self._settings.port}/login?token={token}"
+        return f"{self.origin()}/login?token={token}"
+
+    def origin(self) -> str:
+        host, port = self._settings.host, self._settings.port
+        return (
+            f"http://{_reachable(host)}:{port}" if self._tls is None else f"https://{self._tls.reachable(host)}:{port}"
+        )
 
 
-def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+def server_config(app: FastAPI, settings: Settings, tls: Tls | None = None) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
+        ssl_context_factory=None if tls is None else lambda config, default: tls.context,
         log_config=None,
         # The guard writes one line per request, without the queries that hold sign-in tokens.
         access_log=False,

@@ -22,6 +22,7 @@ ServerError
 │   └── DataDirError           not usable at all: refused at start
 ├── BusyError              too many pages or jobs, or shutting down
 ├── WorkerDiedError        the process that did the work ended (killed, out of memory)
+├── CertificateError       the console's certificate cannot be made, read or used
 └── StartError             settings or port that Hedgehop cannot start with
 
 ``telemetry.errors`` come through as they are. Like ``planning.errors``, every error says what is wrong, where, and
@@ -142,6 +143,10 @@ class BusyError(ServerError):
 
 class WorkerDiedError(ServerError):
     code = "worker_died"
+
+
+class CertificateError(ServerError):
+    code = "certificate"
 
 
 class StartError(ServerError):

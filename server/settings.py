@@ -75,9 +75,17 @@ class Settings(BaseSettings):
     )
 
     host: str = "127.0.0.1"
-    """Address to listen on. Anything but loopback opens Hedgehop to the network: put a proxy with TLS before it."""
+    """Address to listen on. Anything but loopback opens Hedgehop to the network, and needs TLS: see hedgehop tls."""
     port: Annotated[int, Field(ge=1, le=65535)] = 8000
     """Port of the console, the API and the 3D view."""
+    behind_proxy: bool = False
+    """Plain HTTP beyond loopback all the same: a proxy adds TLS, or a container publishes its port on loopback only."""
+    tls_certificate: Path | None = None
+    """A certificate (PEM, with those above it) to use instead of the one that hedgehop tls makes."""
+    tls_key: Path | None = None
+    """Its key, where that is a file of its own."""
+    trust_port: Annotated[int, Field(ge=0, le=65535)] = 8001
+    """Where other devices get the authority's certificate, over plain HTTP and nothing else; 0: nowhere."""
     data_dir: Path = Field(default_factory=default_data_dir)
     """Where surface models, plans and sessions are kept."""
     password: Password | None = None
@@ -185,6 +193,8 @@ def settings_table() -> str:
 _DOCUMENTED = {
     "data_dir": "`$XDG_DATA_HOME/hedgehop`, else `~/.local/share/hedgehop`",
     "password": "none",
+    "tls_certificate": "none",
+    "tls_key": "none",
     "link": "none",
     "allowed_hosts": "none",
     "allowed_origins": "none",

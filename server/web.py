@@ -6,9 +6,9 @@ import asyncio
 import contextlib
 import logging
 import signal
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import AsyncExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -40,6 +40,8 @@ from server.door.auth import Auth
 from server.door.guard import Guard
 from server.door.hub import Hub
 from server.door.sensor_token import sensor_token
+from server.door.tls import Tls
+from server.door.trust import TrustListener
 from server.errors import error_doc, status_of
 from server.library import Library
 from server.library.radar_files import RadarShelf
@@ -87,6 +89,7 @@ def create_app(
     open_flying: OpenFlying,
     *,
     demo: bool = False,
+    tls: Tls | None = None,
 ) -> FastAPI:
     """The app around an open library, which stays its caller's to close."""
     app = FastAPI(
@@ -95,7 +98,7 @@ def create_app(
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
-        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_flying, demo),
+        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_flying, demo, tls),
     )
     for module in ROUTERS:
         app.include_router(module.router)
@@ -103,7 +106,7 @@ def create_app(
         app.add_exception_handler(error, _tell)
     app.add_exception_handler(ClientDisconnect, _answer_nobody)
     app.add_exception_handler(Exception, _tell_unforeseen)
-    app.add_middleware(Guard, settings=settings)
+    app.add_middleware(Guard, settings=settings, certified=tls.names.dns if tls else frozenset())
     return app
 
 
@@ -115,6 +118,7 @@ async def _lifespan(
     make_workspace: MakeWorkspace,
     open_flying: OpenFlying,
     demo: bool,
+    tls: Tls | None,
 ) -> AsyncIterator[None]:
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
@@ -125,7 +129,12 @@ async def _lifespan(
             app.state.start_error = error
             raise
         app.state.parts = parts
-        for loop in (parts.loop_lag.run(), *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
+        for loop in (
+            parts.loop_lag.run(),
+            *_tls_loops(tls, settings),
+            *parts.workspace.loops(),
+            *parts.flying.loops(demo=demo),
+        ):
             background.spawn(loop)
         try:
             yield
@@ -167,6 +176,14 @@ async def _open(
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
     return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag())
+
+
+def _tls_loops(tls: Tls | None, settings: Settings) -> list[Coroutine[Any, Any, None]]:
+    if tls is None:
+        return []
+    offer = tls.offer(settings)
+    listener = [] if offer is None else [TrustListener(offer, settings.host, settings.trust_port).run()]
+    return [tls.run(), *listener]
 
 
 def _open_studies(library: Library, hub: Hub, background: Background) -> tuple[RadarDesk, ScenarioDesk]:

@@ -51,6 +51,7 @@ class _Lazy(TyperGroup):
 class _Commands(_Lazy):
     places: ClassVar = {
         "serve": (".serve_command.serve", examples.SERVE),
+        "tls": (".tls_command.tls", examples.TLS),
         "plan": (".plan_command.plan", examples.PLAN),
         "certify": (".certify_command.certify", examples.CERTIFY),
         "survey": (".survey_command.survey", examples.SURVEY),

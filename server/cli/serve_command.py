@@ -21,6 +21,10 @@ def serve(
     demo: Annotated[bool, Option("--demo", help="Open the generated demo, with a simulated vehicle.")] = False,
     host: Annotated[str | None, Option(help=f"Address to listen on; default {_USUAL['host'].default}.")] = None,
     port: Annotated[int | None, Option(help=f"Port; default {_USUAL['port'].default}.")] = None,
+    behind_proxy: Annotated[
+        bool | None,
+        Option("--behind-proxy", help="Plain HTTP beyond this machine all the same: a proxy adds TLS."),
+    ] = None,
     demo_world: Annotated[
         bool | None,
         Option("--demo-world/--no-demo-world", help="Whether the demo's vehicle meets obstacles that it has to see."),
@@ -44,6 +48,12 @@ def serve(
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
     settings = load_settings(
-        host=host, port=port, data_dir=data_dir, link=link or None, demo_world=demo_world, demo_radar=radar
+        host=host,
+        port=port,
+        behind_proxy=behind_proxy,
+        data_dir=data_dir,
+        link=link or None,
+        demo_world=demo_world,
+        demo_radar=radar,
     )
     run(settings, demo=demo)

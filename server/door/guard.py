@@ -57,8 +57,9 @@ class Door:
     any_address_on_port: int | None
 
     @classmethod
-    def of(cls, settings: Settings) -> Door:
-        names = {"127.0.0.1", "localhost", "[::1]"}
+    def of(cls, settings: Settings, certified: frozenset[str] = frozenset()) -> Door:
+        """``certified``: names of our certificate, under which no other server can appear."""
+        names = {"127.0.0.1", "localhost", "[::1]", *certified}
         wildcard = settings.host in ("0.0.0.0", "::")
         if not wildcard:
             names.add(f"[{settings.host}]" if ":" in settings.host else settings.host.lower())
@@ -108,9 +109,9 @@ def _is_address(text: str) -> bool:
 class Guard:
     """ASGI middleware around the whole app."""
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, settings: Settings, certified: frozenset[str] = frozenset()) -> None:
         self._app = app
-        self._door = Door.of(settings)
+        self._door = Door.of(settings, certified)
         self._upload_limit = settings.upload_limit_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -15,7 +15,13 @@ EXIT_CODES = "Exit codes: 0 done, 1 not certified, not feasible or failed, 2 wro
 SERVE = _examples(
     ("A first look, with the demo terrain", "hedgehop serve --demo"),
     ("The same, the radar simulated from its samples on", "hedgehop serve --demo --radar iq"),
+    ("For tablets in the network, after hedgehop tls", "hedgehop serve --host 0.0.0.0"),
     ("Another port and place for the data", "hedgehop serve --port 8010 --data-dir ~/flights"),
+)
+TLS = _examples(
+    ("Once, before the station serves a network", "hedgehop tls"),
+    ("Also reached under another name and address", "hedgehop tls --name gcs.example --name 192.168.1.20"),
+    ("Then", "hedgehop serve --host 0.0.0.0"),
 )
 PLAN = _examples(
     ("A mission over the points of a file", "hedgehop plan dsm.tif pois.csv --out flight --rtl-height-m 60"),

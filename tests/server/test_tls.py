@@ -1,0 +1,258 @@
+"""TLS from the laptop's own authority: what is made, when it is made anew, and a real station reached through it."""
+
+from __future__ import annotations
+
+import hashlib
+import ipaddress
+import json
+import os
+import re
+import ssl
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from server.app import AnnouncingServer
+from server.door import certificates
+from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
+from server.door.tls import Tls
+from server.errors import CertificateError, StartError
+from server.settings import Settings
+from tests.server.test_process import free_port
+
+HERE = Names(frozenset({"localhost", "laptop", "laptop.local"}), frozenset({ipaddress.ip_address("127.0.0.1")}))
+MOVED = HERE.with_given(["192.168.7.5"])
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> CertificateFiles:
+    files = CertificateFiles(tmp_path)
+    assert files.renew(now_utc(), HERE)
+    return files
+
+
+def test_keys_are_readable_by_their_user_only(files: CertificateFiles) -> None:
+    assert stat.S_IMODE(files.folder.stat().st_mode) == 0o700
+    assert {stat.S_IMODE(path.stat().st_mode) for path in files.folder.iterdir()} == {0o600}
+    assert files.certificate().names == HERE
+
+
+def test_it_is_made_anew_for_a_new_address_and_before_it_ends_and_the_authority_stays(files: CertificateFiles) -> None:
+    authority, now = files.authority.read_bytes(), now_utc()
+    assert not files.renew(now, HERE)
+    assert files.renew(now, MOVED)
+    assert not files.renew(now, HERE)
+    until = files.certificate().until_utc
+    assert not files.renew(until - timedelta(days=31), MOVED)
+    assert files.renew(until - timedelta(days=29), MOVED)
+    assert files.certificate().until_utc > until
+    assert files.authority.read_bytes() == authority
+    assert until - now < timedelta(days=398)
+
+
+def test_a_clock_that_was_reset_makes_it_anew_and_one_out_of_range_is_said(files: CertificateFiles) -> None:
+    for wrong in (now_utc() - timedelta(days=4000), now_utc() + AUTHORITY_LASTS):
+        with pytest.raises(CertificateError, match="clock"):
+            files.renew(wrong, HERE)
+
+
+def test_given_names_are_kept_for_all_that_follow(files: CertificateFiles) -> None:
+    files.add_names(["GCS.example", "203.0.113.9"])
+    assert files.renew(now_utc(), HERE)
+    assert files.certificate().names == HERE.with_given(["gcs.example", "203.0.113.9"])
+    assert not files.renew(now_utc(), HERE)
+    with pytest.raises(CertificateError, match="neither a host name nor an address"):
+        files.add_names(["no name"])
+
+
+@pytest.mark.parametrize("broken", ["server.pem", "authority.pem", "authority.key"])
+def test_a_damaged_file_is_named(files: CertificateFiles, broken: str) -> None:
+    (files.folder / broken).write_text("-----BEGIN NOTHING-----")
+    with pytest.raises(CertificateError, match="cannot be read") as caught:
+        files.renew(now_utc(), MOVED)
+    assert caught.value.where == str(files.folder / broken)
+
+
+def test_this_machines_addresses_are_found(tmp_path: Path) -> None:
+    table = "Main:\n  +-- 0.0.0.0/0 3 0 5\n     |-- 10.1.2.0\n        /24 link UNICAST\n"
+    (tmp_path / "v4").write_text(f"{table}     |-- 10.1.2.3\n        /32 host LOCAL\n")
+    (tmp_path / "v6").write_text("fd00" + "0" * 27 + "2 04 40 00 82 eth0\nfe80" + "0" * 27 + "1 04 40 20 80 eth0\n")
+    assert set(map(str, certificates._ipv4_addresses(tmp_path / "v4"))) == {"127.0.0.1", "10.1.2.3"}
+    assert set(map(str, certificates._ipv6_addresses(tmp_path / "v6"))) == {"fd00::2"}
+    assert {"127.0.0.1"} <= set(map(str, names_of_machine().addresses))
+
+
+def test_plain_text_does_not_leave_the_machine_unasked(tmp_path: Path) -> None:
+    with pytest.raises(StartError, match=r"plain HTTP.*hedgehop tls") as caught:
+        Tls.of(Settings(data_dir=tmp_path, host="0.0.0.0"))
+    assert "--behind-proxy" in caught.value.advice
+    assert Tls.of(Settings(data_dir=tmp_path, host="0.0.0.0", behind_proxy=True)) is None
+    assert Tls.of(Settings(data_dir=tmp_path, host="127.0.0.2")) is None
+    assert Tls.of(Settings(data_dir=tmp_path, host="localhost")) is None
+
+
+def test_a_certificate_of_ones_own_is_used_and_a_wrong_key_is_said(files: CertificateFiles, tmp_path: Path) -> None:
+    own = Settings(data_dir=tmp_path / "other", host="0.0.0.0", tls_certificate=files.server)
+    tls = Tls.of(own)
+    assert tls is not None
+    assert tls.names == HERE
+    assert tls.offer(own) is None
+    wrong = own.model_copy(update={"tls_key": files.folder / "authority.key"})
+    with pytest.raises(CertificateError, match="cannot be used"):
+        Tls.of(wrong)
+
+
+@pytest.mark.parametrize(("host", "printed"), [("0.0.0.0", "192.168.7.5"), ("192.168.7.5", "192.168.7.5")])
+def test_the_printed_address_is_one_that_the_certificate_holds(
+    files: CertificateFiles, tmp_path: Path, host: str, printed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certificates, "names_of_machine", lambda: MOVED)
+    settings = Settings(data_dir=tmp_path, host=host)
+    tls = Tls.of(settings)
+    assert AnnouncingServer(None, settings, tls).origin() == f"https://{printed}:8000"  # pyright: ignore[reportArgumentType]
+
+
+# A station in a process of its own, listening on all addresses.
+
+
+@dataclass(slots=True)
+class Secure:
+    files: CertificateFiles
+    link: str
+    trust_page: str
+    trusting: ssl.SSLContext
+    said: str
+
+    @property
+    def origin(self) -> str:
+        return self.link.partition("/login")[0]
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
+    data_dir = tmp_path_factory.mktemp("tls") / "data"
+    hedgehop = [sys.executable, "-m", "server"]
+    said = subprocess.run(
+        [*hedgehop, "tls", "--data-dir", str(data_dir)], capture_output=True, text=True, check=True
+    ).stderr
+    port, trust_port = free_port(), free_port()
+    process = subprocess.Popen(
+        [*hedgehop, "serve", "--host", "0.0.0.0", "--port", str(port), "--data-dir", str(data_dir)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "HEDGEHOP_TRUST_PORT": str(trust_port)},
+    )
+    try:
+        assert process.stdout is not None
+        printed = [process.stdout.readline() for _ in range(4)]
+        files = CertificateFiles(data_dir)
+        trusting = ssl.create_default_context(cafile=files.authority)
+        yield Secure(files, printed[1].strip(), printed[3].strip(), trusting, said)
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+@pytest.fixture
+def client(station: Secure) -> Iterator[httpx.Client]:
+    with httpx.Client(
+        base_url=station.origin, verify=station.trusting, headers={"Origin": station.origin}, timeout=60
+    ) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def cookie(station: Secure) -> str:
+    with httpx.Client(verify=station.trusting, timeout=60) as client:
+        answer = client.get(station.link)
+    assert answer.status_code == 303
+    set_cookie = answer.headers["set-cookie"]
+    assert set_cookie.startswith("__Host-hedgehop-")
+    assert {"Secure", "HttpOnly", "SameSite=strict"} <= {part.strip() for part in set_cookie.split(";")}
+    return set_cookie.partition(";")[0]
+
+
+def test_the_link_is_https_and_signs_in_who_trusts_the_authority(
+    station: Secure, client: httpx.Client, cookie: str
+) -> None:
+    assert station.link.startswith("https://")
+    health = client.get("/api/health", headers={"Cookie": cookie}).json()
+    assert "loop" in health
+    with pytest.raises(httpx.ConnectError, match="self-signed certificate"):
+        httpx.get(f"{station.origin}/api/health")
+
+
+def test_the_stream_rides_on_it_and_other_origins_do_not(station: Secure, cookie: str) -> None:
+    url = station.origin.replace("https", "wss") + "/ws"
+    headers = {"Cookie": cookie}
+    with connect(url, ssl=station.trusting, origin=station.origin, additional_headers=headers) as socket:  # pyright: ignore[reportArgumentType]
+        assert json.loads(socket.recv(60))["type"] == "snapshot"
+    for origin in (station.origin.replace("https", "http"), "https://evil.example"):
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(url, ssl=station.trusting, origin=origin, additional_headers=headers)  # pyright: ignore[reportArgumentType]
+
+
+def test_pages_may_open_secure_sockets_only_and_foreign_names_are_refused(
+    station: Secure, client: httpx.Client
+) -> None:
+    policy = client.get("/signin").headers["content-security-policy"]
+    assert "ws://" not in policy
+    assert client.get("/signin", headers={"Host": "evil.example"}).status_code == 403
+    port = station.origin.rpartition(":")[2]
+    for name in ("localhost", *station.files.certificate().names.dns):
+        assert client.get("/api/health", headers={"Host": f"{name}:{port}"}).status_code == 200
+
+
+@pytest.mark.filterwarnings("ignore:ssl.TLSVersion:DeprecationWarning")
+def test_old_versions_and_plain_text_are_refused(station: Secure) -> None:
+    old = ssl.create_default_context(cafile=station.files.authority)
+    old.set_ciphers("ALL:@SECLEVEL=0")
+    old.minimum_version = ssl.TLSVersion.MINIMUM_SUPPORTED
+    old.maximum_version = ssl.TLSVersion.TLSv1_1
+    for attempt in (
+        lambda: httpx.get(f"{station.origin}/api/health", verify=old),
+        lambda: httpx.get(f"{station.origin.replace('https', 'http')}/api/health"),
+    ):
+        with pytest.raises(httpx.TransportError):
+            attempt()
+
+
+def test_a_tablet_gets_the_authority_and_nothing_else(station: Secure) -> None:
+    with httpx.Client(base_url=station.trust_page, timeout=60) as tablet:
+        given = tablet.get("/hedgehop-authority.crt")
+        assert given.content == station.files.authority.read_bytes()
+        assert given.headers["content-type"] == "application/x-x509-ca-cert"
+        page = tablet.get("/").text
+        assert "<svg" in page
+        assert station.origin in page
+        for path in ("/api/health", "/login", "/../tls/authority.key", "//etc/passwd"):
+            assert tablet.get(path).status_code == 404
+        assert tablet.post("/").status_code == 404
+    sha256 = hashlib.sha256(ssl.PEM_cert_to_DER_cert(given.text)).hexdigest().upper()
+    shown = ":".join(re.findall("..", sha256))
+    assert shown in page
+    assert shown in station.said
+
+
+def test_a_new_certificate_is_taken_up_while_it_serves(station: Secure) -> None:
+    def serial() -> str:
+        with httpx.Client(verify=station.trusting) as client, client.stream("GET", f"{station.origin}/signin") as got:
+            return got.extensions["network_stream"].get_extra_info("ssl_object").getpeercert()["serialNumber"]
+
+    before = serial()
+    station.files.add_names(["added.example"])
+    assert station.files.renew(now_utc())
+    ends = time.monotonic() + 180
+    while serial() == before and time.monotonic() < ends:
+        time.sleep(1)
+    assert serial() != before
