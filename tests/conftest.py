@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """By the test's own name: workers add its group, and ``--last-failed`` would not find it again."""
+    """By the test's own name: workers add its group, and ``--last-failed`` would not find it."""
     if "PYTEST_XDIST_WORKER" not in os.environ:
         report.nodeid = re.sub(r"@[^@\[\]]+$", "", report.nodeid)
 

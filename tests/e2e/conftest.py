@@ -42,13 +42,16 @@ VIEW = re.compile(r"/view/[^/]+/(\?.*)?$")
 
 SELDOM = """
 if (location.pathname.startsWith("/view/")) {
+  const address = new URL(location.href);
+  address.searchParams.set("fixedDpr", "0.5");
+  history.replaceState(null, "", address);
   const draw = window.requestAnimationFrame.bind(window);
   window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), PAUSE_MS);
   window.cancelAnimationFrame = clearTimeout;
 }
 """
-"""Each picture of the 3D view takes up to half a second of a processor that renders it in software: drawn one after the
-other without a pause, they would leave little to everything that is being tested."""
+"""Each picture of the 3D view takes a processor that renders it in software up to half a second, a quarter of that at
+half its size: drawn without pauses they would leave little to everything that is being tested."""
 
 
 @pytest.fixture(scope="session")
@@ -131,7 +134,7 @@ def page(browser: Browser) -> Iterator[Page]:
 @pytest.fixture
 def page_3d(browser: Browser) -> Iterator[Page]:
     """With the real 3D view."""
-    yield from _page_3d(browser, pause_ms=400)
+    yield from _page_3d(browser, pause_ms=800)
 
 
 @pytest.fixture

@@ -68,6 +68,7 @@ def test_points_are_dragged_reordered_and_brought_back(demo_3d: Page) -> None:
 
 def test_profile_and_view_mark_the_same_place(demo_3d: Page) -> None:
     demo = demo_3d
+    expect(demo.locator(".u-over")).to_be_visible()
     chart = demo.locator(".u-over").bounding_box()
     assert chart is not None
     values = demo.get_by_test_id("cursor-values")
