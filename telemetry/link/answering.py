@@ -76,6 +76,7 @@ class Answering:
             requests.Disconnect: self._disconnect,
             requests.Adopt: self._adopt,
             requests.Release: self._release,
+            requests.SetSigning: self._set_signing,
             requests.Upload: self._upload,
             requests.Download: self._download,
             requests.ReadParameters: self._read_parameters,
@@ -119,6 +120,16 @@ class Answering:
     async def _release(self, request: requests.Release) -> None:
         await self._record(request, "release the vehicle")
         self._link.release()
+
+    async def _set_signing(self, request: requests.SetSigning) -> None:
+        session = self._link.need_session(live=request.enabled)
+        if request.enabled:
+            state = session.vehicle.state
+            if state.armed or state.heartbeat_t_mono_s is None or session.pilot.flight.is_under_way:
+                raise NotAllowedError("A key is given to a vehicle on the ground only.", advice="Land and disarm it.")
+        words = "set up signing" if request.enabled else "switch signing off"
+        await self._record(request, words, must=request.enabled)
+        await session.set_signing(request.enabled)
 
     async def _upload(self, request: requests.Upload) -> object:
         session = self._link.need_session()

@@ -27,9 +27,13 @@ class Line:
         gone: Callable[[Line, Peer], None],
         changed: Callable[[], None],
         clock: Callable[[], float],
+        seal: Callable[[Line, Peer, bytes], bytes],
+        number: int,
     ) -> None:
+        """``number``: of this link in signatures; ``seal``: signs a frame to a peer that has a key."""
         self.address, self.text = address, address.text
         self._heard, self._gone, self._clock = heard, gone, clock
+        self.number, self._seal = number, seal
         self._packer = Packer()
         self._parsers: dict[Peer, Parser] = {}
         self._bad_of_the_past = self.received_messages = 0
@@ -40,6 +44,8 @@ class Line:
     def send(self, message: Message, peer: Peer | None = None) -> bytes | None:
         """The frame that was sent; None when it could not be. ``peer`` None: the far end that the address names."""
         frame = self._packer.pack(message)
+        if peer is not None:
+            frame = self._seal(self, peer, frame)
         return frame if self.connection.send(frame, peer) else None
 
     @property

@@ -14,17 +14,19 @@ from typing import Any
 
 from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.link.audit import AUTOPILOT, Audit, CommandLog
-from telemetry.link.heartbeat import Grace, Heartbeat
+from telemetry.link.heartbeat import PERIOD_S, Grace, Heartbeat, heartbeat
 from telemetry.link.line import Line
-from telemetry.link.peers import Peers, Source, is_same_vehicle
+from telemetry.link.peers import MOST_CANDIDATES, Peers, Source, is_same_vehicle
 from telemetry.link.publishing import StatePublisher, StatusTeller
 from telemetry.link.session import Around, Session
+from telemetry.link.signatures import KeyRing
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.connections import Peer
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.mavlink.ranges import RangeReader
-from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Published, Topic
+from telemetry.mavlink.reduce import is_vehicle_heartbeat
+from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Published, SigningStatus, Topic
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.tracks import TracksStatus
 
@@ -42,9 +44,13 @@ class Link:
         grace_s: float = 10.0,
         server_age_s: Callable[[], float | None] = lambda: None,
         audit: Audit | None = None,
+        keys: KeyRing | None = None,
     ) -> None:
         self._publish = publish
         self.peers, self.lines = Peers(), dict[str, Line]()
+        self.keys = keys or KeyRing()
+        self._late: dict[tuple[str, Peer], tuple[int, float]] = {}
+        """Who signed with a key, too late, and when it was last told the time."""
         self.flight = FlightKeeper()
         self.session: Session | None = None
         self._tasks, self._running = tasks, dict[str, asyncio.Task[None]]()
@@ -61,7 +67,7 @@ class Link:
         """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
         self._again: tuple[Candidate, AvoidBy] | None = None
         """The vehicle for which avoidance was on when the node before this one ended."""
-        self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell)
+        self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell, self.keys)
         self._ranges = RangeReader()
 
     # Connections and the vehicle.
@@ -73,7 +79,16 @@ class Link:
         self.peers.adopt_first_of(text, wanted=adopt, only=only)
         if text in self.lines:
             return
-        line = Line(parsed, heard=self._heard, gone=self._gone, changed=self._connection_changed, clock=time.monotonic)
+        taken = {line.number for line in self.lines.values()}
+        line = Line(
+            parsed,
+            heard=self._heard,
+            gone=self._gone,
+            changed=self._connection_changed,
+            clock=time.monotonic,
+            seal=self._seal,
+            number=next(number for number in range(256) if number not in taken),
+        )
         self.lines[text] = line
         self._running[text] = self.spawn(line.connection.run())
         self._tell()
@@ -156,6 +171,11 @@ class Link:
 
     def _heard(self, line: Line, source: Source, message: Message) -> None:
         now_s, t_utc_s = time.monotonic(), time.time()
+        proof = self.keys.judge(source.system_id, message.get_msgId(), bytes(message.get_msgbuf()), now_s)
+        if proof != "good":
+            if proof == "replayed" and is_vehicle_heartbeat(message):
+                self._tell_time(line, source, now_s)
+            return
         verdict = self.peers.hear(source, message, now_s)
         if verdict == "stranger" and self.peers.wants(source, message):
             candidate = self.peers.find(source.id, now_s)
@@ -167,8 +187,26 @@ class Link:
             return
         if verdict == "adopted":
             session.on_message(message, now_s, t_utc_s)
-        elif verdict == "stranger" and line is session.vehicle.line:
-            session.vehicle.on_foreign(message)
+        elif verdict == "stranger" and line is session.vehicle.line and not session.signs:
+            session.vehicle.on_foreign(message)  # a vehicle that demands signatures does not listen to it
+
+    def _tell_time(self, line: Line, source: Source, now_s: float) -> None:
+        """A vehicle without a clock learns the time from what it hears. A heartbeat does no harm if it is not it."""
+        key = (line.text, source.peer)
+        if now_s - self._late.get(key, (0, -PERIOD_S))[1] < PERIOD_S:
+            return
+        self._late.pop(key, None)
+        self._late[key] = (source.system_id, now_s)
+        if len(self._late) > MOST_CANDIDATES:
+            del self._late[next(iter(self._late))]
+        line.send(heartbeat(), source.peer)
+
+    def _seal(self, line: Line, peer: Peer, frame: bytes) -> bytes:
+        vehicle = self.session and self.session.vehicle
+        if vehicle and vehicle.line is line and vehicle.candidate.peer == peer:
+            return self.keys.seal(vehicle.target[0], frame, line.number)
+        system_id, _ = self._late.get((line.text, peer), (None, 0.0))
+        return self.keys.seal(system_id, frame, line.number)
 
     def on_perception(self, status: PerceptionStatus) -> None:
         """What a sensor's node says about the regions ahead."""
@@ -252,7 +290,12 @@ class Link:
             mission_state=vehicle.onboard.state if vehicle else "unknown",
             mission_digest=vehicle.onboard.digest if vehicle else None,
             again=self.peers.again(now_s),
-            warnings=(*(vehicle.believing.warnings(now_s) if vehicle else ()), *self.peers.warnings(now_s)),
+            signing=self.keys.status(vehicle.target[0]) if vehicle else SigningStatus(),
+            warnings=(
+                *(vehicle.believing.warnings(now_s) if vehicle else ()),
+                *self.peers.warnings(now_s),
+                *self.keys.warnings(vehicle.target[0] if vehicle else None, now_s),
+            ),
         )
 
     def _tell(self) -> None:
@@ -285,6 +328,7 @@ async def open_link(publish: Callable[[str, Published], None], **options: Any) -
         link = Link(publish, tasks, **options)
         link.spawn(link.run_heartbeat())
         link.spawn(link.run_clock())
+        link.spawn(link.keys.run())
         try:
             yield link
         except Exception as error:  # Raised again below: the group would wrap it.

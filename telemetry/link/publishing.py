@@ -75,4 +75,13 @@ def _shape(status: LinkStatus) -> tuple[object, ...]:
     """All but the figures that change all the time."""
     lines = tuple((line.address, line.state, line.error and line.error.what) for line in status.connections)
     mission = (status.mission_state, status.mission_digest)
-    return (lines, status.candidates, status.adopted, status.state, mission, status.warnings, status.again)
+    return (
+        lines,
+        status.candidates,
+        status.adopted,
+        status.state,
+        mission,
+        status.warnings,
+        status.again,
+        status.signing.mode,
+    )

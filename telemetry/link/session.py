@@ -12,21 +12,26 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from telemetry.errors import TelemetryError
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.errors import SilentError, TelemetryError
 from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
 from telemetry.link.piloting import Pilot
 from telemetry.link.procedures import Spawn
 from telemetry.link.publishing import StatePublisher
+from telemetry.link.signatures import KeyRing
 from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.mavlink.ranges import RangeReader
+from telemetry.mavlink.signing import KEY_BYTES
 from telemetry.topics.messages import Candidate, Published, RawFrame, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
 
+SETUP_TIMES, SETUP_EVERY_S = 5, 1.0
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
 AVOIDS_AGAIN = (
     "The link has restarted: nothing avoided obstacles meanwhile. Avoidance is on again. Look where the vehicle is."
@@ -43,6 +48,7 @@ class Around:
     commands: CommandLog
     spawn: Spawn
     changed: Callable[[], None]
+    keys: KeyRing
 
 
 class Session:
@@ -109,6 +115,41 @@ class Session:
 
     def on_sent(self, frame: bytes) -> None:
         self._around.publish(Topic.RAW, RawFrame(time.time(), True, self.vehicle.line.text, frame))
+
+    # Signing.
+
+    @property
+    def signs(self) -> bool:
+        """Nothing unsigned is accepted in its name."""
+        return self._around.keys.status(self.vehicle.target[0]).mode == "on"
+
+    async def set_signing(self, enabled: bool) -> None:
+        """Raises NotAllowedError, SilentError. Switching off is heard here in any case, by the vehicle perhaps."""
+        keys, system_id = self._around.keys, self.vehicle.target[0]
+        keyed = keys.of(system_id)
+        if not enabled:
+            if keyed is not None:
+                for _ in range(SETUP_TIMES):
+                    self._give_key(bytes(KEY_BYTES), 0)
+                keyed.mode = "let"
+                await keys.save()
+            return
+        keyed = keys.new_key(system_id)
+        await keys.save()
+        for _ in range(SETUP_TIMES):
+            self._give_key(keyed.signing.key, keyed.signing.newest)
+            await asyncio.sleep(SETUP_EVERY_S)
+            if keyed.mode == "on":
+                await keys.save()
+                return
+        what = "The vehicle was given a key, and has not begun to sign with it."
+        advice = "It may not know signing, or refuse it on this link: PX4 needs MAV_SIGN_CFG. Read its messages."
+        raise SilentError(what, advice=advice)
+
+    def _give_key(self, key: bytes, timestamp: int) -> None:
+        """Never through ``on_sent``: a recording must not hold the key."""
+        message = mavlink.MAVLink_setup_signing_message(*self.vehicle.target, list(key), timestamp)
+        self.vehicle.line.send(message, self.vehicle.candidate.peer)
 
     def _on_state(self, state: VehicleState) -> None:
         self._around.states.offer(state)

@@ -21,6 +21,7 @@ from telemetry.bus.node import GIVEN_UP_S, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.audit import AuditLog
 from telemetry.link.link import Link, open_link
+from telemetry.link.signatures import KeyRing
 from telemetry.topics.messages import Candidate, FlightStatus, Topic
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.requests import LinkRequest, SetAvoidance
@@ -144,8 +145,11 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
     memory = await asyncio.to_thread(read_memory, file)
     right = OperatorRight(memory.highest_token)
     log = await asyncio.to_thread(AuditLog, audit)
+    keys = await asyncio.to_thread(KeyRing, runtime.parent / "keys" / "signing.json")
     try:
-        async with open_link(bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log) as link:
+        async with open_link(
+            bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log, keys=keys
+        ) as link:
             node = LinkNode(link, right, context, file)
             await node.take_up(memory, links)
             answering = Answering(link, right)

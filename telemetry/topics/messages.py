@@ -5,7 +5,7 @@ Live names stand in ``Topic``; a replay uses the same names behind ``replay/`` a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
 
@@ -127,6 +127,23 @@ class Candidate:
     vehicle_type: int
 
 
+SigningMode = Literal["off", "asked", "on", "let"]
+"""asked: a key was sent, and nothing has come that is signed with it; let: switched off, unsigned messages pass."""
+
+
+@dataclass(frozen=True, slots=True)
+class SigningStatus:
+    """MAVLink 2 signing of the adopted vehicle, and what was refused since the link started."""
+
+    mode: SigningMode = "off"
+    unsigned: int = 0
+    wrong: int = 0
+    """Not by the vehicle's key."""
+    replayed: int = 0
+    ahead: int = 0
+    """By a timestamp that is years ahead."""
+
+
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
     t_mono_s: float
@@ -149,6 +166,7 @@ class LinkStatus:
     """Such as a second vehicle with the same id."""
     again: Candidate | None = None
     """Has the numbers of the adopted vehicle, which has fallen silent, and is heard from elsewhere: perhaps it."""
+    signing: SigningStatus = field(default_factory=SigningStatus)
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,6 +65,13 @@ class Release(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class SetSigning(OperatorRequest):
+    """Gives the vehicle a key over this link, on the ground, or takes it away again. -> None; SilentError"""
+
+    enabled: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Upload(OperatorRequest):
     """Replaces the mission on board and reads it back. Refused while a mission is being flown. -> UploadReport"""
 
@@ -188,6 +195,7 @@ LinkRequest = (
     | Disconnect
     | Adopt
     | Release
+    | SetSigning
     | Upload
     | Download
     | ReadParameters

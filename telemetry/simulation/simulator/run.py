@@ -9,6 +9,7 @@ import signal
 from collections.abc import AsyncIterator, Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
@@ -68,6 +69,8 @@ class Simulator:
         self.vehicle = _vehicle(options)
         self.endpoint = Endpoint(self.vehicle)
         self._channels: dict[Hashable, _Channel] = {}
+        self._key: tuple[bytes, int] | None = None
+        """With which it signs, and the time that it was given with it."""
         self._transport: Transport | None = None
 
     @property
@@ -111,7 +114,8 @@ class Simulator:
     # What the transport tells.
 
     def joined(self, peer: Hashable) -> None:
-        self._channels[peer] = _Channel(self.endpoint)
+        channel = self._channels[peer] = _Channel(self.endpoint)
+        channel.use_key(self._key)
         self.endpoint.connect(peer)
 
     def left(self, peer: Hashable) -> None:
@@ -121,7 +125,19 @@ class Simulator:
     def received(self, peer: Hashable, data: bytes) -> None:
         now_s = asyncio.get_running_loop().time()
         for message in self._channels[peer].read(data):
+            if message.get_type() == "SETUP_SIGNING":
+                self._set_key(message)
+                continue
             self._send(self.endpoint.on_message(message, peer, now_s))
+
+    def _set_key(self, message: Any) -> None:
+        """As ArduCopter: never while armed; a key and a time of nothing but zeros switch signing off."""
+        if self.vehicle.autopilot.armed or message.target_system != self.endpoint.system_id:
+            return
+        key = bytes(message.secret_key)
+        self._key = (key, message.initial_timestamp) if any(key) or message.initial_timestamp else None
+        for channel in self._channels.values():
+            channel.use_key(self._key)
 
     def _send(self, replies: list[Reply]) -> None:
         for peer, message in replies:
@@ -137,6 +153,21 @@ class _Channel:
         self._codec.robust_parsing = True
         self._endpoint = endpoint
         self._newest: int | None = None
+
+    def use_key(self, key: tuple[bytes, int] | None) -> None:
+        """pymavlink's own signing: it has no clock, and follows the time of what it hears."""
+        signing = wire.MAVLinkSigning()
+        if key is not None:
+            signing.secret_key, signing.timestamp = key
+            signing.sign_outgoing = True
+            signing.allow_unsigned_callback = lambda _, number: (
+                number
+                in (
+                    wire.MAVLINK_MSG_ID_RADIO_STATUS,
+                    wire.MAVLINK_MSG_ID_RADIO,
+                )
+            )
+        self._codec.signing = signing
 
     def read(self, data: bytes) -> Iterable[wire.MAVLink_message]:
         for message in self._codec.parse_buffer(data) or []:
