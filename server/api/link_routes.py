@@ -6,7 +6,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, Session, SignedIn, answer
-from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, TakeLease
+from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, SetVehicleSigning, TakeLease
 
 router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["link"], responses=ERROR_RESPONSES)
 
@@ -38,6 +38,12 @@ async def disconnect(body: DisconnectLink, operator: InCharge, flying: Fly) -> N
 async def adopt(body: AdoptVehicle, operator: InCharge, flying: Fly) -> None:
     """Takes one of the vehicles that were heard as the one that is flown."""
     await flying.connections.adopt(operator, body.candidate)
+
+
+@router.post("/link/signing", **DONE)
+async def signing(body: SetVehicleSigning, operator: InCharge, flying: Fly) -> None:
+    """Gives the vehicle on the ground a key over this link, so that both sign what they send; or takes it away."""
+    await flying.connections.set_signing(operator, enabled=body.enabled)
 
 
 @router.post("/link/release", **DONE)

@@ -9,7 +9,7 @@ from server.errors import reported
 from server.heard.node_states import Nodes
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import LinkStatus
-from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release
+from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release, SetSigning
 
 log = logging.getLogger("hedgehop.flying")
 
@@ -57,6 +57,10 @@ class Connections:
     async def adopt(self, operator: Operator, candidate: str) -> None:
         await self._link.call(Adopt(operator, candidate))
         self._candidate = candidate
+
+    async def set_signing(self, operator: Operator, *, enabled: bool) -> None:
+        """Raises NotAllowedError in the air, SilentError."""
+        await self._link.call(SetSigning(operator, enabled))
 
     async def release(self, operator: Operator) -> None:
         self._candidate = None

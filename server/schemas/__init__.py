@@ -18,6 +18,7 @@ from server.schemas.flight_docs import (
     PlayReview,
     PreflightDoc,
     RecordingDoc,
+    SetVehicleSigning,
     SignIn,
     Source,
     StartFlight,

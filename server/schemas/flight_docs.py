@@ -161,6 +161,10 @@ class AdoptVehicle(Strict):
     candidate: Annotated[str, Field(max_length=300)]
 
 
+class SetVehicleSigning(Strict):
+    enabled: bool
+
+
 class UploadPlan(Strict):
     """Uploads the open plan, which must be at this revision."""
 

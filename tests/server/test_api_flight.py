@@ -29,6 +29,7 @@ COMMANDS: list[tuple[str, dict[str, object]]] = [
     ("/api/link/connect", {"address": "udpin:0.0.0.0:14550"}),
     ("/api/link/disconnect", {"address": "udpin:0.0.0.0:14550"}),
     ("/api/link/adopt", {"candidate": "udpin:0.0.0.0:14550/10.0.0.9:14550/1/1"}),
+    ("/api/link/signing", {"enabled": True}),
     ("/api/link/release", {}),
     ("/api/link/simulator", {}),
     ("/api/flight/upload", {"revision": 1}),

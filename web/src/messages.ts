@@ -271,6 +271,7 @@ export interface LinkStatus {
   mission_digest: string | null;
   warnings: string[];
   again: Candidate | null;
+  signing: SigningStatus;
 }
 
 /** Of the map frame. */
@@ -422,6 +423,15 @@ export interface Rounded {
   field: string;
   sent: number | null;
   kept: number | null;
+}
+
+/** MAVLink 2 signing of the adopted vehicle, and what was refused since the link started. */
+export interface SigningStatus {
+  mode: "off" | "asked" | "on" | "let";
+  unsigned: number;
+  wrong: number;
+  replayed: number;
+  ahead: number;
 }
 
 /** One object that is followed from radar frame to radar frame. */
@@ -1150,6 +1160,10 @@ export interface DisconnectLink {
 
 export interface AdoptVehicle {
   candidate: string;
+}
+
+export interface SetVehicleSigning {
+  enabled: boolean;
 }
 
 /** Uploads the open plan, which must be at this revision. */

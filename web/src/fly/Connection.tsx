@@ -1,14 +1,24 @@
 import { useState } from "preact/hooks";
-import type { Candidate, ConnectionStatus } from "../messages";
+import type { Candidate, ConnectionStatus, SigningStatus } from "../messages";
 import { count, number } from "../format";
 import { adopted, isInAir, lease, linkState, linkStatus, silence_s, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { failed, whyNotAsk, whyNotCommand } from "../store/reach";
 import { Button } from "../ui/Button";
+import { HoldButton } from "../ui/HoldButton";
 import { ErrorPanel } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
 import { Section } from "../ui/Section";
-import { adopt, connectTo, disconnect, giveControl, release, startSimulator } from "../vehicle/orders";
+import {
+  adopt,
+  connectTo,
+  disconnect,
+  giveControl,
+  release,
+  setSigning,
+  SIGNING,
+  startSimulator,
+} from "../vehicle/orders";
 import { linkWords } from "../vehicle/vehicle_words";
 
 const PLACE = "connection";
@@ -157,6 +167,56 @@ function Adopted({ used }: { used: Candidate }) {
   );
 }
 
+const SIGNED: Readonly<Record<SigningStatus["mode"], string>> = {
+  off: "Not signed: whoever reaches the link can speak as the vehicle.",
+  asked: "Key sent. The vehicle has not signed with it yet.",
+  on: "Signed",
+  let: "Switched off: unsigned messages are accepted.",
+};
+
+function Signing({ signing }: { signing: SigningStatus }) {
+  const refused = signing.unsigned + signing.wrong + signing.replayed + signing.ahead;
+  const isOn = signing.mode === "on";
+  return (
+    <div class="row" data-testid="signing">
+      <span class="connection-name">
+        <strong>Signing</strong>
+        <span class={isOn ? "muted" : "says-near"} data-testid="signing-state">
+          {SIGNED[signing.mode]}
+          {refused > 0 && ` · ${number(refused)} refused`}
+        </span>
+        {refused > 0 && (
+          <span class="muted">
+            {number(signing.unsigned)} unsigned, {number(signing.wrong)} with another key,{" "}
+            {number(signing.replayed)} heard before, {number(signing.ahead)} of years ahead
+          </span>
+        )}
+      </span>
+      {isOn || signing.mode === "asked" ? (
+        <HoldButton
+          label="Switch off"
+          icon="cross"
+          place={SIGNING}
+          disabled={!lease.value.mine}
+          title="In an emergency: from then on anybody may speak as the vehicle"
+          testid="signing-off"
+          onHold={() => void setSigning(false)}
+        />
+      ) : (
+        <HoldButton
+          label="Set up"
+          icon="check"
+          place={SIGNING}
+          disabled={!lease.value.mine || isInAir.value}
+          title="Over a cable or a link that nobody else hears: the key is sent in the clear"
+          testid="signing-on"
+          onHold={() => void setSigning(true)}
+        />
+      )}
+    </div>
+  );
+}
+
 /** The simulator is the primary action below, until a connection waits for somebody. */
 function NoVehicle({ waits }: { waits: boolean }) {
   return (
@@ -192,6 +252,7 @@ export function ConnectionSection() {
       startsOpen={!used}
     >
       {used ? <Adopted used={used} /> : <NoVehicle waits={Boolean(status?.connections.length)} />}
+      {used && status && <Signing signing={status.signing} />}
       <Candidates found={status?.candidates ?? []} />
       {status && status.connections.length > 0 && (
         <ul class="connections" aria-label="Connections">

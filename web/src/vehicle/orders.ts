@@ -102,7 +102,10 @@ export const disconnect = (address: string) =>
   order({ place: CONNECTION, path: "/api/link/disconnect", body: { address } });
 export const adopt = (candidate: string) =>
   order({ place: CONNECTION, path: "/api/link/adopt", body: { candidate } });
+export const SIGNING = "signing";
 export const release = () => order({ place: CONNECTION, path: "/api/link/release" });
+export const setSigning = (enabled: boolean) =>
+  order({ place: SIGNING, path: "/api/link/signing", body: { enabled } });
 export const startSimulator = (place: string) => order({ place, path: "/api/link/simulator" });
 
 export const LEASE = "lease";
