@@ -16,6 +16,7 @@ from pathlib import Path
 from telemetry.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import RecordingError
+from telemetry.recording.mcap_files.continuing import find_unfinished
 from telemetry.recording.mcap_files.mend import mend
 from telemetry.recording.recorder import Recorder
 from telemetry.topics.messages import RecorderStatus, Topic
@@ -34,7 +35,9 @@ class RecorderNode:
 
     def __init__(self, bus: Bus, context: NodeContext, folder: Path) -> None:
         self._bus, self._context, self._folder = bus, context, folder
-        self._recorder = Recorder(folder)
+        # The flight that a recorder was killed in goes on in the same file.
+        self._going_on = find_unfinished(folder, t_utc_s=time.time(), t_mono_s=time.monotonic())
+        self._recorder = Recorder(folder, unfinished=self._going_on)
         self._disk = ThreadPoolExecutor(1, thread_name_prefix="recording")
         self._told: RecorderStatus | None = None
         self._dropped = 0
@@ -115,16 +118,16 @@ class RecorderNode:
 
     async def _mend(self) -> None:
         """Recordings of a killed recorder get their index."""
-        await asyncio.to_thread(mend_all, self._folder)
+        await asyncio.to_thread(mend_all, self._folder, but=self._going_on.path if self._going_on else None)
 
 
 def _differ(status: RecorderStatus, told: RecorderStatus) -> bool:
     return (status.recording, status.name, status.error is None) != (told.recording, told.name, told.error is None)
 
 
-def mend_all(folder: Path) -> None:
+def mend_all(folder: Path, *, but: Path | None = None) -> None:
     """What cannot be mended is logged and left as it is."""
-    for path in sorted(folder.glob("*.mcap")):
+    for path in sorted(set(folder.glob("*.mcap")) - {but}):
         started_s = time.monotonic()
         try:
             if mend(path):

@@ -12,9 +12,10 @@ from telemetry.errors import RecordingError
 from telemetry.mavlink.reduce import autopilot_name
 from telemetry.recording.file_types import foreign, is_mcap, opened
 from telemetry.recording.frame_facts import decode_frame
+from telemetry.recording.mcap_files.continuing import ABOUT
 from telemetry.recording.mcap_files.reader import UNFINISHED, own_contents
 from telemetry.recording.mcap_files.scan import glance
-from telemetry.recording.mcap_files.writer import ABOUT, PLAN, VEHICLE
+from telemetry.recording.mcap_files.writer import PLAN, VEHICLE
 from telemetry.recording.tlog import Damage, Data, LogFrame, tlog_frames
 from telemetry.recording.tlog_flight import looks_like_tlog
 

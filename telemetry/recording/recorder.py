@@ -17,6 +17,7 @@ from pathlib import Path
 from mapping.sensor_frames import CloudFrame
 from telemetry.errors import RecordingError, RecordingFullError
 from telemetry.recording.disk_space import Measure, Space, full, running_out, space_at
+from telemetry.recording.mcap_files.continuing import Unfinished, read_begun
 from telemetry.recording.mcap_files.sink import Write, describe
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.recording.recorded_topics import RECORDED
@@ -36,6 +37,9 @@ class _Open:
     name: str
     t_mono_s: float
     t_utc_s: float
+    by_hand: bool = False
+    continues: bool = False
+    """The file of a recorder that was killed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +54,7 @@ class Recorder:
         self,
         folder: Path,
         *,
+        unfinished: Unfinished | None = None,
         now: Callable[[], float] = time.monotonic,
         utc: Callable[[], float] = time.time,
         measure: Measure = space_at,
@@ -71,6 +76,8 @@ class Recorder:
         self._space: Space | None = None
         self._measured_s = -_MEASURE_EVERY_S
         self._rate_bytes_s = 0.0
+        if unfinished is not None:
+            self._go_on(unfinished)
 
     @property
     def recording(self) -> bool:
@@ -161,11 +168,17 @@ class Recorder:
     def _begin(self) -> None:
         name = self._asked_name or self._plan_name
         utc_s = self._utc()
-        self._file = _Open(free_path(self._folder, utc_s, name), name, self._now(), utc_s)
+        path = free_path(self._folder, utc_s, name)
+        self._file = _Open(path, name, self._now(), utc_s, by_hand=self._trigger.by_hand)
         self._failed_s = None
         self._waiting.mark(self._file)
         for stamped in self._preroll.take(self._now()):
             self._waiting.put(stamped)
+
+    def _go_on(self, found: Unfinished) -> None:
+        self._trigger.go_on(self._now(), by_hand=found.by_hand)
+        self._file = _Open(found.path, found.name, found.t_mono_s, found.t_utc_s, by_hand=found.by_hand, continues=True)
+        self._waiting.mark(self._file)
 
     def _warning(self) -> RecordingFullError | None:
         if self._space is None or self._file is None:
@@ -194,14 +207,24 @@ class Recorder:
         if isinstance(item, _Open):
             self._written = item
             self._look_at_disk(now=True)
-            self._writer = RecordingWriter(
-                item.path, t_utc_s=item.t_utc_s, t_mono_s=item.t_mono_s, name=item.name, write=self._write
-            )
+            self._writer = self._opened(item)
         elif isinstance(item, _Close):
             self._finish()
         elif self._writer is not None and self._written is not None:
             t_utc_s = self._written.t_utc_s + item.t_mono_s - self._written.t_mono_s
             self._writer.write(item.topic, item.message, t_utc_s)
+
+    def _opened(self, file: _Open) -> RecordingWriter:
+        now_s = self._now() if file.continues else file.t_mono_s
+        return RecordingWriter(
+            file.path,
+            t_utc_s=file.t_utc_s + now_s - file.t_mono_s,
+            t_mono_s=now_s,
+            name=file.name,
+            by_hand=file.by_hand,
+            begun=read_begun(file.path) if file.continues else None,
+            write=self._write,
+        )
 
     def _finish(self) -> None:
         writer, self._writer = self._writer, None

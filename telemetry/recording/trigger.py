@@ -45,9 +45,17 @@ class Trigger:
         if landed or now_s - self._heard_s >= GONE_S:
             self.wanted, self._disarmed_s = False, None
 
+    @property
+    def by_hand(self) -> bool:
+        return self._by_hand
+
     def start_by_hand(self) -> None:
         """Goes on after the landing until it is stopped by hand."""
         self.wanted, self._by_hand, self._refused = True, True, False
+
+    def go_on(self, now_s: float, *, by_hand: bool) -> None:
+        """With the recording of a killed recorder; if not by hand, until the vehicle turns out to be disarmed."""
+        self.wanted, self._by_hand, self._armed, self._heard_s = True, by_hand, True, now_s
 
     def stop_by_hand(self) -> None:
         """In flight: not again before the next arming."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import signal
 import subprocess
 import sys
@@ -84,6 +85,39 @@ def test_a_flight_is_recorded_and_kept_when_the_node_is_killed(tmp_path: Path) -
     mended = read_flight_log(path)
     assert mended.faults == ()
     assert mended.states == log.states
+
+
+def test_a_recorder_that_is_started_again_goes_on_with_the_flight_in_the_same_file(tmp_path: Path) -> None:
+    async def fly(messages: int) -> str:
+        async with await Bus.open(tmp_path / "run", "link") as bus:
+            status = await publish_until(bus, True, lambda status: status.messages > messages)
+            assert status.name is not None
+            return status.name
+
+    async def plan() -> None:
+        async with await Bus.open(tmp_path / "run", "server") as bus:
+            waiting = asyncio.ensure_future(status_until(bus, lambda status: True))
+            while not waiting.done():
+                bus.publish(Topic.PLAN, PLAN)
+                await asyncio.sleep(0.02)
+
+    with recorder_node(tmp_path) as process:
+        asyncio.run(plan())
+        name = asyncio.run(fly(100))
+        process.send_signal(signal.SIGKILL)
+        process.wait(PATIENCE_S)
+    before = read_flight_log(tmp_path / "recordings" / name)
+    with recorder_node(tmp_path) as process:
+        assert asyncio.run(fly(50)) == name
+        process.terminate()
+        assert process.wait(timeout=PATIENCE_S) == 0
+    assert [path.name for path in (tmp_path / "recordings").iterdir()] == [name]
+    log = read_flight_log(tmp_path / "recordings" / name)
+    assert log.plan == PLAN
+    assert log.states[: len(before.states)] == before.states
+    assert len(log.states) > len(before.states)
+    (gap,) = log.faults
+    assert re.fullmatch(r"Nothing was recorded for \d+\.\d s from .* UTC: the recorder had died and was .*", gap)
 
 
 def test_by_hand_and_through_the_death_of_a_server(tmp_path: Path) -> None:

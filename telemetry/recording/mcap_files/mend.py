@@ -62,11 +62,15 @@ def _tail(path: Path) -> tuple[int, bytes] | None:
             return None
         if not contents.chunks:
             raise RecordingError("The recording holds no messages.", where=path.name, advice="It can be deleted.")
-        return _new_tail(data, contents)
+        keep, index, closing = begun(data, contents)
+        return keep, index + closing.block(keep + len(index))
 
 
-def _new_tail(data: Data, contents: Contents) -> tuple[int, bytes]:
-    """The last chunk's own index is written anew: a part of it may be missing."""
+def begun(data: Data, contents: Contents) -> tuple[int, bytes, Closing]:
+    """How many bytes of a file without an index are kept, what comes behind them, and the index of both.
+
+    The last chunk's own index is written anew: a part of it may be missing.
+    """
     closing = Closing()
     last = contents.chunks[-1]
     keep = last.offset + last.length
@@ -82,7 +86,7 @@ def _new_tail(data: Data, contents: Contents) -> tuple[int, bytes]:
     for attachment in contents.attachments.values():
         if attachment.offset < keep:
             closing.add_attachment(attachment)
-    return keep, index + closing.block(keep + len(index))
+    return keep, index, closing
 
 
 def _entries(data: Data, chunk: ChunkPlace) -> dict[int, list[tuple[int, int]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,9 +15,9 @@ from telemetry.errors import RecordingError
 from telemetry.recording.file_types import foreign, is_mcap, opened
 from telemetry.recording.mcap_files.chunks import BROKEN, chunk_content, messages, record_at, stream_of
 from telemetry.recording.mcap_files.closing import ChunkPlace
+from telemetry.recording.mcap_files.continuing import ABOUT
 from telemetry.recording.mcap_files.scan import Contents, read_contents
 from telemetry.recording.mcap_files.schemas import codec_of
-from telemetry.recording.mcap_files.writer import ABOUT
 from telemetry.recording.recorded_topics import RAW_ENCODING, raw_channel_topic
 from telemetry.recording.tlog import Data
 from telemetry.topics.messages import MESSAGE_TYPES, Published, RawFrame, Topic
@@ -56,6 +57,7 @@ class Recording:
         self.name, self._data = name, data
         self._contents = contents = own_contents(name, data, read_contents)
         self.faults: list[str] = [] if contents.finished else [UNFINISHED]
+        self.faults += [_gap(each) for each in contents.continued]
         self._topics = {number: _topic_of(channel) for number, channel in contents.channels.items()}
         self._places: dict[str, list[ChunkPlace]] = {}
         for chunk in contents.chunks:
@@ -149,6 +151,15 @@ class Recording:
         """Each kind of fault once."""
         if text not in self.faults:
             self.faults.append(text)
+
+
+def _gap(continued: dict[str, str]) -> str:
+    try:
+        from_s, until_s = float(continued["from_utc_s"]), float(continued["until_utc_s"])
+        at = f"{datetime.fromtimestamp(from_s, UTC):%H:%M:%S} UTC"
+    except (KeyError, ValueError, OverflowError):
+        return "The recorder had died and was started again: for a while nothing was recorded."
+    return f"Nothing was recorded for {until_s - from_s:.1f} s from {at}: the recorder had died and was started again."
 
 
 def _topic_of(channel: Channel) -> str | None:

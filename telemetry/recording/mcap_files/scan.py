@@ -22,6 +22,8 @@ from telemetry.recording.mcap_files.chunks import (
 from telemetry.recording.mcap_files.closing import ChunkPlace
 from telemetry.recording.tlog import Data
 
+CONTINUED = "continued"
+"""Name of the metadata that tell between which times nothing was recorded."""
 _CHANNEL = struct.Struct("<H")
 """The first field of messages and of their indexes."""
 _FOOTER_BYTES = RECORD_HEAD_BYTES + 20 + len(MCAP_MAGIC)
@@ -37,6 +39,8 @@ class Contents:
     chunks: list[ChunkPlace] = field(default_factory=list)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """The last of each name."""
+    continued: list[dict[str, str]] = field(default_factory=list)
+    """Each time that a recorder went on with the file of one that had been killed."""
     metadata_places: list[tuple[str, int, int]] = field(default_factory=list)
     attachments: dict[str, AttachmentIndex] = field(default_factory=dict)
     """The last of each name."""
@@ -182,6 +186,8 @@ def _take(data: Data, record: Record, contents: Contents) -> None:
     elif record.opcode == Opcode.METADATA:
         metadata = Metadata.read(stream_of(data, record))
         contents.metadata[metadata.name] = metadata.metadata
+        if metadata.name == CONTINUED:
+            contents.continued.append(metadata.metadata)
         contents.metadata_places.append((metadata.name, record.offset, record.end - record.offset))
     elif record.opcode == Opcode.ATTACHMENT_INDEX:
         index = AttachmentIndex.read(stream_of(data, record))

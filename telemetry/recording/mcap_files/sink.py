@@ -17,16 +17,25 @@ _NO_SPACE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 class Sink:
     """Appends blocks. What ``append`` has returned from survives the end of this process."""
 
-    def __init__(self, path: Path, *, write: Write = os.write) -> None:
-        """Creates the file. Raises RecordingFullError or RecordingError when it cannot be."""
+    def __init__(self, path: Path, *, keep: int | None = None, write: Write = os.write) -> None:
+        """Creates the file, or goes on behind the first ``keep`` bytes of one that is there.
+
+        Raises RecordingFullError or RecordingError when it cannot be.
+        """
         self.path = path
         self._write = write
-        self.size = 0
+        self.size = keep or 0
+        new = os.O_CREAT | os.O_EXCL if keep is None else 0
         try:
-            self._fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+            self._fd = os.open(path, os.O_WRONLY | os.O_APPEND | new | os.O_CLOEXEC, 0o600)
         except OSError as error:
             raise describe(error, path) from error
-        fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.ftruncate(self._fd, self.size)
+        except OSError as error:
+            self.close()
+            raise describe(error, path) from error
 
     def append(self, block: bytes) -> None:
         """All of the block, or an error and the file as it was before.

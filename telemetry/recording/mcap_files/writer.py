@@ -18,21 +18,20 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 
-from planning import __version__
 from telemetry.recording.file_types import MCAP_MAGIC
 from telemetry.recording.mcap_files.chunks import message_index
 from telemetry.recording.mcap_files.closing import ChunkPlace, Closing
+from telemetry.recording.mcap_files.continuing import ABOUT, LIBRARY, Begun
 from telemetry.recording.mcap_files.foxglove import Standards, standard_schema
-from telemetry.recording.mcap_files.scan import attachment_index
+from telemetry.recording.mcap_files.scan import CONTINUED, attachment_index
 from telemetry.recording.mcap_files.schemas import codec_of
 from telemetry.recording.mcap_files.sink import Sink, Write
 from telemetry.recording.recorded_topics import RAW_ENCODING, raw_channel_topic
 from telemetry.topics.messages import MESSAGE_TYPES, PlanRecord, Published, RawFrame
 from telemetry.topics.vehicle import VehicleState
 
-LIBRARY = f"hedgehop {__version__}"
-ABOUT, PLAN, VEHICLE = "hedgehop", "plan", "vehicle"
-"""Names of the metadata that tell what a recording is without reading it."""
+PLAN, VEHICLE = "plan", "vehicle"
+"""With ABOUT, the names of the metadata that tell what a recording is without reading it."""
 _CHUNK_BYTES = 64 * 1024
 _CHUNK_S = 0.2
 _LARGE_CHUNK_BYTES = 4 * _CHUNK_BYTES
@@ -51,10 +50,14 @@ class RecordingWriter:
         t_utc_s: float,
         t_mono_s: float,
         name: str = "",
+        by_hand: bool = False,
+        begun: Begun | None = None,
         now: Callable[[], float] = time.monotonic,
         write: Write = os.write,
     ) -> None:
-        """Creates the file. ``t_utc_s`` and ``t_mono_s``: the same moment on both clocks.
+        """Creates the file, or goes on with what a killed recorder has ``begun``.
+
+        ``t_utc_s`` and ``t_mono_s``: the same moment on both clocks. ``by_hand``: until the operator stops it.
 
         Raises RecordingFullError and RecordingError, as do ``write``, ``commit`` and ``close``.
         """
@@ -62,21 +65,25 @@ class RecordingWriter:
         self.messages = 0
         """Committed ones, of what was published."""
         self._now, self._committed_mono_s = now, now()
-        self._closing, self._standards = Closing(), Standards()
-        self._channels: dict[tuple[str, str], int] = {}
-        self._schemas: dict[str, int] = {}
+        self._closing, self._standards = begun.closing if begun else Closing(), Standards()
+        self._channels = {(each.topic, each.metadata.get("link", "")): n for n, each in self._closing.channels.items()}
+        self._schemas = {each.name: n for n, each in self._closing.schemas.items()}
         self._notes: dict[str, dict[str, str]] = {}
         self._compressor = zstandard.ZstdCompressor(level=3)
         self._quick_compressor = zstandard.ZstdCompressor(level=1)
-        self._last_ns = 0
+        self._last_ns = begun.end_ns if begun else 0
         self._clear()
-        self._sink = Sink(path, write=write)
+        self._sink = Sink(path, keep=begun.keep if begun else None, write=write)
         try:
-            self._sink.append(_head())
+            self._sink.append(begun.index if begun else _head())
         except BaseException:
             self._sink.close()
             raise
-        self._note(ABOUT, {"t_utc_s": repr(t_utc_s), "t_mono_s": repr(t_mono_s), "name": name})
+        if begun:
+            self._note(CONTINUED, {"from_utc_s": repr(begun.end_ns / 1e9), "until_utc_s": repr(t_utc_s)})
+        else:
+            about = {"t_utc_s": repr(t_utc_s), "t_mono_s": repr(t_mono_s), "name": name}
+            self._note(ABOUT, {**about, "by_hand": str(by_hand)})
 
     @property
     def bytes(self) -> int:
@@ -156,7 +163,7 @@ class RecordingWriter:
         known = self._channels.get((topic, link))
         if known is not None:
             return known
-        number = self._channels[topic, link] = len(self._channels) + 1
+        number = self._channels[topic, link] = max(self._closing.channels, default=0) + 1
         channel = Channel(
             id=number,
             topic=topic,
@@ -172,7 +179,7 @@ class RecordingWriter:
         if not name:
             return 0
         if name not in self._schemas:
-            number = self._schemas[name] = len(self._schemas) + 1
+            number = self._schemas[name] = max(self._closing.schemas, default=0) + 1
             schema = self._closing.schemas[number] = Schema(id=number, data=data, encoding="jsonschema", name=name)
             self._chunk += _written(schema)
         return self._schemas[name]
