@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_settings import (
     BaseSettings,
     NoDecode,
@@ -90,6 +90,8 @@ class Settings(BaseSettings):
     """Where surface models, plans and sessions are kept."""
     password: Password | None = None
     """Lets operators sign in without the link that is printed at start; at least 8 characters."""
+    password_file: Path | None = None
+    """A file with the password, such as a container's secret: unlike the environment, no other program is shown it."""
     session_days: Annotated[float, Field(gt=0, le=365)] = 30.0
     """How long a sign-in lasts."""
     allowed_hosts: Names = ()
@@ -111,6 +113,21 @@ class Settings(BaseSettings):
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)
     """Where the built console lies."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_password_file(cls, values: dict[str, Any]) -> dict[str, Any]:
+        file = values.get("password_file")
+        if not file or values.get("password") is not None:
+            return values
+        try:
+            return {**values, "password": Path(file).read_text(encoding="utf-8").strip()}
+        except (OSError, UnicodeDecodeError) as error:
+            raise StartError(
+                f"The password's file cannot be read: {error}.",
+                where="setting password_file",
+                advice="Correct its path or its rights.",
+            ) from error
 
     @classmethod
     def settings_customise_sources(
@@ -193,6 +210,7 @@ def settings_table() -> str:
 _DOCUMENTED = {
     "data_dir": "`$XDG_DATA_HOME/hedgehop`, else `~/.local/share/hedgehop`",
     "password": "none",
+    "password_file": "none",
     "tls_certificate": "none",
     "tls_key": "none",
     "link": "none",

@@ -45,9 +45,10 @@ from server.door.trust import TrustListener
 from server.errors import error_doc, status_of
 from server.library import Library
 from server.library.radar_files import RadarShelf
+from server.library.reserve import DiskWatch
 from server.library.scenario_runs import ScenarioShelf
 from server.scene.host import SceneHost
-from server.schemas import NoticeMessage
+from server.schemas import ErrorDoc, NoticeMessage
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
 from server.studies.scenario_desk import ScenarioDesk
@@ -129,12 +130,9 @@ async def _lifespan(
             app.state.start_error = error
             raise
         app.state.parts = parts
-        for loop in (
-            parts.loop_lag.run(),
-            *_tls_loops(tls, settings),
-            *parts.workspace.loops(),
-            *parts.flying.loops(demo=demo),
-        ):
+        disk = DiskWatch(library.reserve, lambda notice: _tell_of_disk(parts.hub, library, notice))
+        own = (parts.loop_lag.run(), disk.run(), *_tls_loops(tls, settings))
+        for loop in (*own, *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
             background.spawn(loop)
         try:
             yield
@@ -174,8 +172,19 @@ async def _open(
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
-    hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
+    hub.greet_with(_damaged(library))
     return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag())
+
+
+def _damaged(library: Library) -> list[NoticeMessage]:
+    return [NoticeMessage(level="warning", error=notice) for notice in library.notices]
+
+
+def _tell_of_disk(hub: Hub, library: Library, notice: NoticeMessage | None) -> None:
+    """To all pages now, and to each that comes while the disk is full."""
+    hub.greet_with([*_damaged(library), *([] if notice is None else [notice])])
+    again = ErrorDoc(code="disk_room", what="There is room on the disk again.")
+    hub.publish(notice or NoticeMessage(level="info", error=again))
 
 
 def _tls_loops(tls: Tls | None, settings: Settings) -> list[Coroutine[Any, Any, None]]:

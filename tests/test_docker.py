@@ -63,7 +63,8 @@ def test_the_last_stage_brings_no_compiler_and_no_node(last_stage: list[tuple[st
 
 def test_its_health_is_checked_at_the_servers_own_address(last_stage: list[tuple[str, str]]) -> None:
     (check,) = [rest for word, rest in last_stage if word == "HEALTHCHECK"]
-    assert "http://127.0.0.1:{port}/api/health" in check
+    assert "/opt/healthy.py" in check
+    assert "127.0.0.1:{os.environ['HEDGEHOP_PORT']}/api/health" in (DOCKER / "healthy.py").read_text(encoding="utf-8")
     sources = (ROOT / "server" / "api").rglob("*.py")
     assert any('@router.get("/api/health"' in path.read_text(encoding="utf-8") for path in sources)
 
@@ -103,7 +104,7 @@ def test_packages_of_the_wheel_and_what_stands_at_the_start_are_not_ignored() ->
 
 def test_the_console_is_published_on_loopback_only(compose: str) -> None:
     ports = re.findall(r'- "([^"]+)"', section(compose, "ports"))
-    assert ports == ["127.0.0.1:8000:8000/tcp", "14550:14550/udp"]
+    assert ports == ["127.0.0.1:8000:8000/tcp", "${HEDGEHOP_MAVLINK_ADDRESS:-127.0.0.1}:14550:14550/udp"]
 
 
 def test_the_container_may_do_nothing_it_does_not_need(compose: str) -> None:

@@ -9,15 +9,18 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
+import logging
 import secrets
 import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
-from server.errors import SignInError, TooManyTriesError
+from server.errors import SignInError, StorageError, TooManyTriesError
 from server.library.whole_files import write_atomically
 from server.settings import PasswordHash
+
+log = logging.getLogger("hedgehop.auth")
 
 SESSIONS_MAX = 1000
 TRIES_MAX = 5
@@ -98,7 +101,11 @@ class Auth:
         live = {key: expiry for key, expiry in self._expiry_utc_s.items() if expiry > now}
         newest = dict(sorted(live.items(), key=lambda item: item[1])[-(SESSIONS_MAX - 1) :])
         self._expiry_utc_s = {**newest, session_key(session_id): now + self._lifetime_s}
-        self._write()
+        try:
+            self._write()
+        except StorageError as error:
+            # Whoever may come in comes in: with a full disk, too, somebody must be able to bring a vehicle home.
+            log.warning("The sign-in is kept in memory only, and ends with this server: %s", error)
         return session_id
 
     def _read(self) -> dict[str, float]:

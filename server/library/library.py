@@ -6,6 +6,7 @@ orthophotos are written by worker processes (``store_terrain``, ``store_orthopho
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import threading
@@ -18,12 +19,13 @@ from planning.errors import PlanningError
 from planning.missions.vehicle_profile import load_profile, shipped_profiles
 from planning.terrain.dsm import Dsm
 from planning.terrain.orthophoto import Orthophoto
-from server.errors import DataDirError, StorageError, error_doc
+from server.errors import DataDirError, StorageError, StorageFullError, error_doc
 from server.library import orthophotos, plans, terrains
 from server.library.documents import doc_from_profile
 from server.library.history import History
 from server.library.orthophotos import OrthophotoManifest
 from server.library.plans import PlanSummary
+from server.library.reserve import Reserve
 from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
 from server.library.whole_files import clean, new_id, storage_errors, write_atomically
@@ -44,7 +46,8 @@ class Library:
         self.notices: list[ErrorDoc] = []
         """What was set aside, to be shown to the operator."""
         self._change = threading.RLock()
-        self._lock = _open_directory(self.root)
+        self.reserve = Reserve(self.root)
+        self._lock = _open_directory(self.root, self.reserve)
         try:
             self._uploads = self._empty_folder("uploads")
             told = self.notices.append
@@ -217,14 +220,15 @@ def _remove_unneeded(root: Path) -> list[ErrorDoc]:
     return []
 
 
-def _open_directory(data_dir: Path) -> DirectoryLock:
-    """Raises ``DataDirError`` unless the directory can be made, written and locked."""
+def _open_directory(data_dir: Path, reserve: Reserve) -> DirectoryLock:
+    """Raises ``DataDirError`` unless the directory can be made, written and locked. One that is full will do."""
     lock: DirectoryLock | None = None
     try:
         data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
         lock = DirectoryLock(data_dir)
+        reserve.look()
         clean(data_dir)
-        write_atomically(data_dir / "format.txt", b"1\n")
+        _write_format(data_dir / "format.txt")
     except (OSError, StorageError) as error:
         if lock is not None:
             lock.release()
@@ -237,6 +241,15 @@ def _open_directory(data_dir: Path) -> DirectoryLock:
             advice="Change its permissions, or start with another --data-dir.",
         ) from error
     return lock
+
+
+def _write_format(file: Path) -> None:
+    try:
+        write_atomically(file, b"1\n")
+    except StorageFullError:
+        # What is there can be read, and vehicles can be led: pages are told that the disk is full.
+        if not file.is_file():
+            raise
 
 
 class DirectoryLock:
@@ -254,8 +267,9 @@ class DirectoryLock:
                 where=str(folder),
                 advice="Stop it, or start this one with another --data-dir.",
             ) from error
-        os.truncate(self._handle, 0)
-        os.pwrite(self._handle, f"{os.getpid()}\n".encode(), 0)
+        with contextlib.suppress(OSError):  # on a full disk: the number is for people only, the lock holds without
+            os.truncate(self._handle, 0)
+            os.pwrite(self._handle, f"{os.getpid()}\n".encode(), 0)
 
     def release(self) -> None:
         """The second time nothing happens: the number may belong to another file by then."""

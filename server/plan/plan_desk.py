@@ -12,10 +12,11 @@ import time
 from collections.abc import Callable
 from typing import Literal
 
-from server.errors import InUseError, StaleRevisionError, reported
+from server.errors import InUseError, StaleRevisionError, StorageFullError, error_doc, reported
 from server.library import Library
 from server.library.history import History
 from server.library.planned_on import on_another_model
+from server.library.whole_files import new_id
 from server.schemas import ErrorDoc, NoticeMessage, Pages, PlanDoc, PlanEdit
 
 log = logging.getLogger("hedgehop.plan")
@@ -141,7 +142,14 @@ class PlanDesk:
         """The plan that was open last, or a new one."""
         last = await asyncio.to_thread(self._library.last_plan)
         if last is None:
-            await self.create(lambda present: PlanDoc())
+            try:
+                await self.create(lambda present: PlanDoc())
+            except StorageFullError as error:
+                # A station without room for a plan can still lead vehicles.
+                self._not_saved(error_doc(error))
+                self.plan_id, self.history = new_id(), History([PlanDoc()])
+                self.revision += 1
+                self._changed(True)
         else:
             await self.open(last)
 

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import select
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 from server.plan.demo import PLAN_NAME
 from tests.server.cli_runs import hedgehop
@@ -132,13 +137,13 @@ def test_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
         assert (plan["document"]["name"], plan["document"]["terrain_id"]) == (PLAN_NAME, terrain["id"])
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 2 MiB of its own."""
+@pytest.fixture(params=["2m"])
+def small_disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
+    """A file system of its own, as large as its parameter says."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(folder)], capture_output=True, check=False
+        ["mount", "-t", "tmpfs", "-o", f"size={request.param}", "tmpfs", str(folder)], capture_output=True, check=False
     )
     if mounted.returncode != 0:
         pytest.skip("this user may not mount a small disk; test_plan_desk covers the same without")
@@ -173,3 +178,74 @@ def test_a_full_disk_loses_no_edit(small_disk: Path) -> None:
     with serving(data_dir) as again:
         assert again.plan["document"]["name"] == "Saved again"
         assert again.plan["can_undo"]
+
+
+def fill(disk: Path) -> Path:
+    """To the last byte."""
+    ballast = disk / "ballast"
+    with contextlib.suppress(OSError), ballast.open("ab", buffering=0) as file:
+        while file.write(bytes(4096)):
+            pass
+    assert shutil.disk_usage(disk).free == 0
+    return ballast
+
+
+@pytest.mark.parametrize("small_disk", ["64m"], indirect=True)
+@pytest.mark.parametrize("reserve", [True, False])
+def test_a_killed_server_comes_back_on_a_full_disk(small_disk: Path, reserve: bool) -> None:
+    data_dir = small_disk / "data"
+    old = data_dir / "recordings" / "old.tlog"
+    with serving(data_dir, "--no-demo-world") as station:
+        ok(station.rename("Before"))
+        deadline = time.monotonic() + PATIENCE_S
+        while not (data_dir / "reserve").is_file() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert (data_dir / "reserve").stat().st_blocks * 512 >= 1_000_000
+        old.write_bytes(bytes(3_000_000))
+        station.process.kill()
+    if not reserve:
+        (data_dir / "reserve").unlink()
+    ballast = fill(small_disk)
+    with serving(data_dir) as again:
+        # Serving has signed in by the link that was printed.
+        assert again.plan["document"]["name"] == "Before"
+        origin = str(again.http.base_url).rstrip("/")
+        cookies = "; ".join(f"{name}={value}" for name, value in again.http.cookies.items())
+        with connect(
+            origin.replace("http", "ws") + "/ws",
+            origin=origin,  # pyright: ignore[reportArgumentType]
+            additional_headers={"Cookie": cookies},
+        ) as page:
+            said = notice(page, "disk_full")
+            assert "Delete old recordings" in said["advice"]
+            listed = ok(again.http.get("/api/recordings")).json()
+            assert [(entry["name"], entry["bytes"]) for entry in listed] == [("old.tlog", 3_000_000)]
+            ok(again.http.delete(f"/api/recordings/{listed[0]['id']}"))
+            assert not old.exists()
+            ballast.unlink()
+            notice(page, "disk_room")
+        assert ok(again.rename("After")).json()["saved_utc"]
+    with serving(data_dir) as later:
+        assert later.plan["document"]["name"] == "After"
+
+
+def notice(page: Connection, code: str) -> dict:
+    while True:
+        message = json.loads(page.recv(PATIENCE_S))
+        if message["type"] == "notice" and message["error"]["code"] == code:
+            return message["error"]
+
+
+@pytest.mark.parametrize("small_disk", ["64m"], indirect=True)
+def test_a_full_disk_without_a_plan_is_no_reason_not_to_start(small_disk: Path) -> None:
+    data_dir = small_disk / "data"
+    with serving(data_dir):
+        pass
+    for manifest in (data_dir / "plans").glob("*/manifest.json"):
+        manifest.write_text("damaged")
+    (data_dir / "reserve").unlink(missing_ok=True)
+    ballast = fill(small_disk)
+    with serving(data_dir) as station:
+        assert station.plan["document"]["pois"] == []
+        ballast.unlink()
+        assert ok(station.rename("Kept")).json()["saved_utc"]
