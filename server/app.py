@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import socket
 import sys
-from contextlib import closing
+from contextlib import closing, suppress
 
 import uvicorn
 from fastapi import FastAPI
@@ -17,6 +17,7 @@ from server.library import Library
 from server.settings import Settings
 from server.stations import Flying
 from server.web import create_app
+from server.work.guarded import Guarded
 from server.work.logs import configure_logging
 from server.workspace import Workspace
 from telemetry.mavlink.address import parse_address
@@ -35,7 +36,7 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     tls = Tls.of(settings)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
         app = create_app(settings, library, Workspace, Flying.open, demo=demo, tls=tls)
-        server = AnnouncingServer(app, settings, tls)
+        server = AnnouncingServer(app, settings, tls, Guarded.found())
         server.run(sockets=[listening])
         if not server.started:
             fault = getattr(app.state, "start_error", None)
@@ -43,22 +44,51 @@ def run(settings: Settings, *, demo: bool = False) -> None:
 
 
 class AnnouncingServer(uvicorn.Server):
-    """Prints the sign-in link once the console answers."""
+    """Prints the sign-in link once the console answers, and proves to its guardian that it goes on answering."""
 
-    def __init__(self, app: FastAPI, settings: Settings, tls: Tls | None = None) -> None:
+    def __init__(
+        self, app: FastAPI, settings: Settings, tls: Tls | None = None, guarded: Guarded | None = None
+    ) -> None:
         super().__init__(server_config(app, settings, tls))
-        self._app, self._settings, self._tls = app, settings, tls
+        self._app, self._settings, self._tls, self._guarded = app, settings, tls, guarded
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if self.started:
-            sys.stdout.write(f"Hedgehop is ready. Open this link, which signs you in once:\n  {self.link()}\n")
+            announcement = self._announcement()
+            with suppress(OSError):  # a terminal that has gone stops no server that is started again
+                sys.stdout.write(announcement)
+                sys.stdout.flush()
+
+    async def on_tick(self, counter: int) -> bool:
+        """Called by the event loop ten times a second."""
+        if self._guarded is not None and counter % 5 == 0:
+            parts = self._app.state.parts
+            if not self._guarded.prove(link_is_open=parts.auth.link_is_open, in_flight=parts.flying.live.armed):
+                self.should_exit = True
+        return await super().on_tick(counter)
+
+    def _announcement(self) -> str:
+        notice = self._guarded and self._guarded.notice()
+        if notice is None:
+            text = f"Hedgehop is ready. Open this link, which signs you in once:\n  {self.link()}\n"
             if self._tls is not None and (offer := self._tls.offer(self._settings)):
-                sys.stdout.write(f"Other devices come to trust this station at:\n  {offer.page}\n")
-            sys.stdout.flush()
+                text += f"Other devices come to trust this station at:\n  {offer.page}\n"
+            return text
+        parts = self._app.state.parts
+        parts.hub.greet_with([*parts.hub.greetings, notice])
+        if self._guarded and self._guarded.link_token:
+            parts.auth.keep_link_token(self._guarded.link_token)
+            return "Hedgehop is ready again. The sign-in link above was not used yet: it still signs you in once.\n"
+        return "Hedgehop is ready again. Pages that are open come back by themselves; whoever was signed in still is.\n"
 
     def link(self) -> str:
-        token = self._app.state.parts.auth.new_link_token()
+        """The guardian's, which a server that is started again keeps; without a guardian a new one."""
+        auth = self._app.state.parts.auth
+        if self._guarded and self._guarded.link_token:
+            auth.keep_link_token(token := self._guarded.link_token)
+        else:
+            token = auth.new_link_token()
         return f"{self.origin()}/login?token={token}"
 
     def origin(self) -> str:

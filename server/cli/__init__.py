@@ -17,7 +17,9 @@ from planning import __version__
 from server.cli.shared import examples
 from server.cli.shared.command import FAILED, run_command
 from server.cli.shared.output import say
+from server.work.guardian import become_guardian
 
+UNGUARDED = "--no-guardian"
 _PLAIN: dict[str, Any] = {"add_completion": False, "rich_markup_mode": "rich", "pretty_exceptions_enable": False}
 
 
@@ -107,4 +109,6 @@ def bench() -> None:
 
 def main() -> None:
     """Entry point of the console script."""
+    if sys.argv[1:2] == ["serve"] and not {UNGUARDED, "--help"} & set(sys.argv):
+        become_guardian(UNGUARDED)  # before anything large is loaded that the guardian would only leave behind
     sys.exit(run_command(app))

@@ -45,8 +45,16 @@ def serve(
     data_dir: Annotated[
         Path | None, Option(help="Where models and plans are kept; default: the user's data home.")
     ] = None,
+    no_guardian: Annotated[
+        bool,
+        Option(
+            "--no-guardian",
+            help="Without the process that starts a dead or hung server again: for debuggers.",
+        ),
+    ] = False,
 ) -> None:
     """Start the ground station and print a sign-in link for the browser."""
+    del no_guardian  # looked at before this process became the server
     settings = load_settings(
         host=host,
         port=port,

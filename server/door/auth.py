@@ -57,8 +57,17 @@ class Auth:
     def new_link_token(self) -> str:
         """A token that signs in once; it stays good until it is used or another one is made."""
         token = secrets.token_urlsafe(32)
-        self._link = _digest(token)
+        self.keep_link_token(token)
         return token
+
+    def keep_link_token(self, token: str) -> None:
+        """One that a server before this one has printed, and that nobody has used."""
+        self._link = _digest(token)
+
+    @property
+    def link_is_open(self) -> bool:
+        """Nobody has used it yet."""
+        return self._link is not None
 
     def redeem(self, token: str) -> str:
         """Exchanges a link's token for a new session id."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import fcntl
 import json
@@ -15,6 +16,7 @@ from typing import Self
 
 from planning import __version__
 from telemetry.errors import BusError
+from telemetry.liveness import SILENT_S
 
 _SUFFIX = ".lock"
 _PATIENCE_S = 1.0
@@ -119,6 +121,14 @@ class NodeLock:
         os.pwrite(self._fd, text, 0)
         os.ftruncate(self._fd, len(text))
         self.prove_alive()
+
+
+async def silence_counts(runtime_dir: Path) -> bool:
+    """Whether the disk takes proofs, and soon: of one that is read-only or broken no silence tells anything."""
+    with contextlib.suppress(TimeoutError, OSError):
+        await asyncio.wait_for(asyncio.to_thread(os.utime, runtime_dir), SILENT_S)
+        return True
+    return False
 
 
 def _take(fd: int, kind: int) -> bool:

@@ -132,7 +132,7 @@ def main(seconds: float = SECONDS, points: float = POINTS) -> None:
 def serving(folder: Path, points: int) -> Iterator[tuple[int, httpx.Client]]:
     """The demo's station, and its operator's client."""
     port = free_port()
-    command = [sys.executable, "-m", "tests.bench.with_points", str(points), "serve", "--demo"]
+    command = [sys.executable, "-m", "tests.bench.with_points", str(points), "serve", "--demo", "--no-guardian"]
     process = subprocess.Popen(
         [*command, "--port", str(port), "--data-dir", str(folder)],
         stdout=subprocess.PIPE,

@@ -42,7 +42,7 @@ class Station:
 
     def start(self) -> None:
         port = _free_port()
-        command = [*self._program, "serve", "--port", str(port), "--data-dir", str(self.data_dir)]
+        command = [*self._program, "serve", "--no-guardian", "--port", str(port), "--data-dir", str(self.data_dir)]
         # Flights of other tests meet no obstacles: a later option wins.
         command.append("--no-demo-world")
         # Into a file: a pipe that nobody empties fills up, and the server waits at it for ever.

@@ -14,9 +14,11 @@ from typing import Any
 
 import httpx
 import pytest
+from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from server.cli import UNGUARDED
 from telemetry.bus.node_lock import running_nodes
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
@@ -37,11 +39,12 @@ _started: list[Server] = []
 class Server:
     """``hedgehop serve`` as a process, with one page that keeps its session from server to server."""
 
-    def __init__(self, data_dir: Path, address: str, cookies: httpx.Cookies | None = None, *, port: int) -> None:
+    def __init__(
+        self, data_dir: Path, address: str, cookies: httpx.Cookies | None = None, *, port: int, guarded: bool = False
+    ) -> None:
         self.port, self.origin = port, f"http://127.0.0.1:{port}"
-        self.process = subprocess.Popen(
-            command(data_dir, port, "--link", address), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
+        start = [word for word in command(data_dir, port, "--link", address) if not (guarded and word == UNGUARDED)]
+        self.process = subprocess.Popen(start, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self.http = httpx.Client(base_url=self.origin, headers={"Origin": self.origin}, timeout=LONG_S, cookies=cookies)
         _started.append(self)
         link = self._link()
@@ -71,6 +74,21 @@ class Server:
         answer = ok(self.http.post(path, json=body))
         return answer.json() if answer.content else None
 
+    def pid(self) -> int:
+        """Of the server under the guardian."""
+        (child,) = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        return int(child)
+
+    def answers_again(self) -> dict[str, Any]:
+        """What a page is told first by a server that was started again."""
+        end = time.monotonic() + LONG_S
+        while True:
+            try:
+                return self.until(lambda m: m["type"] == "notice")["error"]
+            except (OSError, WebSocketException):
+                assert time.monotonic() < end
+                time.sleep(0.2)
+
     def end(self, number: signal.Signals) -> str:
         """What the terminal said after the link."""
         self.process.send_signal(number)
@@ -86,6 +104,8 @@ def data_dir(tmp_path: Path) -> Iterator[Path]:
     while _started:
         server = _started.pop()
         if server.process.poll() is None:
+            for child in Path(f"/proc/{server.process.pid}/task/{server.process.pid}/children").read_text().split():
+                os.kill(int(child), signal.SIGKILL)
             server.end(signal.SIGKILL)
     for facts in running_nodes(tmp_path / "run"):
         os.kill(facts.pid, signal.SIGKILL)
@@ -96,24 +116,53 @@ def _flown(message: dict[str, Any], metres: float) -> bool:
     return message["type"] == "vehicle" and follow is not None and (follow["s_m"] or 0.0) > metres
 
 
+def _fly(server: Server) -> str:
+    """The demo's mission, until it is under way. Its digest."""
+    server.post("/api/terrains/demo")
+    server.until(lambda m: m["type"] == "plan" and m["plan"]["computation"]["state"] == "ready")
+    server.until(
+        lambda m: (
+            m["type"] == "vehicle" and bool(m["state"] and m["state"]["estimator_ok"] and m["state"]["ready_to_arm"])
+        )
+    )
+    revision = ok(server.http.get("/api/state")).json()["plan"]["revision"]
+    server.post("/api/flight/upload", revision=revision)
+    digest = server.post("/api/flight/check")["onboard"]["digest"]
+    server.post("/api/flight/start", digest=digest, accept=["gnss", "battery", "rtl_height"])
+    server.until(lambda m: _flown(m, 10.0))
+    return digest
+
+
+@pytest.mark.parametrize("fault", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_server_that_hangs_or_dies_in_flight_is_started_again(data_dir: Path, fault: signal.Signals) -> None:
+    with simulated_vehicle(HOME, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
+        server = Server(data_dir, address, port=free_port(), guarded=True)
+        digest = _fly(server)
+        pids = {facts.name: facts.pid for facts in running_nodes(data_dir / "run")}
+        before = server.pid()
+        os.kill(before, fault)
+        notice = server.answers_again()
+        assert notice["code"] == "server_restarted"
+        assert re.match(r"The server did not answer for \d+ s and was started again at [\d:]{8} UTC\.", notice["what"])
+        assert server.pid() != before
+        assert server.until(lambda m: m["type"] == "vehicle" and bool(m["state"]))["state"]["armed"]
+        onboard = server.until(lambda m: m["type"] == "fly" and m["fly"]["onboard"]["state"] == "verified")["fly"]
+        assert onboard["onboard"]["digest"] == digest
+        assert {facts.name: facts.pid for facts in running_nodes(data_dir / "run")} == pids
+        assert server.until(lambda m: m["type"] == "lease")["lease"]["mine"]
+        server.until(lambda m: m["type"] == "link" and m["link"]["state"] == "live" and m["link"]["heartbeat_hz"] > 0.5)
+        server.post("/api/flight/land")
+        server.until(lambda m: m["type"] == "vehicle" and bool(m["state"] and not m["state"]["armed"]))
+        assert "login?token" not in server.end(signal.SIGINT)
+        assert running_nodes(data_dir / "run") == []
+
+
 def test_a_flight_outlives_its_servers(data_dir: Path) -> None:
     port = free_port()
     with simulated_vehicle(HOME, "--speedup", SPEEDUP, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
         first = Server(data_dir, address, port=port)
         cookies = first.http.cookies
-        first.post("/api/terrains/demo")
-        first.until(lambda m: m["type"] == "plan" and m["plan"]["computation"]["state"] == "ready")
-        first.until(
-            lambda m: (
-                m["type"] == "vehicle"
-                and bool(m["state"] and m["state"]["estimator_ok"] and m["state"]["ready_to_arm"])
-            )
-        )
-        revision = ok(first.http.get("/api/state")).json()["plan"]["revision"]
-        first.post("/api/flight/upload", revision=revision)
-        digest = first.post("/api/flight/check")["onboard"]["digest"]
-        first.post("/api/flight/start", digest=digest, accept=["gnss", "battery", "rtl_height"])
-        first.until(lambda m: _flown(m, 10.0))
+        digest = _fly(first)
         pids = {facts.name: facts.pid for facts in running_nodes(data_dir / "run")}
         assert set(pids) == {"link", "recorder"}
         first.end(signal.SIGKILL)

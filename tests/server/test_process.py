@@ -21,6 +21,7 @@ import pytest
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
+from server.cli import UNGUARDED
 from server.plan.demo import PLAN_NAME
 from tests.server.cli_runs import hedgehop
 from tests.server.station import PATIENCE_S, ok
@@ -35,7 +36,9 @@ def free_port() -> int:
 
 
 def command(data_dir: Path, port: int, *more: str) -> list[str]:
-    return [sys.executable, "-m", "server", "serve", "--port", str(port), "--data-dir", str(data_dir), *more]
+    """The server itself: what is killed here stays dead (``test_guardian`` has the others)."""
+    start = [sys.executable, "-m", "server", "serve", UNGUARDED]
+    return [*start, "--port", str(port), "--data-dir", str(data_dir), *more]
 
 
 class Serving:

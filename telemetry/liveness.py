@@ -1,14 +1,14 @@
-"""Whether a node still does its work: one that hangs is told from one that merely gets no processor time."""
+"""Whether a process still does its work: one that hangs is told from one that merely gets no processor time.
+
+The guardian lives on this and little else: it imports nothing but the standard library's smallest.
+"""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
-
-from telemetry.bus.node_lock import NodeFacts
+from typing import Protocol
 
 SILENT_S, HUNG_S, STARVED_S, START_S, BUSY_S = 1.0, 3.0, 15.0, 60.0, 180.0
 """Without a proof: said; given up; given up though it waits for a processor or a disk; given up before its first one,
@@ -20,16 +20,26 @@ _ASLEEP_S = 1.0
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
+class Proven(Protocol):
+    @property
+    def pid(self) -> int: ...
+
+    @property
+    def proved_t_mono_s(self) -> float:
+        """When it last proved that it does its work, on the clock that all processes here share."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Silence:
-    """How long a node has proved nothing; ``is_hung``: waiting for it is in vain."""
+    """How long a process has proved nothing; ``is_hung``: waiting for it is in vain."""
 
     silent_s: float = 0.0
     is_hung: bool = False
 
 
 class Liveness:
-    """Of one node, looked at every moment by one observer on the clock of ``time.monotonic``."""
+    """Of one process, looked at every moment by one observer on the clock of ``time.monotonic``."""
 
     def __init__(self, *, hung_s: float = HUNG_S, busy_s: float = BUSY_S, start_s: float = START_S) -> None:
         """``busy_s``: as ``hung_s``, of a node that works hard all the while; ``start_s``: until its first proof."""
@@ -37,7 +47,7 @@ class Liveness:
         self._pid, self._proofs, self._proved_s = 0, 0, 0.0
         self._cpu_s = self._looked_s = self._awake_s = 0.0
 
-    def look(self, facts: NodeFacts, now_s: float) -> Silence:
+    def look(self, facts: Proven, now_s: float) -> Silence:
         if now_s - self._looked_s > _ASLEEP_S:
             self._awake_s = now_s
         self._looked_s = now_s
@@ -53,19 +63,12 @@ class Liveness:
 
     def _patience_s(self, silent_s: float) -> float:
         share = (_cpu_s(self._pid) - self._cpu_s) / silent_s
-        if share >= _WORKS_HARD:
-            return self._busy_s
-        if self._proofs <= 1 and self._start_s > self._hung_s:  # the first one is that of its lock
-            return self._start_s
+        busy_s = self._busy_s if share >= _WORKS_HARD else 0.0
+        if self._proofs <= 1 and self._start_s > self._hung_s:  # the first one is that of its start
+            return max(busy_s, self._start_s)
+        if busy_s:
+            return busy_s
         return STARVED_S if share >= _WORKS or _is_waiting(self._pid) else self._hung_s
-
-
-async def silence_counts(runtime_dir: Path) -> bool:
-    """Whether the disk takes proofs, and soon: of one that is read-only or broken no silence tells anything."""
-    with contextlib.suppress(TimeoutError, OSError):
-        await asyncio.wait_for(asyncio.to_thread(os.utime, runtime_dir), SILENT_S)
-        return True
-    return False
 
 
 def _cpu_s(pid: int) -> float:
