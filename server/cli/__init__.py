@@ -65,6 +65,7 @@ class _Commands(_Lazy):
         "map": (".map_command.build_map", examples.MAP),
         "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
         "agent": (".agent_command.agent", examples.AGENT),
+        "audit": (".audit_command.audit", examples.AUDIT),
         "bench": ("bench", examples.BENCH),
         "radar": ("", ""),
     }

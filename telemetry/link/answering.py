@@ -6,7 +6,7 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any, NamedTuple
 
-from telemetry.errors import NotAllowedError, NoVehicleError, OvertakenError
+from telemetry.errors import NotAllowedError, NoVehicleError, OvertakenError, TelemetryError
 from telemetry.link.link import Link
 from telemetry.link.piloting import Pilot
 from telemetry.topics import requests
@@ -71,6 +71,8 @@ class Answering:
 
     def __init__(self, link: Link, right: OperatorRight) -> None:
         self._link, self._right = link, right
+        self._written: dict[int, str] = {}
+        """Requests under way that were written down, by identity."""
         self._answers: dict[type, Callable[[Any], Awaitable[object]]] = {
             requests.Connect: self._connect,
             requests.Disconnect: self._disconnect,
@@ -91,9 +93,27 @@ class Answering:
     async def answer(self, request: requests.LinkRequest) -> object:
         if not isinstance(request, requests.ReadParameters | requests.HighestToken):
             self._right.check(request.operator)
+        result = "no answer was waited for"
+        try:
+            answered = await self._carry_out(request)
+            result = "done"
+        except TelemetryError as error:
+            result = f"not done: {error.what}"
+            raise
+        finally:
+            self._settle(request, result)
+        return answered
+
+    async def _carry_out(self, request: requests.LinkRequest) -> object:
         if (command := _COMMANDS.get(type(request))) is not None:
             return await self._command(request, command)
         return await self._answers[type(request)](request)
+
+    def _settle(self, request: Any, result: str) -> None:
+        """Beside what was written down before: a refused command must not look like one that was carried out."""
+        words = self._written.pop(id(request), None)
+        if words is not None:
+            self._link.spawn(self._link.commands.settle(request.operator, words, result))
 
     async def _command(self, request: requests.LinkRequest, command: _Command) -> None:
         pilot = self._link.need_session(live=command.live).pilot
@@ -189,6 +209,7 @@ class Answering:
 
     async def _record(self, request: Any, words: str, *, must: bool = True) -> None:
         await self._link.commands.record(request.operator, words, must=must)
+        self._written[id(request)] = words
 
 
 def _refuse_in_mission(pilot: Pilot) -> None:

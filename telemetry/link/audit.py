@@ -1,25 +1,26 @@
-"""The audit log: one JSON line per command, on the disk before the command is sent, chained by hashes."""
+"""The audit log: one JSON line per command, on the disk before the command is sent, and one for what came of it."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
-import hashlib
-import json
 import os
+import secrets
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from telemetry.errors import RecordingError, RecordingFullError, TelemetryError
+from telemetry.link.audit_chain import FIRST, chained, check_file, parsed
 from telemetry.topics.messages import CommandRecord
 from telemetry.topics.requests import Operator
 
-FIRST = "0" * 64
-"""Stands for the line before the first one."""
+KEY_BYTES = 32
+END_BYTES = 1 << 16
+"""The last line is shorter."""
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 AUTOPILOT = Operator("link", 0)
 """Who is named in the audit log for what the link does by itself."""
@@ -27,31 +28,57 @@ DISK_S = 1.0
 """A command that ends a flight well waits for the disk no longer than this."""
 
 
-@dataclass(frozen=True, slots=True)
-class Broken:
-    """The first place where the chain does not hold; 1 is the first line."""
+def audit_key_file(data_dir: Path) -> Path:
+    return data_dir / "keys" / "audit.key"
 
-    line: int
-    why: str
+
+def open_audit(path: Path, key_file: Path) -> AuditLog:
+    """With this machine's key, which is made if it is missing. A log from before it is set aside, and that is said."""
+    try:
+        key = key_file.read_bytes() if key_file.exists() else b""
+        note = ""
+        if len(key) != KEY_BYTES:
+            if path.exists() and path.stat().st_size:
+                aside = path.with_name(f"audit-until-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.jsonl")
+                os.replace(path, aside)
+                note = f"This machine had no key for its audit log: the log until now stands in {aside.name}."
+            key = secrets.token_bytes(KEY_BYTES)
+            _write_key(key_file, key)
+    except OSError as error:
+        raise _trouble(path, error) from error
+    return AuditLog(path, key, note=note)
 
 
 class AuditLog:
     """Appends to ``path``, which is made if it is missing. All calls wait for the disk: not for an event loop.
 
-    ``broken`` tells what ``check_chain`` found when the file was opened; new lines follow the last one in any case.
+    ``head`` is the last line's hash; new lines follow it, whatever ``check`` finds. ``note``: to be told to people.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, key: bytes = b"", *, note: str = "") -> None:
+        self._path, self._key, self.note = path, key, note
         flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
         try:
-            content = path.read_bytes() if path.exists() else b""
             self._file = os.open(path, flags, 0o600)
+            self._length = os.fstat(self._file).st_size
+            end = os.pread(self._file, END_BYTES, max(0, self._length - END_BYTES))
         except OSError as error:
             raise _trouble(path, error) from error
-        self.broken = check_chain(content)
-        self._last = _last_hash(content)
-        self._torn = bool(content) and not content.endswith(b"\n")
+        self.head = _last_hash(end)
+        self._torn = bool(end) and not end.endswith(b"\n")
+
+    def check(self) -> str:
+        """What is wrong with what was there at the start, in words; nothing: every line is as it was written."""
+        try:
+            broken = check_file(self._path, self._key, self._length).broken
+        except OSError as error:
+            return f"The audit log cannot be read: {error.strerror}."
+        if broken is None:
+            return self.note
+        return (
+            f"The audit log is BROKEN at line {broken.line}. {broken.why} Keep a copy of {self._path.name} and of the "
+            "recordings, and find out who could write to the data folder. hedgehop audit says more."
+        )
 
     def __enter__(self) -> AuditLog:
         return self
@@ -67,9 +94,11 @@ class AuditLog:
     def write(self, record: CommandRecord) -> str:
         """Returns the line's hash when it is on the disk. Raises RecordingFullError; then do not send the command."""
         entry = {"t_utc_s": record.t_utc_s, "operator": record.operator, "words": record.words}
-        line, hashed = _chained(entry, self._last)
+        if record.result:
+            entry["result"] = record.result
+        line, hashed = chained(entry, self.head, self._key)
         self._append((b"\n" if self._torn else b"") + line)
-        self._last, self._torn = hashed, False
+        self.head, self._torn = hashed, False
         return hashed
 
     def _append(self, data: bytes) -> None:
@@ -88,51 +117,25 @@ class AuditLog:
             raise _trouble(self._path, error) from error
 
 
-def check_chain(content: bytes) -> Broken | None:
-    """Where the chain of an audit log's content is broken first; None: every line is as it was written."""
-    before = FIRST
-    for number, line in enumerate(content.splitlines(), start=1):
-        entry = _parsed(line)
-        if entry is None:
-            return Broken(number, "The line is no entry; it may be cut short.")
-        if entry.get("before") != before:
-            return Broken(number, "The line does not follow the one before it: lines were changed, removed or added.")
-        if entry.get("hash") != _hash(entry):
-            return Broken(number, "The line was changed.")
-        before = entry["hash"]
-    return None
-
-
-def _chained(entry: dict[str, Any], before: str) -> tuple[bytes, str]:
-    linked = {**entry, "before": before}
-    hashed = _hash(linked)
-    return _as_json({**linked, "hash": hashed}) + b"\n", hashed
-
-
-def _hash(entry: dict[str, Any]) -> str:
-    return hashlib.sha256(_as_json({key: value for key, value in entry.items() if key != "hash"})).hexdigest()
-
-
-def _as_json(entry: dict[str, Any]) -> bytes:
-    # Escaped throughout: a line break in a name must not become a second line.
-    return json.dumps(entry, sort_keys=True, ensure_ascii=True, separators=(",", ":")).encode()
-
-
-def _parsed(line: bytes) -> dict[str, Any] | None:
-    try:
-        entry = json.loads(line)
-    except ValueError:
-        return None
-    return entry if isinstance(entry, dict) else None
-
-
 def _last_hash(content: bytes) -> str:
     """Of the last line that has one."""
     for line in reversed(content.splitlines()):
-        entry = _parsed(line)
+        entry = parsed(line)
         if entry is not None and isinstance(entry.get("hash"), str):
             return entry["hash"]
     return FIRST
+
+
+def _write_key(file: Path, key: bytes) -> None:
+    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with contextlib.suppress(FileNotFoundError):
+        file.unlink()
+    handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    try:
+        os.write(handle, key)
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _trouble(path: Path, error: OSError) -> RecordingError:
@@ -152,6 +155,9 @@ def _trouble(path: Path, error: OSError) -> RecordingError:
 class Audit(Protocol):
     """``AuditLog``: it waits for the disk."""
 
+    head: str
+
+    def check(self) -> str: ...
     def write(self, record: CommandRecord) -> object: ...
 
 
@@ -166,6 +172,21 @@ class CommandLog:
     ) -> None:
         self._audit, self._publish, self._say = audit, publish, say
         self._disk = ThreadPoolExecutor(1, thread_name_prefix="audit")
+        self.trouble = ""
+        """What is wrong with the log, in words."""
+
+    @property
+    def head(self) -> str:
+        return "" if self._audit is None else self._audit.head
+
+    async def check(self) -> None:
+        """Of a log that may be long: beside what is written to it."""
+        if self._audit is not None:
+            self.trouble = await asyncio.to_thread(self._audit.check)
+
+    async def settle(self, operator: Operator, words: str, result: str) -> None:
+        """What came of a command that was written down."""
+        await self._write(CommandRecord(time.time(), operator.name, words, result), must=False)
 
     async def record(self, operator: Operator, words: str, *, must: bool = True) -> None:
         """Raises RecordingError, and nothing is to be sent then.
@@ -174,6 +195,9 @@ class CommandLog:
         """
         record = CommandRecord(time.time(), operator.name, words)
         self._publish(record)
+        await self._write(record, must=must)
+
+    async def _write(self, record: CommandRecord, *, must: bool) -> None:
         if self._audit is None:
             return
         writing = asyncio.get_running_loop().run_in_executor(self._disk, self._audit.write, record)

@@ -295,7 +295,9 @@ class Link:
                 *(vehicle.believing.warnings(now_s) if vehicle else ()),
                 *self.peers.warnings(now_s),
                 *self.keys.warnings(vehicle.target[0] if vehicle else None, now_s),
+                *([self.commands.trouble] if self.commands.trouble else []),
             ),
+            audit_head=self.commands.head,
         )
 
     def _tell(self) -> None:
@@ -329,6 +331,7 @@ async def open_link(publish: Callable[[str, Published], None], **options: Any) -
         link.spawn(link.run_heartbeat())
         link.spawn(link.run_clock())
         link.spawn(link.keys.run())
+        link.spawn(link.commands.check())
         try:
             yield link
         except Exception as error:  # Raised again below: the group would wrap it.

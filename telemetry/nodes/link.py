@@ -19,7 +19,7 @@ import msgspec
 from telemetry.bus import Bus
 from telemetry.bus.node import GIVEN_UP_S, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.link.answering import Answering, OperatorRight
-from telemetry.link.audit import AuditLog
+from telemetry.link.audit import audit_key_file, open_audit
 from telemetry.link.link import Link, open_link
 from telemetry.link.signatures import KeyRing
 from telemetry.topics.messages import Candidate, FlightStatus, Topic
@@ -144,7 +144,7 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
     file = runtime / "link.json"
     memory = await asyncio.to_thread(read_memory, file)
     right = OperatorRight(memory.highest_token)
-    log = await asyncio.to_thread(AuditLog, audit)
+    log = await asyncio.to_thread(open_audit, audit, audit_key_file(runtime.parent))
     keys = await asyncio.to_thread(KeyRing, runtime.parent / "keys" / "signing.json")
     try:
         async with open_link(

@@ -167,6 +167,8 @@ class LinkStatus:
     again: Candidate | None = None
     """Has the numbers of the adopted vehicle, which has fallen silent, and is heard from elsewhere: perhaps it."""
     signing: SigningStatus = field(default_factory=SigningStatus)
+    audit_head: str = ""
+    """Hash of the audit log's last line: each recording holds it, so that lines removed from the end are missed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +271,8 @@ class CommandRecord:
     operator: str
     words: str
     """What was asked: "arm", "upload 88 items" ..."""
+    result: str = ""
+    """What came of it, in a line of its own; never on the bus."""
 
 
 @dataclass(frozen=True, slots=True)

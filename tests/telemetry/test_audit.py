@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.link.audit import AuditLog, check_chain
+from telemetry.link.audit import AuditLog, audit_key_file, open_audit
+from telemetry.link.audit_chain import check_chain, check_file
 from telemetry.topics.messages import CommandRecord
 
 
@@ -57,7 +58,7 @@ def test_a_log_that_exists_is_continued(tmp_path: Path) -> None:
     assert len(content.splitlines()) == 2
     assert check_chain(content) is None
     with AuditLog(path) as log:
-        assert log.broken is None
+        assert log.check() == ""
 
 
 def test_only_the_owner_may_read_it(tmp_path: Path) -> None:
@@ -71,8 +72,7 @@ def test_a_changed_line_is_told(tmp_path: Path) -> None:
     content = written(path, "arm", "start", "land")
     path.write_bytes(content.replace(b'"start"', b'"stare"'))
     with AuditLog(path) as log:
-        assert log.broken is not None
-        assert log.broken.line == 2
+        assert "BROKEN at line 2." in log.check()
 
 
 @pytest.mark.parametrize("gone", [0, 1])
@@ -110,8 +110,7 @@ def test_a_line_that_was_cut_short_is_told_and_the_next_one_is_whole(tmp_path: P
     content = written(path, "arm", "start")
     path.write_bytes(content[:-20])
     with AuditLog(path) as log:
-        assert log.broken is not None
-        assert log.broken.line == 2
+        assert "BROKEN at line 2." in log.check()
         log.write(record("land"))
     assert [entry["words"] for entry in entries_of(path)] == ["arm", "land"]
     assert [entry["before"] for entry in entries_of(path)][1] == entries_of(path)[0]["hash"]
@@ -159,3 +158,48 @@ def test_every_line_is_on_the_disk_before_write_returns(tmp_path: Path, monkeypa
     with AuditLog(path) as log:
         log.write(record("arm"))
         assert synced == [path.stat().st_size]
+
+
+def test_who_has_not_the_key_cannot_mend_the_chain(tmp_path: Path) -> None:
+    path, key_file = tmp_path / "audit.jsonl", audit_key_file(tmp_path)
+    with open_audit(path, key_file) as log:
+        log.write(record("arm"))
+    assert key_file.stat().st_mode & 0o077 == 0
+    assert key_file.parent.stat().st_mode & 0o077 == 0
+    path.unlink()
+    written(path, "something else", "arm")  # a whole chain, under no key
+    with open_audit(path, key_file) as log:
+        assert "BROKEN at line 1. The line was changed." in log.check()
+        assert log.note == ""
+
+
+def test_a_log_without_a_key_is_set_aside_and_that_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    before = written(path, "arm")
+    with open_audit(path, audit_key_file(tmp_path)) as log:
+        (aside,) = tmp_path.glob("audit-until-*.jsonl")
+        assert aside.read_bytes() == before
+        assert aside.name in log.check()
+        log.write(record("start"))
+    with open_audit(path, audit_key_file(tmp_path)) as log:
+        assert log.check() == ""
+
+
+def test_what_came_of_a_command_stands_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    with AuditLog(path) as log:
+        log.write(record("disarm"))
+        log.write(CommandRecord(2.0, "Ada", "disarm", "not done: The vehicle is in the air."))
+    assert [entry.get("result") for entry in entries_of(path)] == [None, "not done: The vehicle is in the air."]
+    assert check_chain(path.read_bytes()) is None
+
+
+def test_a_check_looks_at_what_was_there_before_however_much_is_written_meanwhile(tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    written(path, *["arm"] * 1000)
+    with AuditLog(path) as log:
+        length = path.stat().st_size
+        log.write(record("start"))
+        assert log.check() == ""
+        assert check_file(path, b"", length).lines == 1000
+        assert log.head in check_file(path, b"").hashes

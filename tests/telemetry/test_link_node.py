@@ -21,7 +21,8 @@ from telemetry.bus import Bus
 from telemetry.bus.link_client import COMMAND_S, LinkClient
 from telemetry.bus.node_lock import running_node
 from telemetry.errors import AddressError, BusError, MissionUnknownError, NoVehicleError
-from telemetry.link.audit import check_chain
+from telemetry.link.audit import audit_key_file
+from telemetry.link.audit_chain import check_chain
 from telemetry.link.session import AVOIDS_AGAIN
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic, VehicleText
@@ -151,8 +152,10 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             await until(lambda: (facts := running_node(node.runtime, "link")) is not None and facts.replaceable)
 
             audit = tmp_path / "audit.jsonl"
-            assert check_chain(audit.read_bytes()) is None
-            words = [json.loads(line)["words"] for line in audit.read_bytes().splitlines()]
+            assert check_chain(audit.read_bytes(), audit_key_file(node.runtime.parent).read_bytes()) is None
+            entries = [json.loads(line) for line in audit.read_bytes().splitlines()]
+            assert {"done"} <= {entry.get("result") for entry in entries}
+            words = [entry["words"] for entry in entries if "result" not in entry]
             assert words[0] == "upload 8 items"
             assert words[-3:] == [
                 f"start mission {report.onboard.digest[:12]} at item 1",

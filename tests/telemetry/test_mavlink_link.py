@@ -267,12 +267,21 @@ def test_whoever_was_relieved_can_send_nothing() -> None:
 class Disk:
     """Takes the place of the audit log."""
 
+    head = "h"
+
+    def check(self) -> str:
+        return ""
+
     def __init__(self, vehicle: UdpVehicle | None = None) -> None:
         self.full = False
         self.vehicle = vehicle
         self.written: list[tuple[str, int]] = []
+        self.results: list[tuple[str, str]] = []
 
     def write(self, record: CommandRecord) -> None:
+        if record.result:
+            self.results.append((record.words, record.result))
+            return
         if self.full:
             raise RecordingFullError("No space is left.")
         commands = [m for m in self.vehicle.of("COMMAND_LONG") if m.command == 400] if self.vehicle else []
@@ -337,6 +346,20 @@ def test_a_full_disk_forbids_arming_but_never_the_way_home() -> None:
             await bench.handle(ReturnHome(ME))
             assert [m.param2 for m in vehicle.of("COMMAND_LONG") if m.command == 176] == [6.0]
             assert "No space" in bench.flight.hint
+
+    run(whole)
+
+
+def test_what_came_of_each_command_is_written_down_too() -> None:
+    async def whole() -> None:
+        async with commanded({400: 4}, b"PreArm: Compass not healthy") as (bench, _, disk):
+            with pytest.raises(RefusedError):
+                await bench.handle(Arm(ME))
+            await until(lambda: disk.results)
+            ((words, result),) = disk.results
+            assert words == "arm"
+            assert result.startswith("not done: ")
+            await until(lambda: bench.status.audit_head == "h")
 
     run(whole)
 

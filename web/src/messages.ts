@@ -272,6 +272,7 @@ export interface LinkStatus {
   warnings: string[];
   again: Candidate | null;
   signing: SigningStatus;
+  audit_head: string;
 }
 
 /** Of the map frame. */

@@ -23,6 +23,10 @@ TLS = _examples(
     ("Also reached under another name and address", "hedgehop tls --name gcs.example --name 192.168.1.20"),
     ("Then", "hedgehop serve --host 0.0.0.0"),
 )
+AUDIT = _examples(
+    ("Is the log of commands whole", "hedgehop audit ~/.local/share/hedgehop"),
+    ("As a table too", "hedgehop audit ~/.local/share/hedgehop --csv commands.csv"),
+)
 PLAN = _examples(
     ("A mission over the points of a file", "hedgehop plan dsm.tif pois.csv --out flight --rtl-height-m 60"),
     ("Closer to the ground, with RTK", "hedgehop plan dsm.tif pois.kml --out flight --profile mapper-rtk --height-m 3"),

@@ -1,0 +1,59 @@
+"""``hedgehop audit``: a whole log, a broken one, and one whose last lines were taken away."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from telemetry.link.audit import audit_key_file, open_audit
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import CommandRecord, LinkStatus, Topic
+from tests.server.cli_runs import hedgehop
+
+
+def log_in(folder: Path, *words: str) -> str:
+    with open_audit(folder / "audit.jsonl", audit_key_file(folder)) as log:
+        for word in words:
+            log.write(CommandRecord(1.0, "=Ada", word))
+        log.write(CommandRecord(2.0, "=Ada", words[-1], "done"))
+        return log.head
+
+
+def test_a_whole_log_is_said_and_written_as_a_table(tmp_path: Path) -> None:
+    log_in(tmp_path, "arm", "start")
+    out = tmp_path / "commands.csv"
+    ran = hedgehop("audit", tmp_path, "--csv", out)
+    assert ran.code == 0
+    assert "whole: 3 lines" in ran.err
+    rows = list(csv.reader(out.read_text(encoding="utf-8").splitlines()))
+    assert rows[0] == ["t_utc", "operator", "words", "result"]
+    assert rows[-1][1:] == ["'=Ada", "start", "done"]
+
+
+def test_a_changed_line_is_said(tmp_path: Path) -> None:
+    log_in(tmp_path, "arm", "start")
+    log = tmp_path / "audit.jsonl"
+    log.write_bytes(log.read_bytes().replace(b'"arm"', b'"land"'))
+    ran = hedgehop("audit", log)
+    assert ran.code == 1
+    assert "BROKEN at line 1." in ran.out + ran.err
+
+
+def test_lines_taken_from_the_end_are_missed_by_the_recording_that_has_seen_them(tmp_path: Path) -> None:
+    head = log_in(tmp_path, "arm", "start")
+    (tmp_path / "recordings").mkdir()
+    writer = RecordingWriter(tmp_path / "recordings" / "flight.mcap", t_utc_s=1.0, t_mono_s=0.0)
+    writer.write(Topic.LINK, LinkStatus(1.0, audit_head=head), 2.0)
+    writer.close()
+    assert hedgehop("audit", tmp_path).code == 0
+    log = tmp_path / "audit.jsonl"
+    log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-1]))
+    ran = hedgehop("audit", tmp_path)
+    assert ran.code == 1
+    assert "LINES ARE MISSING: flight.mcap" in ran.out + ran.err
+
+
+def test_nothing_to_look_at_is_said(tmp_path: Path) -> None:
+    ran = hedgehop("audit", tmp_path)
+    assert ran.code != 0
+    assert "There is no audit.jsonl" in ran.out + ran.err
