@@ -5,6 +5,7 @@ UV ?= uv
 WORKERS ?= 2
 PYTEST_ARGS ?=
 LOCK_ARGS ?=
+TRUST_ARGS ?=
 
 STAMPS := .venv/.stamps
 VENV_PYTHON := .venv/bin/python
@@ -29,7 +30,7 @@ else \
 fi
 endef
 
-.PHONY: help setup demo test check docs screenshots coverage bench proof wheel lock clean
+.PHONY: help setup demo test check docs screenshots coverage bench proof trust wheel lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -72,6 +73,9 @@ bench: $(STAMPS)/test ## measure the speed of the kernels and print it
 
 proof: $(STAMPS)/test ## prove the certificates of over 200 missions by a slow independent measurement, print the table
 	@$(VENV_PYTHON) -m tests.proof
+
+trust: $(STAMPS)/test $(STAMPS)/kernels ## try the promises of docs/security.md, print which hold (TRUST_ARGS=--help)
+	@$(VENV_PYTHON) -m tests.trust $(TRUST_ARGS)
 
 wheel: $(STAMPS)/project web/dist/index.html ## build one wheel with the console inside, for machines without a checkout
 	$(call step,The wheel,rm -f dist/hedgehop-*.whl && $(VENV_PYTHON) -m pip wheel --disable-pip-version-check \
