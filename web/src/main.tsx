@@ -36,7 +36,7 @@ import "./styles/studies.css";
 import { App } from "./shell/App";
 import { startKeyboard } from "./shell/keyboard";
 import { startFollowing } from "./scene/camera";
-import { startSound } from "./obstacles/sound";
+import { startSound } from "./shell/sound";
 import { startClock } from "./store/clock";
 import { connect } from "./store/stream";
 

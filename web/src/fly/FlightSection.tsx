@@ -1,7 +1,7 @@
 import { bytes, duration } from "../format";
 import { adopted, flight, isInAir, recorded_s, recorder, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
-import { whyNotAsk, whyNotCommand, whyUnheard } from "../store/reach";
+import { failed, whyNotAsk, whyNotCommand, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
 import { Done, ErrorPanel, Outcome } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
@@ -54,12 +54,13 @@ function Actions() {
 
 function Recorder() {
   const status = recorder.value?.status;
-  const seconds = recorded_s.value;
+  const word = status?.recording ? `Recording ${duration(recorded_s.value)}` : "Not recording";
+  const isUnheard = failed.value === "server";
   return (
     <div class="recorder">
       <div class="row">
         <span class="connection-name">
-          <strong>{status?.recording ? `Recording ${duration(seconds)}` : "Not recording"}</strong>
+          <strong>{isUnheard ? "Recording: not known" : word}</strong>
           <span class="muted">
             {status?.recording
               ? `${status.name ?? ""} · ${bytes(status.bytes)}`

@@ -4,6 +4,7 @@ import { endingsOf, parted, type Endings } from "../store/alerts";
 import { now_ms } from "../store/clock";
 import { alerts } from "../store/obstacles";
 import { pending } from "../store/outcomes";
+import { failed } from "../store/reach";
 import { isReplaying } from "../store/review";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -164,6 +165,7 @@ function Banner({ first, others, isReplay, onShrink }: BannerProps) {
           {alert.text}
         </p>
       )}
+      {!isReplay && failed.value === "server" && <p class="alert-old">Old: nothing new is heard of it.</p>}
       <div class="row alert-actions">
         {alert.obstacle && <Place obstacle={alert.obstacle} />}
         <span class="spring" />

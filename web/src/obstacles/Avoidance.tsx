@@ -3,7 +3,7 @@ import { withUnit } from "../format";
 import type { AvoidanceStatus } from "../messages";
 import { nodes, vehicle } from "../store/flying";
 import { obstacles } from "../store/obstacles";
-import { whyNotAsk, whyNotCommand } from "../store/reach";
+import { failed, whyNotAsk, whyNotCommand } from "../store/reach";
 import { setError } from "../store/state";
 import { Button } from "../ui/Button";
 import { Check } from "../ui/fields";
@@ -11,7 +11,7 @@ import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
 import { AVOIDANCE, setPerception, switchAvoidance, wantsConsent } from "./obstacle_orders";
-import { avoidanceWords, isTooFast } from "./obstacle_words";
+import { avoidanceWords, isTooFast, type AvoidanceWords } from "./obstacle_words";
 
 const isSimulated = () => nodes.value.some((node) => node.name === "simulator" && node.state === "running");
 
@@ -154,13 +154,19 @@ function AfterClimb() {
   );
 }
 
+const UNHEARD: AvoidanceWords = {
+  word: "Not known",
+  level: "near",
+  note: "This page cannot see what it does now.",
+};
+
 /** What is done about obstacles without asking, and the switch for it. */
 export function Avoidance() {
   const [asks, setAsks] = useState(false);
   const [chosen, setChosen] = useState<AvoidBy>("climb");
   const status = obstacles.live.value.avoidance;
   const by = status.enabled ? status.by : chosen;
-  const { word, level, note } = avoidanceWords({ ...status, by });
+  const { word, level, note } = failed.value === "server" ? UNHEARD : avoidanceWords({ ...status, by });
   const close = () => {
     setAsks(false);
     setError(AVOIDANCE, null);

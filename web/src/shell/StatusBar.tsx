@@ -2,7 +2,7 @@ import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { theme } from "../store/prefs";
 import { link } from "../store/state";
-import { SoundSwitch } from "../obstacles/SoundSwitch";
+import { SoundSwitch } from "./SoundSwitch";
 import { VerdictBadge } from "../plan/Verdict";
 import { JobList } from "./JobList";
 import { NoticeMenu } from "./Notices";

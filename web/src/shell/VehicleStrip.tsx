@@ -22,6 +22,7 @@ import {
   troubledNodes,
   vehicle,
 } from "../store/flying";
+import { acknowledgeLoss, isLossCalling } from "../store/losses";
 import { pending } from "../store/outcomes";
 import { failed, isOld, whyNotCommand, whyUnheard } from "../store/reach";
 import { isReplaying, review } from "../store/review";
@@ -31,6 +32,7 @@ import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
 import { goTo, viewId } from "../store/view";
+import { SoundWaits } from "./SoundSwitch";
 
 /** Known to be disarmed just now. In doubt the vehicle may be in the air. */
 function isParked(): boolean {
@@ -133,6 +135,17 @@ function Recording() {
   if (error)
     return <Chip icon="warning" text="Not recording" level="bad" title={error.what} testid="chip-rec" />;
   if (seconds === null) return null;
+  if (failed.value === "server")
+    return (
+      <Chip
+        icon="question"
+        text="REC"
+        stale
+        title="Whether it is still being recorded is not known"
+        testid="chip-rec"
+        class="rec"
+      />
+    );
   return (
     <span class="chip rec" data-testid="chip-rec" title="This flight is being recorded">
       <span class="rec-dot" aria-hidden="true" />
@@ -145,6 +158,23 @@ const NODE_STATES: Readonly<Record<string, string>> = {
   silent: "does not answer",
   restarting: "starts again",
 };
+
+/** Silences the alarm of what is lost; that it is lost stays on the screen. */
+function LossCalls() {
+  if (!isLossCalling.value) return null;
+  return (
+    <button
+      type="button"
+      class="chip bad loss"
+      title="The alarm stops; what is lost stays on the screen"
+      data-testid="loss-acknowledge"
+      onClick={acknowledgeLoss}
+    >
+      <Icon name="check" size={16} />
+      <strong>Acknowledge</strong> <kbd>K</kbd>
+    </button>
+  );
+}
 
 /** The newest message that nobody has acknowledged, and nodes that ended: to be seen in every view. */
 function Alerts() {
@@ -244,6 +274,8 @@ export function VehicleStrip() {
       )}
       <Recording />
       <span class="spring" />
+      <SoundWaits />
+      <LossCalls />
       <Alerts />
       <Replaying />
       <Operator />

@@ -1,9 +1,10 @@
 import { setSection } from "../ui/Section";
 import { redo, removeSelectedPoi, undo } from "../store/plans";
 import { acknowledgeFirst } from "../obstacles/obstacle_orders";
-import { switchSound } from "../obstacles/sound";
+import { switchSound } from "./sound";
 import { openHelpPages } from "../help/HelpPages";
 import { chase } from "../scene/camera";
+import { acknowledgeLoss, isLossCalling } from "../store/losses";
 import { seekBy, togglePlaying } from "../store/review";
 import { stepFrame } from "../studies/radar";
 import { sound } from "../store/prefs";
@@ -64,7 +65,7 @@ function act(hit: Hit): void {
     case "view":
       return goTo(hit.view ?? "plan");
     case "acknowledge":
-      return acknowledgeFirst();
+      return isLossCalling.value ? acknowledgeLoss() : acknowledgeFirst();
     case "sound":
       return void switchSound(!sound.value);
     case "play":

@@ -1,0 +1,28 @@
+import { computed, effect, signal } from "@preact/signals";
+import { adopted, linkState, vehicle } from "./flying";
+import { failed, type Failed } from "./reach";
+
+/** What is lost while the vehicle may be in the air: nothing is louder, until somebody has seen it. */
+
+export type Loss = Failed | "vehicle";
+
+/** Unless it was disarmed when it was last heard. */
+const mayFly = computed(() => adopted.value !== null && vehicle.value?.armed !== false);
+
+export const loss = computed<Loss | null>(() => {
+  if (!mayFly.value) return null;
+  return failed.value ?? (linkState.value === "lost" ? "vehicle" : null);
+});
+
+const seen = signal<Loss | null>(null);
+
+effect(() => {
+  if (loss.value === null) seen.value = null;
+});
+
+/** It is so, and nobody has said that they know; another loss than the one that was seen calls again. */
+export const isLossCalling = computed(() => loss.value !== null && loss.value !== seen.value);
+
+export function acknowledgeLoss(): void {
+  seen.value = loss.value;
+}
