@@ -70,7 +70,6 @@ class FrameResult:
     """For the operator, empty while running."""
     accepted: bool
     """The frame is in the map."""
-    dropped_because: str | None = None
     pose: Pose | None = None
     points: int = 0
     """After the gates."""

@@ -192,7 +192,6 @@ class Perception:
             state=state,
             text=text,
             accepted=False,
-            dropped_because=reason,
             alerts=tuple(alerts),
         )
 

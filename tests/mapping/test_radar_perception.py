@@ -189,8 +189,8 @@ def test_columns_of_different_length_are_refused() -> None:
     flight = hovering(None)
     flight.move()
     scan = radar_frame(flight.t_s, 1, np.zeros((3, 3)), np.zeros(2), np.zeros(3))
-    result = flight.perception.on_frame(scan, flight.t_s)  # type: ignore[attr-defined]
-    assert result.dropped_because == "columns of different length"
+    assert not flight.perception.on_frame(scan, flight.t_s).accepted  # type: ignore[attr-defined]
+    assert flight.perception.dropped == {"columns of different length": 1}
 
 
 anything = st.floats(width=32) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0, 1e30, 10.0, 5.0])

@@ -77,7 +77,7 @@ describe("a sensor's row", () => {
       lost_frames: 2,
     });
     const row = sensorRow(withStatus(undefined, perceptionMessage(status), 0));
-    expect(row.lost).toBe("3 dropped, 2 lost");
+    expect(row.lost).toBe("3 not used: too far from any position, 2 lost");
     expect(row.reasons).toEqual(["3 × too far from any position"]);
     expect([plain(row.latency), row.rate]).toEqual(["62 ms", "–"]);
   });

@@ -82,9 +82,11 @@ export interface SensorRow {
 }
 
 export function sensorRow({ status, rate_hz }: Sensed): SensorRow {
-  const dropped = status.dropped.reduce((sum, entry) => sum + entry.count, 0);
+  const dropped = status.dropped.filter((entry) => entry.count > 0).sort((a, b) => b.count - a.count);
+  const total = dropped.reduce((sum, entry) => sum + entry.count, 0);
+  const more = dropped.length > 1 ? " and other reasons" : "";
   const parts = [
-    ...(dropped > 0 ? [`${number(dropped)} dropped`] : []),
+    ...(total > 0 ? [`${number(total)} not used: ${dropped[0]?.what}${more}`] : []),
     ...(status.lost_frames > 0 ? [`${number(status.lost_frames)} lost`] : []),
   ];
   return {
@@ -92,7 +94,7 @@ export function sensorRow({ status, rate_hz }: Sensed): SensorRow {
     latency: status.latency_s === null ? DASH : withUnit(status.latency_s * 1000, "ms"),
     voxels: number(status.voxels_occupied),
     lost: parts.join(", "),
-    reasons: status.dropped.filter((entry) => entry.count > 0).map((e) => `${number(e.count)} × ${e.what}`),
+    reasons: dropped.map((e) => `${number(e.count)} × ${e.what}`),
   };
 }
 
