@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import socket
+import threading
+import time
+from pathlib import Path
 from typing import Literal
 
 import pytest
 from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 
 from server.schemas import NodeDoc, NodesMessage
+from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import connect, open_demo, upload
 
@@ -47,6 +53,71 @@ class Stream:
 @pytest.fixture
 def stream(page: Page) -> Stream:
     return Stream(page.context)
+
+
+SLOW_BYTES_PER_S = 4_000
+
+
+class SlowLine:
+    """A way to a station that takes no more than so much from it, once it is slow; it holds next to nothing itself."""
+
+    def __init__(self) -> None:
+        self.is_slow = False
+        self._to = 0
+        self._free_s = 0.0
+        self._lock = threading.Lock()
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.host = f"127.0.0.1:{self._listening.getsockname()[1]}"
+
+    def lead_to(self, port: int) -> None:
+        self._to = port
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        while True:
+            page, _ = self._listening.accept()
+            server = socket.socket()
+            server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            server.connect(("127.0.0.1", self._to))
+            for source, sink, is_limited in ((page, server, False), (server, page, True)):
+                threading.Thread(target=self._pass_on, args=(source, sink, is_limited), daemon=True).start()
+
+    def _pass_on(self, source: socket.socket, sink: socket.socket, is_limited: bool) -> None:
+        try:
+            while data := source.recv(1460):
+                if is_limited and self.is_slow:
+                    self._wait(len(data))
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
+        except OSError:
+            source.close()
+            sink.close()
+
+    def _wait(self, size: int) -> None:
+        with self._lock:
+            self._free_s = max(self._free_s, time.monotonic()) + size / SLOW_BYTES_PER_S
+            pause_s = self._free_s - time.monotonic()
+        time.sleep(max(0.0, pause_s))
+
+
+def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Path, console: None) -> None:
+    line = SlowLine()
+    station = Station(tmp_path / "data", environment={**os.environ, "HEDGEHOP_ALLOWED_HOSTS": line.host})
+    try:
+        line.lead_to(int(station.origin.rpartition(":")[2]))
+        with simulated_vehicle() as vehicle:
+            page.goto(station.link.replace(station.origin, f"http://{line.host}"))
+            connect(page, vehicle)
+            expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
+            line.is_slow = True
+            expect(page.get_by_test_id("link-state")).to_contain_text(re.compile(r"Slow line: \d+\ss late|silent"))
+            expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
+            line.is_slow = False
+            expect(page.get_by_test_id("link-state")).to_contain_text("Connected")
+            expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
+            page.close()
+    finally:
+        station.stop()
 
 
 def test_while_the_link_has_failed_nothing_is_offered_that_it_would_do(

@@ -1,7 +1,8 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import { now_ms } from "../src/store/clock";
 import { heard, lease, linkStatus, nodes, takeFlying } from "../src/store/flying";
-import { failed, isOld, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
+import { failed, isOld, late_s, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
+import { forgetClock, takeClock } from "../src/store/server_clock";
 import { link } from "../src/store/state";
 import { linkStatus as status, vehicleMessage } from "./flight_samples";
 
@@ -56,5 +57,16 @@ describe("how far this page's word reaches", () => {
     expect([isOld("live", "position"), isOld("replay", "position")]).toEqual([true, false]);
     nodes.value = linkNode("running");
     expect(isOld("live", "battery")).toBe(false);
+  });
+
+  it("says how late a slow line brings what the server says", () => {
+    takeClock({ v: 1, type: "clock", page_ms: 0, now_mono_s: 100.2 }, 10);
+    takeFlying(vehicleMessage({ now_mono_s: 101.2 }), 1050);
+    expect(late_s.value).toBeNull();
+    takeFlying(vehicleMessage({ now_mono_s: 102.2 }), 6500);
+    expect(late_s.value).toBe(4);
+    link.value = "silent";
+    expect(late_s.value).toBeNull();
+    forgetClock();
   });
 });

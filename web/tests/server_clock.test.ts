@@ -11,23 +11,23 @@ function answer(page_ms: number, there_ms: number, back_ms: number, ahead_s: num
 }
 
 describe("the server's clock", () => {
-  it("is known to half the way there and back of the quickest answer", () => {
+  it("is known by the quickest answer, at its latest: half its way there and back later than its middle", () => {
     answer(1000, 10, 10, 500);
-    expect(serverNow_s(2000)).toBeCloseTo(502, 3);
+    expect(serverNow_s(2000)).toBeCloseTo(502.01, 3);
     answer(2000, 20, 9000, 500);
-    expect(serverNow_s(12_000)).toBeCloseTo(512, 3);
+    expect(serverNow_s(12_000)).toBeCloseTo(512.01, 3);
   });
 
   it("is taken anew where both cannot be right: the page slept, or the server is another", () => {
     answer(20_000, 10, 10, 500);
     answer(21_000, 200, 200, 560);
-    expect(serverNow_s(22_000)).toBeCloseTo(582, 1);
+    expect(serverNow_s(22_000)).toBeCloseTo(582.2, 1);
   });
 
   it("is measured anew after a minute", () => {
     answer(30_000, 1, 1, 560);
     answer(100_000, 50, 60, 560.02);
-    expect(Math.abs((serverNow_s(101_000) ?? 0) - 661.02)).toBeLessThan(0.06);
+    expect(Math.abs((serverNow_s(101_000) ?? 0) - 661.02 - 0.05)).toBeLessThan(0.06);
   });
 
   it("makes what waited on a slow line as old as it is", () => {

@@ -1,6 +1,8 @@
+import { withUnit } from "../format";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { theme } from "../store/prefs";
+import { late_s } from "../store/reach";
 import { link } from "../store/state";
 import { SoundSwitch } from "./SoundSwitch";
 import { VerdictBadge } from "../plan/Verdict";
@@ -33,8 +35,9 @@ const LINK_WORDS = {
 } as const;
 
 function LinkBadge() {
-  const state = link.value;
-  const text = LINK_WORDS[state];
+  const state = late_s.value === null ? link.value : "slow";
+  const text =
+    late_s.value === null ? LINK_WORDS[link.value] : `Slow line: ${withUnit(late_s.value, "s")} late`;
   return (
     <span class={`link-badge ${state}`} role="status" data-testid="link-state">
       <span class="dot" aria-hidden="true" />

@@ -1,7 +1,7 @@
 import { signal } from "@preact/signals";
 import type { ErrorDoc } from "../messages";
 import { asErrorDoc, request } from "../net/api";
-import { serverIn_s } from "./server_clock";
+import { serverNow_s } from "./server_clock";
 import { setError } from "./state";
 
 /** What a command came to, by the place on the page where it was given. */
@@ -96,8 +96,8 @@ export async function order(given: Order): Promise<Response | null> {
 }
 
 function goodUntil(): Record<string, string> {
-  const until_s = serverIn_s(GOOD_FOR_S, performance.now());
-  return until_s === null ? {} : { "Hedgehop-Good-Until": until_s.toFixed(3) };
+  const now_s = serverNow_s(performance.now());
+  return now_s === null ? {} : { "Hedgehop-Good-Until": (now_s + GOOD_FOR_S).toFixed(3) };
 }
 
 /** A request without an answer to keep; its error appears at `place`. */

@@ -2,6 +2,7 @@ import { computed } from "@preact/signals";
 import { isStale, type Group } from "./ages";
 import { now_ms } from "./clock";
 import { hasLinkFailed, heard, lease, type Source } from "./flying";
+import { serverNow_s } from "./server_clock";
 import { link } from "./state";
 
 /** How far this page's word reaches, and why no farther. Every control says it with these sentences. */
@@ -39,3 +40,15 @@ export const whyNotCommand = computed(() => whyUnheard.value ?? whyObserving.val
 /** Whether a value may no longer be so: it is old, or what would tell that it is has failed. */
 export const isOld = (source: Source, group: Group): boolean =>
   (source === "live" && failed.value !== null) || isStale(heard[source].value, group, now_ms.value);
+
+/** A line that is slower than what there is to say, from here on. */
+const LATE_S = 2;
+
+/** How late the newest word of the vehicle came from the server to this page, whole seconds; null: not noticeably. */
+export const late_s = computed<number | null>(() => {
+  const known = heard.live.value;
+  const came_s = known && serverNow_s(known.received_ms);
+  if (!known || came_s === null || link.value !== "open") return null;
+  const seconds = came_s - known.message.now_mono_s;
+  return seconds < LATE_S ? null : Math.floor(seconds);
+});

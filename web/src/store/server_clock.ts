@@ -22,15 +22,11 @@ export function takeClock(message: ClockMessage, now_ms: number): void {
     best = { offset_s, error_s, at_ms: now_ms };
 }
 
-/** By the server's clock, at the latest: when so many seconds from now have passed; null before the first answer. */
-export const serverIn_s = (seconds: number, now_ms: number): number | null =>
-  best === null ? null : now_ms / 1000 + best.offset_s + best.error_s + seconds;
-
 /** Another connection: whatever lay between, a computer that slept or another server, the old clock says nothing. */
 export function forgetClock(): void {
   best = null;
 }
 
-/** The server's clock now, seconds; null before the first answer. */
+/** The server's clock now, seconds, at the latest: nothing is taken for newer than it is. Null before the first answer. */
 export const serverNow_s = (now_ms: number): number | null =>
-  best === null ? null : now_ms / 1000 + best.offset_s;
+  best === null ? null : now_ms / 1000 + best.offset_s + best.error_s;
