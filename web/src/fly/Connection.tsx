@@ -197,7 +197,7 @@ function Signing({ signing }: { signing: SigningStatus }) {
           label="Switch off"
           icon="cross"
           place={SIGNING}
-          disabled={!lease.value.mine}
+          disabled={whyNotCommand.value !== null}
           title="In an emergency: from then on anybody may speak as the vehicle"
           testid="signing-off"
           onHold={() => void setSigning(false)}
@@ -207,7 +207,7 @@ function Signing({ signing }: { signing: SigningStatus }) {
           label="Set up"
           icon="check"
           place={SIGNING}
-          disabled={!lease.value.mine || isInAir.value}
+          disabled={whyNotCommand.value !== null || isInAir.value}
           title="Over a cable or a link that nobody else hears: the key is sent in the clear"
           testid="signing-on"
           onHold={() => void setSigning(true)}
