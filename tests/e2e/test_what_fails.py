@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -67,6 +68,7 @@ class SlowLine:
         self._free_s = 0.0
         self._lock = threading.Lock()
         self._listening = socket.create_server(("127.0.0.1", 0))
+        self._sockets = [self._listening]
         self.host = f"127.0.0.1:{self._listening.getsockname()[1]}"
 
     def lead_to(self, port: int) -> None:
@@ -75,23 +77,31 @@ class SlowLine:
 
     def _accept(self) -> None:
         while True:
-            page, _ = self._listening.accept()
+            try:
+                page, _ = self._listening.accept()
+            except OSError:
+                return
             server = socket.socket()
+            self._sockets += [page, server]
             server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             server.connect(("127.0.0.1", self._to))
             for source, sink, is_limited in ((page, server, False), (server, page, True)):
                 threading.Thread(target=self._pass_on, args=(source, sink, is_limited), daemon=True).start()
 
     def _pass_on(self, source: socket.socket, sink: socket.socket, is_limited: bool) -> None:
-        try:
+        with contextlib.suppress(OSError):
             while data := source.recv(1460):
                 if is_limited and self.is_slow:
                     self._wait(len(data))
                 sink.sendall(data)
-            sink.shutdown(socket.SHUT_WR)
-        except OSError:
-            source.close()
-            sink.close()
+        with contextlib.suppress(OSError):
+            sink.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        for one in self._sockets:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
 
     def _wait(self, size: int) -> None:
         with self._lock:
@@ -118,6 +128,7 @@ def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Pa
             page.close()
     finally:
         station.stop()
+        line.close()
 
 
 def test_while_the_link_has_failed_nothing_is_offered_that_it_would_do(
