@@ -5,7 +5,7 @@ const FLOORS = [
   ["main"],
   ["shell"],
   ["scene"],
-  ["plan", "fly", "review"],
+  ["plan", "fly", "review", "account"],
   ["studies", "vehicle", "traversability"],
   ["chart", "tracks"],
   ["obstacles"],

@@ -17,6 +17,7 @@ import "./styles/chart.css";
 import "./styles/messages.css";
 import "./styles/menus.css";
 import "./styles/dialogs.css";
+import "./styles/account.css";
 import "./styles/strip.css";
 import "./styles/hold.css";
 import "./styles/fly.css";

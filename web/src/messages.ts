@@ -1033,6 +1033,67 @@ export interface SelectionDoc {
   site_rank: number | null;
 }
 
+/** Who this page is. */
+export interface MeDoc {
+  name: string;
+  role: "operator" | "observer";
+  /** Of this machine: in by the printed link or by the password of the settings. */
+  owner: boolean;
+}
+
+/** Who is in charge. Only they can command the vehicle. */
+export interface LeaseDoc {
+  holder: string | null;
+  mine: boolean;
+  /** Nothing is heard of the holder's pages: control can be taken by a press. */
+  silent: boolean;
+  /** Told to the holder: who asks for control. */
+  asks: string | null;
+  /** Told to who asks: the holder has not answered yet. */
+  waits: boolean;
+}
+
+export interface AccountDoc {
+  name: string;
+  role: "operator" | "observer";
+  has_password: boolean;
+  /** Its newest link that has not been used leads in until then. */
+  invited_until_utc_s: number | null;
+}
+
+export interface SessionDoc {
+  id: string;
+  name: string;
+  role: "operator" | "observer";
+  since_utc_s: number;
+  seen_utc_s: number;
+  address: string;
+  /** The session that asks. */
+  mine: boolean;
+  in_charge: boolean;
+}
+
+export interface InvitationDoc {
+  /** Signs in once. */
+  link: string;
+  expires_utc_s: number;
+}
+
+export interface SignIn {
+  /** Of the account; none: the owner of the machine. */
+  name?: string;
+  password: string;
+}
+
+export interface NewAccount {
+  name: string;
+  role: "operator" | "observer";
+}
+
+export interface ChangePassword {
+  password: string;
+}
+
 /** Where the vehicle is against the plan and the surface model; null where it cannot be told. */
 export interface FollowDoc {
   /** Distance flown along the planned line, at the place nearest to the vehicle. */
@@ -1118,16 +1179,6 @@ export interface FlyState {
   busy: string;
 }
 
-export interface SignIn {
-  password: string;
-}
-
-/** Who is in charge. Only they can command the vehicle. */
-export interface LeaseDoc {
-  holder: string | null;
-  mine: boolean;
-}
-
 export interface NodeDoc {
   name: string;
   state: "starting" | "running" | "silent" | "restarting" | "stopped";
@@ -1177,10 +1228,6 @@ export interface StartFlight {
   digest: string;
   accept?: ("gnss" | "battery" | "rtl_height" | "avoidance")[];
   from_item?: number;
-}
-
-export interface TakeLease {
-  name?: string;
 }
 
 export interface OpenReview {
@@ -1887,6 +1934,13 @@ export interface LeaseMessage {
   lease: LeaseDoc;
 }
 
+/** Right after the snapshot. */
+export interface MeMessage {
+  v: 1;
+  type: "me";
+  me: MeDoc;
+}
+
 export interface NodesMessage {
   v: 1;
   type: "nodes";
@@ -2045,6 +2099,7 @@ export type ServerMessage =
   | FlightMessage
   | FlyMessage
   | LeaseMessage
+  | MeMessage
   | NodesMessage
   | RecorderMessage
   | RecordingsMessage

@@ -277,7 +277,7 @@ export function ConnectionSection() {
           data-testid="give-control"
           onClick={() => void giveControl()}
         >
-          Hand over control
+          Let go of control
         </button>
       )}
     </Section>

@@ -1,6 +1,17 @@
 import { openReview, recordings } from "../store/review";
 import { goTo } from "../store/view";
-import { flight, fly, isInAir, lease, linkStatus, recorder, transfer, vehicle } from "../store/flying";
+import {
+  flight,
+  fly,
+  isInAir,
+  isObserver,
+  lease,
+  linkStatus,
+  notInCharge,
+  recorder,
+  transfer,
+  vehicle,
+} from "../store/flying";
 import { pending } from "../store/outcomes";
 import { failed, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
@@ -65,12 +76,13 @@ function Primary({ step, isCut }: { step: Step; isCut: boolean }) {
       return plain("It is this vehicle", "drone", () => again && void adopt(again.id));
     }
     case "take_control":
+      if (isObserver.value || lease.value.waits) return null;
       return (
         <HoldButton
           key={step.id}
           wide
           kind="primary"
-          label="Take control"
+          label={lease.value.holder && !lease.value.silent ? "Ask for control" : "Take control"}
           icon="user"
           place={LEASE}
           disabled={failed.value === "server"}
@@ -147,6 +159,12 @@ const presentStep = (): Step =>
     obstacle: uploadRefusal(),
   });
 
+function whoIsInCharge(): string {
+  const { holder, silent, waits } = lease.value;
+  if (waits) return `${holder} has been asked for control.`;
+  return silent ? `${holder} is in charge, and nothing is heard of them.` : `${holder} is in charge.`;
+}
+
 /** The next step of the flight, at the bottom of the left panel. */
 export function NextAction() {
   const step = presentStep();
@@ -161,7 +179,8 @@ export function NextAction() {
       <TransferBar />
       {hint && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}
-      {observer && <p class="muted action-hint">{lease.value.holder} is in charge. You see everything.</p>}
+      {observer && <p class="muted action-hint">{whoIsInCharge()}</p>}
+      {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}
       <Primary step={step} isCut={cut !== null} />
     </footer>
   );

@@ -1,3 +1,5 @@
+import { AccountsDialog } from "../account/AccountsDialog";
+import { AskedForControl } from "../account/AskedForControl";
 import { Scene } from "../scene/Scene";
 import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
 import { FileDrop } from "./FileDrop";
@@ -40,6 +42,8 @@ export function App() {
       <FileDrop />
       {openDialog.value === "help" && <HelpSheet />}
       {openDialog.value === "plans" && <PlansDialog />}
+      {openDialog.value === "accounts" && <AccountsDialog />}
+      <AskedForControl />
       {openDialog.value === "save_as" && <SaveAsDialog />}
     </div>
   );

@@ -2,9 +2,11 @@ import { withUnit } from "../format";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { theme } from "../store/prefs";
+import { isObserver, me, notInCharge } from "../store/flying";
 import { late_s } from "../store/reach";
 import { link } from "../store/state";
 import { SoundSwitch } from "./SoundSwitch";
+import { Chip } from "../ui/Chip";
 import { VerdictBadge } from "../plan/Verdict";
 import { JobList } from "./JobList";
 import { NoticeMenu } from "./Notices";
@@ -126,10 +128,15 @@ export function StatusBar() {
       <PlanDrawerButton />
       <Brand />
       <Tabs />
-      <PlanName />
-      <UndoRedo />
+      <fieldset class="changes" disabled={isObserver.value}>
+        <PlanName />
+        <UndoRedo />
+      </fieldset>
       <span class="spring" />
       <JobList />
+      {isObserver.value && (
+        <Chip icon="eye" text="Observer" title={notInCharge.value ?? ""} testid="chip-observer" />
+      )}
       <LinkBadge />
       <button
         type="button"
@@ -145,6 +152,13 @@ export function StatusBar() {
         <SoundSwitch />
         <NoticeMenu />
         <ThemeToggle />
+        <Button
+          kind="quiet"
+          icon="user"
+          title={`Signed in as ${me.value?.name ?? "…"}: accounts and sessions`}
+          testid="accounts"
+          onClick={() => (openDialog.value = "accounts")}
+        />
         <Button
           kind="quiet"
           icon="help"

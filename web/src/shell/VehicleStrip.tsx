@@ -1,5 +1,5 @@
 import { clock, duration } from "../format";
-import { LEASE, SAFETY, holdPosition, returnHome, takeControl } from "../vehicle/orders";
+import { LEASE, SAFETY, holdPosition, returnHome, giveControl, takeControl } from "../vehicle/orders";
 import {
   batteryLevel,
   batteryWord,
@@ -13,6 +13,7 @@ import {
   adopted,
   hasLinkFailed,
   latched,
+  isObserver,
   lease,
   linkState,
   linkStatus,
@@ -28,6 +29,7 @@ import { failed, isOld, whyNotCommand, whyUnheard } from "../store/reach";
 import { isReplaying, review } from "../store/review";
 import { severityWord } from "../store/texts";
 import { Chip } from "../ui/Chip";
+import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
@@ -228,24 +230,47 @@ function Replaying() {
   );
 }
 
+function takes(holder: string | null, silent: boolean): string {
+  if (!holder) return "You will command the vehicle";
+  return silent ? `Nothing is heard of ${holder}: takes the command` : `Asks ${holder}, who can hand it over`;
+}
+
 function Operator() {
-  const { holder, mine } = lease.value;
-  const text = mine ? "In charge" : holder ? "Observer" : "Nobody in charge";
+  const { holder, mine, silent, waits } = lease.value;
+  const text = mine
+    ? "In charge"
+    : isObserver.value
+      ? "Observer"
+      : holder
+        ? "Looking on"
+        : "Nobody in charge";
+  const title = holder ? `${holder} is in charge` : "Nobody is in charge";
   return (
     <div class="operator">
       <Chip
         icon={mine ? "user" : "eye"}
         text={text}
-        title={mine ? "You command the vehicle" : holder ? `${holder} is in charge` : "Take control to fly"}
+        title={mine ? "You command the vehicle" : title}
         testid="chip-operator"
       />
-      {!mine && (
+      {!mine && holder && (
+        <span class="muted operator-holder">
+          {holder}
+          {silent ? ", silent" : ""}
+        </span>
+      )}
+      {waits && (
+        <Button kind="quiet" testid="ask-no-more" onClick={() => void giveControl()}>
+          Ask no more
+        </Button>
+      )}
+      {!mine && !waits && !isObserver.value && (
         <HoldButton
-          label="Take control"
+          label={holder && !silent ? "Ask for control" : "Take control"}
           icon="user"
           place={LEASE}
           disabled={failed.value === "server"}
-          title={holder ? `Takes the command from ${holder}` : "You will command the vehicle"}
+          title={takes(holder, silent)}
           testid="take-control"
           onHold={() => void takeControl()}
         />

@@ -4,6 +4,7 @@ import type {
   FlyState,
   LeaseDoc,
   LinkStatus,
+  MeDoc,
   NodeDoc,
   RecorderStatus,
   ServerMessage,
@@ -20,7 +21,17 @@ export type FlyingMessage = Extract<
   ServerMessage,
   {
     type:
-      "vehicle" | "track" | "text" | "link" | "transfer" | "flight" | "fly" | "lease" | "nodes" | "recorder";
+      | "vehicle"
+      | "track"
+      | "text"
+      | "link"
+      | "transfer"
+      | "flight"
+      | "fly"
+      | "lease"
+      | "me"
+      | "nodes"
+      | "recorder";
   }
 >;
 
@@ -42,7 +53,21 @@ export const texts = signal<readonly TextEntry[]>([]);
 export const linkStatus = signal<{ status: LinkStatus; received_ms: number } | null>(null);
 export const transfer = signal<TransferStatus | null>(null);
 export const fly = signal<FlyState | null>(null);
-export const lease = signal<LeaseDoc>({ holder: null, mine: false });
+export const lease = signal<LeaseDoc>({
+  holder: null,
+  mine: false,
+  silent: false,
+  asks: null,
+  waits: false,
+});
+/** Who this page is; unknown until the server has said it. */
+export const me = signal<MeDoc | null>(null);
+export const isObserver = computed(() => me.value?.role === "observer");
+/** Why this page commands nothing; null: it does. */
+export const notInCharge = computed(() => {
+  if (isObserver.value) return "You are an observer: you see everything and change nothing";
+  return lease.value.mine ? null : "You observe: take control first";
+});
 export const nodes = signal<readonly NodeDoc[]>([]);
 export const recorder = signal<{ status: RecorderStatus; received_ms: number } | null>(null);
 
@@ -131,6 +156,9 @@ export function takeFlying(message: FlyingMessage, received_ms: number): void {
       return;
     case "lease":
       lease.value = message.lease;
+      return;
+    case "me":
+      me.value = message.me;
       return;
     case "nodes":
       nodes.value = message.nodes;

@@ -1,7 +1,7 @@
 import { computed } from "@preact/signals";
 import { isStale, type Group } from "./ages";
 import { now_ms } from "./clock";
-import { hasLinkFailed, heard, lease, type Source } from "./flying";
+import { hasLinkFailed, heard, notInCharge, type Source } from "./flying";
 import { serverNow_s } from "./server_clock";
 import { link } from "./state";
 
@@ -27,15 +27,13 @@ export const whyUnheard = computed(() => {
   return FAILURES[link.value === "silent" ? "silent" : failed.value];
 });
 
-const whyObserving = computed(() => (lease.value.mine ? null : "You observe: take control first"));
-
 /** Why the server does nothing that only whoever is in charge may ask of it; null: it does. */
 export const whyNotAsk = computed(() =>
-  failed.value === "server" ? "The server cannot be reached" : whyObserving.value,
+  failed.value === "server" ? "The server cannot be reached" : notInCharge.value,
 );
 
 /** Why the vehicle cannot be commanded from this page; null: it can. */
-export const whyNotCommand = computed(() => whyUnheard.value ?? whyObserving.value);
+export const whyNotCommand = computed(() => whyUnheard.value ?? notInCharge.value);
 
 /** Whether a value may no longer be so: it is old, or what would tell that it is has failed. */
 export const isOld = (source: Source, group: Group): boolean =>

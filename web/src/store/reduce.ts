@@ -58,6 +58,7 @@ export function receive(message: ServerMessage): void {
     case "flight":
     case "fly":
     case "lease":
+    case "me":
     case "nodes":
     case "recorder":
       takeFlying(message, performance.now());

@@ -1,4 +1,5 @@
 import type { ComponentChildren } from "preact";
+import { isObserver, notInCharge } from "../store/flying";
 import { computation, editedPlace, errors } from "../store/state";
 import type { ErrorDoc } from "../messages";
 import { openSections } from "../store/prefs";
@@ -52,7 +53,13 @@ export function Section({ id, title, icon, summary, startsOpen = false, isUrgent
         <div class="section-body" id={`section-${id}`}>
           <ErrorBox place={id} />
           {wrong && <ErrorPanel error={wrong} />}
-          {children}
+          <fieldset
+            class="changes"
+            disabled={isObserver.value}
+            title={isObserver.value ? (notInCharge.value ?? "") : undefined}
+          >
+            {children}
+          </fieldset>
         </div>
       )}
     </section>

@@ -1,5 +1,5 @@
 import { computed, signal } from "@preact/signals";
-import type { CheckRow, StartFlight } from "../messages";
+import type { CheckRow, LeaseDoc, StartFlight } from "../messages";
 import { fly } from "../store/flying";
 import { order, say } from "../store/outcomes";
 import { allSent } from "../store/plan";
@@ -109,10 +109,16 @@ export const setSigning = (enabled: boolean) =>
 export const startSimulator = (place: string) => order({ place, path: "/api/link/simulator" });
 
 export const LEASE = "lease";
-export const takeControl = () =>
-  order({ place: LEASE, path: "/api/lease/take", body: {}, done: "You are in charge." });
-export const giveControl = () =>
-  order({ place: LEASE, path: "/api/lease/release", done: "Nobody is in charge now." });
+export async function takeControl(): Promise<void> {
+  const answer = await order({ place: LEASE, path: "/api/lease/take" });
+  if (!answer) return;
+  const { mine, holder } = (await answer.json()) as LeaseDoc;
+  say(LEASE, mine ? "You are in charge." : `${holder ?? "Who is in charge"} has been asked.`);
+}
+/** Lets go, or asks no more. */
+export const giveControl = () => order({ place: LEASE, path: "/api/lease/release" });
+export const handOver = () => order({ place: LEASE, path: "/api/lease/hand_over" });
+export const keepControl = () => order({ place: LEASE, path: "/api/lease/keep" });
 
 export const startRecording = () => order({ place: "recorder", path: "/api/recorder/start" });
 export const stopRecording = () => order({ place: "recorder", path: "/api/recorder/stop" });
