@@ -2,9 +2,10 @@
 
 ServerError
 ├── SignInError            no session, a wrong password, a used link
-│   └── TooManyTriesError      wrong passwords in a row
+│   └── TooManyTriesError      too many passwords wait to be looked at
 ├── ForbiddenError         a foreign origin or host
-│   └── NotInChargeError       a command of a session that does not hold the lease
+│   ├── NotInChargeError       a command of a session that does not hold the lease
+│   └── ObserverError          an observer's account would change something
 ├── NotFoundError          no plan, terrain, page or job of that id
 ├── ConflictError          what was asked for does not fit the present state
 │   ├── StaleRevisionError     an edit of a plan that has changed meanwhile
@@ -75,6 +76,10 @@ class ForbiddenError(ServerError):
 
 class NotInChargeError(ForbiddenError):
     code = "not_in_charge"
+
+
+class ObserverError(ForbiddenError):
+    code = "observer"
 
 
 class NotFoundError(ServerError):
@@ -185,6 +190,8 @@ STATUS: dict[type[Exception], int] = {
 }
 """Subclasses take the status of their nearest ancestor here; all that is missing is 500."""
 
+ASK_OPERATOR = "Ask an operator to do it, or for an operator's account."
+"""To an observer."""
 _UNFORESEEN = "internal"
 _HTTP_CODES = {400: "invalid", 404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import hmac
 import os
-import secrets
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, SecretStr, ValidationError, model_validator
 from pydantic_settings import (
     BaseSettings,
     NoDecode,
@@ -23,39 +19,12 @@ from server.errors import StartError, error_doc
 from telemetry.topics.vehicle import RadarKind
 
 GIB = 1024**3
-_SCRYPT = {"n": 2**14, "r": 8, "p": 1, "maxmem": 64 * 1024**2}
-
-
-@dataclass(frozen=True, slots=True)
-class PasswordHash:
-    """All that is kept of the password (scrypt)."""
-
-    salt: bytes
-    digest: bytes
-
-    @classmethod
-    def of(cls, password: str) -> PasswordHash:
-        salt = secrets.token_bytes(16)
-        return cls(salt, hashlib.scrypt(password.encode(), salt=salt, **_SCRYPT))
-
-    def matches(self, password: str) -> bool:
-        """Takes about 50 ms, whatever the password."""
-        return hmac.compare_digest(self.digest, hashlib.scrypt(password.encode(), salt=self.salt, **_SCRYPT))
-
-
-def _hash_password(value: object) -> object:
-    if isinstance(value, str):
-        if len(value) < 8:
-            raise ValueError("a password needs at least 8 characters")
-        return PasswordHash.of(value)
-    return value
 
 
 def _split(value: object) -> object:
     return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
 
 
-Password = Annotated[PasswordHash, BeforeValidator(_hash_password)]
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)]
 
 
@@ -71,7 +40,7 @@ def default_console_dir() -> Path:
 
 class Settings(BaseSettings):
     model_config = SettingsConfigDict(
-        env_prefix="HEDGEHOP_", extra="forbid", frozen=True, use_attribute_docstrings=True, arbitrary_types_allowed=True
+        env_prefix="HEDGEHOP_", extra="forbid", frozen=True, use_attribute_docstrings=True
     )
 
     host: str = "127.0.0.1"
@@ -88,8 +57,9 @@ class Settings(BaseSettings):
     """Where other devices get the authority's certificate, over plain HTTP and nothing else; 0: nowhere."""
     data_dir: Path = Field(default_factory=default_data_dir)
     """Where surface models, plans and sessions are kept."""
-    password: Password | None = None
-    """Lets operators sign in without the link that is printed at start; at least 8 characters."""
+    password: Annotated[SecretStr, Field(min_length=8, max_length=1024)] | None = None
+    """Lets the owner of this machine sign in without the link that is printed at start; at least 8 characters. Others
+    get accounts of their own: hedgehop account."""
     password_file: Path | None = None
     """A file with the password, such as a container's secret: unlike the environment, no other program is shown it."""
     session_days: Annotated[float, Field(gt=0, le=365)] = 30.0

@@ -12,6 +12,7 @@ from typing import Any
 
 from server.door.hub import Hub
 from server.door.lease import Lease
+from server.door.operators import Operators
 from server.errors import reported
 from server.flying.flight_desk import FlightDesk
 from server.flying.plan_followed import PlanFollowed
@@ -31,9 +32,6 @@ from server.library import Library
 from server.library.recording_list import RecordingShelf
 from server.obstacles.obstacles import Obstacles
 from server.schemas import (
-    ErrorDoc,
-    LeaseDoc,
-    LeaseMessage,
     LinkMessage,
     NoticeMessage,
     ServerMessage,
@@ -73,7 +71,7 @@ class Flying:
         settings: Settings,
     ) -> None:
         self._bus, self._hub, self._workspace, self._scenarios = bus, hub, workspace, scenarios
-        self.lease = lease
+        self.lease, self.operators = lease, Operators(lease, hub)
         self._present = present = Present(hub)
         self._lane = lane = Lane("flight")
         runtime_dir, board = library.root / RUNTIME_FOLDER, workspace.board
@@ -176,8 +174,7 @@ class Flying:
             self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
             self.live.tick()
             self._obstacles.tick()
-            if self.lease.pass_on(self._hub.session_keys, in_flight=self.live.armed):
-                await self._lease_changed()
+            await self.operators.look()
             await asyncio.sleep(ALIVE_EVERY_S)
 
     async def _hear_of_plan(self) -> None:
@@ -259,35 +256,7 @@ class Flying:
 
     def present_for(self, session_key: str) -> list[ServerMessage]:
         """What a page is told right after its snapshot."""
-        return [*self._present.messages(), self._lease_message(session_key)]
-
-    async def page_opens(self, session_key: str) -> None:
-        if self.lease.take_if_free(session_key):
-            await self._lease_changed()
-
-    async def take_lease(self, session_key: str, name: str) -> LeaseDoc:
-        before = self.lease.take(session_key, name)
-        await self._lease_changed()
-        if before is not None and self.lease.holder is not None:
-            what = f"{self.lease.holder.name} has taken control of the vehicle."
-            doc = ErrorDoc(code="lease_taken", what=what, advice="Press Take control to have it back.")
-            self._hub.publish_to(before.session_key, NoticeMessage(level="warning", error=doc))
-        return self.lease.doc_for(session_key)
-
-    async def release_lease(self, session_key: str) -> LeaseDoc:
-        if self.lease.release(session_key):
-            await self._lease_changed()
-        return self.lease.doc_for(session_key)
-
-    async def _lease_changed(self) -> None:
-        self._hub.publish_each(self._lease_message)
-        try:
-            await asyncio.to_thread(self.lease.save)
-        except Exception as error:
-            log.warning("Noting who is in charge: %s", reported(error, log, "Noting who is in charge").what)
-
-    def _lease_message(self, session_key: str) -> LeaseMessage:
-        return LeaseMessage(lease=self.lease.doc_for(session_key))
+        return [*self._present.messages(), self.operators.message(session_key)]
 
 
 _LEFT_FLYING = (

@@ -20,6 +20,7 @@ from planning import __version__
 from planning.confinement import what_holds
 from planning.errors import DescribedError
 from server.api import (
+    account_routes,
     console_routes,
     flight_routes,
     link_routes,
@@ -35,7 +36,9 @@ from server.api import (
     traversability_routes,
     view_routes,
 )
-from server.api.access import Parts, answer
+from server.api.access import Admitted, Parts, answer
+from server.api.sessions_ended import watch_sessions
+from server.door.accounts import Accounts
 from server.door.auth import Auth
 from server.door.guard import Guard
 from server.door.hub import Hub
@@ -67,6 +70,7 @@ OpenFlying = Callable[[Settings, Library, Hub, "Workspace", ScenarioDesk], Await
 """Joins the bus and all that hangs on it."""
 ROUTERS = (
     session_routes,
+    account_routes,
     plan_routes,
     terrain_routes,
     traversability_routes,
@@ -99,6 +103,7 @@ def create_app(
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
+        dependencies=[Admitted],
         lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_flying, demo, tls),
     )
     for module in ROUTERS:
@@ -131,7 +136,7 @@ async def _lifespan(
             raise
         app.state.parts = parts
         disk = DiskWatch(library.reserve, lambda notice: _tell_of_disk(parts.hub, library, notice))
-        own = (parts.loop_lag.run(), disk.run(), *_tls_loops(tls, settings))
+        own = (parts.loop_lag.run(), watch_sessions(parts), disk.run(), *_tls_loops(tls, settings))
         for loop in (*own, *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
             background.spawn(loop)
         try:
@@ -156,7 +161,13 @@ async def _open(
     demo: bool,
 ) -> Parts:
     """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
-    auth = Auth(library.root / "sessions.json", password=settings.password, lifetime_s=settings.session_days * 86400.0)
+    auth = await asyncio.to_thread(
+        Auth,
+        library.root / "sessions.json",
+        Accounts(library.root),
+        password=None if settings.password is None else settings.password.get_secret_value(),
+        lifetime_s=settings.session_days * 86400.0,
+    )
     await asyncio.to_thread(sensor_token, library.root)
     hub = Hub()
     host = await asyncio.to_thread(SceneHost)

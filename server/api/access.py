@@ -1,19 +1,22 @@
-"""What every route needs: the parts of the running app, the session behind a request, answers as JSON."""
+"""What every route needs: the parts of the running app, who is behind a request and what they may, answers as JSON."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from fastapi import Depends, Request
 from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import HTTPConnection
 
-from server.door.auth import Auth, session_key
+from server.door.auth import Auth, Identity
+from server.door.guard import SAFE_METHODS
 from server.door.hub import Hub
-from server.errors import BadRequestError, LateError, SignInError
+from server.errors import ASK_OPERATOR, BadRequestError, LateError, ObserverError, SignInError
 from server.library import Library
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc
@@ -54,19 +57,64 @@ def cookie_name(connection: HTTPConnection) -> str:
     return f"{prefix}hedgehop-{parts_of(connection).settings.port}"
 
 
-def session_of(connection: HTTPConnection) -> str:
-    """The id of the live session that the request belongs to; raises ``SignInError``."""
-    session_id = connection.cookies.get(cookie_name(connection), "")
-    if parts_of(connection).auth.remaining_s(session_id) <= 0:
+class Need(Enum):
+    """What a route asks of whoever calls it."""
+
+    NOTHING = "nothing"
+    OBSERVER = "observer"
+    OPERATOR = "operator"
+
+
+_NEEDS: dict[object, Need] = {}
+_ROUTE = TypeVar("_ROUTE", bound=Callable[..., Any])
+
+
+def needs(need: Need) -> Callable[[_ROUTE], _ROUTE]:
+    """Declares it, where it is not what the method says: to look is for everybody who is in, all else for operators."""
+
+    def mark(route: _ROUTE) -> _ROUTE:
+        _NEEDS[route] = need
+        return route
+
+    return mark
+
+
+def need_of(endpoint: object, method: str) -> Need:
+    return _NEEDS.get(endpoint, Need.OBSERVER if method in SAFE_METHODS else Need.OPERATOR)
+
+
+def admit(connection: HTTPConnection) -> None:
+    """Before every route, whoever wrote it. Raises SignInError, ObserverError. Sockets say it after they have opened:
+    before, no page could be told why."""
+    if connection.scope["type"] != "http":
+        return
+    need = need_of(connection.scope["endpoint"], connection.scope["method"])
+    if need is Need.NOTHING:
+        return
+    identity = identity_of(connection)
+    if need is Need.OPERATOR and not identity.may_change:
+        raise observer_refused(identity.name)
+
+
+def observer_refused(name: str) -> ObserverError:
+    return ObserverError(f"{name} is an observer: observers see everything and change nothing.", advice=ASK_OPERATOR)
+
+
+def identity_of(connection: HTTPConnection) -> Identity:
+    """Who is behind the request; raises ``SignInError``."""
+    auth = parts_of(connection).auth
+    identity = auth.identity(connection.cookies.get(cookie_name(connection), ""))
+    if identity is None:
         raise SignInError(
             "You are not signed in, or your session has ended.",
             advice="Open the sign-in link that Hedgehop printed, or sign in with the password.",
         )
-    return session_id
+    auth.note_seen(identity.session_key, address_of(connection))
+    return identity
 
 
-def signed_in(request: Request) -> str:
-    return session_of(request)
+def address_of(connection: HTTPConnection) -> str:
+    return connection.client.host if connection.client else ""
 
 
 def workspace_of(request: Request) -> Workspace:
@@ -77,14 +125,14 @@ def flying_of(request: Request) -> Flying:
     return parts_of(request).flying
 
 
-def session_key_of(request: Request) -> str:
-    return session_key(session_of(request))
+def who_asks(request: Request) -> Identity:
+    return identity_of(request)
 
 
 def in_charge(request: Request) -> Operator:
     """What a command of this session carries; raises ``NotInChargeError``, and ``LateError`` for one that is late."""
     _check_in_time(request.headers.get("hedgehop-good-until", ""))
-    return parts_of(request).flying.lease.operator(session_key_of(request))
+    return parts_of(request).flying.lease.operator(identity_of(request).session_key)
 
 
 def _check_in_time(good_until: str) -> None:
@@ -102,10 +150,10 @@ def _check_in_time(good_until: str) -> None:
         )
 
 
-SignedIn = Depends(signed_in)
+Admitted = Depends(admit)
 Work = Annotated["Workspace", Depends(workspace_of)]
 Fly = Annotated["Flying", Depends(flying_of)]
-Session = Annotated[str, Depends(session_key_of)]
+Who = Annotated[Identity, Depends(who_asks)]
 InCharge = Annotated[Operator, Depends(in_charge)]
 """Demanded by everything that reaches a vehicle."""
 ERROR_RESPONSES: dict[int | str, dict[str, object]] = {

@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Redirect
 
 from planning import __version__
 from planning.confinement import what_holds
-from server.api.access import SignedIn, parts_of, session_of
+from server.api.access import Need, identity_of, needs, parts_of
 from server.api.session_routes import inline_policy, render
 from server.errors import NotFoundError, SignInError
 from server.schemas.health_docs import HealthDoc, LoopDoc
@@ -21,10 +21,11 @@ _FOR_EVER = "public, max-age=31536000, immutable"
 
 
 @router.get("/api/health", include_in_schema=True, response_model_exclude_none=True, tags=["health"])
+@needs(Need.NOTHING)
 async def health(request: Request) -> HealthDoc:
     """Answers without a session; who has one learns how the station is."""
     try:
-        session_of(request)
+        identity_of(request)
     except SignInError:
         return HealthDoc(version=__version__)
     lag = parts_of(request).loop_lag.lag
@@ -38,9 +39,10 @@ async def health(request: Request) -> HealthDoc:
 
 
 @router.get("/")
+@needs(Need.NOTHING)
 async def console(request: Request) -> Response:
     try:
-        session_of(request)
+        identity_of(request)
     except SignInError:
         return _to_sign_in(request)
     index = parts_of(request).settings.console_dir / "index.html"
@@ -50,7 +52,7 @@ async def console(request: Request) -> Response:
     return FileResponse(index, media_type="text/html", headers={"cache-control": "no-cache"})
 
 
-@router.get("/assets/{path:path}", dependencies=[SignedIn])
+@router.get("/assets/{path:path}")
 async def asset(path: str, request: Request) -> Response:
     """Built files carry a digest in their names, so browsers may keep them."""
     return FileResponse(
@@ -60,15 +62,17 @@ async def asset(path: str, request: Request) -> Response:
 
 @router.get("/help")
 @router.get("/help/")
+@needs(Need.NOTHING)
 async def help_contents() -> Response:
     return RedirectResponse("/help/index.html")
 
 
 @router.get("/help/{path:path}")
+@needs(Need.NOTHING)
 async def help_page(path: str, request: Request) -> Response:
     """The documents, as they were when the console was built."""
     try:
-        session_of(request)
+        identity_of(request)
     except SignInError:
         return _to_sign_in(request)
     file = _file_below(parts_of(request).settings.console_dir / "help", path)
@@ -76,18 +80,19 @@ async def help_page(path: str, request: Request) -> Response:
 
 
 @router.get("/favicon.svg")
+@needs(Need.NOTHING)
 async def favicon(request: Request) -> Response:
     return FileResponse(
         _file_below(parts_of(request).settings.console_dir, "favicon.svg"), headers={"cache-control": "no-cache"}
     )
 
 
-@router.get("/api/openapi.json", dependencies=[SignedIn])
+@router.get("/api/openapi.json")
 async def openapi(request: Request) -> Response:
     return JSONResponse(request.app.openapi())
 
 
-@router.get("/api/docs", dependencies=[SignedIn])
+@router.get("/api/docs")
 async def docs(request: Request) -> Response:
     """The operations on one page, without anyone else's scripts."""
     page = render("api.html", title=request.app.title, version=__version__, operations=_operations(request.app))

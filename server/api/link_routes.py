@@ -5,22 +5,34 @@ from __future__ import annotations
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, Session, SignedIn, answer
-from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, SetVehicleSigning, TakeLease
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, Who, answer
+from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, SetVehicleSigning
 
-router = APIRouter(prefix="/api", dependencies=[SignedIn], tags=["link"], responses=ERROR_RESPONSES)
+router = APIRouter(prefix="/api", tags=["link"], responses=ERROR_RESPONSES)
 
 
 @router.post("/lease/take", response_model=LeaseDoc)
-async def take(body: TakeLease, session: Session, flying: Fly) -> Response:
-    """Takes charge of the vehicle; whoever was in charge is told so."""
-    return answer(await flying.take_lease(session, body.name))
+async def take(who: Who, flying: Fly) -> Response:
+    """Takes charge where nobody is, or where nothing is heard of who is; else asks them: they have 15 s to answer."""
+    return answer(await flying.operators.take(who.session_key, who.name))
+
+
+@router.post("/lease/hand_over", response_model=LeaseDoc)
+async def hand_over(who: Who, flying: Fly) -> Response:
+    """To whoever has asked."""
+    return answer(await flying.operators.hand_over(who.session_key))
+
+
+@router.post("/lease/keep", response_model=LeaseDoc)
+async def keep(who: Who, flying: Fly) -> Response:
+    """Who has asked is told so."""
+    return answer(await flying.operators.keep(who.session_key))
 
 
 @router.post("/lease/release", response_model=LeaseDoc)
-async def release_lease(session: Session, flying: Fly) -> Response:
-    """Lets go of the vehicle: the next one who asks is in charge."""
-    return answer(await flying.release_lease(session))
+async def release_lease(who: Who, flying: Fly) -> Response:
+    """Lets go of the vehicle, or asks no more: the next one who presses is in charge."""
+    return answer(await flying.operators.release(who.session_key))
 
 
 @router.post("/link/connect", **DONE)

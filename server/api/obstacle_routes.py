@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query
 from fastapi.responses import Response
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, SignedIn, answer
+from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
 from server.schemas import (
     AcknowledgeBody,
     MapFormat,
@@ -23,7 +23,7 @@ from server.schemas import (
 )
 from telemetry.topics.obstacles import MapName
 
-router = APIRouter(prefix="/api/obstacles", dependencies=[SignedIn], tags=["obstacles"], responses=ERROR_RESPONSES)
+router = APIRouter(prefix="/api/obstacles", tags=["obstacles"], responses=ERROR_RESPONSES)
 
 MEDIA_TYPES: dict[MapFormat, str] = {
     "ply": "application/octet-stream",

@@ -19,8 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from server.api.access import parts_of, session_of
-from server.door.auth import session_key
+from server.api.access import Need, identity_of, needs, parts_of
 from server.door.hub import Page
 from server.errors import NotFoundError, SignInError
 from server.scene.filter import MessageFilter
@@ -62,6 +61,7 @@ async def view_page(page_id: str, request: Request) -> Response:
 
 
 @router.websocket("/view/{page_id}")
+@needs(Need.OBSERVER)
 async def view_socket(page_id: str, websocket: WebSocket) -> None:
     """The bridge. A stranger and a client of another viser version are refused before the upgrade."""
     try:
@@ -76,15 +76,15 @@ async def view_socket(page_id: str, websocket: WebSocket) -> None:
 
 
 def _page(connection: Request | WebSocket, page_id: str) -> Page:
-    session_id = session_of(connection)
+    identity = identity_of(connection)
     page = parts_of(connection).hub.page(page_id)
-    if page is None or page.session_key != session_key(session_id):
+    if page is None or page.session_key != identity.session_key:
         raise NotFoundError("This 3D view belongs to no open page.", advice="Reload the page.")
     return page
 
 
 async def _bridge(websocket: WebSocket, page: Page, host: SceneHost) -> None:
-    messages = MessageFilter()
+    messages = MessageFilter(may_change=page.may_change)
     async with connect(
         host.url,
         subprotocols=[Subprotocol(SUBPROTOCOL)],

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import Response
 from pydantic import RootModel
 
-from server.api.access import DONE, ERROR_RESPONSES, SignedIn, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, answer, parts_of
 from server.api.terrain_routes import RAW_BODY, FileName
 from server.api.uploads import display_name, stream_to_disk
 from server.errors import BadRequestError, TooLargeError
@@ -19,7 +19,7 @@ from server.library.radar_files import ending_of
 from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading
 from server.schemas.study_docs import PageName
 
-router = APIRouter(prefix="/api/radar", dependencies=[SignedIn], tags=["radar"], responses=ERROR_RESPONSES)
+router = APIRouter(prefix="/api/radar", tags=["radar"], responses=ERROR_RESPONSES)
 
 CFG_LIMIT_BYTES = 1024**2
 

@@ -9,7 +9,7 @@ import time
 from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from server.api.access import parts_of
+from server.api.access import Need, needs, parts_of
 from server.door.sensor_token import is_token, sensor_token
 from server.errors import BusyError
 from server.heard.agents import Agents
@@ -28,8 +28,9 @@ CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_TRY_LATER = 1002, 1008, 1013
 
 
 @router.websocket(PATH)
+@needs(Need.NOTHING)
 async def frames(websocket: WebSocket) -> None:
-    """One agent. The guard has refused foreign hosts and origins before this."""
+    """One agent, with a token of its own. The guard has refused foreign hosts and origins before this."""
     parts = parts_of(websocket)
     scheme, _, given = websocket.headers.get("authorization", "").partition(" ")
     secret = await asyncio.to_thread(sensor_token, parts.library.root)

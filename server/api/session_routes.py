@@ -13,10 +13,10 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from server.api.access import cookie_name, parts_of, session_of
-from server.door.auth import session_key
+from server.api.access import Need, Who, address_of, answer, cookie_name, identity_of, needs, parts_of
+from server.api.sessions_ended import end_sessions
 from server.errors import SignInError, status_of
-from server.schemas import SignIn
+from server.schemas import MeDoc, SignIn
 
 router = APIRouter(tags=["session"])
 
@@ -24,16 +24,17 @@ _TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
 
 
 @router.get("/login", include_in_schema=False)
+@needs(Need.NOTHING)
 async def login(request: Request, token: str = "") -> Response:
     """The one-time link. Opened again by who is in already, it simply leads to the console."""
     auth = parts_of(request).auth
     try:
-        session_of(request)
+        identity_of(request)
         return RedirectResponse("/", 303)
     except SignInError:
         pass
     try:
-        session_id = await asyncio.to_thread(auth.redeem, token)
+        session_id = await asyncio.to_thread(auth.redeem, token, address_of(request))
     except SignInError as error:
         return sign_in_page(request, str(error), status_of(error))
     return _with_cookie(request, RedirectResponse("/", 303), session_id)
@@ -43,25 +44,30 @@ _ENDED = "Your session has ended. Sign in again: the plan is saved."
 
 
 @router.get("/signin", include_in_schema=False)
+@needs(Need.NOTHING)
 async def sign_in_form(request: Request, ended: bool = False) -> Response:
     return sign_in_page(request, _ENDED if ended else "", 200)
 
 
+@router.get("/api/session", response_model=MeDoc)
+async def me(who: Who) -> Response:
+    """Who this session is, and what it may."""
+    return answer(MeDoc(name=who.name, role=who.role, owner=who.is_owner))
+
+
 @router.post("/api/session", status_code=204)
+@needs(Need.NOTHING)
 async def sign_in(body: SignIn, request: Request) -> Response:
-    """Signs in with the password; at most five wrong ones a minute."""
-    session_id = await asyncio.to_thread(parts_of(request).auth.sign_in, body.password)
+    """Signs in with the password; after five wrong ones from an address each further one waits."""
+    session_id = await parts_of(request).auth.sign_in(body.name, body.password, address_of(request))
     return _with_cookie(request, Response(status_code=204), session_id)
 
 
 @router.delete("/api/session", status_code=204)
-async def sign_out(request: Request) -> Response:
+@needs(Need.OBSERVER)
+async def sign_out(who: Who, request: Request) -> Response:
     """Ends the session and closes all its pages."""
-    session_id = session_of(request)
-    parts = parts_of(request)
-    await asyncio.to_thread(parts.auth.sign_out, session_id)
-    parts.hub.close_session(session_key(session_id))
-    await parts.flying.release_lease(session_key(session_id))
+    await end_sessions(parts_of(request), [who.session_key])
     response = Response(status_code=204)
     response.delete_cookie(cookie_name(request))
     return response

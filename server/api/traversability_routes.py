@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, SignedIn, Work, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, Fly, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
@@ -23,9 +23,7 @@ class UwbClear(UwbRule):
     name: Annotated[str, Field(max_length=1000)]
 
 
-router = APIRouter(
-    prefix="/api/traversability", dependencies=[SignedIn], tags=["traversability"], responses=ERROR_RESPONSES
-)
+router = APIRouter(prefix="/api/traversability", tags=["traversability"], responses=ERROR_RESPONSES)
 
 
 @router.post("", response_model=JobDoc, status_code=202)

@@ -23,7 +23,7 @@ from pydantic import TypeAdapter, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server import schemas
-from server.errors import BusyError, error_doc
+from server.errors import ASK_OPERATOR, BusyError, ObserverError, error_doc
 from server.work.task_group import until_first
 
 log = logging.getLogger("hedgehop.hub")
@@ -38,6 +38,8 @@ RATE_PER_S, BURST = 120.0, 600.0
 CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
 
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
+OBSERVERS_MAY = (schemas.FrameView, schemas.HoldCamera, schemas.Ping)
+"""What moves nothing but this page's own camera."""
 _CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera", "ping")
 
 OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
@@ -73,9 +75,10 @@ def key_of(message: schemas.ServerMessage) -> object | None:
 class Page:
     """One browser page: its queue, and the reason why it has to go once there is one."""
 
-    def __init__(self, session_key: str) -> None:
+    def __init__(self, session_key: str, *, may_change: bool = True) -> None:
         self.page_id = secrets.token_urlsafe(16)
-        self.session_key = session_key
+        self.session_key, self.may_change = session_key, may_change
+        self.heard_mono_s = time.monotonic()
         self.gone = asyncio.Event()
         self.close_code = CLOSE_GOING_AWAY
         self._waiting: dict[object, _Outgoing] = {}
@@ -122,10 +125,10 @@ class Hub:
     def page(self, page_id: str) -> Page | None:
         return self._pages.get(page_id)
 
-    @property
-    def session_keys(self) -> list[str]:
-        """Of the pages that are open, the one that has been open longest first."""
-        return [page.session_key for page in self._pages.values()]
+    def session_keys(self, *, heard_within_s: float = float("inf")) -> set[str]:
+        """Of the pages that are open, and say so: each does every second."""
+        since = time.monotonic() - heard_within_s
+        return {page.session_key for page in self._pages.values() if page.heard_mono_s >= since}
 
     def publish(self, message: schemas.ServerMessage) -> None:
         """To every page; never waits."""
@@ -171,6 +174,7 @@ class Hub:
         *,
         session_key: str,
         session_remaining_s: float,
+        may_change: bool = True,
         snapshot: Callable[[str], schemas.Snapshot],
         present: Callable[[], Iterable[schemas.ServerMessage]] = tuple,
         on_message: OnMessage,
@@ -178,7 +182,7 @@ class Hub:
         """Runs one accepted socket until either side ends it; ``present`` is what follows the snapshot at once."""
         if len(self._pages) >= PAGES_MAX:
             raise BusyError(f"{PAGES_MAX} pages are open already.", advice="Close some of them.")
-        page = Page(session_key)
+        page = Page(session_key, may_change=may_change)
         self._pages[page.page_id] = page
         try:
             # Taken in the same step as the registration: no change can fall between snapshot and deltas.
@@ -214,6 +218,7 @@ class Hub:
             received = await websocket.receive()
             if received["type"] == "websocket.disconnect":
                 return
+            page.heard_mono_s = time.monotonic()
             allowed = bucket.left(time.monotonic()) >= 1.0
             bucket.spend(1.0)
             if not allowed:
@@ -233,7 +238,10 @@ class Hub:
             self.send(page.page_id, clock)
             return
         try:
-            await on_message(page.page_id, message)
+            if page.may_change or isinstance(message, OBSERVERS_MAY):
+                await on_message(page.page_id, message)
+            elif not isinstance(message, schemas.HoverProfile | schemas.HoverView):  # a pointer is no wish
+                raise ObserverError("Observers see everything and change nothing.", advice=ASK_OPERATOR)
         except Exception as error:
             notice = error_doc(error)
             if notice.code == "internal":

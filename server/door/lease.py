@@ -1,7 +1,8 @@
 """Who is in charge: one session at a time may command the vehicle, and every command carries a fencing token.
 
-Whoever has no page any more, and commands nothing either, loses it to a page that is there, but never in flight: a
-browser that comes back must not find another one in charge.
+It is taken by a press, and never passes on by itself: a browser that comes back must not find another one in charge.
+Who is in charge is asked for consent; nobody has to be asked who has been silent for five seconds, without a page that
+is heard and without a command. That is so in flight, too.
 
 The token only ever grows, across restarts too: it counts milliseconds since 1970, or one more than the last one if
 the clock went back. Whoever held the lease before has a lower token, and the link node refuses it. Where the clock went
@@ -14,11 +15,11 @@ from __future__ import annotations
 import json
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from server.errors import NotInChargeError
+from server.errors import ConflictError, NotInChargeError
 from server.library.whole_files import write_atomically
 from server.schemas import LeaseDoc
 from telemetry.topics.requests import Operator, highest_possible_token
@@ -27,10 +28,10 @@ log = logging.getLogger("hedgehop.flying")
 
 SERVER_NAME = "Hedgehop"
 """What the server calls itself when it opens the connections it was started with."""
-
-
-GONE_S = 8.0
-"""Without a page for so long, nobody comes back to it: a page that lost its server tries again every 5 s."""
+SILENT_S = 5.0
+"""A page says every second that it is there; one that lost its server is back within about five."""
+ANSWER_S = 15.0
+"""For so long the one in charge may think about it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,50 +55,86 @@ class Lease:
         self._since_token = self._token
         """The first one of who is in charge, or of nobody."""
         self._seen_mono_s = now_mono_s()
+        self._asker: Holder | None = None
+        self._asked_mono_s = 0.0
 
     @property
     def holder(self) -> Holder | None:
         return self._holder
 
+    @property
+    def is_silent(self) -> bool:
+        """Nothing is heard of who is in charge: it can be taken."""
+        return self._holder is not None and self._now_mono_s() - self._seen_mono_s >= SILENT_S
+
     def doc_for(self, session_key: str) -> LeaseDoc:
-        holder = self._holder
+        holder, asker = self._holder, self._asker
+        mine = holder is not None and holder.session_key == session_key
         return LeaseDoc(
             holder=None if holder is None else holder.name,
-            mine=holder is not None and holder.session_key == session_key,
+            mine=mine,
+            silent=self.is_silent,
+            asks=asker.name if mine and asker is not None else None,
+            waits=asker is not None and asker.session_key == session_key,
         )
 
-    def take_if_free(self, session_key: str) -> bool:
-        """The first one to open a page takes charge; False when somebody is in charge already."""
-        if self._holder is not None:
-            return False
-        self.take(session_key)
-        return True
+    def press(self, session_key: str, name: str) -> Holder | None:
+        """Takes charge where nobody has to be asked, else asks; the one who was in charge and has lost it.
 
-    def take(self, session_key: str, name: str = "") -> Holder | None:
-        """Takes charge; the one who was in charge before, unless it was this session."""
+        Raises ConflictError while somebody else is asking.
+        """
         before = self._holder
-        self._holder = Holder(session_key, name or default_name(session_key))
+        if before is not None and before.session_key == session_key:
+            return None
+        if before is None or self.is_silent:
+            self._take(Holder(session_key, name))
+            return before
+        if self._asker is not None and self._asker.session_key != session_key:
+            raise ConflictError(f"{self._asker.name} is asking for control already.", advice="Wait for the answer.")
+        self._asker, self._asked_mono_s = Holder(session_key, name), self._now_mono_s()
+        return None
+
+    def hand_over(self, session_key: str) -> Holder:
+        """To whom has asked. Raises NotInChargeError, ConflictError."""
+        asker = self._asked_of(session_key)
+        self._take(asker)
+        return asker
+
+    def keep(self, session_key: str) -> Holder:
+        """Whom to tell so. Raises NotInChargeError, ConflictError."""
+        asker = self._asked_of(session_key)
+        self._asker = None
+        return asker
+
+    def look(self, heard: Collection[str]) -> Holder | None:
+        """To be told every second whose pages were heard; who has asked and got no answer, once."""
+        now_mono_s, asker = self._now_mono_s(), self._asker
+        if self._holder is not None and self._holder.session_key in heard:
+            self._seen_mono_s = now_mono_s
+        if asker is None or now_mono_s - self._asked_mono_s < ANSWER_S:
+            return None
+        self._asker = None
+        return asker
+
+    def _asked_of(self, session_key: str) -> Holder:
+        self.operator(session_key)
+        if self._asker is None:
+            raise ConflictError("Nobody asks for control any more.")
+        return self._asker
+
+    def _take(self, holder: Holder) -> None:
+        self._holder, self._asker = holder, None
         self._seen_mono_s = self._now_mono_s()
         self._next_token()
-        return before if before is not None and before.session_key != session_key else None
-
-    def pass_on(self, present: Sequence[str], *, in_flight: bool) -> bool:
-        """To be told regularly whose pages are open: whether the first of ``present`` has taken charge just now."""
-        holder, now_mono_s = self._holder, self._now_mono_s()
-        if holder is None:
-            return False  # let go on purpose
-        if in_flight or holder.session_key in present:
-            self._seen_mono_s = now_mono_s
-        if not present or now_mono_s - self._seen_mono_s < GONE_S:
-            return False
-        self.take(present[0])
-        return True
 
     def release(self, session_key: str) -> bool:
-        """Lets go, if this session was in charge."""
+        """Lets go, if this session was in charge, and asks no more, if it did."""
+        if self._asker is not None and self._asker.session_key == session_key:
+            self._asker = None
+            return True
         if self._holder is None or self._holder.session_key != session_key:
             return False
-        self._holder = None
+        self._holder = self._asker = None
         self._next_token()
         return True
 
@@ -155,8 +192,3 @@ class Lease:
         except (FileNotFoundError, ValueError, TypeError, KeyError):
             # A damaged file costs pressing a button, never a refused start.
             return now, None
-
-
-def default_name(session_key: str) -> str:
-    """Sessions have no names; four characters tell them apart, and stay the same after a restart."""
-    return f"Operator {session_key[:4]}"

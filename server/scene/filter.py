@@ -18,6 +18,8 @@ ALLOWED = (
     _messages.TransformControlsDragStartMessage,
     _messages.TransformControlsDragEndMessage,
 )
+OF_OBSERVERS = frozenset({_messages.ViewerCameraMessage.__name__})
+"""Clicks and drags become edits."""
 MESSAGE_LIMIT_BYTES = 16 * 1024
 
 _DECODERS = {message.__name__: msgspec.msgpack.Decoder(message) for message in ALLOWED}
@@ -33,7 +35,8 @@ _TYPE = msgspec.msgpack.Decoder(_Tagged)
 class MessageFilter:
     """One per connection; counts what it drops, by type."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, may_change: bool = True) -> None:
+        self._may_change = may_change
         self.dropped: Counter[str] = Counter()
 
     def lets_through(self, raw: bytes | None) -> bool:
@@ -42,6 +45,8 @@ class MessageFilter:
             return self._drop("not viser's")
         try:
             kind = _TYPE.decode(raw).type
+            if not self._may_change and kind in _DECODERS and kind not in OF_OBSERVERS:
+                return False  # a hand that slips, and nothing to warn of
             decoder = _DECODERS.get(kind)
             if decoder is None:
                 return self._drop(kind[:40])

@@ -4,6 +4,16 @@
 Numbers are SI, degrees only for latitude, longitude, heading and gimbal pitch. NaN and infinity become null.
 """
 
+from server.schemas.account_docs import (
+    AccountDoc,
+    ChangePassword,
+    InvitationDoc,
+    LeaseDoc,
+    MeDoc,
+    NewAccount,
+    SessionDoc,
+    SignIn,
+)
 from server.schemas.flight_docs import (
     AdoptVehicle,
     CheckRow,
@@ -11,7 +21,6 @@ from server.schemas.flight_docs import (
     DisconnectLink,
     FlyState,
     FollowDoc,
-    LeaseDoc,
     NodeDoc,
     OnboardDoc,
     OpenReview,
@@ -19,10 +28,8 @@ from server.schemas.flight_docs import (
     PreflightDoc,
     RecordingDoc,
     SetVehicleSigning,
-    SignIn,
     Source,
     StartFlight,
-    TakeLease,
     TrackDoc,
     UploadPlan,
 )
@@ -101,6 +108,7 @@ from server.schemas.stream import (
     LeaseMessage,
     LibraryMessage,
     LinkMessage,
+    MeMessage,
     NodesMessage,
     NoticeMessage,
     ObstaclesMessage,

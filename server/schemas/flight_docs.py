@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
-from server.schemas.strict_model import Name, Strict
+from server.schemas.strict_model import Strict
 from telemetry.topics.messages import Rounded
 
 Source = Literal["live", "replay"]
@@ -112,17 +112,6 @@ class FlyState(Strict):
     """What is being done right now: "Uploading", "Checking the start" ..."""
 
 
-class SignIn(Strict):
-    password: Annotated[str, StringConstraints(max_length=1024)]
-
-
-class LeaseDoc(Strict):
-    """Who is in charge. Only they can command the vehicle."""
-
-    holder: str | None
-    mine: bool
-
-
 class NodeDoc(Strict):
     name: str
     state: Literal["starting", "running", "silent", "restarting", "stopped"]
@@ -176,10 +165,6 @@ class StartFlight(Strict):
     digest: str
     accept: list[Literal["gnss", "battery", "rtl_height", "avoidance"]] = Field(default_factory=list)
     from_item: Annotated[int, Field(ge=1)] = 1
-
-
-class TakeLease(Strict):
-    name: Name = ""
 
 
 class OpenReview(Strict):

@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
-from server.schemas.flight_docs import FlyState, FollowDoc, LeaseDoc, NodeDoc, RecordingDoc, Source, TrackDoc
+from server.schemas.account_docs import LeaseDoc, MeDoc
+from server.schemas.flight_docs import FlyState, FollowDoc, NodeDoc, RecordingDoc, Source, TrackDoc
 from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
@@ -143,6 +144,13 @@ class LeaseMessage(Message):
     lease: LeaseDoc
 
 
+class MeMessage(Message):
+    """Right after the snapshot."""
+
+    type: Literal["me"] = "me"
+    me: MeDoc
+
+
 class NodesMessage(Message):
     type: Literal["nodes"] = "nodes"
     nodes: list[NodeDoc]
@@ -252,6 +260,7 @@ ServerMessage = Annotated[
     | FlightMessage
     | FlyMessage
     | LeaseMessage
+    | MeMessage
     | NodesMessage
     | RecorderMessage
     | RecordingsMessage

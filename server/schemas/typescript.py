@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 
 from server import schemas
 from server.schemas import (
+    account_docs,
     flight_docs,
     library_docs,
     obstacle_docs,
@@ -35,6 +36,9 @@ ANSWERS = (
     schemas.ScenarioResultDoc,
     schemas.SectionDoc,
     schemas.RadarTargetsDoc,
+    schemas.AccountDoc,
+    schemas.SessionDoc,
+    schemas.InvitationDoc,
 )
 """Of requests, beside the stream."""
 CONSTANTS = {"CHECK_FRESH_S": flight_docs.CHECK_FRESH_S, "STALE_S": STALE_S, "LOST_S": LOST_S}
@@ -68,6 +72,7 @@ def _models() -> Iterator[type[BaseModel]]:
         result_docs,
         library_docs,
         view_docs,
+        account_docs,
         flight_docs,
         review_docs,
         obstacle_docs,

@@ -69,7 +69,9 @@ class Station:
         """In charge of the vehicle, whoever was before; once a page has signed out, with a new session."""
         if self.http.get("/api/state").status_code == 401:
             ok(self.http.post("/api/session", json={"password": PASSWORD}))
-        ok(self.http.post("/api/lease/take", json={"name": "Anna"}))
+        if not ok(self.http.post("/api/lease/take")).json()["mine"]:
+            ok(self.http.delete("/api/sessions"))
+            ok(self.http.post("/api/lease/take"))
 
     @property
     def cookies(self) -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import Any, cast
 
 from server.door.hub import Hub
 from server.door.lease import Lease
+from server.door.operators import Operators
 from server.errors import NotReadyError, StaleRevisionError
 from server.heard.agents import Agents
 from server.library import Library
@@ -22,7 +23,6 @@ from server.schemas import (
     JobDoc,
     LandingSitesBody,
     LayerName,
-    LeaseDoc,
     LibraryState,
     NoticeMessage,
     ObstaclesState,
@@ -200,7 +200,7 @@ class FakeFlying:
 
     def __init__(self, library: Library, hub: Hub) -> None:
         self.lease = Lease(library.root / "lease.json")
-        self.hub = hub
+        self.operators = Operators(self.lease, hub)
         self.asked: list[tuple[Any, ...]] = []
         self.obstacles = self.looking = _Asked(self.asked)
         self.published: list[tuple[str, Any]] = []
@@ -219,19 +219,8 @@ class FakeFlying:
     async def close(self) -> None:
         self.asked.append(("close",))
 
-    async def page_opens(self, session_key: str) -> None:
-        self.lease.take_if_free(session_key)
-
     def present_for(self, session_key: str) -> list[ServerMessage]:
         return []
-
-    async def take_lease(self, session_key: str, name: str) -> LeaseDoc:
-        self.lease.take(session_key, name)
-        return self.lease.doc_for(session_key)
-
-    async def release_lease(self, session_key: str) -> LeaseDoc:
-        self.lease.release(session_key)
-        return self.lease.doc_for(session_key)
 
 
 _FLY_STATE, _OBSTACLES = FlyState(onboard=OnboardDoc(state="none")), ObstaclesState()

@@ -58,6 +58,11 @@ class Running:
         return f"http://127.0.0.1:{self.settings.port}"
 
     @property
+    def name(self) -> str:
+        """Of the operator."""
+        return self.http.get("/api/session").json()["name"]
+
+    @property
     def cookie(self) -> str:
         return f"hedgehop-{self.settings.port}={self.http.cookies[f'hedgehop-{self.settings.port}']}"
 

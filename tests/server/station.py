@@ -121,4 +121,7 @@ def station(data_dir: Path, *, demo: bool = False, flies: bool = False, **overri
     with running(data_dir, make=Workspace, flying=flying, demo=demo, **overrides) as server:
         server.http.timeout = httpx.Timeout(PATIENCE_S)
         with server.socket() as socket:
-            yield Station(server, socket)
+            made = Station(server, socket)
+            if flies:
+                ok(made.http.post("/api/lease/take"))
+            yield made

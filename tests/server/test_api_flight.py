@@ -50,8 +50,8 @@ COMMANDS: list[tuple[str, dict[str, object]]] = [
 @pytest.fixture
 def pilot(served: Running) -> Iterator[httpx.Client]:
     """The one in charge."""
-    taken = served.http.post("/api/lease/take", json={"name": "Anna"})
-    assert LeaseDoc.model_validate_json(taken.text) == LeaseDoc(holder="Anna", mine=True)
+    taken = LeaseDoc.model_validate_json(served.http.post("/api/lease/take").text)
+    assert taken == LeaseDoc(holder=served.name, mine=True)
     served.flying.asked.clear()
     yield served.http
     served.http.post("/api/lease/release")
@@ -63,6 +63,7 @@ def observer(served: Running) -> Iterator[httpx.Client]:
     with served.stranger(headers={"Origin": served.origin}) as client:
         assert client.post("/api/session", json={"password": PASSWORD}).status_code == 204
         yield client
+        client.delete("/api/session")
 
 
 @pytest.mark.parametrize(("path", "body"), COMMANDS)
@@ -73,7 +74,7 @@ def test_only_the_one_in_charge_commands(
         assert stranger.post(path, json=body).status_code == 401
     refused = observer.post(path, json=body)
     assert (refused.status_code, refused.json()["code"]) == (403, "not_in_charge")
-    assert "Anna is in charge" in refused.json()["what"]
+    assert f"{served.name} is in charge" in refused.json()["what"]
     assert served.flying.asked == []
     assert pilot.post(path, json=body).is_success
     assert len(served.flying.asked) == 1
@@ -90,20 +91,27 @@ def test_commands_carry_name_and_token(served: Running, pilot: httpx.Client) -> 
     requests = [asked[1] for asked in served.flying.asked]
     assert [type(request) for request in requests] == [Arm, Pause, ReturnHome, Land]
     operators: list[Operator] = [request.operator for request in requests]
-    assert {operator.name for operator in operators} == {"Anna"}
+    assert {operator.name for operator in operators} == {served.name}
     assert len({operator.token for operator in operators}) == 1
 
 
-def test_control_changes_hands(pilot: httpx.Client, observer: httpx.Client) -> None:
-    assert observer.post("/api/lease/take", json={}).json()["mine"]
+def test_control_changes_hands_with_consent(pilot: httpx.Client, observer: httpx.Client) -> None:
+    asked = observer.post("/api/lease/take").json()
+    assert (asked["mine"], asked["waits"]) == (False, True)
+    assert pilot.post("/api/lease/keep").json()["asks"] is None
+    assert observer.post("/api/flight/arm").status_code == 403
+    assert observer.post("/api/lease/take").json()["waits"]
+    assert observer.post("/api/lease/hand_over").status_code == 403
+    assert not pilot.post("/api/lease/hand_over").json()["mine"]
     assert pilot.post("/api/flight/arm").status_code == 403
     assert observer.post("/api/flight/arm").status_code == 204
-    assert observer.post("/api/lease/release").json() == {"holder": None, "mine": False}
+    assert observer.post("/api/lease/release").json()["holder"] is None
     assert "Nobody is in charge" in pilot.post("/api/flight/arm").json()["what"]
+    assert pilot.post("/api/lease/keep").status_code == 403
 
 
 def test_signing_out_lets_go(served: Running, observer: httpx.Client) -> None:
-    observer.post("/api/lease/take", json={"name": "Ben"})
+    observer.post("/api/lease/take")
     assert served.flying.lease.holder is not None
     assert observer.delete("/api/session").status_code == 204
     assert served.flying.lease.holder is None

@@ -23,7 +23,7 @@ CHANGES: list[tuple[str, str, dict[str, Any]]] = [
 
 @pytest.fixture
 def pilot(served: Running) -> Iterator[httpx.Client]:
-    served.http.post("/api/lease/take", json={"name": "Anna"})
+    served.http.post("/api/lease/take")
     served.flying.asked.clear()
     yield served.http
     served.http.post("/api/lease/release")

@@ -1,15 +1,22 @@
-"""Links work once, sessions survive a restart and end, passwords cannot be guessed quickly."""
+"""Links work once, sessions survive a restart and end with what they rest on, guesses wait and refuse nobody else."""
 
 from __future__ import annotations
 
+import asyncio
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from server.door.auth import TRIES_MAX, Auth, session_key
-from server.errors import SignInError, TooManyTriesError
-from server.settings import PasswordHash
+from server.door.accounts import OWNER, Accounts
+from server.door.auth import Auth, session_key
+from server.door.passwords import PasswordHash
+from server.door.tries import FROM_ONE_PLACE_MAX, IN_LINE_MAX, REMEMBERED_MAX, WRONG_MAX, Tries, place_of
+from server.errors import BadRequestError, ConflictError, NotFoundError, SignInError, StorageError, TooManyTriesError
+
+GOOD, HERE, THERE = "long enough", "192.0.2.1", "198.51.100.7"
 
 
 class Clock:
@@ -25,16 +32,34 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def auth(tmp_path: Path, clock: Clock) -> Auth:
-    return Auth(tmp_path / "sessions.json", password=PasswordHash.of("long enough"), clock_utc_s=clock)
+def make(tmp_path: Path, clock: Clock) -> Callable[..., Auth]:
+    def auth(password: str | None = GOOD) -> Auth:
+        accounts = Accounts(tmp_path, clock_utc_s=clock)
+        return Auth(tmp_path / "sessions.json", accounts, password=password, clock_utc_s=clock)
+
+    return auth
+
+
+@pytest.fixture
+def auth(make: Callable[..., Auth]) -> Auth:
+    return make()
+
+
+def enter(auth: Auth, name: str = OWNER, password: str = GOOD, address: str = HERE) -> str:
+    return asyncio.run(auth.sign_in(name, password, address))
+
+
+def lasts(auth: Auth, session_id: str) -> bool:
+    return auth.identity(session_id) is not None
 
 
 def test_a_link_signs_in_once(auth: Auth) -> None:
     token = auth.new_link_token()
     with pytest.raises(SignInError, match="newest"):
         auth.redeem(token + "x")
-    session = auth.redeem(token)
-    assert auth.remaining_s(session) == auth.lifetime_s
+    identity = auth.identity(auth.redeem(token))
+    assert identity is not None
+    assert (identity.role, identity.is_owner, identity.remaining_s) == ("operator", True, auth.lifetime_s)
     with pytest.raises(SignInError, match="used already"):
         auth.redeem(token)
 
@@ -48,45 +73,239 @@ def test_only_the_newest_link_counts(auth: Auth) -> None:
 
 @pytest.mark.parametrize("session_id", ["", "x", "\udcff", "a" * 10_000])
 def test_an_invented_session_is_none(auth: Auth, session_id: str) -> None:
-    assert auth.remaining_s(session_id) == 0
+    assert not lasts(auth, session_id)
 
 
-def test_sessions_survive_a_restart_but_their_file_signs_nobody_in(auth: Auth, tmp_path: Path, clock: Clock) -> None:
-    session = auth.sign_in("long enough")
+def test_sessions_survive_a_restart_but_their_file_signs_nobody_in(
+    auth: Auth, make: Callable[..., Auth], tmp_path: Path
+) -> None:
+    session = enter(auth)
     file = tmp_path / "sessions.json"
-    assert Auth(file, clock_utc_s=clock).remaining_s(session) > 0
+    assert lasts(make(), session)
     assert session not in file.read_text()
-    assert list(json.loads(file.read_text())) == [session_key(session)]
-    assert auth.remaining_s(session_key(session)) == 0
+    assert list(json.loads(file.read_text())["sessions"]) == [session_key(session)]
+    assert not lasts(auth, session_key(session))
     assert file.stat().st_mode & 0o077 == 0
 
 
+def test_another_password_in_the_settings_ends_what_the_old_one_let_in(auth: Auth, make: Callable[..., Auth]) -> None:
+    by_password, by_link = enter(auth), auth.redeem(auth.new_link_token())
+    assert lasts(make(GOOD), by_password)
+    for other in ("another one", None):
+        assert [lasts(make(other), session) for session in (by_password, by_link)] == [False, True]
+
+
 def test_sessions_end(auth: Auth, clock: Clock) -> None:
-    first, second = auth.sign_in("long enough"), auth.sign_in("long enough")
-    auth.sign_out(first)
-    assert (auth.remaining_s(first), auth.remaining_s(second)) == (0, auth.lifetime_s)
+    first, second = enter(auth), enter(auth)
+    auth.sign_out([session_key(first)])
+    assert (lasts(auth, first), lasts(auth, second)) == (False, True)
     clock.now += auth.lifetime_s
-    assert auth.remaining_s(second) == 0
+    assert not lasts(auth, second)
 
 
-def test_five_wrong_passwords_close_the_door_for_a_minute(auth: Auth, clock: Clock) -> None:
-    for _ in range(TRIES_MAX):
+def test_an_account_is_invited_chooses_a_password_and_is_removed(auth: Auth, clock: Clock) -> None:
+    auth.accounts.add("Anna", "observer")
+    with pytest.raises(SignInError, match="wrong"):
+        enter(auth, "Anna", "")
+    token = auth.accounts.invite("anna")
+    invited = auth.redeem(token, THERE)
+    identity = auth.identity(invited)
+    assert identity is not None
+    assert (identity.name, identity.role, identity.is_owner) == ("Anna", "observer", False)
+    with pytest.raises(SignInError, match="used already"):
+        auth.redeem(token)
+    by_other_link = auth.redeem(auth.accounts.invite("Anna"))
+    unused = auth.accounts.invite("Anna")
+    auth.change_password("Anna", PasswordHash.of("hers alone"), stays=session_key(invited))
+    assert (lasts(auth, invited), lasts(auth, by_other_link)) == (True, False)
+    with pytest.raises(SignInError):
+        auth.redeem(unused)
+    by_password = enter(auth, "ANNA", "hers alone")
+    late = auth.accounts.invite("Anna", lasts_s=10.0)
+    clock.now += 11.0
+    with pytest.raises(SignInError, match="expired"):
+        auth.redeem(late)
+    assert auth.ended([session_key(each) for each in (invited, by_password, "x")]) == {session_key("x")}
+    auth.accounts.remove("Anna")
+    assert not lasts(auth, invited)
+    assert not lasts(auth, by_password)
+    with pytest.raises(SignInError):
+        enter(auth, "Anna", "hers alone")
+    auth.accounts.add("Anna", "operator")
+    assert not lasts(auth, by_password)
+
+
+def test_what_the_command_line_has_written_counts_at_once(auth: Auth, tmp_path: Path, clock: Clock) -> None:
+    elsewhere = Accounts(tmp_path, clock_utc_s=clock)
+    elsewhere.add("Ben", "operator")
+    elsewhere.set_password("Ben", PasswordHash.of("bens own one"))
+    session = enter(auth, "Ben", "bens own one")
+    assert lasts(auth, session)
+    assert lasts(auth, auth.redeem(elsewhere.invite(OWNER)))
+    elsewhere.remove("ben")
+    assert not lasts(auth, session)
+
+
+def test_the_file_of_accounts_is_plain_holds_no_secret_and_is_for_this_user_alone(auth: Auth, tmp_path: Path) -> None:
+    auth.accounts.add("Anna", "operator")
+    token = auth.accounts.invite("Anna")
+    auth.accounts.set_password("Anna", PasswordHash.of("hers alone"))
+    text = (tmp_path / "accounts.json").read_text()
+    assert json.loads(text)["accounts"][0]["name"] == "Anna"
+    assert "hers alone" not in text
+    assert token not in text
+    assert (tmp_path / "accounts.json").stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.parametrize("name", ["", "   ", "x" * 41, "Owner", "hedgehop", "Link"])
+def test_names_that_mislead_are_refused(auth: Auth, name: str) -> None:
+    with pytest.raises(BadRequestError):
+        auth.accounts.add(name, "operator")
+
+
+def test_an_account_is_there_once(auth: Auth) -> None:
+    assert auth.accounts.add("  A\u202enna\n Berg ", "operator").name == "Anna Berg"
+    with pytest.raises(ConflictError, match="already"):
+        auth.accounts.add("ANNA berg", "observer")
+    for change in (auth.accounts.remove, auth.accounts.invite):
+        with pytest.raises(NotFoundError):
+            change("Nobody")
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"accounts": 1}', "\x00", '{"accounts": [{"name": "x"}]}'])
+def test_a_damaged_file_of_accounts_keeps_the_owner_in_and_is_not_overwritten(
+    auth: Auth, tmp_path: Path, content: str
+) -> None:
+    (tmp_path / "accounts.json").write_text(content)
+    assert lasts(auth, auth.redeem(auth.new_link_token()))
+    with pytest.raises(SignInError):
+        enter(auth, "Anna", "hers alone")
+    with pytest.raises(StorageError, match="cannot be read"):
+        auth.accounts.add("Anna", "operator")
+    assert (tmp_path / "accounts.json").read_text() == content
+
+
+def test_without_a_password_none_is_right(make: Callable[..., Auth]) -> None:
+    auth = make(None)
+    assert not auth.has_password
+    for guess in ("", "x" * 64):
         with pytest.raises(SignInError, match="wrong"):
-            auth.sign_in("guess")
-    with pytest.raises(TooManyTriesError):
-        auth.sign_in("long enough")
-    clock.now += 61
-    assert auth.remaining_s(auth.sign_in("long enough")) > 0
+            enter(auth, OWNER, guess)
 
 
-def test_without_a_password_none_is_right(tmp_path: Path) -> None:
-    with pytest.raises(SignInError, match="No password"):
-        Auth(tmp_path / "s.json").sign_in("")
+@pytest.mark.parametrize("content", ["", "[]", '{"a": 3.5}', '{"sessions": {"a": 3}}', "\x00"])
+def test_a_damaged_file_costs_a_sign_in_only(make: Callable[..., Auth], tmp_path: Path, content: str) -> None:
+    (tmp_path / "sessions.json").write_text(content)
+    auth = make()
+    assert lasts(auth, auth.redeem(auth.new_link_token()))
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"a": "b"}', "\x00"])
-def test_a_damaged_file_costs_a_sign_in_only(tmp_path: Path, content: str) -> None:
-    file = tmp_path / "sessions.json"
-    file.write_text(content)
-    auth = Auth(file)
-    assert auth.remaining_s(auth.redeem(auth.new_link_token())) > 0
+# Guesses
+
+
+class Waits:
+    """Tries on a clock of their own, where ``waited`` counts those that were made to wait."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.tries, self.waited = Tries(clock_mono_s=lambda: 0.0, wait_s=0.001), 0
+        sleep = asyncio.sleep
+
+        async def slept(seconds: float) -> None:
+            self.waited += 1
+            await sleep(seconds)
+
+        monkeypatch.setattr(asyncio, "sleep", slept)
+
+    async def guess(self, address: str, *, right: bool = False, known: bool = False, name: str = "anna") -> bool:
+        return await self.tries.check(address, name, known=known, matches=lambda: right)
+
+
+@pytest.fixture
+def waits(monkeypatch: pytest.MonkeyPatch) -> Waits:
+    return Waits(monkeypatch)
+
+
+def test_wrong_ones_make_the_next_from_there_wait_and_refuse_nobody(waits: Waits) -> None:
+    async def whole() -> list[int]:
+        counted = []
+        for _ in range(WRONG_MAX + 2):
+            assert not await waits.guess(HERE)
+        counted.append(waits.waited)
+        assert await waits.guess(THERE, right=True)
+        counted.append(waits.waited)
+        assert await waits.guess(HERE, right=True)  # the operator beside the guesser: later, but in
+        counted.append(waits.waited)
+        assert await waits.guess(HERE, right=True)
+        return [*counted, waits.waited]
+
+    assert asyncio.run(whole()) == [2, 2, 3, 3]
+
+
+def test_guesses_from_everywhere_hold_up_no_address_that_the_account_is_known_at(waits: Waits) -> None:
+    async def whole() -> tuple[int, int]:
+        for k in range(40):
+            await waits.guess(f"203.0.113.{k}")
+        before = waits.waited
+        assert await waits.guess(HERE, right=True, known=True)
+        assert await waits.guess(THERE, right=True, name="ben")
+        known = waits.waited - before
+        assert await waits.guess(THERE, right=True)
+        return known, waits.waited - before - known
+
+    assert asyncio.run(whole()) == (0, 1)
+
+
+def test_a_flood_is_looked_at_one_at_a_time_and_bounded(waits: Waits) -> None:
+    at_once = most = 0
+
+    def slow() -> bool:
+        nonlocal at_once, most
+        at_once += 1
+        most = max(most, at_once)
+        at_once -= 1
+        return False
+
+    async def whole() -> list[Any]:
+        flood = [waits.tries.check(f"10.0.{k // 250}.{k % 250}", "anna", known=False, matches=slow) for k in range(300)]
+        asked = asyncio.gather(*flood, return_exceptions=True)
+        await asyncio.sleep(0)
+        assert await waits.guess(HERE, right=True, known=True)
+        return await asked
+
+    ended = asyncio.run(whole())
+    assert most == 1
+    assert sum(isinstance(each, TooManyTriesError) for each in ended) >= 300 - IN_LINE_MAX
+
+
+def test_one_address_cannot_stand_in_line_for_all(waits: Waits) -> None:
+    async def whole() -> list[Any]:
+        return await asyncio.gather(*(waits.guess(HERE) for _ in range(10)), return_exceptions=True)
+
+    assert sum(each is False for each in asyncio.run(whole())) == FROM_ONE_PLACE_MAX
+
+
+def test_what_is_remembered_of_guessers_is_bounded(waits: Waits) -> None:
+    async def whole() -> None:
+        for k in range(REMEMBERED_MAX + 50):
+            await waits.guess(f"2001:db8:{k:x}::1", name=f"name {k}")
+
+    asyncio.run(whole())
+    assert len(waits.tries._wrong) == REMEMBERED_MAX
+
+
+def test_an_ipv6_host_is_one_place() -> None:
+    assert place_of("2001:db8::1") == place_of("2001:db8::ffff:1")
+    assert place_of("2001:db8:0:1::1") != place_of("2001:db8::1")
+    assert place_of("::ffff:192.0.2.1") == place_of("192.0.2.1")
+    assert place_of("nonsense") == place_of("")
+
+
+def test_a_hash_is_read_back_as_it_was_written() -> None:
+    made = PasswordHash.of("same words")
+    assert PasswordHash.read(made.text) == made
+    assert made != PasswordHash.of("same words")
+    assert made.matches("same words")
+    assert not made.matches("same words ")
+    for text in ("", "scrypt$1$2", "md5$2$1$1$aa$bb", "scrypt$1073741824$8$1$aa$bb"):
+        with pytest.raises(ValueError, match=r".+"):
+            PasswordHash.read(text)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from server.schemas import FlyState, ReviewDoc, Snapshot
@@ -52,24 +54,50 @@ def _is_ready(state: Any) -> bool:
     return state is not None and bool(state.ready_to_arm and state.estimator_ok) and state.home_lat_deg is not None
 
 
-def test_a_page_is_told_everything_at_once(planned: Station) -> None:
+def test_a_page_is_told_everything_at_once_and_opening_it_gives_no_command(planned: Station) -> None:
     with planned.server.socket() as socket:
         page = Station(planned.server, socket)
         assert isinstance(page.snapshot, Snapshot)
-        lease = page.until(lambda m: m.type == "lease").lease
-        assert lease.mine
+        assert page.until(lambda m: m.type == "me").me.owner
+        assert page.until(lambda m: m.type == "lease").lease.mine
+    with other_operator(planned) as other, planned.server.socket(additional_headers=cookies(other)) as socket:
+        assert not Station(planned.server, socket).until(lambda m: m.type == "lease").lease.mine
 
 
-def test_control_is_taken_over_and_the_other_page_reads_it(planned: Station) -> None:
+@contextlib.contextmanager
+def other_operator(planned: Station) -> Iterator[httpx.Client]:
     with planned.server.stranger(headers={"Origin": planned.server.origin}) as other:
         assert other.post("/api/session", json={"password": PASSWORD}).status_code == 204
+        yield other
+        other.delete("/api/session")
+
+
+def cookies(client: httpx.Client) -> dict[str, str]:
+    return {"Cookie": "; ".join(f"{name}={value}" for name, value in client.cookies.items())}
+
+
+def test_control_is_asked_for_and_handed_over(planned: Station) -> None:
+    with other_operator(planned) as other:
         refused = other.post("/api/flight/arm")
         assert (refused.status_code, refused.json()["code"]) == (403, "not_in_charge")
-        ok(other.post("/api/lease/take", json={"name": "Ben"}))
-        assert planned.notice().what == "Ben has taken control of the vehicle."
+        name = other.get("/api/session").json()["name"]
+        planned.socket.send('{"type": "ping", "page_ms": 1.0}')
+        assert ok(other.post("/api/lease/take")).json()["waits"]
+        assert planned.until(lambda m: m.type == "lease" and m.lease.asks).lease.asks == name
+        ok(planned.http.post("/api/lease/hand_over"))
         assert planned.http.post("/api/flight/arm").status_code == 403
-        ok(planned.http.post("/api/lease/take", json={"name": "Anna"}))
-        assert planned.until(lambda m: m.type == "lease" and m.lease.mine).lease.holder == "Anna"
+        ok(other.post("/api/lease/release"))
+        ok(planned.http.post("/api/lease/take"))
+        assert planned.until(lambda m: m.type == "lease" and m.lease.mine).lease.holder == planned.server.name
+
+
+def test_a_holder_of_whom_nothing_is_heard_can_be_relieved_and_reads_it(planned: Station) -> None:
+    with other_operator(planned) as other:
+        planned.until(lambda m: m.type == "lease" and m.lease.silent)
+        assert ok(other.post("/api/lease/take")).json()["mine"]
+        assert "has taken control of the vehicle" in planned.notice().what
+        ok(other.post("/api/lease/release"))
+    ok(planned.http.post("/api/lease/take"))
 
 
 def test_a_link_that_names_a_file_is_refused(planned: Station) -> None:

@@ -44,7 +44,7 @@ async def started(node: Node, client: LinkClient, lease: Lease, *arguments: str)
 
 def test_no_token_of_a_stranger_shuts_the_operator_out(tmp_path: Path) -> None:
     lease = Lease(tmp_path / "lease.json")
-    lease.take(ANNA, "Anna")
+    lease.press(ANNA, "Anna")
 
     async def whole() -> None:
         async with station(tmp_path, issue_above=lease.issue_above) as (node, client):
@@ -58,7 +58,8 @@ def test_no_token_of_a_stranger_shuts_the_operator_out(tmp_path: Path) -> None:
                 await can_command(client, lease)
             anna = lease.operator(ANNA)
             assert await client.call(HighestToken()) == anna.token
-            lease.take(BEN, "Ben")
+            lease.press(BEN, "Ben")
+            lease.hand_over(ANNA)
             with pytest.raises(NoVehicleError):
                 await client.call(ReturnHome(lease.operator(BEN)))
             with pytest.raises(OvertakenError, match="taken over by Ben"):
@@ -70,7 +71,7 @@ def test_no_token_of_a_stranger_shuts_the_operator_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize("highest", [2**61, 10**30])
 def test_what_an_earlier_version_has_kept_heals(tmp_path: Path, highest: int) -> None:
     lease = Lease(tmp_path / "lease.json")
-    lease.take(ANNA, "Anna")
+    lease.press(ANNA, "Anna")
 
     async def whole() -> None:
         async with station(tmp_path, issue_above=lease.issue_above) as (node, client):
