@@ -6,6 +6,7 @@ import errno
 import socket
 import sys
 from contextlib import closing, suppress
+from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI
@@ -15,7 +16,7 @@ from server.door.tls import Tls
 from server.errors import ServerError, StartError
 from server.library import Library
 from server.settings import Settings
-from server.stations import Flying
+from server.stations import RUNTIME_FOLDER, Flying
 from server.web import create_app
 from server.work.guarded import Guarded
 from server.work.logs import configure_logging
@@ -55,6 +56,8 @@ class AnnouncingServer(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if self.started:
+            with suppress(OSError):  # a full disk: hedgehop account then prints the usual address
+                origin_file(self._settings).write_text(self.origin(), encoding="ascii")
             announcement = self._announcement()
             with suppress(OSError):  # a terminal that has gone stops no server that is started again
                 sys.stdout.write(announcement)
@@ -96,6 +99,11 @@ class AnnouncingServer(uvicorn.Server):
         return (
             f"http://{_reachable(host)}:{port}" if self._tls is None else f"https://{self._tls.reachable(host)}:{port}"
         )
+
+
+def origin_file(settings: Settings) -> Path:
+    """Says where the server is found: for links that are made outside it."""
+    return settings.data_dir / RUNTIME_FOLDER / "origin.txt"
 
 
 def server_config(app: FastAPI, settings: Settings, tls: Tls | None = None) -> uvicorn.Config:

@@ -39,8 +39,8 @@ class _Lazy(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         del ctx
-        if cmd_name == "radar" and cmd_name in self.places:
-            return typer.main.get_group(radar)
+        if cmd_name in _GROUPS and cmd_name in self.places:
+            return typer.main.get_group(_GROUPS[cmd_name])
         if cmd_name not in self.places:
             return None
         place, epilog = self.places[cmd_name]
@@ -68,6 +68,7 @@ class _Commands(_Lazy):
         "audit": (".audit_command.audit", examples.AUDIT),
         "bench": ("bench", examples.BENCH),
         "radar": ("", ""),
+        "account": ("", ""),
     }
 
 
@@ -78,9 +79,23 @@ class _RadarCommands(_Lazy):
     }
 
 
+class _AccountCommands(_Lazy):
+    places: ClassVar = {
+        "add": (".account_command.add", examples.ACCOUNT_ADD),
+        "list": (".account_command.list_", examples.ACCOUNT_LIST),
+        "link": (".account_command.link", examples.ACCOUNT_LINK),
+        "password": (".account_command.password", examples.ACCOUNT_PASSWORD),
+        "remove": (".account_command.remove", examples.ACCOUNT_REMOVE),
+    }
+
+
 radar = typer.Typer(
     name="radar", help="Raw radar files.", no_args_is_help=True, rich_markup_mode="rich", cls=_RadarCommands
 )
+account = typer.Typer(
+    name="account", help="Who may sign in.", no_args_is_help=True, rich_markup_mode="rich", cls=_AccountCommands
+)
+_GROUPS = {"radar": radar, "account": account}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

@@ -29,6 +29,7 @@ def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATI
 
 def enter(page: Page, station: Station) -> None:
     """As the operator who is signed in and in charge."""
+    station.sign_in()
     for name, value in station.cookies.items():
         page.context.add_cookies([{"name": name, "value": value, "url": station.origin}])
     page.goto(station.origin)

@@ -59,7 +59,7 @@ def routes(served: Running) -> list[tuple[str, str, Any]]:
         (method, route.path, route.endpoint)
         for route in _all(served.app.router)
         if isinstance(route, APIRoute)
-        for method in sorted(route.methods)
+        for method in sorted(route.methods or ())
     ]
 
 

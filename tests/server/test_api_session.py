@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
 from server.door.hub import CLOSE_SIGNED_OUT
@@ -89,7 +90,7 @@ def test_signing_out_closes_the_sockets_of_the_session(served: Running) -> None:
     assert closed.value.rcvd.code == CLOSE_SIGNED_OUT
 
 
-def read_on(socket: ClientConnection) -> None:
+def read_on(socket: Connection) -> None:
     while True:
         socket.recv(timeout=30)
 

@@ -27,6 +27,17 @@ AUDIT = _examples(
     ("Is the log of commands whole", "hedgehop audit ~/.local/share/hedgehop"),
     ("As a table too", "hedgehop audit ~/.local/share/hedgehop --csv commands.csv"),
 )
+ACCOUNT_ADD = _examples(
+    ("Somebody who looks on", "hedgehop account add Olga --role observer"),
+    ("A second pilot", "hedgehop account add Otto --role operator"),
+)
+ACCOUNT_LINK = _examples(
+    ("Into your own station again", "hedgehop account link"),
+    ("For somebody else", "hedgehop account link Olga"),
+)
+ACCOUNT_PASSWORD = _examples(("Asked for twice", "hedgehop account password Otto"))
+ACCOUNT_REMOVE = _examples(("Out at once", "hedgehop account remove Olga"))
+ACCOUNT_LIST = _examples(("Who may sign in", "hedgehop account list"))
 PLAN = _examples(
     ("A mission over the points of a file", "hedgehop plan dsm.tif pois.csv --out flight --rtl-height-m 60"),
     ("Closer to the ground, with RTK", "hedgehop plan dsm.tif pois.kml --out flight --profile mapper-rtk --height-m 3"),
