@@ -42,7 +42,7 @@ def test_who_takes_nothing_is_dropped(served: Running, monkeypatch: pytest.Monke
         while b"snapshot" not in line.recv(4096):
             pass
         deadline_s, number = time.monotonic() + 60, 0
-        while served.parts.hub.session_keys:
+        while served.parts.hub.session_keys():
             served.on_loop(_publish(served, number := number + 1))
             assert time.monotonic() < deadline_s
 
@@ -99,7 +99,7 @@ def _slow_page(served: Running) -> socket.socket:
         f"Cookie: {served.cookie}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
     )
-    while not served.parts.hub.session_keys:
+    while not served.parts.hub.session_keys():
         time.sleep(0.01)
     return line
 
