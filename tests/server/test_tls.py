@@ -27,6 +27,7 @@ from server.door import certificates
 from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
 from server.door.tls import Tls
 from server.errors import CertificateError, StartError
+from server.scene.host import SUBPROTOCOL
 from server.settings import Settings
 from tests.server.test_process import free_port
 
@@ -196,7 +197,11 @@ def test_the_stream_rides_on_it_and_other_origins_do_not(station: Secure, cookie
     url = station.origin.replace("https", "wss") + "/ws"
     headers = {"Cookie": cookie}
     with connect(url, ssl=station.trusting, origin=station.origin, additional_headers=headers) as socket:  # pyright: ignore[reportArgumentType]
-        assert json.loads(socket.recv(60))["type"] == "snapshot"
+        snapshot = json.loads(socket.recv(60))
+        view = f"{station.origin.replace('https', 'wss')}/view/{snapshot['page_id']}"
+        options = {"subprotocols": [SUBPROTOCOL], "origin": station.origin, "additional_headers": headers}
+        with connect(view, ssl=station.trusting, max_size=None, **options) as picture:  # pyright: ignore[reportArgumentType]
+            assert isinstance(picture.recv(60), bytes)
     for origin in (station.origin.replace("https", "http"), "https://evil.example"):
         with pytest.raises(InvalidStatus, match="403"):
             connect(url, ssl=station.trusting, origin=origin, additional_headers=headers)  # pyright: ignore[reportArgumentType]
