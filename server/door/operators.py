@@ -39,6 +39,7 @@ class Operators:
 
     async def take(self, session_key: str, name: str) -> LeaseDoc:
         """Raises ConflictError while somebody else asks."""
+        await self.look()  # a holder whose page is just back is asked
         before = self._lease.press(session_key, name)
         if before is not None:
             what = f"{name} has taken control of the vehicle: nothing was heard of this page for {SILENT_S:g} s."

@@ -82,6 +82,7 @@ def test_control_is_asked_for_and_handed_over(planned: Station) -> None:
         assert (refused.status_code, refused.json()["code"]) == (403, "not_in_charge")
         name = other.get("/api/session").json()["name"]
         planned.socket.send('{"type": "ping", "page_ms": 1.0}')
+        planned.until(lambda m: m.type == "clock")
         assert ok(other.post("/api/lease/take")).json()["waits"]
         assert planned.until(lambda m: m.type == "lease" and m.lease.asks).lease.asks == name
         ok(planned.http.post("/api/lease/hand_over"))
