@@ -14,7 +14,7 @@ from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
-from telemetry.liveness import HUNG_S
+from telemetry.liveness import HUNG_S, STARVED_S
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 90.0
@@ -299,7 +299,10 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(folder: Path, h
             assert time.monotonic() - since_s >= HUNG_S
             state = watched.state("link")
             assert state is not None
-            assert "was ended after it had not answered for 3 s and was started again" in state.text
+            # One that is busy counts as starved where others leave it less than half of a processor.
+            waited_s = [HUNG_S] if how == "stopped" else [HUNG_S, STARVED_S]
+            ended = [f"was ended after it had not answered for {s:.0f} s and was started again" for s in waited_s]
+            assert any(words in state.text for words in ended)
             await watched.supervisor.stop("link")
 
     run(whole)
