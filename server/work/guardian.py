@@ -30,7 +30,7 @@ LINK_OPEN, LINK_USED = b"o", b"u"
 """A proof, which also says whether the sign-in link still waits to be used."""
 PAUSES_S = (0.0, 1.0, 2.0, 5.0, 10.0)
 """Before it is started again: at once after a server that ran for long, slower and slower after one that did not."""
-STEADY_S = 60.0
+STEADY_S = PAUSES_S[-1]
 _BUSY_S, _START_S = 30.0, 180.0
 """Given up though it works hard, or before it answers for the first time; a machine may be very slow."""
 _LOOK_EVERY_S = 0.1
@@ -98,7 +98,7 @@ class Guardian:
     def run(self) -> int:
         """The exit code of the last server."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) != signal.SIG_IGN:  # nohup means it
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup means it
                 signal.signal(number, self._on_signal)
         while True:
             server = _Server(self._command, {"link": self._link, "silent_since_t_mono_s": self._silent_since_s})
@@ -126,7 +126,7 @@ class Guardian:
             silence = liveness.look(server, time.monotonic())
             # The first start of all is watched by whoever asked for it; one that was asked to end says nothing more.
             watched = self._asked_s is None and (server.has_answered or self._restarts)
-            if watched and silence.is_hung:
+            if watched and silence.is_hung and not hung:
                 hung = f"did not answer for {silence.silent_s:.0f} s"
                 _log(f"The server {hung} and is ended. What its threads were doing:")
                 server.signal(signal.SIGUSR1)

@@ -36,6 +36,7 @@ if what == "saves":
         print("saved", flush=True)
         sys.exit(5)
     signal.signal(signal.SIGTERM, save)
+    signal.signal(signal.SIGINT, save)
 if what == "slow" and told["silent_since_t_mono_s"]:
     time.sleep({HUNG_S + 2})
 proved = False
@@ -165,6 +166,18 @@ def test_one_that_is_only_slow_to_start_again_is_waited_for(guarded) -> None:
     os.kill(station.pid(1), signal.SIGKILL)
     answered(station, times=2)
     assert len(station._servers()) == 2
+
+
+def test_as_a_background_job_of_a_script_it_heeds_an_interrupt(guarded) -> None:
+    """A shell starts those with SIGINT ignored."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        station = guarded("saves")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    answered(station)
+    station.process.send_signal(signal.SIGINT)
+    assert station.ended() == 5
 
 
 def test_killed_before_it_came_up_it_is_not_started_again(guarded) -> None:
