@@ -13,9 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import httpx
-
 from telemetry.bus.node_lock import running_nodes
+from tests.server.running import client
 from tests.server.station import PATIENCE_S, ok
 
 Point = dict[str, Any]
@@ -53,7 +52,7 @@ class Station:
             )
         self.origin = f"http://127.0.0.1:{port}"
         self.link = self._read_link()
-        self.http = httpx.Client(base_url=self.origin, headers={"Origin": self.origin}, timeout=PATIENCE_S)
+        self.http = client(self.origin, timeout=PATIENCE_S)
 
     def _read_link(self) -> str:
         while True:

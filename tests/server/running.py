@@ -85,6 +85,15 @@ class Running:
         return httpx.Client(base_url=self.origin, **options)
 
 
+def client(origin: str, **options: Any) -> httpx.Client:
+    """As a page of this origin. The server closes connections that were idle for five seconds: none is kept that long,
+    or a request would now and then be written into one that closes.
+    """
+    return httpx.Client(
+        base_url=origin, headers={"Origin": origin}, limits=httpx.Limits(keepalive_expiry=2.0), **options
+    )
+
+
 def _fake_workspace(library: Library, hub: Hub, *_: object) -> Any:
     return FakeWorkspace(library, hub)
 
@@ -114,9 +123,9 @@ def running(
         try:
             assert ready.wait(90)
             origin = f"http://127.0.0.1:{port}"
-            with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=90) as client:
-                client.get("/login", params={"token": app.state.parts.auth.new_link_token()})
-                yield Running(settings, app, client, server)
+            with client(origin, timeout=90) as http:
+                http.get("/login", params={"token": app.state.parts.auth.new_link_token()})
+                yield Running(settings, app, http, server)
         finally:
             server.should_exit = True
             thread.join(90)

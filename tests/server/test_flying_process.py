@@ -20,6 +20,7 @@ from websockets.typing import Origin
 
 from server.cli import UNGUARDED
 from telemetry.bus.node_lock import running_nodes
+from tests.server.running import client
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
 from tests.server.test_process import command, free_port
@@ -45,7 +46,7 @@ class Server:
         self.port, self.origin = port, f"http://127.0.0.1:{port}"
         start = [word for word in command(data_dir, port, "--link", address) if not (guarded and word == UNGUARDED)]
         self.process = subprocess.Popen(start, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        self.http = httpx.Client(base_url=self.origin, headers={"Origin": self.origin}, timeout=LONG_S, cookies=cookies)
+        self.http = client(self.origin, timeout=LONG_S, cookies=cookies)
         _started.append(self)
         link = self._link()
         if cookies is None:
@@ -118,6 +119,7 @@ def _flown(message: dict[str, Any], metres: float) -> bool:
 
 def _fly(server: Server) -> str:
     """The demo's mission, until it is under way. Its digest."""
+    server.post("/api/lease/take")
     server.post("/api/terrains/demo")
     server.until(lambda m: m["type"] == "plan" and m["plan"]["computation"]["state"] == "ready")
     server.until(

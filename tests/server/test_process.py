@@ -24,6 +24,7 @@ from websockets.sync.connection import Connection
 from server.cli import UNGUARDED
 from server.plan.demo import PLAN_NAME
 from tests.server.cli_runs import hedgehop
+from tests.server.running import client
 from tests.server.station import PATIENCE_S, ok
 
 pytestmark = pytest.mark.xdist_group("process")
@@ -47,7 +48,7 @@ class Serving:
     def __init__(self, process: subprocess.Popen[str], port: int) -> None:
         self.process = process
         origin = f"http://127.0.0.1:{port}"
-        self.http = httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=PATIENCE_S)
+        self.http = client(origin, timeout=PATIENCE_S)
         assert process.stdout is not None
         for line in process.stdout:
             if found := re.search(r"/login\?token=\S+", line):
