@@ -11,6 +11,7 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI
 
+from server.door.connections import limited_protocol, raise_file_limit, usual_connections
 from server.door.slow_lines import PageWebSocket
 from server.door.tls import Tls
 from server.errors import ServerError, StartError
@@ -32,6 +33,7 @@ SHUTDOWN_S = 5
 def run(settings: Settings, *, demo: bool = False) -> None:
     """Serves until interrupted. Raises StartError, DataDirError, AddressError or BusError with what to do."""
     configure_logging(settings.log_level)
+    raise_file_limit()
     for address in settings.link:
         parse_address(address)
     tls = Tls.of(settings)
@@ -118,6 +120,7 @@ def server_config(app: FastAPI, settings: Settings, tls: Tls | None = None) -> u
         server_header=False,
         # Meshes deflate slowly and little: a 36 MB one took 2.2 s with, 0.3 s without.
         ws_per_message_deflate=False,
+        http=limited_protocol(usual_connections()),
         ws=PageWebSocket,
         ws_max_size=WEBSOCKET_LIMIT_BYTES,
         timeout_graceful_shutdown=SHUTDOWN_S,

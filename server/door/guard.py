@@ -27,6 +27,8 @@ JSON_LIMIT_BYTES = 2 * 1024**2
 """A plan of 5000 points is half of it; the loop that reads it passes on what vehicles say."""
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 CHUNK_TIMEOUT_S = 30.0
+SLOWEST_BYTES_PER_S = 4096
+"""Of a body, once it has been waited for so long in all."""
 DRAIN_LIMIT_BYTES = 64 * 1024**2
 DRAIN_TIMEOUT_S = 5.0
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -201,17 +203,21 @@ class _Metered:
     def __init__(self, receive: Receive, limit: int) -> None:
         self._receive = receive
         self._limit = limit
-        self._seen = 0
+        self._seen, self._waited_s = 0, 0.0
         self._complete = False
 
     async def __call__(self) -> Message:
         if self._complete:
             return await self._receive()
+        since_s = time.monotonic()
         try:
             async with asyncio.timeout(CHUNK_TIMEOUT_S):
                 message = await self._receive()
         except TimeoutError:
             raise HTTPException(408, f"No part of the body came for {CHUNK_TIMEOUT_S:g} seconds.") from None
+        self._waited_s += time.monotonic() - since_s
+        if self._waited_s > CHUNK_TIMEOUT_S + self._seen / SLOWEST_BYTES_PER_S:
+            raise HTTPException(408, f"The body comes at less than {SLOWEST_BYTES_PER_S} bytes a second.")
         self._seen += len(message.get("body", b""))
         self._complete = not message.get("more_body", False)
         if self._seen > self._limit:

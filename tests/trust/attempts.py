@@ -28,17 +28,30 @@ HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         "A full disk while recording: said, all before it readable",
         (f"{T}test_recording_recorder.py", f"{T}test_recording_disk_space.py"),
     ),
-    ("R13", "A browser that stalls holds up no other", (f"{S}test_hub.py",)),
+    ("R5", "A server that hangs or dies is started again", (f"{S}test_guardian.py",)),
+    ("R13", "A browser that stalls holds up no other", (f"{S}test_hub.py", f"{S}test_slow_line.py")),
     ("S1", "Other sites' requests and sockets are refused", (f"{S}test_guard.py",)),
     ("S2", "Foreign hosts are refused (DNS rebinding)", (f"{S}test_guard.py",)),
     ("S3", "Hostile messages to the 3D view do nothing", (f"{S}test_filter.py", f"{S}test_proxy.py")),
-    ("S4", "Hostile rasters read, ask for and delete nothing", ("tests/planning/test_geotiff_safety.py",)),
+    (
+        "S4",
+        "Hostile rasters read, ask for and delete nothing, and take no memory that others need",
+        tuple(f"tests/planning/test_{name}.py" for name in ("geotiff_safety", "confinement", "memory_at_hand")),
+    ),
     ("S5", "Hostile KML and KMZ are refused", ("tests/planning/test_poi_files.py",)),
-    ("S6", "Huge bodies are refused without being kept", (f"{S}test_limits.py",)),
+    ("S6", "Huge bodies and half-open connections shut nobody out", (f"{S}test_guard.py", f"{S}test_connections.py")),
     ("S7", "Names from outside lead to no file", (f"{S}test_wrong_input.py", f"{S}test_terrains.py")),
     ("S8", "Signing: verified first, replays refused also after a restart", (f"{T}test_mavlink_signing.py",)),
-    ("S9", "Commands go to the pinned peer only", (f"{T}test_mavlink_peers.py", f"{T}test_mavlink_adopted.py")),
-    ("S10", "One operator in charge, held by the server and the link", (f"{S}test_lease.py",)),
+    (
+        "S9",
+        "Commands go to the pinned peer only, and impossible changes are not believed",
+        tuple(f"{T}test_mavlink_{name}.py" for name in ("peers", "adopted", "believing", "forged")),
+    ),
+    (
+        "S10",
+        "One operator in charge, held by the server and the link; observers change nothing",
+        tuple(f"{S}test_{name}.py" for name in ("lease", "lease_over_the_bus", "api_roles")),
+    ),
     ("S11", "Every command is written down first; changed lines are told", (f"{T}test_audit.py",)),
     ("S12", "The container: no root, nothing writable, no capabilities", ("tests/test_docker.py",)),
     ("S13", "No plain text beyond loopback; certificates of the laptop's own", (f"{S}test_tls.py",)),
@@ -46,7 +59,6 @@ HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("S15", "Names in files are text wherever they are shown", ("tests/planning/test_formats_safe_text.py",)),
 )
 NOT_MEASURED = (
-    Row("R5", "A server that hangs is ended and started again", "not measured", "no server is stopped in flight here"),
     Row("R14", "50 browsers: none later than one alone, by more than twice", "not measured", "needs a quiet machine"),
     Row("R15", "No growth in 24 simulated hours", "not measured", "no accelerated flight of that length is run"),
 )
