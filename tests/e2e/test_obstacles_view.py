@@ -234,7 +234,7 @@ def _maps_begin_anew_when_held_for(page: Page) -> None:
 
 def test_without_the_server_hold_and_return_are_disabled_and_say_why(own_station: Station, page: Page) -> None:
     with simulated_vehicle() as vehicle:
-        page.goto(own_station.link)
+        visit(page, own_station)
         connect(page, vehicle)
         own_station.kill()
         _is_left_alone(page)
