@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
+import socket
 import ssl
 from pathlib import Path
 
@@ -79,7 +80,8 @@ class Tls:
         if host not in ("0.0.0.0", "::"):
             return f"[{host}]" if ":" in host else host
         outside = [a for a in self.names.addresses if not a.is_loopback]
-        for address in sorted(outside, key=lambda a: (a.version, a.packed)):
+        ours = _address_of_network()
+        for address in sorted(outside, key=lambda a: (a != ours, a.version, a.packed)):
             return f"[{address}]" if address.version == 6 else str(address)
         return next(iter(sorted(self.names.dns - {"localhost"})), "localhost")
 
@@ -104,6 +106,14 @@ class Tls:
                 advice="Correct tls_certificate and tls_key, or run hedgehop tls.",
             ) from error
         self._loaded_ns = changed_ns
+
+
+def _address_of_network() -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """Ours in the network that leads elsewhere, which a container's bridge does not. Nothing is sent for it."""
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        asking.connect(("198.51.100.1", 9))  # set aside for documents: nobody has it
+        return ipaddress.ip_address(asking.getsockname()[0])
+    return None
 
 
 def is_loopback(host: str) -> bool:

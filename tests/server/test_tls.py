@@ -23,7 +23,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from server.app import AnnouncingServer
-from server.door import certificates
+from server.door import certificates, tls
 from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
 from server.door.tls import Tls
 from server.errors import CertificateError, StartError
@@ -46,6 +46,18 @@ def test_keys_are_readable_by_their_user_only(files: CertificateFiles) -> None:
     assert stat.S_IMODE(files.folder.stat().st_mode) == 0o700
     assert {stat.S_IMODE(path.stat().st_mode) for path in files.folder.iterdir()} == {0o600}
     assert files.certificate().names == HERE
+
+
+def test_the_link_leads_to_the_address_in_use_not_to_a_bridge(
+    files: CertificateFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = HERE.with_given(["172.17.0.1", "192.168.7.5"])
+    assert files.renew(now_utc(), names)
+    station = Tls(files.server, None, own=files)
+    monkeypatch.setattr(tls, "_address_of_network", lambda: ipaddress.ip_address("192.168.7.5"))
+    assert station.reachable("0.0.0.0") == "192.168.7.5"
+    monkeypatch.setattr(tls, "_address_of_network", lambda: None)
+    assert station.reachable("0.0.0.0") == "172.17.0.1"
 
 
 def test_it_is_made_anew_for_a_new_address_and_before_it_ends_and_the_authority_stays(files: CertificateFiles) -> None:
