@@ -32,6 +32,7 @@ SHUTDOWN_S = 5
 
 def run(settings: Settings, *, demo: bool = False) -> None:
     """Serves until interrupted. Raises StartError, DataDirError, AddressError or BusError with what to do."""
+    guarded = Guarded.found()  # a spare server waits here, with all its modules loaded
     configure_logging(settings.log_level)
     raise_file_limit()
     for address in settings.link:
@@ -39,7 +40,7 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     tls = Tls.of(settings)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
         app = create_app(settings, library, Workspace, Flying.open, demo=demo, tls=tls)
-        server = AnnouncingServer(app, settings, tls, Guarded.found())
+        server = AnnouncingServer(app, settings, tls, guarded)
         server.run(sockets=[listening])
         if not server.started:
             fault = getattr(app.state, "start_error", None)

@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import socket
+import sys
 import time
 from datetime import UTC, datetime
 
@@ -18,11 +19,15 @@ log = logging.getLogger("hedgehop.guarded")
 
 
 class Guarded:
-    """All methods belong to the event loop's thread; none of them waits."""
+    """All methods belong to the event loop's thread; none of them waits, once it is made."""
 
     def __init__(self, channel: socket.socket) -> None:
+        """Waits for its turn: the first server has it at once, a spare one when that has gone."""
         with channel.makefile("rb") as greeting:
-            told = json.loads(greeting.readline())
+            line = greeting.readline()
+        if not line:
+            sys.exit(0)  # never needed
+        told = json.loads(line)
         channel.setblocking(False)
         self._channel = channel
         self._is_alone = False

@@ -3,7 +3,8 @@
 It is small, so that it lasts: one thread, the standard library, no port, no disk. The server proves over a socket pair,
 twice a second and from its event loop, that it works (``server.work.guarded``); nodes and their vehicle's heartbeat go
 on meanwhile. The guardian holds no listening socket: while there is no server, pages are refused at once and say so,
-instead of waiting in a queue that nobody serves.
+instead of waiting in a queue that nobody serves. Beside a server that has run for a while a spare one waits, with all
+its modules loaded.
 
 It ends when it is asked to (SIGINT, SIGTERM, SIGHUP), and with a server that never came up, with that one's exit code.
 As process 1 of a container it also reaps what others leave.
@@ -31,6 +32,8 @@ LINK_OPEN, LINK_USED = b"o", b"u"
 PAUSES_S = (0.0, 1.0, 2.0, 5.0, 10.0)
 """Before it is started again: at once after a server that ran for long, slower and slower after one that did not."""
 STEADY_S = PAUSES_S[-1]
+SPARE_AFTER_S, SPARE_AGAIN_S = 10.0, 60.0
+"""Once the server answers, and after a spare one that ended: loading it takes processor time from others."""
 _BUSY_S, _START_S = 30.0, 180.0
 """Given up though it works hard, or before it answers for the first time; a machine may be very slow."""
 _LOOK_EVERY_S = 0.1
@@ -39,12 +42,11 @@ _END_WITHIN_S = 25.0
 
 
 class _Server:
-    """One server's process, as long as it runs."""
+    """One server's process, as long as it runs. It loads its modules, then waits until it is greeted."""
 
-    def __init__(self, command: list[str], greeting: dict[str, object]) -> None:
+    def __init__(self, command: list[str]) -> None:
         self.channel, theirs = socket.socketpair()
         self.channel.setblocking(False)
-        self.channel.send(json.dumps(greeting).encode() + b"\n")
         theirs.set_inheritable(True)
         # In a group of its own: Ctrl-C reaches the guardian alone, which passes it on once.
         environment = {**os.environ, CHANNEL: str(theirs.fileno())}
@@ -60,6 +62,12 @@ class _Server:
         self.code: int | None = None if self.pid else 1
         """As ``os.waitstatus_to_exitcode`` has it; None while it runs."""
 
+    def greet(self, greeting: dict[str, object]) -> None:
+        """It is its turn."""
+        self.started_s = self.proved_t_mono_s = time.monotonic()
+        with contextlib.suppress(OSError):  # it has ended meanwhile, which is seen as with any other
+            self.channel.send(json.dumps(greeting).encode() + b"\n")
+
     def hear(self, timeout_s: float) -> None:
         """Takes its proofs. Waits for the first one, but no longer than this."""
         if not select.select([self.channel], [], [], timeout_s)[0]:
@@ -71,16 +79,8 @@ class _Server:
                 return
         time.sleep(timeout_s)  # its end is closed: it is ending, or did so at once
 
-    def runs(self) -> bool:
-        """Reaps whatever has ended: process 1 of a container inherits the nodes of a server that died."""
-        with contextlib.suppress(ChildProcessError):
-            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-                if ended[0] == self.pid:
-                    self.code = os.waitstatus_to_exitcode(ended[1])
-        return self.code is None
-
     def signal(self, number: int) -> None:
-        if self.runs():
+        if self.code is None:  # not reaped: its number is still its own
             os.kill(self.pid, number)
 
 
@@ -92,16 +92,26 @@ class Guardian:
         self._silent_since_s: float | None = None
         """When a server was last heard that has gone since."""
         self._restarts = self._failures = 0
+        self._spare: _Server | None = None
+        self._spare_ended_s = -SPARE_AGAIN_S
         self._signals: list[int] = []
         self._asked_s: float | None = None
 
     def run(self) -> int:
         """The exit code of the last server."""
+        try:
+            return self._run()
+        finally:
+            if self._spare is not None:
+                self._spare.signal(signal.SIGKILL)
+
+    def _run(self) -> int:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup means it
                 signal.signal(number, self._on_signal)
         while True:
-            server = _Server(self._command, {"link": self._link, "silent_since_t_mono_s": self._silent_since_s})
+            server, self._spare = self._spare or _Server(self._command), None
+            server.greet({"link": self._link, "silent_since_t_mono_s": self._silent_since_s})
             how = self._watch(server)
             if self._asked_s is not None or not (server.has_answered or self._restarts):
                 return server.code or 0
@@ -120,9 +130,10 @@ class Guardian:
         # Looked at before it is heard: else its first proof would be taken for its start, and waited for longer.
         liveness.look(server, server.started_s)
         hung = ""
-        while server.runs():
+        while self._runs(server):
             server.hear(_LOOK_EVERY_S)
             self._pass_on(server)
+            self._keep_spare(server)
             silence = liveness.look(server, time.monotonic())
             # The first start of all is watched by whoever asked for it; one that was asked to end says nothing more.
             watched = self._asked_s is None and (server.has_answered or self._restarts)
@@ -137,6 +148,25 @@ class Guardian:
         server.hear(0.0)  # what it proved just before it ended
         server.channel.close()
         return hung or f"ended {_ending(server.code or 0)}"
+
+    def _runs(self, server: _Server) -> bool:
+        """Reaps whatever has ended: process 1 of a container inherits the nodes of a server that died."""
+        with contextlib.suppress(ChildProcessError):
+            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+                for each in (server, self._spare):
+                    if each is not None and ended[0] == each.pid:
+                        each.code = os.waitstatus_to_exitcode(ended[1])
+        return server.code is None
+
+    def _keep_spare(self, server: _Server) -> None:
+        now_s = time.monotonic()
+        if self._spare is not None and self._spare.code is not None:
+            self._spare.channel.close()
+            self._spare, self._spare_ended_s = None, now_s
+        is_steady = server.has_answered and now_s - server.started_s > SPARE_AFTER_S
+        may_try = is_steady and self._asked_s is None and now_s - self._spare_ended_s > SPARE_AGAIN_S
+        if self._spare is None and may_try:
+            self._spare = _Server(self._command)
 
     def _pause_s(self, server: _Server) -> float:
         if server.has_answered:

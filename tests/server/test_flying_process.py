@@ -77,8 +77,8 @@ class Server:
 
     def pid(self) -> int:
         """Of the server under the guardian."""
-        (child,) = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        return int(child)
+        oldest, *_spare = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        return int(oldest)
 
     def answers_again(self) -> dict[str, Any]:
         """What a page is told first by a server that was started again."""

@@ -23,8 +23,12 @@ PATIENCE_S = 90.0
 SERVER = f"""
 import json, os, signal, socket, sys, time
 
+print("loaded", os.getpid(), flush=True)
 channel = socket.socket(fileno=int(os.environ["{CHANNEL}"]))
-told = json.loads(channel.makefile("rb").readline())
+line = channel.makefile("rb").readline()
+if not line:
+    sys.exit(0)
+told = json.loads(line)
 print("server", os.getpid(), told["link"], told["silent_since_t_mono_s"] is not None, flush=True)
 what = sys.argv[1]
 if what == "refuse" or (what == "once" and told["silent_since_t_mono_s"]):
@@ -54,8 +58,9 @@ while True:
 class Guarded:
     """A guardian's process, and the lines of its servers."""
 
-    def __init__(self, what: str) -> None:
-        command = [sys.executable, "-m", guardian.__name__, sys.executable, "-c", SERVER, what]
+    def __init__(self, what: str, spare_after_s: float = 1000.0) -> None:
+        main = f"from server.work import guardian; guardian.SPARE_AFTER_S = {spare_after_s}; guardian.main()"
+        command = [sys.executable, "-c", main, sys.executable, "-c", SERVER, what]
         self.process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT, start_new_session=True
         )
@@ -74,6 +79,10 @@ class Guarded:
     def pid(self, number: int) -> int:
         return int(self.server(number)[0])
 
+    def loaded(self) -> list[int]:
+        """Process ids of all servers that were started, spare ones as well."""
+        return [int(line.split()[1]) for line in self.lines if line.startswith("loaded")]
+
     def _servers(self) -> list[str]:
         return [line for line in self.lines if line.startswith("server")]
 
@@ -88,7 +97,7 @@ class Guarded:
 
     def close(self) -> None:
         """Whatever is left of it."""
-        for pid in [int(line.split()[1]) for line in self._servers()]:
+        for pid in self.loaded():
             if _is_there(pid):
                 os.kill(pid, signal.SIGKILL)
         self.process.kill()
@@ -120,8 +129,8 @@ def wait(condition: object) -> None:
 def guarded() -> Iterator[object]:
     made: list[Guarded] = []
 
-    def make(what: str) -> Guarded:
-        made.append(Guarded(what))
+    def make(what: str, **options: float) -> Guarded:
+        made.append(Guarded(what, **options))
         return made[-1]
 
     yield make
@@ -140,6 +149,41 @@ def test_a_killed_server_is_started_again_with_the_link_that_nobody_has_used(gua
     assert second[0] != first[0]
     assert second[1:] == [first[1], "True"]
     assert "The server ended by SIGKILL. It is started again now; restart 1 " in station.words()
+
+
+def test_a_spare_server_waits_with_its_modules_loaded_and_takes_over(guarded) -> None:
+    station = guarded("works", spare_after_s=0.3)
+    answered(station)
+    wait(lambda: len(station.loaded()) == 2)
+    first, spare = station.loaded()
+    assert len(station._servers()) == 1
+    os.kill(first, signal.SIGKILL)
+    assert station.pid(2) == spare
+    assert station.server(2)[2] == "True"
+    answered(station, times=2)
+    wait(lambda: len(station.loaded()) == 3)
+    station.process.send_signal(signal.SIGTERM)
+    assert station.ended() == -signal.SIGTERM
+    wait(lambda: not _is_there(station.loaded()[2]))
+
+
+def test_a_spare_server_that_ends_costs_nothing(guarded) -> None:
+    station = guarded("works", spare_after_s=0.3)
+    answered(station)
+    wait(lambda: len(station.loaded()) == 2)
+    os.kill(station.loaded()[1], signal.SIGKILL)
+    wait(lambda: not _is_there(station.loaded()[1]))
+    os.kill(station.pid(1), signal.SIGKILL)
+    assert station.pid(2) == station.loaded()[2]
+    answered(station, times=2)
+
+
+def test_nobody_is_left_of_a_guardian_that_is_killed(guarded) -> None:
+    station = guarded("works", spare_after_s=0.3)
+    answered(station)
+    wait(lambda: len(station.loaded()) == 2)
+    station.process.kill()
+    wait(lambda: not _is_there(station.loaded()[1]))
 
 
 def test_a_used_link_is_not_given_to_the_next_server(guarded) -> None:
