@@ -17,7 +17,6 @@ ServerError
 │   └── JobCancelledError      somebody cancelled the job
 ├── BadRequestError        a query or body that makes no sense
 ├── TooLargeError          a body beyond its limit
-├── SlowRequestError       a body that stopped arriving
 ├── StorageError           the data directory cannot be read or written
 │   ├── StorageFullError       no space left
 │   └── DataDirError           not usable at all: refused at start
@@ -126,10 +125,6 @@ class TooLargeError(ServerError):
     code = "too_large"
 
 
-class SlowRequestError(ServerError):
-    code = "too_slow"
-
-
 class StorageError(ServerError):
     code = "storage"
 
@@ -170,7 +165,6 @@ STATUS: dict[type[Exception], int] = {
     ConflictError: 409,
     BadRequestError: 422,
     TooLargeError: 413,
-    SlowRequestError: 408,
     StorageError: 500,
     StorageFullError: 507,
     BusyError: 503,
