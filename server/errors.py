@@ -169,6 +169,7 @@ STATUS: dict[type[Exception], int] = {
     StorageFullError: 507,
     BusyError: 503,
     WorkerDiedError: 500,
+    CertificateError: 500,
     StartError: 503,
     TelemetryError: 502,
     AddressError: 422,
