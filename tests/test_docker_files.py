@@ -51,7 +51,7 @@ def test_the_password_comes_from_a_file(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("HEDGEHOP_PASSWORD_FILE", str(secret))
     password = load_settings().password
     assert password is not None
-    assert password.matches("hunter2hunter2")
+    assert password.get_secret_value() == "hunter2hunter2"
     for content, fault in (("short", "at least 8 characters"), (None, "cannot be read")):
         secret.write_text(content) if content else secret.unlink()
         with pytest.raises(StartError, match=fault):

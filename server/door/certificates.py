@@ -1,6 +1,6 @@
 """The laptop's own certificate authority, and the certificate of its console.
 
-``tls/`` in the data directory holds ``authority.pem`` (which tablets are to trust), ``authority.key``, ``server.pem``
+``tls/`` in the data directory holds ``authority.pem`` (which tablets are to trust), ``authority.key``, ``console.pem``
 (the console's key and certificates in one file, so that both are replaced at once) and ``names.txt`` (what else than
 the machine's own names and addresses the certificate is for). All are readable by their user only.
 """
@@ -74,7 +74,7 @@ class CertificateFiles:
     def __init__(self, data_dir: Path) -> None:
         folder = data_dir.expanduser().absolute() / FOLDER
         self.folder = folder
-        self.authority, self.server = folder / "authority.pem", folder / "server.pem"
+        self.authority, self.server = folder / "authority.pem", folder / "console.pem"
         self._authority_key, self._names = folder / "authority.key", folder / "names.txt"
 
     def exist(self) -> bool:

@@ -117,6 +117,7 @@ def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Pa
         line.lead_to(int(station.origin.rpartition(":")[2]))
         with simulated_vehicle() as vehicle:
             page.goto(station.link.replace(station.origin, f"http://{line.host}"))
+            page.get_by_test_id("take-control").click()
             connect(page, vehicle)
             expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
             line.is_slow = True

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
+from websockets.sync.client import ClientConnection
 
 from server.schemas import Snapshot
 from tests.server.fakes import notice
@@ -24,7 +26,7 @@ def test_an_edit_comes_back_and_reaches_the_other_pages(served: Running) -> None
         response = served.http.put("/api/plan", json=edit)
         # Markup stays text; control characters go.
         assert response.json()["document"]["name"] == "<b>&"
-        assert json.loads(socket.recv(timeout=10))["plan"]["revision"] == 2
+        assert _next(socket, "plan")["plan"]["revision"] == 2
 
 
 def test_a_stale_edit_is_a_conflict(served: Running) -> None:
@@ -94,13 +96,21 @@ def test_the_stream_answers_faulty_messages_and_hides_details(served: Running) -
     with served.socket() as socket:
         socket.recv(timeout=10)
         socket.send('{"type": "launch"}')
-        assert "launch" in json.loads(socket.recv(timeout=10))["error"]["what"]
+        assert "launch" in _next(socket, "notice")["error"]["what"]
         for poi, code in (("refused", "not_ready"), ("broken", "internal")):
             socket.send(json.dumps({"type": "set_selection", "selection": {"poi_id": poi}, "change": 7}))
-            answer = json.loads(socket.recv(timeout=10))
-            assert (answer["type"], answer["error"]["code"]) == ("notice", code)
+            answer = _next(socket, "notice")
+            assert answer["error"]["code"] == code
             assert "secret" not in json.dumps(answer)
             # Refused or not, the page need not wait for it any longer.
-            assert json.loads(socket.recv(timeout=10)) == {"v": 1, "type": "answered", "change": 7}
+            assert _next(socket, "answered") == {"v": 1, "type": "answered", "change": 7}
         served.workspace.loop.call_soon_threadsafe(served.parts.hub.publish, notice("still here"))
-        assert json.loads(socket.recv(timeout=10))["error"]["what"] == "still here"
+        assert _next(socket, "notice")["error"]["what"] == "still here"
+
+
+def _next(socket: ClientConnection, kind: str) -> dict[str, Any]:
+    """What is told of other matters meanwhile, such as who is in charge, is passed over."""
+    while True:
+        message = json.loads(socket.recv(timeout=10))
+        if message["type"] == kind:
+            return message

@@ -88,7 +88,7 @@ def test_given_names_are_kept_for_all_that_follow(files: CertificateFiles) -> No
         files.add_names(["no name"])
 
 
-@pytest.mark.parametrize("broken", ["server.pem", "authority.pem", "authority.key"])
+@pytest.mark.parametrize("broken", ["console.pem", "authority.pem", "authority.key"])
 def test_a_damaged_file_is_named(files: CertificateFiles, broken: str) -> None:
     (files.folder / broken).write_text("-----BEGIN NOTHING-----")
     with pytest.raises(CertificateError, match="cannot be read") as caught:
