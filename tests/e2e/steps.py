@@ -27,12 +27,12 @@ def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATI
     raise AssertionError("not within the time allowed")
 
 
-def enter(page: Page, station: Station) -> None:
-    """As the operator who is signed in and in charge."""
+def enter(page: Page, station: Station, origin: str = "") -> None:
+    """As the operator who is signed in and in charge; ``origin``: where the page finds the station, if elsewhere."""
     station.sign_in()
     for name, value in station.cookies.items():
-        page.context.add_cookies([{"name": name, "value": value, "url": station.origin}])
-    page.goto(station.origin)
+        page.context.add_cookies([{"name": name, "value": value, "url": origin or station.origin}])
+    page.goto(origin or station.origin)
 
 
 def visit(page: Page, station: Station) -> None:

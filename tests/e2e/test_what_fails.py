@@ -18,7 +18,7 @@ from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 from server.schemas import NodeDoc, NodesMessage
 from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import connect, open_demo, upload
+from tests.e2e.steps import connect, enter, open_demo, upload
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
 
@@ -116,8 +116,7 @@ def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Pa
     try:
         line.lead_to(int(station.origin.rpartition(":")[2]))
         with simulated_vehicle() as vehicle:
-            page.goto(station.link.replace(station.origin, f"http://{line.host}"))
-            page.get_by_test_id("take-control").click()
+            enter(page, station, f"http://{line.host}")
             connect(page, vehicle)
             expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
             line.is_slow = True
