@@ -188,7 +188,7 @@ STATUS: dict[type[Exception], int] = {
 ASK_OPERATOR = "Ask an operator to do it, or for an operator's account."
 """To an observer."""
 _UNFORESEEN = "internal"
-_HTTP_CODES = {400: "invalid", 404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
+HTTP_CODES = {400: "invalid", 404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
 
 
 def status_of(error: Exception) -> int:
@@ -204,7 +204,7 @@ def error_doc(error: Exception) -> ErrorDoc:
     if isinstance(error, (RequestValidationError, ValidationError)):
         return _invalid(error)
     if isinstance(error, HTTPException):
-        return ErrorDoc(code=_HTTP_CODES.get(error.status_code, "http"), what=str(error.detail))
+        return ErrorDoc(code=HTTP_CODES.get(error.status_code, "http"), what=str(error.detail))
     return ErrorDoc(
         code=_UNFORESEEN,
         what="Something in Hedgehop itself went wrong.",
