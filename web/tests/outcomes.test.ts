@@ -28,8 +28,8 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-const hold = () => order({ place: "safety", path: "/hold", done: "It holds.", moves: true });
-const upload = () => order({ place: "next", path: "/upload" });
+const hold = () => order({ place: "safety", path: "/api/flight/pause", done: "It holds.", moves: true });
+const upload = () => order({ place: "next", path: "/api/flight/upload" });
 const told = (place: string) => errors.value[place]?.what ?? outcomes.value[place] ?? "";
 
 describe("an order that the vehicle acts on", () => {
@@ -90,6 +90,22 @@ describe("every order", () => {
     takeClock({ v: 1, type: "clock", page_ms: now_ms - 1000, now_mono_s: 700 }, now_ms);
     void upload();
     expect(Number(asked[1]?.headers["Hedgehop-Good-Until"])).toBeCloseTo(700 + 0.5 + 5 + 0.5, 1);
+    giveUpOrders();
+  });
+
+  it("is good for as long as it takes where it reaches no vehicle", () => {
+    const now_ms = performance.now();
+    takeClock({ v: 1, type: "clock", page_ms: now_ms, now_mono_s: 700 }, now_ms);
+    for (const path of ["/api/obstacles/seen", "/api/scenarios/runs", "/api/flights"])
+      void order({ place: "seen", path });
+    expect(asked.map(({ headers }) => headers["Hedgehop-Good-Until"])).toEqual([
+      undefined,
+      undefined,
+      undefined,
+    ]);
+    for (const path of ["/api/obstacles/avoidance", "/api/lease/take", "/api/link/adopt"])
+      void order({ place: "seen", path });
+    expect(asked.slice(3).every(({ headers }) => "Hedgehop-Good-Until" in headers)).toBe(true);
     giveUpOrders();
   });
 });

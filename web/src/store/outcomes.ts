@@ -32,8 +32,10 @@ function setPending(place: string, isPending: boolean): void {
 
 /** So long somebody who needs the vehicle to act now waits for an answer before they are told that there is none. */
 const PATIENCE_MS = 3000;
-/** What comes to the server later than that is not done any more: by then somebody may have taken the transmitter. */
+/** An order about the vehicle that comes to the server later than that is not done any more: by then somebody may have
+ * taken the transmitter. What is asked of plans, maps and recordings is as good late. */
 const GOOD_FOR_S = 5;
+const ABOUT_THE_VEHICLE = /^\/api\/(flight|lease|link|obstacles\/(avoidance|manoeuvre))\b/;
 
 const unknown = (what: string, moves: boolean): ErrorDoc => ({
   code: "no_answer",
@@ -83,7 +85,7 @@ export async function order(given: Order): Promise<Response | null> {
   // It goes on being waited for: a late answer takes the place of these words.
   const patience = moves ? setTimeout(() => settle(unknown("No answer yet", moves)), PATIENCE_MS) : undefined;
   try {
-    const answer = await request(method, path, body, { signal, headers: goodUntil() });
+    const answer = await request(method, path, body, { signal, headers: goodUntil(path) });
     settle(null);
     if (done && isLast()) say(place, done);
     return answer;
@@ -95,9 +97,11 @@ export async function order(given: Order): Promise<Response | null> {
   }
 }
 
-function goodUntil(): Record<string, string> {
+function goodUntil(path: string): Record<string, string> {
   const now_s = serverNow_s(performance.now());
-  return now_s === null ? {} : { "Hedgehop-Good-Until": (now_s + GOOD_FOR_S).toFixed(3) };
+  return now_s === null || !ABOUT_THE_VEHICLE.test(path)
+    ? {}
+    : { "Hedgehop-Good-Until": (now_s + GOOD_FOR_S).toFixed(3) };
 }
 
 /** A request without an answer to keep; its error appears at `place`. */
