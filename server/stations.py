@@ -207,6 +207,8 @@ class Flying:
         relay.on(Topic.VEHICLE, self._on_state)
         relay.on(Topic.TEXT, self.live.on_text, each=True)
         relay.on(Topic.LINK, self._on_link)
+        # Its scans are placed between positions: each one counts.
+        relay.on(Topic.VEHICLE, self.uwb.on_state, each=True)
         relay.on(Topic.UWB_SCAN, self.uwb.on_scan, each=True)
         relay.on(Topic.TRANSFER, lambda transfer: present.publish(TransferMessage(transfer=transfer)))
         relay.on(Topic.FLIGHT, self._on_flight)
@@ -222,7 +224,6 @@ class Flying:
     def _on_state(self, state: VehicleState) -> None:
         was_armed = self.live.armed
         self.live.on_state(state)
-        self.uwb.on_state(state)
         self._workspace.picture.on_vehicle(self.live.armed, self.live.home)
         if was_armed and not state.armed:
             self.desk.on_disarmed()

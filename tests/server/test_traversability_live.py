@@ -151,6 +151,14 @@ def walk() -> UwbScans:
     return scans(hill().lat_lon_from_xy(along))
 
 
+LEAD = 25
+"""Positions that are said before the scan of the first of them."""
+
+
+def _uwb(log: UwbScans, k: int, t_mono_s: float) -> Uwb:
+    return Uwb(0, t_mono_s, log.intensity[k].astype("<f4").tobytes(), log.geometry.bin_m)
+
+
 async def scan_over_sockets(page: Station) -> None:
     """A simulated radar behind a real agent, and its vehicle on the bus, as the link's node puts it there."""
     log, token = walk(), sensor_token(page.server.settings.data_dir)
@@ -162,11 +170,16 @@ async def scan_over_sockets(page: Station) -> None:
             while not agent.is_ready:
                 await asyncio.sleep(0.02)
             begun_s = time.monotonic() - 6.0
-            for k, t_s in enumerate(log.t_s.tolist()):
+            times_s = [begun_s + t_s for t_s in log.t_s.tolist()]
+            for k, t_s in enumerate(times_s):
                 lat_deg, lon_deg = log.lat_lon_deg[k].tolist()
-                bus.publish(Topic.VEHICLE, state_of(begun_s + t_s, lat_deg, lon_deg, float(log.heading_rad[k])))
-                intensity = log.intensity[k].astype("<f4").tobytes()
-                agent.put(Uwb(0, begun_s + t_s, intensity, log.geometry.bin_m))
+                bus.publish(Topic.VEHICLE, state_of(t_s, lat_deg, lon_deg, float(log.heading_rad[k])))
+                # Scans and positions come by two ways: time flies here, and a scan waits a second for its position.
+                if k >= LEAD:
+                    agent.put(_uwb(log, k - LEAD, times_s[k - LEAD]))
+                await asyncio.sleep(0.02)
+            for k in range(len(times_s) - LEAD, len(times_s)):
+                agent.put(_uwb(log, k, times_s[k]))
                 await asyncio.sleep(0.02)
             while agent.counts.report is None or agent.counts.report.received < len(log.t_s):
                 await asyncio.sleep(0.02)
