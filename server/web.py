@@ -129,6 +129,7 @@ async def _lifespan(
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
         stack.callback(background.stop)
+        await asyncio.to_thread(_complete_routes, app)
         try:
             parts = await _open(settings, library, make_workspace, open_flying, background, stack, demo)
         except DescribedError as error:
@@ -149,6 +150,13 @@ async def _lifespan(
         finally:
             parts.hub.close()
             background.stop()
+
+
+def _complete_routes(app: FastAPI) -> None:
+    """Left to itself, FastAPI does it when first asked, and holds up the loop for a third of a second."""
+    scope = {"type": "http", "method": "GET", "path": "/-", "headers": []}
+    for route in app.router.routes:
+        route.matches(scope)
 
 
 async def _open(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from fastapi.dependencies.utils import get_dependant
 
 from server.app import AnnouncingServer, bound_socket, run
 from server.errors import DataDirError, StartError, StorageFullError
@@ -117,3 +118,16 @@ def test_sessions_survive_a_restart(tmp_path: Path) -> None:
     with running(tmp_path) as second, second.stranger() as client:
         client.cookies.set(f"hedgehop-{second.settings.port}", session)
         assert client.get("/api/state").status_code == 200
+
+
+def test_no_route_is_completed_while_the_server_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would hold up the loop, and with it what a vehicle says, for longer than anything else."""
+    with running(tmp_path) as server:
+        completed: list[str] = []
+        monkeypatch.setattr(
+            "fastapi.routing.get_dependant",
+            lambda *, path, **given: completed.append(path) or get_dependant(path=path, **given),
+        )
+        assert server.http.get("/api/state").is_success
+        assert server.http.get("/api/nothing").status_code == 404
+        assert completed == []
