@@ -15,8 +15,9 @@ from server.cli.shared.command import command
 from server.cli.shared.output import say
 from server.errors import NotFoundError
 from telemetry.errors import RecordingError
-from telemetry.link.audit import audit_key_file
+from telemetry.link.audit import AUDIT_FILE
 from telemetry.link.audit_chain import Checked, check_file, parsed
+from telemetry.link.keys import audit_key_file
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.topics.messages import LinkStatus, Topic
 
@@ -30,7 +31,7 @@ def audit(
     table: Annotated[Path | None, Option("--csv", help="Write the commands and what came of them here.")] = None,
 ) -> None:
     """Hold the log of commands against this machine's key and against what the recordings have seen of it."""
-    log = data_dir if data_dir.is_file() else data_dir / "audit.jsonl"
+    log = data_dir if data_dir.is_file() else data_dir / AUDIT_FILE
     folder = log.parent
     key_file = audit_key_file(folder)
     for needed in (log, key_file):

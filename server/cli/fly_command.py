@@ -69,6 +69,7 @@ def fly(
         list[Acceptable] | None, Option(help="Fly although this row of the check is only acceptable; several times.")
     ] = None,
     record: Annotated[Path | None, Option(metavar="FILE", help="Keep the recording (.mcap) here.")] = None,
+    data_dir: o.Keys = None,
     as_json: o.AsJson = False,
     given: Annotated[o.VehicleOptions, Without("max_items")],
     demands: Annotated[o.ClearanceOptions, Without("flown_as", "max_height_above_ground_m")],
@@ -99,7 +100,7 @@ def fly(
         accept=frozenset(accept or ()),
         name=mission.stem,
     )
-    result, doc = asyncio.run(_Conductor(flight, options, record).run())
+    result, doc = asyncio.run(_Conductor(flight, options, record, data_dir).run())
     say(result.text)
     completed = result.completed and (doc.figures is None or doc.figures.completed)
     if doc.figures is not None:
@@ -112,8 +113,8 @@ def fly(
 class _Conductor:
     """One flight with nodes of its own, and what Ctrl+C means at each moment of it."""
 
-    def __init__(self, mission: Mission, options: FlyOptions, record: Path | None) -> None:
-        self._mission, self._options, self._record = mission, options, record
+    def __init__(self, mission: Mission, options: FlyOptions, record: Path | None, data_dir: Path | None) -> None:
+        self._mission, self._options, self._record, self._data_dir = mission, options, record, data_dir
         self._go_home = asyncio.Event()
         self._progress = FlightProgress(options)
         self._pressed = 0
@@ -124,7 +125,7 @@ class _Conductor:
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGINT, self._on_interrupt)
         try:
-            async with own_nodes(recorder=True) as station:
+            async with own_nodes(recorder=True, data_dir=self._data_dir) as station:
                 return await self._fly(station)
         except asyncio.CancelledError:
             raise typer.Abort from None

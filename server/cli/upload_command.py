@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -22,18 +23,18 @@ from telemetry.topics.messages import UploadReport
 
 
 @command
-def upload(mission: o.MissionFile, *, link: o.Link, as_json: o.AsJson = False) -> None:
+def upload(mission: o.MissionFile, *, link: o.Link, data_dir: o.Keys = None, as_json: o.AsJson = False) -> None:
     """Replace the mission on board, read it back, and say what the vehicle rounded."""
     flight = read_mission(mission.name, read_small(mission))
     parse_address(link)
     say_notes(*flight.warnings)
-    report = asyncio.run(_upload(flight, link))
+    report = asyncio.run(_upload(flight, link, data_dir))
     answer(_summary(report), upload_lines(report), as_json=as_json)
     raise typer.Exit(DONE if report.verified else FAILED)
 
 
-async def _upload(flight: Mission, link: str) -> UploadReport:
-    async with own_nodes(recorder=False) as station, watching(station.bus) as watch:
+async def _upload(flight: Mission, link: str, data_dir: Path | None) -> UploadReport:
+    async with own_nodes(recorder=False, data_dir=data_dir) as station, watching(station.bus) as watch:
         await connect(station.link, watch, link, OPERATOR, say)
         return await transfer(station.link, flight, OPERATOR, say)
 

@@ -6,8 +6,6 @@ orthophotos are written by worker processes (``store_terrain``, ``store_orthopho
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import threading
 from collections.abc import Iterator
@@ -21,6 +19,7 @@ from planning.terrain.dsm import Dsm
 from planning.terrain.orthophoto import Orthophoto
 from server.errors import DataDirError, StorageError, StorageFullError, error_doc
 from server.library import orthophotos, plans, terrains
+from server.library.directory_lock import DirectoryLock
 from server.library.documents import doc_from_profile
 from server.library.history import History
 from server.library.orthophotos import OrthophotoManifest
@@ -250,32 +249,6 @@ def _write_format(file: Path) -> None:
         # What is there can be read, and vehicles can be led: pages are told that the disk is full.
         if not file.is_file():
             raise
-
-
-class DirectoryLock:
-    """Held from construction to ``release``; raises ``DataDirError`` when another process holds it."""
-
-    def __init__(self, folder: Path) -> None:
-        self._handle = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            holder = os.read(self._handle, 32).decode("ascii", "replace").strip()
-            os.close(self._handle)
-            raise DataDirError(
-                f"Another Hedgehop (process {holder or 'unknown'}) uses this data directory.",
-                where=str(folder),
-                advice="Stop it, or start this one with another --data-dir.",
-            ) from error
-        with contextlib.suppress(OSError):  # on a full disk: the number is for people only, the lock holds without
-            os.truncate(self._handle, 0)
-            os.pwrite(self._handle, f"{os.getpid()}\n".encode(), 0)
-
-    def release(self) -> None:
-        """The second time nothing happens: the number may belong to another file by then."""
-        if self._handle >= 0:
-            os.close(self._handle)
-            self._handle = -1
 
 
 def read_profiles(folder: Path) -> tuple[list[ProfileEntry], list[ErrorDoc]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import os
 import secrets
@@ -15,9 +14,11 @@ from typing import Protocol
 
 from telemetry.errors import RecordingError, RecordingFullError, TelemetryError
 from telemetry.link.audit_chain import FIRST, chained, check_file, parsed
+from telemetry.link.keys import write_key_file
 from telemetry.topics.messages import CommandRecord
 from telemetry.topics.requests import Operator
 
+AUDIT_FILE = "audit.jsonl"
 KEY_BYTES = 32
 END_BYTES = 1 << 16
 """The last line is shorter."""
@@ -26,10 +27,6 @@ AUTOPILOT = Operator("link", 0)
 """Who is named in the audit log for what the link does by itself."""
 DISK_S = 1.0
 """A command that ends a flight well waits for the disk no longer than this."""
-
-
-def audit_key_file(data_dir: Path) -> Path:
-    return data_dir / "keys" / "audit.key"
 
 
 def open_audit(path: Path, key_file: Path) -> AuditLog:
@@ -43,7 +40,7 @@ def open_audit(path: Path, key_file: Path) -> AuditLog:
                 os.replace(path, aside)
                 note = f"This machine had no key for its audit log: the log until now stands in {aside.name}."
             key = secrets.token_bytes(KEY_BYTES)
-            _write_key(key_file, key)
+            write_key_file(key_file, key)
     except OSError as error:
         raise _trouble(path, error) from error
     return AuditLog(path, key, note=note)
@@ -124,18 +121,6 @@ def _last_hash(content: bytes) -> str:
         if entry is not None and isinstance(entry.get("hash"), str):
             return entry["hash"]
     return FIRST
-
-
-def _write_key(file: Path, key: bytes) -> None:
-    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with contextlib.suppress(FileNotFoundError):
-        file.unlink()
-    handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    try:
-        os.write(handle, key)
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _trouble(path: Path, error: OSError) -> RecordingError:

@@ -7,8 +7,6 @@ twice nor takes a frame twice.
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import os
 import secrets
 import time
 from collections import Counter
@@ -18,7 +16,8 @@ from pathlib import Path
 
 import msgspec
 
-from telemetry.mavlink.signing import KEY_BYTES, PER_S, UNSIGNED, Signing, Stream, Verdict, timestamp_of
+from telemetry.link.keys import write_key_file
+from telemetry.mavlink.signing import KEY_BYTES, PER_S, UNSIGNED, Signing, Stream, Verdict, is_signed, timestamp_of
 from telemetry.topics.messages import SigningMode, SigningStatus
 
 AHEAD, STREAM_AHEAD = 60 * PER_S, 2 * PER_S
@@ -66,6 +65,8 @@ class KeyRing:
     def __init__(self, file: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
         self._file, self._clock = file, clock
         self._keyed: dict[int, Keyed] = {}
+        self._strange_s: dict[int, float] = {}
+        """When vehicles whose key is not here last signed."""
         self._saving = asyncio.Lock()
         self.trouble = ""
         """Why keys could not be read or kept."""
@@ -96,6 +97,8 @@ class KeyRing:
         """ "good": it may be used; that is every message of a vehicle without a key."""
         keyed = self.of(system_id)
         if keyed is None:
+            if is_signed(frame):
+                self._strange_s[system_id] = now_s
             return "good"
         if keyed.mode == "let":
             return "good"  # whatever key it may have got since
@@ -114,6 +117,11 @@ class KeyRing:
     def warnings(self, system_id: int | None, now_s: float) -> tuple[str, ...]:
         keyed = None if system_id is None else self.of(system_id)
         said = [self.trouble] if self.trouble else []
+        if keyed is None and system_id is not None and now_s - self._strange_s.get(system_id, -SAID_S) < SAID_S:
+            said.append(
+                "This vehicle signs its messages with a key that is not here: it will not obey. Use the data "
+                "directory that has its key, or connect by USB and set up signing again."
+            )
         if keyed is not None and now_s - keyed.refused_s < SAID_S:
             total = keyed.refused.total()
             said.append(
@@ -139,7 +147,7 @@ class KeyRing:
 
     async def _save(self, file: Path) -> None:
         try:
-            await asyncio.to_thread(_write, file, self._reserved())
+            await asyncio.to_thread(write_key_file, file, self._reserved())
             self.trouble = ""
         except OSError as error:
             for keyed in self._keyed.values():
@@ -181,18 +189,3 @@ def _keyed(one: _Kept) -> Keyed:
     streams = {(system, component, link): at for system, component, link, at in one.streams}
     newest = max([one.timestamp, *streams.values()])
     return Keyed(Signing(bytes.fromhex(one.key), newest, streams), one.mode)
-
-
-def _write(file: Path, content: bytes) -> None:
-    """Whole or not at all, for nobody else's eyes."""
-    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    new = file.with_suffix(".new")
-    with contextlib.suppress(FileNotFoundError):
-        new.unlink()
-    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    try:
-        os.write(handle, content)
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-    os.replace(new, file)

@@ -38,6 +38,11 @@ def timestamp_of(t_utc_s: float) -> int:
     return max(0, round((t_utc_s - EPOCH_S) * PER_S))
 
 
+def is_signed(frame: bytes) -> bool:
+    """Rightly or wrongly."""
+    return frame[0] == mavlink.PROTOCOL_MARKER_V2 and bool(frame[2] & _SIGNED)
+
+
 @dataclass(slots=True)
 class Signing:
     """Of one key. ``newest``: the newest timestamp that was sent or proven; ``streams``: the newest of each."""
@@ -59,7 +64,7 @@ class Signing:
 
     def verify(self, frame: bytes, *, now: int) -> Verdict:
         """Of a whole frame whose checksum holds. What is good is remembered; nothing else changes anything."""
-        if frame[0] != mavlink.PROTOCOL_MARKER_V2 or not frame[2] & _SIGNED or len(frame) < _HEADER + _SIGNATURE:
+        if not is_signed(frame) or len(frame) < _HEADER + _SIGNATURE:
             return "unsigned"
         if not hmac.compare_digest(_hash(self.key, frame[:-_HASH]), frame[-_HASH:]):
             return "wrong"

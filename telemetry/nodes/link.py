@@ -1,4 +1,4 @@
-"""The link node: ``python -m telemetry.nodes.link --runtime DIR [--link ADDRESS]... [--grace-s S] [--audit FILE]``.
+"""The link node: ``python -m telemetry.nodes.link --runtime DIR [--link ADDRESS]... [--grace-s S] [--data DIR]``.
 
 It outlives the server: vehicles keep their heartbeat for the grace time, and a new server finds everything as it was.
 """
@@ -19,7 +19,8 @@ import msgspec
 from telemetry.bus import Bus
 from telemetry.bus.node import GIVEN_UP_S, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.link.answering import Answering, OperatorRight
-from telemetry.link.audit import audit_key_file, open_audit
+from telemetry.link.audit import AUDIT_FILE, open_audit
+from telemetry.link.keys import audit_key_file, signing_key_file
 from telemetry.link.link import Link, open_link
 from telemetry.link.signatures import KeyRing
 from telemetry.topics.messages import Candidate, FlightStatus, Topic
@@ -139,13 +140,13 @@ class LinkNode:
             await asyncio.to_thread(write_memory, self._file, memory)
 
 
-async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: float, runtime: Path, audit: Path) -> None:
+async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: float, runtime: Path, data: Path) -> None:
     """The whole node on an open bus."""
     file = runtime / "link.json"
     memory = await asyncio.to_thread(read_memory, file)
     right = OperatorRight(memory.highest_token)
-    log = await asyncio.to_thread(open_audit, audit, audit_key_file(runtime.parent))
-    keys = await asyncio.to_thread(KeyRing, runtime.parent / "keys" / "signing.json")
+    log = await asyncio.to_thread(open_audit, data / AUDIT_FILE, audit_key_file(data))
+    keys = await asyncio.to_thread(KeyRing, signing_key_file(data))
     try:
         async with open_link(
             bus.publish, grace_s=grace_s, server_age_s=context.unattended_s, audit=log, keys=keys
@@ -188,13 +189,13 @@ def main() -> int:
     parser.add_argument("--runtime", type=Path, required=True, help="directory of the bus's sockets")
     parser.add_argument("--link", action="append", default=[], metavar="ADDRESS", help="connection to open")
     parser.add_argument("--grace-s", type=float, default=10.0, help="heartbeats go on so long without a server")
-    parser.add_argument("--audit", type=Path, help="file in which every command is written down")
+    parser.add_argument("--data", type=Path, help="where keys and the log of commands are; else beside the runtime")
     options = parser.parse_args()
     runtime: Path = options.runtime
-    audit: Path = options.audit or runtime.parent / "audit.jsonl"
+    data: Path = options.data or runtime.parent
 
     async def node(bus: Bus, context: NodeContext) -> None:
-        await live(bus, context, links=options.link, grace_s=options.grace_s, runtime=runtime, audit=audit)
+        await live(bus, context, links=options.link, grace_s=options.grace_s, runtime=runtime, data=data)
 
     return run_node("link", runtime, node)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from telemetry.link.audit import audit_key_file, open_audit
+from telemetry.link.audit import open_audit
+from telemetry.link.keys import audit_key_file
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.topics.messages import CommandRecord, LinkStatus, Topic
 from tests.server.cli_runs import hedgehop

@@ -14,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import RecordingError, RecordingFullError
-from telemetry.link.audit import AuditLog, audit_key_file, open_audit
+from telemetry.link.audit import AuditLog, open_audit
 from telemetry.link.audit_chain import check_chain, check_file
+from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 
 

@@ -30,6 +30,10 @@ Link = Annotated[
         metavar="URL", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600."
     ),
 ]
+Keys = Annotated[
+    Path | None,
+    Option(metavar="DIR", help="Sign as the Hedgehop of this data directory does, and keep the log of commands there."),
+]
 Out = Annotated[Path, Option(metavar="DIR", help="Directory for the files.")]
 AsJson = Annotated[bool, Option("--json", help="Print one JSON object on stdout, messages on stderr.")]
 

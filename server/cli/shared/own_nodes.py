@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import shutil
 import tempfile
@@ -12,6 +13,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.library.directory_lock import locked
 from server.work.supervisor import Supervisor
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
@@ -33,14 +35,25 @@ class Station:
 
 
 @asynccontextmanager
-async def own_nodes(*, recorder: bool) -> AsyncIterator[Station]:
-    """A link node, and a recorder node if asked for, that are ended with the block."""
+async def own_nodes(*, recorder: bool, data_dir: Path | None = None) -> AsyncIterator[Station]:
+    """A link node, and a recorder node if asked for, that are ended with the block.
+
+    The link signs with the keys of ``data_dir`` and writes its commands into the log there. Raises ``DataDirError``
+    where there is none, or where a server uses it: two that count on would each spoil the other's signatures.
+    """
+    with contextlib.nullcontext() if data_dir is None else locked(data_dir):
+        async with _nodes(recorder, () if data_dir is None else ("--data", str(data_dir.resolve()))) as station:
+            yield station
+
+
+@asynccontextmanager
+async def _nodes(recorder: bool, link_options: tuple[str, ...]) -> AsyncIterator[Station]:
     folder = Path(tempfile.mkdtemp(prefix="hedgehop-"))
     recordings = folder / "recordings"
     recordings.mkdir(mode=0o700)
     runtime = folder / "run"
     supervisor = Supervisor(runtime, changed=lambda states: None)
-    names = {"link": (), "recorder": ("--recordings", str(recordings))} if recorder else {"link": ()}
+    names = {"link": link_options, **({"recorder": ("--recordings", str(recordings))} if recorder else {})}
     failure: BaseException | None = None
     try:
         async with asyncio.TaskGroup() as tasks:

@@ -95,6 +95,8 @@ async def connect(
         raise NoVehicleError(what, where=address, advice=advice)
     told = await watch.until(lambda seen: _with_version(seen.vehicle, answer), timeout_s=VERSION_S) or answer
     report(f"Vehicle {told.system_id}: {told.autopilot} {told.firmware_version or ''}".rstrip())
+    for warning in () if watch.link is None else watch.link.warnings:
+        report(f"Warning: {warning}")
     return told
 
 
