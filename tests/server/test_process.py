@@ -22,6 +22,8 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 from server.cli import UNGUARDED
+from server.library import Library
+from server.library.history import History
 from server.plan.demo import PLAN_NAME
 from tests.server.cli_runs import hedgehop
 from tests.server.running import client
@@ -111,18 +113,18 @@ def test_a_data_directory_that_cannot_be_used(tmp_path: Path) -> None:
     assert "cannot be written" in refused(Path("/proc/hedgehop"), free_port())
 
 
-def test_a_kill_loses_nothing_and_leaves_no_process(tmp_path: Path) -> None:
-    with serving(tmp_path) as station:
-        ok(station.http.post("/api/terrains/demo"))
-        ok(station.rename("Before the power cut"))
-        handles = [os.pidfd_open(pid) for pid in station.workers()]
+def test_a_kill_leaves_no_process_and_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
+    with serving(tmp_path, "--demo") as first:
+        terrain = ok(first.http.post("/api/terrains/demo")).json()
+        handles = [os.pidfd_open(pid) for pid in first.workers()]
         assert handles
-        station.process.kill()
-        station.process.wait(PATIENCE_S)
+        first.process.kill()
+        first.process.wait(PATIENCE_S)
         for handle in handles:
             assert _ended(handle)
-    with serving(tmp_path) as again:
-        assert again.plan["document"]["name"] == "Before the power cut"
+    with serving(tmp_path, "--demo") as second:
+        plan = second.plan
+        assert (plan["document"]["name"], plan["document"]["terrain_id"]) == (PLAN_NAME, terrain["id"])
 
 
 def _ended(handle: int) -> bool:
@@ -131,14 +133,6 @@ def _ended(handle: int) -> bool:
         return bool(select.select([handle], [], [], PATIENCE_S)[0])
     finally:
         os.close(handle)
-
-
-def test_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
-    with serving(tmp_path, "--demo") as first:
-        terrain = ok(first.http.post("/api/terrains/demo")).json()
-    with serving(tmp_path, "--demo") as second:
-        plan = second.plan
-        assert (plan["document"]["name"], plan["document"]["terrain_id"]) == (PLAN_NAME, terrain["id"])
 
 
 @pytest.fixture(params=["2m"])
@@ -161,10 +155,7 @@ def test_a_full_disk_loses_no_edit(small_disk: Path) -> None:
     data_dir = small_disk / "data"
     with serving(data_dir) as station:
         saved = ok(station.rename("Saved")).json()["saved_utc"]
-        ballast = small_disk / "ballast"
-        with contextlib.suppress(OSError), ballast.open("wb", buffering=0) as file:
-            while file.write(bytes(4096)):
-                pass
+        ballast = fill(small_disk)
         state = ok(station.rename("Held in memory")).json()
         assert (state["document"]["name"], state["saved_utc"]) == ("Held in memory", saved)
         upload = station.http.post(
@@ -179,9 +170,17 @@ def test_a_full_disk_loses_no_edit(small_disk: Path) -> None:
         assert station.plan["document"]["name"] == "Held in memory"
         ballast.unlink()
         assert ok(station.rename("Saved again")).json()["saved_utc"] > saved
-    with serving(data_dir) as again:
-        assert again.plan["document"]["name"] == "Saved again"
-        assert again.plan["can_undo"]
+    kept = kept_plan(data_dir)
+    assert kept.present.name == "Saved again"
+    assert kept.can_undo
+
+
+def kept_plan(data_dir: Path) -> History:
+    """The one that the next server opens."""
+    with contextlib.closing(Library(data_dir)) as library:
+        plan_id = library.last_plan()
+        assert plan_id is not None
+        return library.load_plan(plan_id)
 
 
 def fill(disk: Path) -> Path:
@@ -190,29 +189,35 @@ def fill(disk: Path) -> Path:
     with contextlib.suppress(OSError), ballast.open("ab", buffering=0) as file:
         while file.write(bytes(4096)):
             pass
-    assert shutil.disk_usage(disk).free == 0
     return ballast
 
 
 @pytest.mark.parametrize("small_disk", ["64m"], indirect=True)
-@pytest.mark.parametrize("reserve", [True, False])
-def test_a_killed_server_comes_back_on_a_full_disk(small_disk: Path, reserve: bool) -> None:
+def test_a_killed_server_comes_back_on_a_full_disk(small_disk: Path) -> None:
     data_dir = small_disk / "data"
-    old = data_dir / "recordings" / "old.tlog"
     with serving(data_dir, "--no-demo-world") as station:
         ok(station.rename("Before"))
         deadline = time.monotonic() + PATIENCE_S
         while not (data_dir / "reserve").is_file() and time.monotonic() < deadline:
             time.sleep(0.1)
         assert (data_dir / "reserve").stat().st_blocks * 512 >= 1_000_000
-        old.write_bytes(bytes(3_000_000))
         station.process.kill()
-    if not reserve:
-        (data_dir / "reserve").unlink()
-    ballast = fill(small_disk)
+    for name, reserve in (("With a reserve", True), ("Without one", False)):
+        (data_dir / "recordings" / "old.tlog").write_bytes(bytes(3_000_000))
+        if not reserve:
+            (data_dir / "reserve").unlink(missing_ok=True)
+        before = kept_plan(data_dir).present.name
+        _comes_back(small_disk, before, name)
+    assert kept_plan(data_dir).present.name == "Without one"
+
+
+def _comes_back(disk: Path, before: str, after: str) -> None:
+    data_dir, old = disk / "data", disk / "data" / "recordings" / "old.tlog"
+    ballast = fill(disk)
+    assert shutil.disk_usage(disk).free == 0
     with serving(data_dir) as again:
         # Serving has signed in by the link that was printed.
-        assert again.plan["document"]["name"] == "Before"
+        assert again.plan["document"]["name"] == before
         origin = str(again.http.base_url).rstrip("/")
         cookies = "; ".join(f"{name}={value}" for name, value in again.http.cookies.items())
         with connect(
@@ -228,9 +233,8 @@ def test_a_killed_server_comes_back_on_a_full_disk(small_disk: Path, reserve: bo
             assert not old.exists()
             ballast.unlink()
             notice(page, "disk_room")
-        assert ok(again.rename("After")).json()["saved_utc"]
-    with serving(data_dir) as later:
-        assert later.plan["document"]["name"] == "After"
+        assert ok(again.rename(after)).json()["saved_utc"]
+        again.process.kill()
 
 
 def notice(page: Connection, code: str) -> dict:
@@ -243,12 +247,12 @@ def notice(page: Connection, code: str) -> dict:
 @pytest.mark.parametrize("small_disk", ["64m"], indirect=True)
 def test_a_full_disk_without_a_plan_is_no_reason_not_to_start(small_disk: Path) -> None:
     data_dir = small_disk / "data"
-    with serving(data_dir):
-        pass
-    for manifest in (data_dir / "plans").glob("*/manifest.json"):
-        manifest.write_text("damaged")
-    (data_dir / "reserve").unlink(missing_ok=True)
+    with contextlib.closing(Library(data_dir)) as library:
+        plan_id, _ = library.create_plan(History())
+        library.remember_plan(plan_id)
+    (data_dir / "plans" / plan_id / "manifest.json").write_text("damaged")
     ballast = fill(small_disk)
+    assert shutil.disk_usage(small_disk).free == 0
     with serving(data_dir) as station:
         assert station.plan["document"]["pois"] == []
         ballast.unlink()
