@@ -25,13 +25,11 @@ from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
 from tests.server.test_process import command, free_port
 
-pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
+pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 
 LONG_S = 3 * PATIENCE_S
 HOME = "37.729020492,14.992623645,1711.986"
 """Of the demo's plan."""
-SPEEDUP = 2
-"""It is still on its mission when the second server has started."""
 
 
 _started: list[Server] = []
@@ -135,60 +133,54 @@ def _fly(server: Server) -> str:
     return digest
 
 
-@pytest.mark.parametrize("fault", [signal.SIGSTOP, signal.SIGKILL])
-def test_a_server_that_hangs_or_dies_in_flight_is_started_again(data_dir: Path, fault: signal.Signals) -> None:
-    with simulated_vehicle(HOME, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
-        server = Server(data_dir, address, port=free_port(), guarded=True)
-        digest = _fly(server)
-        pids = {facts.name: facts.pid for facts in running_nodes(data_dir / "run")}
-        before = server.pid()
-        os.kill(before, fault)
-        notice = server.answers_again()
-        assert notice["code"] == "server_restarted"
-        assert re.match(r"The server did not answer for \d+ s and was started again at [\d:]{8} UTC\.", notice["what"])
-        assert server.pid() != before
-        assert server.until(lambda m: m["type"] == "vehicle" and bool(m["state"]))["state"]["armed"]
-        onboard = server.until(lambda m: m["type"] == "fly" and m["fly"]["onboard"]["state"] == "verified")["fly"]
-        assert onboard["onboard"]["digest"] == digest
-        assert {facts.name: facts.pid for facts in running_nodes(data_dir / "run")} == pids
-        assert server.until(lambda m: m["type"] == "lease")["lease"]["mine"]
-        server.until(lambda m: m["type"] == "link" and m["link"]["state"] == "live" and m["link"]["heartbeat_hz"] > 0.5)
-        server.post("/api/flight/land")
-        server.until(lambda m: m["type"] == "vehicle" and bool(m["state"] and not m["state"]["armed"]))
-        assert "login?token" not in server.end(signal.SIGINT)
-        assert running_nodes(data_dir / "run") == []
-
-
 def test_a_flight_outlives_its_servers(data_dir: Path) -> None:
-    port = free_port()
-    with simulated_vehicle(HOME, "--speedup", SPEEDUP, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
-        first = Server(data_dir, address, port=port)
-        cookies = first.http.cookies
-        digest = _fly(first)
-        pids = {facts.name: facts.pid for facts in running_nodes(data_dir / "run")}
+    """One flight, as each takes its time: a server that hangs, one that dies, one that is stopped, and the next."""
+    with simulated_vehicle(HOME, "--boot-s", 1, "--parameter", "RTL_ALT=6000", *QUICKLY_DOWN) as address:
+        guarded = Server(data_dir, address, port=free_port(), guarded=True)
+        cookies = guarded.http.cookies
+        digest = _fly(guarded)
+        pids = _nodes(data_dir)
         assert set(pids) == {"link", "recorder"}
-        first.end(signal.SIGKILL)
-
-        second = Server(data_dir, address, cookies, port=port)
-        again = second.until(lambda m: _flown(m, 10.0))
-        assert again["state"]["armed"]
-        onboard = second.until(lambda m: m["type"] == "fly" and m["fly"]["onboard"]["state"] == "verified")["fly"][
-            "onboard"
-        ]
-        assert (onboard["digest"], onboard["plan_name"], onboard["is_open_plan"]) == (digest, "Demo flight", True)
-        path = second.until(lambda m: m["type"] == "track" and len(m["track"]["t_s"]) > 5)["track"]
-        assert min(s for s in path["s_m"] if s is not None) < 5.0
-        assert {facts.name: facts.pid for facts in running_nodes(data_dir / "run")} == pids
-        assert second.until(lambda m: m["type"] == "lease")["lease"]["mine"]
-        second.post("/api/flight/pause")
-        second.until(lambda m: m["type"] == "flight" and m["flight"]["phase"] == "paused")
-        words = second.end(signal.SIGINT)
+        for fault in (signal.SIGSTOP, signal.SIGKILL):
+            _is_started_again(guarded, fault)
+            _finds_the_flight(guarded, digest)
+            assert _nodes(data_dir) == pids
+        guarded.post("/api/flight/pause")
+        guarded.until(lambda m: m["type"] == "flight" and m["flight"]["phase"] == "paused")
+        words = guarded.end(signal.SIGINT)
         assert "The vehicle is armed" in words
-        assert {facts.name: facts.pid for facts in running_nodes(data_dir / "run")} == pids
+        assert "login?token" not in words
+        assert _nodes(data_dir) == pids
 
-        third = Server(data_dir, address, cookies, port=port)
-        third.until(lambda m: m["type"] == "vehicle" and bool(m["state"] and m["state"]["armed"]))
-        third.post("/api/flight/land")
-        third.until(lambda m: m["type"] == "vehicle" and bool(m["state"] and not m["state"]["armed"]))
-        assert "armed" not in third.end(signal.SIGINT)
+        last = Server(data_dir, address, cookies, port=guarded.port)
+        _finds_the_flight(last, digest)
+        last.post("/api/flight/land")
+        last.until(lambda m: m["type"] == "vehicle" and bool(m["state"] and not m["state"]["armed"]))
+        assert "armed" not in last.end(signal.SIGINT)
         assert running_nodes(data_dir / "run") == []
+
+
+def _nodes(data_dir: Path) -> dict[str, int]:
+    return {facts.name: facts.pid for facts in running_nodes(data_dir / "run")}
+
+
+def _is_started_again(server: Server, fault: signal.Signals) -> None:
+    before = server.pid()
+    os.kill(before, fault)
+    notice = server.answers_again()
+    assert notice["code"] == "server_restarted"
+    assert re.match(r"The server did not answer for \d+ s and was started again at [\d:]{8} UTC\.", notice["what"])
+    assert server.pid() != before
+    server.until(lambda m: m["type"] == "link" and m["link"]["state"] == "live" and m["link"]["heartbeat_hz"] > 0.5)
+
+
+def _finds_the_flight(server: Server, digest: str) -> None:
+    """All of it: also what was flown before this server came."""
+    assert server.until(lambda m: _flown(m, 10.0))["state"]["armed"]
+    onboard = server.until(lambda m: m["type"] == "fly" and m["fly"]["onboard"]["state"] == "verified")["fly"][
+        "onboard"
+    ]
+    assert (onboard["digest"], onboard["plan_name"], onboard["is_open_plan"]) == (digest, "Demo flight", True)
+    path = server.until(lambda m: m["type"] == "track" and len(m["track"]["t_s"]) > 5)["track"]
+    assert min(s for s in path["s_m"] if s is not None) < 5.0
+    assert server.until(lambda m: m["type"] == "lease")["lease"]["mine"]
