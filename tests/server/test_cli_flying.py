@@ -36,6 +36,8 @@ from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 pytestmark = pytest.mark.xdist_group("cli-flying")
 
 SHORT = mission([(50.0, 150.0, 12.0), (90.0, 150.0, 12.0), (90.0, 175.0, 14.0)])
+BRIEF = mission([(50.0, 150.0, 12.0), (65.0, 150.0, 12.0), (65.0, 160.0, 13.0)])
+"""In GUIDED the station leads the vehicle by its own clock, however fast the vehicle's is."""
 TO_AND_FRO = mission([(50.0, 150.0, 12.0), *8 * [(110.0, 150.0, 12.0), (60.0, 150.0, 12.0)]])
 """Still on its way when a busy machine has heard Ctrl+C twice."""
 VEHICLE = ("--boot-s", 1, "--parameter", "RTL_ALT=2000", *QUICKLY_DOWN)
@@ -131,12 +133,23 @@ def test_the_record_is_reviewed_alike(flight: tuple[Run, Path], ground: Ground) 
     assert "certified 12.00 m" in people.out
 
 
-def test_waypoints_one_at_a_time(ground: Ground) -> None:
+def test_waypoints_one_at_a_time_over_another_model_than_the_planned_one_which_is_said_first(
+    ground: Ground, flight: tuple[Run, Path], tmp_path: Path
+) -> None:
+    surface = {"surface_sha256": "ab" * 32, "surface_name": "spring.tif"}
+    elsewhere = write_mission(tmp_path / "elsewhere.waypoints", replace(BRIEF, **surface))
     run = hedgehop(
-        "fly", ground.mission, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk", "--mode", "guided"
+        "fly", elsewhere, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk", "--mode", "guided"
     )
     assert run.code == 0, run.err
-    assert run.out.startswith("COMPLETED\n")
+    first, second = run.out.splitlines()[:2]
+    assert 'than the mission was planned on, "spring.tif" (SHA-256 abababab)' in first
+    assert second == "COMPLETED"
+    notes = [line for line in run.err.splitlines() if line.startswith("Note: ")]
+    assert notes[0] == f"Note: {first}"
+    flown = write_mission(tmp_path / "flown.waypoints", replace(SHORT, **surface))
+    again = hedgehop("review", flight[1], "--dsm", ground.dsm, "--mission", flown, "--json")
+    assert again.json["other_surface"] == first
 
 
 def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp_path: Path) -> None:
@@ -156,23 +169,6 @@ def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp
     assert "planned for AUTO, judged as flown in GUIDED" in wider.err
     assert "the plan assumes 1.50 m" in wider.err
     assert wider.code == 1
-
-
-def test_a_flight_over_another_model_than_the_planned_one_says_so_first(
-    ground: Ground, flight: tuple[Run, Path], tmp_path: Path
-) -> None:
-    planned = replace(SHORT, surface_sha256="ab" * 32, surface_name="spring.tif")
-    elsewhere = write_mission(tmp_path / "elsewhere.waypoints", planned)
-    arguments = ("fly", elsewhere, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk")
-    run = hedgehop(*arguments)
-    assert run.code == 0, run.err
-    first, second = run.out.splitlines()[:2]
-    assert 'than the mission was planned on, "spring.tif" (SHA-256 abababab)' in first
-    assert second == "COMPLETED"
-    notes = [line for line in run.err.splitlines() if line.startswith("Note: ")]
-    assert notes[0] == f"Note: {first}"
-    again = hedgehop("review", flight[1], "--dsm", ground.dsm, "--mission", elsewhere, "--json")
-    assert again.json["other_surface"] == first
 
 
 def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -98,29 +98,49 @@ class Bench:
         return await self.until(lambda state: state.revision == revision and state.state in ("ready", "error"))
 
 
+Use = Callable[[Bench], Awaitable[None]]
+Run = Callable[..., None]
+
+
 @pytest.fixture(autouse=True)
 def _fakes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tasks, "compute_plan", fake_plan)
     monkeypatch.setattr(tasks, "compute_trade", fake_trade)
 
 
-def run(use: Callable[[Bench], Awaitable[None]], terrain_dir: Any = lambda _: SOMEWHERE, **delays: float) -> None:
-    async def whole() -> None:
-        lane = Lane("test")
-        bench = Bench(lane, terrain_dir, **{"trade_when_idle_s": 0.0, "supersede_after_s": 0.0, **delays})
-        loop = asyncio.create_task(bench.computing.run())
-        try:
-            await use(bench)
-            assert not loop.done()
-        finally:
-            loop.cancel()
-            await asyncio.gather(loop, return_exceptions=True)
-            await lane.close()
-
-    asyncio.run(whole())
+@pytest.fixture(scope="module")
+def runner() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as runner:
+        yield runner
 
 
-def test_an_answer_arrives_and_the_trade_after_it() -> None:
+@pytest.fixture(scope="module")
+def lane(runner: asyncio.Runner) -> Iterator[Lane]:
+    """One for all: a worker takes seconds to start."""
+    lane = Lane("test")
+    yield lane
+    runner.run(lane.close())
+
+
+@pytest.fixture
+def run(runner: asyncio.Runner, lane: Lane) -> Run:
+    def run(use: Use, terrain_dir: Any = lambda _: SOMEWHERE, **delays: float) -> None:
+        async def whole() -> None:
+            bench = Bench(lane, terrain_dir, **{"trade_when_idle_s": 0.0, "supersede_after_s": 0.0, **delays})
+            loop = asyncio.create_task(bench.computing.run())
+            try:
+                await use(bench)
+                assert not loop.done()
+            finally:
+                loop.cancel()
+                await asyncio.gather(loop, return_exceptions=True)
+
+        runner.run(whole())
+
+    return run
+
+
+def test_an_answer_arrives_and_the_trade_after_it(run: Run) -> None:
     async def use(bench: Bench) -> None:
         bench.computing.request(1, document("abc"))
         assert bench.computing.state.state == "running"
@@ -134,7 +154,7 @@ def test_an_answer_arrives_and_the_trade_after_it() -> None:
     run(use)
 
 
-def test_errors_are_answers_and_the_next_document_is_computed() -> None:
+def test_errors_are_answers_and_the_next_document_is_computed(run: Run) -> None:
     async def use(bench: Bench) -> None:
         for revision, (name, code) in enumerate([("refused", "parameter"), ("defect", "internal")], start=1):
             bench.computing.request(revision, document(name))
@@ -148,7 +168,7 @@ def test_errors_are_answers_and_the_next_document_is_computed() -> None:
     run(use)
 
 
-def test_a_failing_trade_leaves_the_plan() -> None:
+def test_a_failing_trade_leaves_the_plan(run: Run) -> None:
     async def use(bench: Bench) -> None:
         bench.computing.request(1, document("no trade"))
         await bench.answer(1)
@@ -159,7 +179,7 @@ def test_a_failing_trade_leaves_the_plan() -> None:
 
 
 @pytest.mark.parametrize("name", ["endless", "endless trade"])
-def test_what_runs_long_is_superseded(name: str) -> None:
+def test_what_runs_long_is_superseded(run: Run, name: str) -> None:
     async def use(bench: Bench) -> None:
         bench.computing.request(1, document(name))
         async with asyncio.timeout(60):
@@ -172,7 +192,7 @@ def test_what_runs_long_is_superseded(name: str) -> None:
     run(use)
 
 
-def test_of_many_requests_the_last_is_answered() -> None:
+def test_of_many_requests_the_last_is_answered(run: Run) -> None:
     async def use(bench: Bench) -> None:
         seen: list[int] = []
         for revision in range(1, 8):
@@ -184,7 +204,7 @@ def test_of_many_requests_the_last_is_answered() -> None:
     run(use, supersede_after_s=60.0)
 
 
-def test_the_last_answer_stays_in_sight_until_another_plan_is_opened() -> None:
+def test_the_last_answer_stays_in_sight_until_another_plan_is_opened(run: Run) -> None:
     async def use(bench: Bench) -> None:
         bench.computing.request(1, document("abc"))
         await bench.answer(1)
@@ -200,7 +220,7 @@ def test_the_last_answer_stays_in_sight_until_another_plan_is_opened() -> None:
     run(use)
 
 
-def test_a_model_that_is_gone_is_said() -> None:
+def test_a_model_that_is_gone_is_said(run: Run) -> None:
     def nowhere(terrain_id: str) -> Path:
         raise NotFoundError(f"There is no surface model {terrain_id!r}.")
 

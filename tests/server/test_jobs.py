@@ -32,7 +32,7 @@ def _sleep(seconds, *, report):
     time.sleep(seconds)
 
 
-async def _with_lane(use):
+async def _with_own_lane(use):
     lane = Lane("test")
     try:
         return await use(lane)
@@ -40,36 +40,45 @@ async def _with_lane(use):
         await lane.close()
 
 
-def test_answers_and_reports_progress():
+@pytest.fixture(scope="module")
+def with_lane():
+    """Runs with one lane for all: a worker takes seconds to start."""
+    with asyncio.Runner() as runner:
+        lane = Lane("test")
+        yield lambda use: runner.run(use(lane))
+        runner.run(lane.close())
+
+
+def test_answers_and_reports_progress(with_lane):
     seen = []
 
     async def use(lane):
         return await lane.call(_double, 21, progress=lambda step, share: seen.append((step, share)))
 
-    assert asyncio.run(_with_lane(use)) == 42
+    assert with_lane(use) == 42
     assert seen == [("half way", 0.5)]
 
 
-def test_planning_errors_cross_with_every_field():
+def test_planning_errors_cross_with_every_field(with_lane):
     async def use(lane):
         with pytest.raises(PoiError) as caught:
             await lane.call(_refuse)
         return caught.value
 
-    error = asyncio.run(_with_lane(use))
+    error = with_lane(use)
     assert (error.what, error.where, error.advice) == ("POI 3 lies outside.", "row 4", "Move it.")
 
 
-def test_a_dead_worker_is_said_and_replaced():
+def test_a_dead_worker_is_said_and_replaced(with_lane):
     async def use(lane):
         with pytest.raises(WorkerDiedError):
             await lane.call(_die)
         return await lane.call(_double, 1)
 
-    assert asyncio.run(_with_lane(use)) == 2
+    assert with_lane(use) == 2
 
 
-def test_cancel_ends_the_call_at_once_and_the_lane_goes_on():
+def test_cancel_ends_the_call_at_once_and_the_lane_goes_on(with_lane):
     async def use(lane):
         started = asyncio.Event()
         task = asyncio.create_task(lane.call(_sleep, 60, progress=lambda *_: started.set()))
@@ -79,7 +88,7 @@ def test_cancel_ends_the_call_at_once_and_the_lane_goes_on():
             await asyncio.wait_for(task, 10)
         return await lane.call(_double, 3)
 
-    assert asyncio.run(_with_lane(use)) == 6
+    assert with_lane(use) == 6
 
 
 def _raise_os_error(*, report):
@@ -107,7 +116,7 @@ def _modules(*, report):
     return sorted(sys.modules)
 
 
-def test_an_error_of_the_job_is_not_the_death_of_the_worker():
+def test_an_error_of_the_job_is_not_the_death_of_the_worker(with_lane):
     async def use(lane):
         first = await lane.call(_pid)
         with pytest.raises(FileNotFoundError) as caught:
@@ -119,7 +128,7 @@ def test_an_error_of_the_job_is_not_the_death_of_the_worker():
             await lane.call(_exhaust)
         return first, await lane.call(_pid)
 
-    first, last = asyncio.run(_with_lane(use))
+    first, last = with_lane(use)
     assert first == last
 
 
@@ -133,10 +142,10 @@ def test_a_cancel_before_the_worker_is_up_counts():
             await asyncio.wait_for(task, 30)
         return await lane.call(_double, 3)
 
-    assert asyncio.run(_with_lane(use)) == 6
+    assert asyncio.run(_with_own_lane(use)) == 6
 
 
-def test_a_failing_progress_does_not_shift_the_answers():
+def test_a_failing_progress_does_not_shift_the_answers(with_lane):
     def refuse(step, share):
         raise KeyError(step)
 
@@ -145,10 +154,10 @@ def test_a_failing_progress_does_not_shift_the_answers():
             await lane.call(_double, 1, progress=refuse)
         return await lane.call(_double, 5)
 
-    assert asyncio.run(_with_lane(use)) == 10
+    assert with_lane(use) == 10
 
 
-def test_an_abandoned_call_does_not_shift_the_answers():
+def test_an_abandoned_call_does_not_shift_the_answers(with_lane):
     async def use(lane):
         started = asyncio.Event()
         task = asyncio.create_task(lane.call(_sleep, 60, progress=lambda *_: started.set()))
@@ -157,7 +166,7 @@ def test_an_abandoned_call_does_not_shift_the_answers():
         await asyncio.gather(task, return_exceptions=True)
         return await lane.call(_double, 4)
 
-    assert asyncio.run(_with_lane(use)) == 8
+    assert with_lane(use) == 8
 
 
 def test_closing_ends_the_running_call_and_refuses_the_waiting_one():
@@ -173,11 +182,11 @@ def test_closing_ends_the_running_call_and_refuses_the_waiting_one():
     assert [type(error) for error in asyncio.run(whole())] == [JobCancelledError, BusyError, BusyError]
 
 
-def test_a_worker_does_not_load_what_only_the_server_needs():
+def test_a_worker_does_not_load_what_only_the_server_needs(with_lane):
     async def use(lane):
         return await lane.call(_modules)
 
-    assert not {"viser", "uvicorn", "typer"} & set(asyncio.run(_with_lane(use)))
+    assert not {"viser", "uvicorn", "typer"} & set(with_lane(use))
 
 
 def _secrets_and_connections(port, *, report):
@@ -199,7 +208,7 @@ def test_a_worker_has_no_secrets_and_no_connections(monkeypatch):
     monkeypatch.setenv("HEDGEHOP_PASSWORD", "hunter2hunter2")
     with socket.create_server(("127.0.0.1", 0)) as listening:
         port = listening.getsockname()[1]
-        password, tried, seen = asyncio.run(_with_lane(lambda lane: lane.call(_secrets_and_connections, port)))
+        password, tried, seen = asyncio.run(_with_own_lane(lambda lane: lane.call(_secrets_and_connections, port)))
     assert password is None
     assert not seen
     assert tried == [errno.EPERM, errno.EPERM] or not what_holds().calls
