@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
 from server.settings import default_console_dir
 from tests.e2e.stations import SimulatedVehicle, Station
@@ -16,14 +17,17 @@ from tests.e2e.steps import PATIENCE_MS
 
 expect.set_options(timeout=PATIENCE_MS)
 
+HERE = Path(__file__).parent
+
 # viser's page tries to evaluate a string, which the content security policy forbids, and goes on without.
 KNOWN_ERROR = "Evaluating a string as JavaScript violates the following Content Security Policy directive"
 
 GONE = "WebSocket connection to"
 """A page says so while its server is away, which one test brings about."""
 
-REFUSED = re.compile(r"the server responded with a status of (400|409|422|502|504)\b")
-"""What the server refuses, the page explains; the browser notes it as well."""
+REFUSED = re.compile(r"responded with a status of ((400|409|422|502|504)\b|404 .* /api/obstacles/manoeuvre/\S+/fly$)")
+"""What the server refuses, the page explains; the browser notes it as well. A way past something may have gone by the
+time its button has been held for long enough."""
 
 FLAGS = [
     "--no-sandbox",
@@ -46,12 +50,25 @@ if (location.pathname.startsWith("/view/")) {
   address.searchParams.set("fixedDpr", "0.5");
   history.replaceState(null, "", address);
   const draw = window.requestAnimationFrame.bind(window);
-  window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), PAUSE_MS);
+  window.requestAnimationFrame = (callback) => setTimeout(() => draw(callback), 800);
   window.cancelAnimationFrame = clearTimeout;
 }
 """
 """Each picture of the 3D view takes a processor that renders it in software up to half a second, a quarter of that at
 half its size: drawn without pauses they would leave little to everything that is being tested."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Sensors keep a processor busy: the station that has some is started last."""
+    places = [place for place, item in enumerate(items) if item.path.is_relative_to(HERE)]
+    last = sorted((items[place] for place in places), key=_has_sensors)
+    for place, item in zip(places, last, strict=True):
+        items[place] = item
+
+
+def _has_sensors(item: pytest.Item) -> bool:
+    return isinstance(item, pytest.Function) and "sighted" in item.fixturenames
 
 
 @pytest.fixture(scope="session")
@@ -79,7 +96,7 @@ def own_station(tmp_path: Path, console: None) -> Iterator[Station]:
         yield station
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def sighted(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[Station]:
     """A station whose demo stands in a world with things that the surface model does not know."""
     with _running(tmp_path_factory.mktemp("data"), "--demo-world") as station:
@@ -134,18 +151,8 @@ def page(browser: Browser) -> Iterator[Page]:
 @pytest.fixture
 def page_3d(browser: Browser) -> Iterator[Page]:
     """With the real 3D view."""
-    yield from _page_3d(browser, pause_ms=800)
-
-
-@pytest.fixture
-def page_3d_in_flight(browser: Browser) -> Iterator[Page]:
-    """With the real 3D view, beside which sensors and what works on their frames must keep up."""
-    yield from _page_3d(browser, pause_ms=5000)
-
-
-def _page_3d(browser: Browser, *, pause_ms: int) -> Iterator[Page]:
     with _watched(browser) as context:
-        context.add_init_script(SELDOM.replace("PAUSE_MS", str(pause_ms)))
+        context.add_init_script(SELDOM)
         yield _opened(context)
 
 
@@ -155,6 +162,11 @@ def _opened(context: BrowserContext) -> Page:
     return page
 
 
+def _said(message: ConsoleMessage) -> str:
+    """With the path of what it is about."""
+    return f"{message.text} {urlsplit(message.location['url']).path}"
+
+
 @contextmanager
 def _watched(browser: Browser) -> Iterator[BrowserContext]:
     """Fails the test when one of its pages asks any other origin, or when its console logs an error."""
@@ -162,7 +174,7 @@ def _watched(browser: Browser) -> Iterator[BrowserContext]:
     asked: set[str] = set()
     errors: list[str] = []
     context.on("request", lambda request: asked.add("/".join(request.url.split("/")[:3])))
-    context.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    context.on("console", lambda message: errors.append(_said(message)) if message.type == "error" else None)
     context.on("weberror", lambda error: errors.append(str(error.error)))
     try:
         yield context

@@ -105,8 +105,8 @@ class Station:
             assert time.monotonic() < end_s, f"recordings that cannot be deleted: {left}"
 
     def open_demo(self, points: Callable[[dict[str, Point]], list[Point]], profile: dict[str, float]) -> None:
-        """The demo's plan with other points, made of its own by name, and another profile."""
-        self.sign_in()
+        """The demo's plan alone, with other points, made of its own by name, and another profile."""
+        self.clear()
         ok(self.http.post("/api/terrains/demo"))
         document = self.state["plan"]["document"]
         pois = points({point["name"]: point for point in document["pois"]})

@@ -162,3 +162,14 @@ def play(page: Page, testid: str = "play") -> None:
         return False
 
     wait_until(page, plays)
+
+
+def play_alert(page: Page) -> None:
+    """From the event before the first alert on, with the instruments beside it."""
+    page.get_by_test_id("review-part-events").click()
+    events = page.get_by_test_id("review-event")
+    expect(events.and_(page.locator("[data-kind=alert]")).first).to_be_visible()
+    kinds = events.evaluate_all("events => events.map((event) => event.dataset.kind)")
+    events.nth(kinds.index("alert") - 1).click()
+    page.get_by_test_id("review-part-instruments").click()
+    play(page)

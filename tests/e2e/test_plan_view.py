@@ -53,24 +53,6 @@ def test_plan_on_a_real_model_from_sign_in_to_export(
     assert b"<script" not in archive.read("report.html")
 
 
-def test_a_plan_survives_a_power_cut(own_station: Station, page: Page) -> None:
-    station = own_station
-    _sign_in(page, station)
-    page.get_by_test_id("empty-demo").click()
-    expect(page.get_by_test_id("poi-row")).to_have_count(6)
-    name = page.get_by_test_id("poi-name").first
-    name.fill("Cairn <b>1</b>")
-    name.press("Enter")
-    expect(page.get_by_test_id("undo")).to_be_enabled()
-    expect(page.get_by_test_id("saved-state")).to_contain_text("Saved")
-    station.kill()
-    station.start()
-    page.goto(station.link)
-    expect(page.get_by_test_id("poi-name").first).to_have_value("Cairn <b>1</b>")
-    page.get_by_test_id("undo").click()
-    expect(page.get_by_test_id("poi-name").first).not_to_have_value("Cairn <b>1</b>")
-
-
 def test_a_file_that_is_no_surface_model_is_explained_where_it_was_dropped(
     station: Station, page: Page, shared_data: Path, tmp_path: Path
 ) -> None:
@@ -133,9 +115,9 @@ def _export_all(page: Page) -> bytes:
     return Path(download.value.path()).read_bytes()
 
 
-def test_home_is_moved_by_one_press_to_where_it_would_do(own_station: Station, page: Page, shared_data: Path) -> None:
+def test_home_is_moved_by_one_press_to_where_it_would_do(station: Station, page: Page, shared_data: Path) -> None:
     """The first point lies on the edge of bush, and so does home when it is put there."""
-    _sign_in(page, own_station)
+    visit(page, station)
     _load_model(page, shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif")
     page.get_by_test_id("empty-add").or_(page.get_by_test_id("tool-add_poi")).first.wait_for()
     with page.expect_file_chooser() as chooser:

@@ -8,17 +8,19 @@ from playwright.sync_api import Page, expect
 from tests.e2e.stations import Station
 from tests.e2e.steps import start_simulator, visit, wait_until
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 def test_a_plan_that_is_faster_than_seen_says_so_in_plan_and_is_slowed_by_one_press(
-    sighted: Station, page: Page
+    station: Station, sighted: Station, page: Page
 ) -> None:
-    sighted.open_demo(lambda points: list(points.values()), {"max_speed_m_s": 9.0, "mean_speed_m_s": 8.5})
-    visit(page, sighted)
     hint = page.get_by_test_id("sees-enough")
-    expect(page.get_by_test_id("length")).to_be_visible()
-    expect(hint).to_have_count(0)  # nothing is known of any sensor
+    for each, is_known in ((station, False), (sighted, True)):
+        each.open_demo(lambda points: list(points.values()), {"max_speed_m_s": 9.0, "mean_speed_m_s": 8.5})
+        visit(page, each)
+        expect(page.get_by_test_id("length")).to_be_visible()
+        if not is_known:
+            expect(hint).to_have_count(0)  # nothing is known of any sensor
 
     start_simulator(page)
     page.get_by_test_id("tab-plan").click()

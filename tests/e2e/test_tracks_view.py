@@ -14,7 +14,7 @@ from tests.e2e.steps import (
     disarmed,
     hold,
     open_recording,
-    play,
+    play_alert,
     start,
     start_simulator,
     upload,
@@ -22,7 +22,7 @@ from tests.e2e.steps import (
     wait_until,
 )
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 @pytest.fixture(scope="module")
@@ -109,9 +109,7 @@ def test_an_approach_is_alerted_evaded_and_reviewed(towards_another: Station, pa
     disarmed(page)
 
     open_recording(page)
-    page.get_by_test_id("review-part-instruments").click()
-    page.get_by_test_id("speed").select_option("2")
-    play(page)
+    play_alert(page)
     page.get_by_test_id("display-velocity").click()
     expect(page.get_by_test_id("instruments-replay").get_by_test_id("velocity")).to_have_attribute(
         "data-state", "running"

@@ -20,7 +20,7 @@ from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import connect, enter, open_demo, upload
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 class Stream:
@@ -192,3 +192,26 @@ def test_a_server_that_is_silent_is_said_and_nobody_waits_for_its_answers(
     expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
     expect(page.get_by_test_id("safety-why")).to_have_count(0)
     expect(arm).to_be_enabled()
+
+
+def test_without_its_server_a_page_says_so_and_the_plan_survives_the_power_cut(
+    own_station: Station, page: Page, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, own_station)
+    name = page.get_by_test_id("poi-name").first
+    name.fill("Cairn <b>1</b>")
+    name.press("Enter")
+    expect(page.get_by_test_id("undo")).to_be_enabled()
+    expect(page.get_by_test_id("saved-state")).to_contain_text("Saved")
+    connect(page, vehicle)
+    own_station.kill()
+    expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
+    expect(page.get_by_test_id("hold-position")).to_be_disabled()
+    expect(page.get_by_test_id("return-home")).to_be_disabled()
+
+    own_station.start()
+    page.goto(own_station.link)
+    page.get_by_test_id("tab-plan").click()
+    expect(name).to_have_value("Cairn <b>1</b>")
+    page.get_by_test_id("undo").click()
+    expect(name).not_to_have_value("Cairn <b>1</b>")
