@@ -45,7 +45,7 @@ demo: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## start Hedgehop 
 
 test: $(STAMPS)/test web/dist/index.html $(STAMPS)/kernels ## run the tests of the console and of the Python packages
 	@cd web && $(WITH_NODE) npm test
-	@$(WITH_NODE) $(VENV_PYTHON) -m pytest -n $(WORKERS) --dist loadgroup $(PYTEST_ARGS)
+	@$(WITH_NODE) $(VENV_PYTHON) -m pytest -n $(WORKERS) --dist loadgroup --no-loadscope-reorder $(PYTEST_ARGS)
 
 check: $(STAMPS)/test web/node_modules/.stamp ## lint, formatting, types and the floors' import rules
 	@.venv/bin/ruff check .

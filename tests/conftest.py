@@ -20,6 +20,10 @@ settings.load_profile("patient")
 
 LONGEST_ID = 80
 
+LONG_GROUPS = ("real-time", "browser", "process")
+"""In their order. The first has all that must keep up with the clock, so that no two of its tests do beside each other:
+flights with sensors, and what a page says of a vehicle that is heard just now."""
+
 ROOT = Path(__file__).resolve().parent.parent
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
@@ -31,12 +35,27 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that share what their module makes once stay on one worker, which then makes it once."""
+    """Tests that share what their module makes once stay on one worker, which then makes it once; what takes long is
+    begun first.
+    """
     for item in items:
         if isinstance(item, pytest.Function) and item.get_closest_marker("xdist_group") is None:
             fixtures = item._fixtureinfo.name2fixturedefs.values()
             if any(fixture.scope == "module" for named in fixtures for fixture in named):
                 item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        slow = {_group(item) for item in items if item.get_closest_marker("slow") is not None}
+        items.sort(key=lambda item: (_rank(_group(item)), _group(item) not in slow))
+
+
+def _group(item: pytest.Item) -> str:
+    """The tests that one worker runs one after the other."""
+    marker = item.get_closest_marker("xdist_group")
+    return item.nodeid if marker is None else marker.args[0]
+
+
+def _rank(group: str) -> int:
+    return LONG_GROUPS.index(group) if group in LONG_GROUPS else len(LONG_GROUPS)
 
 
 @pytest.hookimpl(tryfirst=True)

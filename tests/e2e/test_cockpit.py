@@ -15,7 +15,7 @@ from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import connect, enter, open_demo, visit
 from tests.server.obstacle_messages import alert, approach, obstacle
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 QUAD = Candidate("q", "udpin:127.0.0.1:14550", "127.0.0.1:14551", 1, 1, "ardupilot", 2)
 PRESS_AT_ONCE = """

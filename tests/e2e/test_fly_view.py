@@ -21,7 +21,7 @@ from tests.e2e.steps import (
     wait_until,
 )
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 def test_plan_upload_fly_review(station: Station, page: Page, vehicle: SimulatedVehicle) -> None:

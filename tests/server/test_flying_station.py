@@ -15,7 +15,7 @@ from tests.server.running import PASSWORD
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
 
-pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
+pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 
 LONG_S = 3 * PATIENCE_S
 SPEEDUP = 12.0

@@ -19,7 +19,7 @@ from telemetry.bus.node_lock import running_node, running_nodes
 from tests.server.running import PASSWORD
 from tests.server.station import PATIENCE_S, Station, ok, station
 
-pytestmark = [pytest.mark.xdist_group("process"), pytest.mark.slow]
+pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 
 LONG_S = 4 * PATIENCE_S
 
