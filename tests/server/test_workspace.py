@@ -267,9 +267,8 @@ def test_a_large_file_of_points_does_not_hold_up_the_loop(demo: Station) -> None
 
     in_thread_s = demo.server.on_loop(longest_gap_s(lambda: read_pois("large.geojson", data)))
     # Whatever else the machine does may come in between once, not each time.
-    in_worker_s = min(demo.server.on_loop(longest_gap_s(send)) for _ in range(3))
-    print(f"longest gap: {in_thread_s:.3f} s while a thread read it, {in_worker_s:.3f} s while a worker did")
-    assert in_worker_s < in_thread_s / 2
+    in_worker_s = (demo.server.on_loop(longest_gap_s(send)) for _ in range(3))
+    assert any(gap_s < in_thread_s / 2 for gap_s in in_worker_s)
     assert not demo.uploads_left()
 
 
