@@ -139,7 +139,7 @@ web/dist/index.html: $(WEB_SOURCES) web/node_modules/.stamp
 	@touch $@
 
 $(STAMPS)/kernels: $(KERNELS) $(STAMPS)/project
-	$(call step,Step 7 of 7: compiling the kernels (once; about 20 s),find $(FLOORS) -name '*.nb[ic]' -delete; \
+	$(call step,Step 7 of 7: compiling the kernels (once; about a minute),find $(FLOORS) -name '*.nb[ic]' -delete; \
 	  $(VENV_PYTHON) -m server.compile_kernels)
 	@touch $@
 

@@ -6,8 +6,12 @@ from typing import get_args
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
+from mapping.geometry.polyline import Polyline
+from mapping.perceiving.ground import ground_grid
+from mapping.voxels.map import VoxelMap
 from planning.evading.manoeuvres import Seen, around, over
-from planning.evading.seen import conflicts
+from planning.evading.seen import Columns, burn, conflicts
 from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
@@ -15,9 +19,12 @@ from planning.ground.demo_hillside import small_hill
 from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
+from planning.safe_surface.surface import block_max
 from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
 from planning.terrain.raycast import raycast
 from server.plan import file_tasks, tasks
+from telemetry.nodes import tracks
 from telemetry.perception.sensor_kinds import KINDS
 from telemetry.perception.warm_up import warm_up
 from telemetry.simulation.simulator.demo_world import demo_world
@@ -31,8 +38,10 @@ def main() -> None:
     file_tasks.warm_up(report=lambda step, share: None)
     for kind in KINDS.values():
         warm_up(kind)
+    tracks.warm_up()
     _see_and_avoid()
     dsm = small_hill()
+    _raise_and_fill(dsm)
     _follow_a_flight(dsm)
     west, south, east, north = dsm.bounds_m
     above_m = np.array([(west + east) / 2, (south + north) / 2, 1e4])
@@ -48,11 +57,36 @@ def _see_and_avoid() -> None:
     for kind in get_args(RadarKind):
         radar_sensor(kind, world, seed=0).frame(truth)
     StereoSensor(world, seed=0).frame(truth)
+    world.touching(here, 1.0)
+    world.top_under_m(here)
     wall_m = np.array([(x, 20.0, z) for x in np.arange(-3.0, 4.0) for z in np.arange(0.0, 8.0)])
     line_m = np.array([here, (0.0, 60.0, 5.0)])
+    ground = ground_grid(np.zeros((40, 40), np.float32), [[-1.0, 0.0, 20.0], [0.0, 1.0, 20.0]])
     for way in (over, around):
         way(line_m[0], line_m, [Seen(wall_m, 1.0)])
+        way(line_m[0], line_m, [Seen(wall_m, 1.0)], ground)
     conflicts(line_m, wall_m, resolution_m=1.0, radius_m=0.5)
+    Polyline(line_m).nearest(line_m[0])
+    _change_a_map(wall_m)
+
+
+def _change_a_map(points_m: F64) -> None:
+    voxels = VoxelMap(resolution_m=1.0)
+    voxels.insert_hits(points_m)
+    before, keys = voxels.revision, voxels.occupied_keys()
+    voxels.mark_explained(keys, True)
+    voxels.assign(keys, False)
+    voxels.changed_since(before, ever_hit_only=True)
+
+
+def _raise_and_fill(dsm: Dsm) -> None:
+    """What surface models of files have and the hill has not: a hole; and what was seen, to be planned against."""
+    holed_m = dsm.elevation_m.copy()
+    holed_m[60, 60] = np.nan
+    filled, _ = fill_holes(dsm.with_cells(holed_m))
+    west, south, _, _ = dsm.bounds_m
+    burn(filled, Columns(np.array([(west + 60.0, south + 60.0)]), np.array([20.0]), 1.0))
+    block_max(filled, 2)
 
 
 def _follow_a_flight(dsm: Dsm) -> None:
