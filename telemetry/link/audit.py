@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from telemetry.errors import RecordingError, RecordingFullError, TelemetryError
 from telemetry.link.audit_chain import FIRST, chained, check_file, parsed
@@ -62,7 +62,8 @@ class AuditLog:
         except OSError as error:
             raise _trouble(path, error) from error
         self.head = _last_hash(end)
-        self._torn = bool(end) and not end.endswith(b"\n")
+        self._left = b"" if end.endswith(b"\n") else end.rpartition(b"\n")[2]
+        """What a power cut has left of the last line."""
 
     def check(self) -> str:
         """What is wrong with what was there at the start, in words; nothing: every line is as it was written."""
@@ -90,12 +91,14 @@ class AuditLog:
 
     def write(self, record: CommandRecord) -> str:
         """Returns the line's hash when it is on the disk. Raises RecordingFullError; then do not send the command."""
-        entry = {"t_utc_s": record.t_utc_s, "operator": record.operator, "words": record.words}
+        entry: dict[str, Any] = {"t_utc_s": record.t_utc_s, "operator": record.operator, "words": record.words}
         if record.result:
             entry["result"] = record.result
+        if self._left and parsed(self._left) is None:
+            entry["torn"] = len(self._left)
         line, hashed = chained(entry, self.head, self._key)
-        self._append((b"\n" if self._torn else b"") + line)
-        self.head, self._torn = hashed, False
+        self._append((b"\n" if self._left else b"") + line)
+        self.head, self._left = hashed, b""
         return hashed
 
     def _append(self, data: bytes) -> None:

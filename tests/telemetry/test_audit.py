@@ -86,7 +86,17 @@ def test_a_removed_line_is_told(tmp_path: Path, gone: int) -> None:
 
 def test_swapped_and_foreign_lines_are_told(tmp_path: Path) -> None:
     one, two, three = written(tmp_path / "audit.jsonl", "arm", "start", "land").splitlines(keepends=True)
-    for content, line in ((two + one + three, 1), (one + b"nonsense\n" + two, 2), (one + b"[1]\n", 2), (b"\xff\n", 1)):
+    cut = two[:-20] + b"\n"
+    for content, line in (
+        (two + one + three, 1),
+        (one + b"nonsense\n" + two, 2),
+        (one + b"[1]\n", 2),
+        (b"\xff\n", 1),
+        (one + cut, 2),
+        (one + cut + two + three, 2),
+        (one + cut + cut, 2),
+        (one + three[:-20], 2),
+    ):
         broken = check_chain(content)
         assert broken is not None
         assert broken.line == line
@@ -98,7 +108,9 @@ def test_any_flipped_bit_is_told(tmp_path_factory: pytest.TempPathFactory, data:
     content = bytearray(written(path, "arm", "start"))
     place = data.draw(st.integers(0, len(content) - 1))
     content[place] ^= 1 << data.draw(st.integers(0, 7))
-    assert check_chain(bytes(content)) is not None or same_entries(bytes(content), path.read_bytes())
+    path.with_suffix(".flipped").write_bytes(content)
+    checked = check_file(path.with_suffix(".flipped"), b"")
+    assert checked.broken or checked.torn or same_entries(bytes(content), path.read_bytes())
 
 
 def same_entries(a: bytes, b: bytes) -> bool:
@@ -106,15 +118,27 @@ def same_entries(a: bytes, b: bytes) -> bool:
     return [json.loads(line) for line in a.splitlines()] == [json.loads(line) for line in b.splitlines()]
 
 
-def test_a_line_that_was_cut_short_is_told_and_the_next_one_is_whole(tmp_path: Path) -> None:
+@pytest.mark.parametrize("zeros", [0, 100])
+@pytest.mark.parametrize("lost", [1, 20, 150, 10_000])
+def test_a_line_that_a_power_cut_has_cut_off_is_no_break_and_the_chain_goes_on(
+    tmp_path: Path, lost: int, zeros: int
+) -> None:
     path = tmp_path / "audit.jsonl"
-    content = written(path, "arm", "start")
-    path.write_bytes(content[:-20])
+    first = written(path, "arm")
+    last = written(path, "start")[len(first) :]
+    left = last[:-lost].rstrip(b"\n") + bytes(zeros)
+    path.write_bytes(first + left)
     with AuditLog(path) as log:
-        assert "BROKEN at line 2." in log.check()
+        assert log.check() == ""
         log.write(record("land"))
-    assert [entry["words"] for entry in entries_of(path)] == ["arm", "land"]
-    assert [entry["before"] for entry in entries_of(path)][1] == entries_of(path)[0]["hash"]
+    checked = check_file(path, b"")
+    assert checked.broken is None
+    is_lost = lost > 1 or zeros > 0
+    assert checked.torn == ((2,) if is_lost and left else ())
+    words = [entry["words"] for entry in entries_of(path)]
+    assert words == (["arm", "land"] if is_lost else ["arm", "start", "land"])
+    path.write_bytes(path.read_bytes().replace(left + b"\n", b""))
+    assert not is_lost or check_file(path, b"").broken is None  # what was lost is lost, and nothing else
 
 
 def test_line_breaks_in_a_name_stay_in_their_line(tmp_path: Path) -> None:
