@@ -13,13 +13,16 @@ from typing import Literal
 
 import numpy as np
 
-from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.arrays import F64, I64, Bools
 from planning.following.nearest import Deviations
 from planning.following.passing import REACHED_M, Flown, Passing, first_approach, passings
 from planning.following.reference import Reference
 
 BACK_ON_LINE_M = 1.0
 """After an interruption a position counts again once it is this near to the line, beside and above it."""
+
+GAP_S, _GAP_STEPS = 2.0, 5.0
+"""Positions that lie further apart, and so many times further than usual, have no line between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,14 @@ class Track:
     """Seconds of the vehicle's clock per second of ``t_s``: not 1 in a simulation that runs faster."""
     detours: tuple[tuple[float, float], ...] = ()
     """Spans of time in which avoidance flew what was left of the mission, mostly higher."""
+
+    @property
+    def gaps(self) -> I64:
+        """(M,) rows after which nothing is known for a while: the recorder, or the vehicle, was away."""
+        steps_s = np.diff(self.t_s)
+        if not len(steps_s):
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(steps_s > max(GAP_S, _GAP_STEPS * float(np.median(steps_s)))).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,15 @@ from planning.following.figures import Judged, judge
 from planning.formats.other_surface import other_surface
 from planning.model import Mission
 from planning.terrain.dsm import Dsm
-from server.flying.review_curves import curves, demanded_of, events, figures_doc, histogram_doc, predicted_note
+from server.flying.review_curves import (
+    curves,
+    demanded_of,
+    events,
+    figures_doc,
+    gap_events,
+    histogram_doc,
+    predicted_note,
+)
 from server.flying.review_flight import Flight, placed_flight
 from server.library.shelf import iso_utc
 from server.schemas.flight_docs import RecordingDoc
@@ -57,7 +65,7 @@ def review(
         figures=figures_doc(flight, figures) if flight and figures else None,
         series=curves(flight, judged) if flight else EMPTY,
         histogram=histogram_doc(figures) if figures else None,
-        events=events(log),
+        events=events(log, gap_events(flight.track) if flight else []),
         plan_name=log.plan.name if log.plan and mission is None else "",
         terrain_name=terrain_name,
         other_surface=other or "",

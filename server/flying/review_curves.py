@@ -14,6 +14,7 @@ from planning.following.below import Demanded, below_required
 from planning.following.figures import Judged, TrackFigures
 from planning.following.lag import planned_alt_dsm_m
 from planning.following.reference import Reference
+from planning.following.track import Track
 from planning.request import clearance_of_planned
 from server.flying.review_flight import Flight
 from server.schemas.review_docs import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
@@ -98,7 +99,8 @@ def histogram_doc(figures: TrackFigures) -> Histogram:
 
 
 def curves(flight: Flight, judged: Judged | None) -> ReviewSeries:
-    """Curves over the whole recording; errors against the plan only where the flight is judged."""
+    """Curves over the whole recording, parted where nothing is known; errors against the plan only where the flight
+    is judged."""
     track = flight.track
     n = len(track.t_s)
     nowhere = np.full(n, math.nan)
@@ -117,15 +119,24 @@ def curves(flight: Flight, judged: Judged | None) -> ReviewSeries:
     if flight.surface is not None:
         ground_m = flight.dsm.elevation_at(track.xyz_m[:, :2]) - flight.home_alt_dsm_m
     kept = thinned(n, (cross_m, height_m - reference_m, distance_m, height_m, planned_m))
+    gaps = track.gaps
+    kept = np.union1d(kept, np.concatenate([gaps, gaps + 1]))
+    after = np.searchsorted(kept, gaps) + 1
+
+    def parted(curve: F64) -> list[float | None]:
+        return _or_null(np.insert(curve[kept], after, math.nan))
+
     return ReviewSeries(
-        t_s=track.t_s[kept].tolist(),
-        alt_rel_home_m=_or_null(height_m[kept]),
-        reference_alt_rel_home_m=_or_null(reference_m[kept]),
-        planned_alt_rel_home_m=_or_null(planned_m[kept]),
-        ground_rel_home_m=_or_null(ground_m[kept]),
-        cross_track_m=_or_null(cross_m[kept]),
-        s_m=_or_null(s_m[kept]),
-        distance_to_dsm_m=_or_null(distance_m[kept]),
+        t_s=np.insert(track.t_s[kept], after, (track.t_s[gaps] + track.t_s[gaps + 1]) / 2).tolist()
+        if len(gaps)
+        else track.t_s[kept].tolist(),
+        alt_rel_home_m=parted(height_m),
+        reference_alt_rel_home_m=parted(reference_m),
+        planned_alt_rel_home_m=parted(planned_m),
+        ground_rel_home_m=parted(ground_m),
+        cross_track_m=parted(cross_m),
+        s_m=parted(s_m),
+        distance_to_dsm_m=parted(distance_m),
     )
 
 
@@ -152,7 +163,20 @@ def _or_null(values: F64) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def events(log: FlightLog) -> list[ReviewEvent]:
+def gap_events(track: Track) -> list[ReviewEvent]:
+    """Where curves and line are parted, and why."""
+    return [
+        ReviewEvent(
+            t_s=float(track.t_s[row]),
+            kind="gap",
+            text=f"No position was recorded for {track.t_s[row + 1] - track.t_s[row]:.1f} s: no line is drawn.",
+            severity=_WARNING,
+        )
+        for row in track.gaps
+    ]
+
+
+def events(log: FlightLog, gaps: list[ReviewEvent]) -> list[ReviewEvent]:
     """Everything that happened, in the order of time."""
     found = [_event(log, t, "mode", mode) for t, mode in log.modes]
     found += [_event(log, t, "arm", "Armed" if armed else "Disarmed") for t, armed in log.armed]
@@ -160,7 +184,7 @@ def events(log: FlightLog) -> list[ReviewEvent]:
     found += [_event(log, text.t_utc_s, "text", text.text, text.severity) for text in log.texts]
     found += [_event(log, c.t_utc_s, "command", f"{c.operator}: {c.words}") for c in log.commands]
     found += [_alert(log, alert) for alert in log.alerts]
-    return sorted(found, key=lambda event: event.t_s)
+    return sorted([*found, *gaps], key=lambda event: event.t_s)
 
 
 def _alert(log: FlightLog, alert: ObstacleAlert) -> ReviewEvent:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planning.following.reference import Reference
+from planning.following.track import Track
 from planning.plan import plan_mission
 from planning.terrain.dsm import Dsm
 from server.heard.flown_track import EVERY_S
@@ -123,7 +124,7 @@ def review(
         doc=doc,
         start_utc_s=log.start_utc_s,
         terrain_id=None if terrain is None else terrain.terrain_id,
-        scene=None if flight is None else _scene(flight.track.xyz_m, reference, ground, drawn),
+        scene=None if flight is None else _scene(flight.track, reference, ground, drawn),
         reference=None if dsm is None else reference,
     )
 
@@ -140,11 +141,12 @@ def _drawn(ground: Dsm) -> TerrainScene:
     return build_terrain_scene("", ground, shading="height", orthophoto=None)
 
 
-def _scene(
-    flown_m: np.ndarray, reference: Reference | None, ground: Dsm | None, drawn: TerrainScene | None
-) -> ReviewScene:
-    every = max(1, len(flown_m) // _DRAWN_POINTS)
-    return ReviewScene(planned_m=_planned_m(reference), flown_m=flown_m[::every], ground=ground, drawn=drawn)
+def _scene(track: Track, reference: Reference | None, ground: Dsm | None, drawn: TerrainScene | None) -> ReviewScene:
+    every = max(1, len(track.xyz_m) // _DRAWN_POINTS)
+    rows = np.union1d(np.arange(0, len(track.xyz_m), every), np.concatenate([track.gaps, track.gaps + 1]))
+    after = np.searchsorted(rows, track.gaps) + 1
+    flown_m = np.insert(track.xyz_m[rows], after, np.nan, axis=0)
+    return ReviewScene(planned_m=_planned_m(reference), flown_m=flown_m, ground=ground, drawn=drawn)
 
 
 def _planned_m(reference: Reference | None) -> np.ndarray:

@@ -69,7 +69,7 @@ class Histogram(Strict):
 class ReviewEvent(Strict):
     t_s: float
     kind: str
-    """mode, text, arm, item, command, alert"""
+    """mode, text, arm, item, command, alert, gap"""
     text: str
     severity: int = 6
 

@@ -14,9 +14,12 @@ from planning.model import Home, PlannedFor
 from server.cli.review_command import figure_lines, summary
 from server.flying.review import recording_of, review
 from server.flying.review_curves import STRETCHES, thinned
+from server.flying.review_flight import placed_flight
+from server.flying.review_task import _scene
+from server.scene.geometry.mark_shapes import line_node
 from server.schemas.flight_docs import RecordingDoc
 from telemetry.recording.frame_facts import SentTarget
-from telemetry.recording.recorded_flight import FlightLog
+from telemetry.recording.recorded_flight import FlightLog, track_of
 from telemetry.topics.messages import CommandRecord, PlanRecord
 from telemetry.topics.obstacles import ObstacleAlert
 from tests.server.flight_logs import PLAIN, ROUTE, START_UTC_S, degrees, log_of, mission, plain, positions
@@ -124,6 +127,31 @@ def test_a_delayed_flight_lies_behind_the_plan_by_its_own_clock() -> None:
     planned = [alt_m for alt_m in series.planned_alt_rel_home_m if alt_m is not None]
     assert planned == pytest.approx([20.0] * len(planned), abs=0.05)
     assert planned
+
+
+def test_where_nothing_was_recorded_no_line_is_drawn_and_that_is_said() -> None:
+    whole = log_of(positions(), flown=FLOWN)
+    from_s, until_s = 40.0, 44.1
+    states = tuple(each for each in whole.states if not from_s < each[0] - START_UTC_S < until_s)
+    log = replace(whole, states=states, track=track_of(states))
+    doc = reviewed(log, dsm=PLAIN)
+    assert not [event for event in reviewed(whole, dsm=PLAIN).events if event.kind == "gap"]
+    (gap,) = [event for event in doc.events if event.kind == "gap"]
+    assert gap.t_s == pytest.approx(from_s)
+    assert "No position was recorded for 4.2 s" in gap.text
+    inside = [k for k, t_s in enumerate(doc.series.t_s) if from_s < t_s < until_s]
+    assert len(inside) == 1
+    curves = doc.series.model_dump()
+    assert {name: curves[name][inside[0]] for name in curves if name != "t_s"} == dict.fromkeys(curves.keys() - {"t_s"})
+    assert all(step >= 0 for step in np.diff(doc.series.t_s))
+
+    placed = placed_flight(log, dsm=PLAIN)
+    assert placed is not None
+    flown_m = _scene(placed.track, None, None, None).flown_m
+    line = line_node("/flown", flown_m, (1, 2, 3), width_px=1.0)
+    assert len(line.props["points"]) == len(placed.track.t_s) - 2
+    assert np.isfinite(line.props["points"]).all()
+    assert len(line.props["colors"]) == len(line.props["points"])
 
 
 def test_a_long_flight_is_thinned_and_keeps_its_peaks() -> None:

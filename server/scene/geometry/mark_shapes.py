@@ -25,12 +25,14 @@ CONE = _shape(trimesh.creation.cone(radius=1.0, height=2.4, sections=24))
 
 
 def line_node(name: str, points: F64, color: Rgb | U8, *, width_px: float) -> Node:
-    """A polyline through (N, 3) scene points; ``color`` is one, or (N - 1, 3): one per segment."""
+    """A polyline through (N, 3) scene points, parted where one is nowhere; ``color`` is one, or (N - 1, 3): one per
+    segment."""
     segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
     colors = linear_light(np.asarray(color, dtype=np.uint8))
     # One colour for each end of each segment: viser takes a single colour for sRGB.
     ends = np.broadcast_to(colors[..., None, :] if colors.ndim == 2 else colors, (len(segments), 2, 3)).copy()
-    props = {"points": segments, "colors": ends, "thickness": width_px, "thickness_units": "screen"}
+    known = np.isfinite(segments).all(axis=(1, 2))
+    props = {"points": segments[known], "colors": ends[known], "thickness": width_px, "thickness_units": "screen"}
     return Node(name, "line_segments", props)
 
 

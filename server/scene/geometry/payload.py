@@ -73,7 +73,7 @@ class ReviewScene:
     planned_m: F64
     """(K, 3) waypoints of the plan that was flown; K is 0 when it is unknown"""
     flown_m: F64
-    """(N, 3)"""
+    """(N, 3); NaN where nothing is known of the line"""
     ground: Dsm | None = None
     """To draw it on where the library has no surface model of it: the recording's own, or level ground."""
     drawn: TerrainScene | None = None

@@ -3,6 +3,7 @@ import { timecode } from "../format";
 import type { ReviewDoc, ReviewEvent } from "../messages";
 import { playhead_s, seek } from "../store/review";
 import { severityLevel, severityWord } from "../store/texts";
+import { Changes } from "../ui/Changes";
 import { Icon, type IconName } from "../ui/Icon";
 import { eventAt } from "./time";
 
@@ -15,9 +16,12 @@ const KINDS: Readonly<Record<string, IconName>> = {
   alert: "radar",
 };
 
+/** With a severity of their own. */
+const TOLD: ReadonlySet<string> = new Set(["text", "alert", "gap"]);
+
 function Row({ event, isNow }: { event: ReviewEvent; isNow: boolean }) {
   const row = useRef<HTMLLIElement>(null);
-  const level = event.kind === "text" || event.kind === "alert" ? severityLevel(event.severity) : "neutral";
+  const level = TOLD.has(event.kind) ? severityLevel(event.severity) : "neutral";
   useEffect(() => {
     const list = row.current?.parentElement;
     // Only the list scrolls, and not under a pointer that is choosing from it.
@@ -54,9 +58,11 @@ export function EventList({ review }: { review: ReviewDoc }) {
         <p class="muted">None were recorded.</p>
       ) : (
         <ol>
-          {review.events.map((event, index) => (
-            <Row key={`${event.t_s} ${index}`} event={event} isNow={index === now} />
-          ))}
+          <Changes>
+            {review.events.map((event, index) => (
+              <Row key={`${event.t_s} ${index}`} event={event} isNow={index === now} />
+            ))}
+          </Changes>
         </ol>
       )}
     </section>
