@@ -26,6 +26,8 @@ async def watch_sessions(parts: Parts) -> None:
     """``hedgehop account`` changes the file from outside."""
     while True:
         await close_ended(parts)
+        if parts.auth.owes_writing:
+            await asyncio.to_thread(parts.auth.settle)
         await asyncio.sleep(LOOK_EVERY_S)
 
 

@@ -8,6 +8,7 @@ the password that it had.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import hmac
 import logging
@@ -89,6 +90,8 @@ class Auth:
         self._seen: dict[str, tuple[float, str]] = {}
         """Of each session, when it was last seen and where, since the file was written."""
         self._changing = threading.RLock()
+        self.owes_writing = False
+        """The disk was full when a session ended."""
         self._link: bytes | None = None
         self._owner = self._owner_of(kept, password)
 
@@ -176,8 +179,20 @@ class Auth:
         """Those of ``keys`` that there are."""
         with self._changing:
             gone = self._sessions.keys() & set(keys)
-            if gone:
+            if not gone:
+                return
+            try:
                 self._write({key: session for key, session in self._sessions.items() if key not in gone})
+            except StorageError as error:
+                # Whoever signs out is out; written once the disk takes it, or a restart would let them in again.
+                self.owes_writing = True
+                log.warning("The sign-out is kept in memory only until there is room: %s", error)
+
+    def settle(self) -> None:
+        """Writes what a full disk has not taken."""
+        with self._changing, contextlib.suppress(StorageError):
+            if self.owes_writing:
+                self._write(self._sessions)
 
     def change_password(self, name: str, password: PasswordHash, *, stays: str) -> None:
         """Of an account; its sessions end but for the one that asked, if it is one of them."""
@@ -244,6 +259,7 @@ class Auth:
         owner = self._owner
         kept = _Kept("", "", sessions) if owner is None else _Kept(owner.password, owner.stamp, sessions)
         write_atomically(self._file, msgspec.json.encode(kept))
+        self.owes_writing = False
 
 
 def session_key(session_id: str) -> str:
