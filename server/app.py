@@ -82,7 +82,7 @@ class AnnouncingServer(uvicorn.Server):
                 text += f"Other devices come to trust this station at:\n  {offer.page}\n"
             return text
         parts = self._app.state.parts
-        parts.hub.greet_with([*parts.hub.greetings, notice])
+        parts.alarms.begin("restart", notice, level="warning")
         if self._guarded and self._guarded.link_token:
             parts.auth.keep_link_token(self._guarded.link_token)
             return "Hedgehop is ready again. The sign-in link above was not used yet: it still signs you in once.\n"

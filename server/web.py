@@ -21,6 +21,7 @@ from planning.confinement import what_holds
 from planning.errors import DescribedError
 from server.api import (
     account_routes,
+    audit_routes,
     console_routes,
     flight_routes,
     link_routes,
@@ -39,6 +40,8 @@ from server.api import (
 from server.api.access import Admitted, Parts, answer
 from server.api.sessions_ended import watch_sessions
 from server.door.accounts import Accounts
+from server.door.alarms import Alarms
+from server.door.audit_watch import AuditWatch
 from server.door.auth import Auth
 from server.door.guard import Guard
 from server.door.hub import Hub
@@ -71,6 +74,7 @@ OpenFlying = Callable[[Settings, Library, Hub, "Workspace", ScenarioDesk], Await
 ROUTERS = (
     session_routes,
     account_routes,
+    audit_routes,
     plan_routes,
     terrain_routes,
     traversability_routes,
@@ -136,8 +140,14 @@ async def _lifespan(
             app.state.start_error = error
             raise
         app.state.parts = parts
-        disk = DiskWatch(library.reserve, lambda notice: _tell_of_disk(parts.hub, library, notice))
-        own = (parts.loop_lag.run(), watch_sessions(parts), disk.run(), *_tls_loops(tls, settings))
+        disk = DiskWatch(library.reserve, lambda full: _tell_of_disk(parts, full))
+        own = (
+            parts.loop_lag.run(),
+            watch_sessions(parts),
+            disk.run(),
+            parts.audit.run(),
+            *_tls_loops(tls, settings, parts.alarms),
+        )
         for loop in (*own, *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
             background.spawn(loop)
         try:
@@ -191,27 +201,27 @@ async def _open(
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
-    hub.greet_with(_damaged(library))
-    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag())
+    hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
+    alarms = Alarms(hub)
+    audit = AuditWatch(library.root, workspace.board, alarms)
+    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag(), alarms, audit)
 
 
-def _damaged(library: Library) -> list[NoticeMessage]:
-    return [NoticeMessage(level="warning", error=notice) for notice in library.notices]
-
-
-def _tell_of_disk(hub: Hub, library: Library, notice: NoticeMessage | None) -> None:
-    """To all pages now, and to each that comes while the disk is full."""
-    hub.greet_with([*_damaged(library), *([] if notice is None else [notice])])
+def _tell_of_disk(parts: Parts, full: ErrorDoc | None) -> None:
+    if full is not None:
+        parts.alarms.begin("disk", full)
+        return
+    parts.alarms.end("disk")
     again = ErrorDoc(code="disk_room", what="There is room on the disk again.")
-    hub.publish(notice or NoticeMessage(level="info", error=again))
+    parts.hub.publish(NoticeMessage(level="info", error=again))
 
 
-def _tls_loops(tls: Tls | None, settings: Settings) -> list[Coroutine[Any, Any, None]]:
+def _tls_loops(tls: Tls | None, settings: Settings, alarms: Alarms) -> list[Coroutine[Any, Any, None]]:
     if tls is None:
         return []
     offer = tls.offer(settings)
     listener = [] if offer is None else [TrustListener(offer, settings.host, settings.trust_port).run()]
-    return [tls.run(), *listener]
+    return [tls.run(alarms), *listener]
 
 
 def _open_studies(library: Library, hub: Hub, background: Background) -> tuple[RadarDesk, ScenarioDesk]:

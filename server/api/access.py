@@ -13,6 +13,8 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import HTTPConnection
 
+from server.door.alarms import Alarms
+from server.door.audit_watch import AuditWatch
 from server.door.auth import Auth, Identity
 from server.door.guard import SAFE_METHODS
 from server.door.hub import Hub
@@ -45,6 +47,8 @@ class Parts:
     radar: RadarDesk
     scenarios: ScenarioDesk
     loop_lag: LoopLag
+    alarms: Alarms
+    audit: AuditWatch
 
 
 def parts_of(connection: HTTPConnection) -> Parts:

@@ -34,7 +34,7 @@ async def stream(websocket: WebSocket) -> None:
             session_remaining_s=identity.remaining_s,
             may_change=identity.may_change,
             snapshot=parts.workspace.snapshot,
-            present=lambda: [me, *parts.workspace.present(), *parts.flying.present_for(key)],
+            present=lambda: [me, parts.alarms.message, *parts.workspace.present(), *parts.flying.present_for(key)],
             on_message=parts.workspace.on_show.on_client_message,
         )
     except BusyError:

@@ -118,10 +118,6 @@ class Hub:
         """Notices that every page gets after its first snapshot."""
         self._greetings = list(notices)
 
-    @property
-    def greetings(self) -> list[schemas.NoticeMessage]:
-        return list(self._greetings)
-
     def page(self, page_id: str) -> Page | None:
         return self._pages.get(page_id)
 

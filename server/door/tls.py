@@ -11,6 +11,7 @@ import ssl
 from pathlib import Path
 
 from planning.errors import DescribedError
+from server.door.alarms import Alarms
 from server.door.certificates import CertificateFiles, Names, now_utc, read_certificate
 from server.door.trust import TrustOffer
 from server.errors import CertificateError, StartError, reported
@@ -59,7 +60,7 @@ class Tls:
             log.warning("The certificate could not be renewed: %s", error)
         return cls(files.server, None, own=files)
 
-    async def run(self) -> None:
+    async def run(self, alarms: Alarms) -> None:
         """Until cancelled: renews an own certificate, takes up whatever is new."""
         while True:
             await asyncio.sleep(LOOK_EVERY_S)
@@ -69,11 +70,14 @@ class Tls:
                 # Here, on the loop, where connections are accepted: a context is not for two threads at once.
                 self._load()
                 self._told = ""
+                alarms.end("certificate")
             except Exception as error:
                 doc = reported(error, log, "Renewing the certificate")
                 if doc.what != self._told:
                     self._told = doc.what
                     log.error("The certificate could not be renewed: %s (%s)", doc.what, doc.where)
+                    what = f"The console's certificate could not be renewed. {doc.what}"
+                    alarms.begin("certificate", doc.model_copy(update={"what": what}))
 
     def reachable(self, host: str) -> str:
         """A name or address of the certificate under which this machine is found: for links that others open."""

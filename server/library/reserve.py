@@ -14,7 +14,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from server.schemas import ErrorDoc, NoticeMessage
+from server.schemas import ErrorDoc
 
 log = logging.getLogger("hedgehop.disk")
 
@@ -76,7 +76,7 @@ class Reserve:
 class DiskWatch:
     """Looks every few seconds, and tells every page what changes."""
 
-    def __init__(self, reserve: Reserve, tell: Callable[[NoticeMessage | None], None]) -> None:
+    def __init__(self, reserve: Reserve, tell: Callable[[ErrorDoc | None], None]) -> None:
         self._reserve, self._tell = reserve, tell
 
     async def run(self) -> None:
@@ -85,8 +85,7 @@ class DiskWatch:
         while True:
             await asyncio.to_thread(self._reserve.look)
             if (notice := self._reserve.notice) != told:
-                if told is None or notice is None:
-                    self._tell(None if notice is None else NoticeMessage(level="error", error=notice))
+                self._tell(notice)
                 told = notice
             await asyncio.sleep(LOOK_EVERY_S)
 

@@ -92,7 +92,9 @@ from server.schemas.result_docs import (
     WorstDoc,
 )
 from server.schemas.review_docs import Histogram, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries
+from server.schemas.station_docs import AlarmDoc, AuditDoc, AuditEntryDoc
 from server.schemas.stream import (
+    AlarmsMessage,
     AlertMessage,
     AnsweredMessage,
     ClientMessage,

@@ -12,6 +12,7 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
+from server.schemas.station_docs import AlarmDoc
 from server.schemas.strict_model import Message, Strict
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
@@ -242,8 +243,16 @@ class NoticeMessage(Message):
     error: ErrorDoc
 
 
+class AlarmsMessage(Message):
+    """All that is wrong with the station itself."""
+
+    type: Literal["alarms"] = "alarms"
+    alarms: list[AlarmDoc]
+
+
 ServerMessage = Annotated[
     Snapshot
+    | AlarmsMessage
     | PlanMessage
     | LibraryMessage
     | ViewMessage

@@ -21,6 +21,7 @@ from server.schemas import (
     plan_docs,
     result_docs,
     review_docs,
+    station_docs,
     stream,
     study_docs,
     traversability_docs,
@@ -39,6 +40,7 @@ ANSWERS = (
     schemas.AccountDoc,
     schemas.SessionDoc,
     schemas.InvitationDoc,
+    schemas.AuditDoc,
 )
 """Of requests, beside the stream."""
 CONSTANTS = {"CHECK_FRESH_S": flight_docs.CHECK_FRESH_S, "STALE_S": STALE_S, "LOST_S": LOST_S}
@@ -73,6 +75,7 @@ def _models() -> Iterator[type[BaseModel]]:
         library_docs,
         view_docs,
         account_docs,
+        station_docs,
         flight_docs,
         review_docs,
         obstacle_docs,

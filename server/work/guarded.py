@@ -12,7 +12,7 @@ import sys
 import time
 from datetime import UTC, datetime
 
-from server.schemas import ErrorDoc, NoticeMessage
+from server.schemas import ErrorDoc
 from server.work.guardian import CHANNEL, LINK_OPEN, LINK_USED
 
 log = logging.getLogger("hedgehop.guarded")
@@ -47,7 +47,7 @@ class Guarded:
         faulthandler.register(signal.SIGUSR1, all_threads=True)
         return cls(channel)
 
-    def notice(self) -> NoticeMessage | None:
+    def notice(self) -> ErrorDoc | None:
         """For the pages of a server that is there again."""
         if self._silent_since_s is None:
             return None
@@ -59,7 +59,7 @@ class Guarded:
             advice="The link and the recording went on without it. Look where the vehicle is; the log tells the cause.",
         )
         log.warning(doc.what)
-        return NoticeMessage(level="warning", error=doc)
+        return doc
 
     def prove(self, *, link_is_open: bool, in_flight: bool) -> bool:
         """Twice a second. False: the guardian has gone, and the server must end; not while a vehicle is in flight."""

@@ -96,6 +96,12 @@ class FakeWorkspace:
         self.plans = self.terrains = self.on_show = self.board = self
         self.traversability = FakeTraversability(self.calls)
 
+    async def unseen(self, work: Callable[[Any], Awaitable[object]]) -> None:
+        await work(self)
+
+    async def call(self, function: Callable[..., object], *arguments: object) -> object:
+        return function(*arguments, report=None)
+
     async def start(self, *, with_demo: bool = False) -> None:
         self.calls.append("start with demo" if with_demo else "start")
 

@@ -83,7 +83,7 @@ class Server:
         end = time.monotonic() + LONG_S
         while True:
             try:
-                return self.until(lambda m: m["type"] == "notice")["error"]
+                return self.until(lambda m: m["type"] == "alarms" and bool(m["alarms"]))["alarms"][0]["error"]
             except (OSError, WebSocketException):
                 assert time.monotonic() < end
                 time.sleep(0.2)

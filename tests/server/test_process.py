@@ -225,7 +225,7 @@ def _comes_back(disk: Path, before: str, after: str) -> None:
             origin=origin,  # pyright: ignore[reportArgumentType]
             additional_headers={"Cookie": cookies},
         ) as page:
-            said = notice(page, "disk_full")
+            said = alarm(page, "disk_full")
             assert "Delete old recordings" in said["advice"]
             listed = ok(again.http.get("/api/recordings")).json()
             assert [(entry["name"], entry["bytes"]) for entry in listed] == [("old.tlog", 3_000_000)]
@@ -235,6 +235,14 @@ def _comes_back(disk: Path, before: str, after: str) -> None:
             notice(page, "disk_room")
         assert ok(again.rename(after)).json()["saved_utc"]
         again.process.kill()
+
+
+def alarm(page: Connection, code: str) -> dict:
+    while True:
+        message = json.loads(page.recv(PATIENCE_S))
+        for each in message.get("alarms", []):
+            if each["error"]["code"] == code:
+                return each["error"]
 
 
 def notice(page: Connection, code: str) -> dict:

@@ -1094,6 +1094,35 @@ export interface ChangePassword {
   password: string;
 }
 
+/** Stands on every page until it is over, or until somebody has read it. */
+export interface AlarmDoc {
+  kind: "disk" | "audit" | "certificate" | "restart";
+  level: "warning" | "error";
+  began_utc_s: number;
+  error: ErrorDoc;
+}
+
+/** A command, or what came of it. */
+export interface AuditEntryDoc {
+  t_utc_s: number | null;
+  operator: string;
+  words: string;
+  /** Empty: written down before it was sent. */
+  result: string;
+}
+
+/** The log of commands, and whether it is as it was written. */
+export interface AuditDoc {
+  /** none: no command was given yet. */
+  state: "none" | "whole" | "broken";
+  /** One sentence each, the most important first. */
+  verdict: string[];
+  lines: number;
+  checked_utc_s: number | null;
+  /** The newest first. */
+  newest: AuditEntryDoc[];
+}
+
 /** Where the vehicle is against the plan and the surface model; null where it cannot be told. */
 export interface FollowDoc {
   /** Distance flown along the planned line, at the place nearest to the vehicle. */
@@ -1304,7 +1333,7 @@ export interface Histogram {
 
 export interface ReviewEvent {
   t_s: number;
-  /** mode, text, arm, item, command, alert */
+  /** mode, text, arm, item, command, alert, gap */
   kind: string;
   text: string;
   severity: number;
@@ -2037,6 +2066,13 @@ export interface NoticeMessage {
   error: ErrorDoc;
 }
 
+/** All that is wrong with the station itself. */
+export interface AlarmsMessage {
+  v: 1;
+  type: "alarms";
+  alarms: AlarmDoc[];
+}
+
 /** The pointer is over the altitude profile at this distance; null: it left. */
 export interface HoverProfile {
   type: "hover_profile";
@@ -2083,6 +2119,7 @@ export interface Ping {
 
 export type ServerMessage =
   | Snapshot
+  | AlarmsMessage
   | PlanMessage
   | LibraryMessage
   | ViewMessage

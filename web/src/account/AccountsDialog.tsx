@@ -21,6 +21,9 @@ import {
   sessions,
 } from "./accounts";
 
+/** Others come in and go while it is open. */
+const EVERY_MS = 3000;
+
 const when = (utc_s: number) => day(new Date(1000 * utc_s).toISOString());
 
 function SessionRow({ session }: { session: SessionDoc }) {
@@ -169,7 +172,11 @@ function close(): void {
 
 /** Who may sign in, and who is in: for operators; whoever has an account can change their own password. */
 export function AccountsDialog() {
-  useEffect(() => void refresh(), []);
+  useEffect(() => {
+    void refresh();
+    const timer = setInterval(() => void refresh(), EVERY_MS);
+    return () => clearInterval(timer);
+  }, []);
   const operates = me.value?.role === "operator";
   return (
     <Dialog title="Accounts and sessions" testid="accounts-dialog" onClose={close}>
@@ -179,6 +186,10 @@ export function AccountsDialog() {
       </p>
       {me.value && !me.value.owner && <OwnPassword />}
       {operates && <ForOperators />}
+      <h3>Commands</h3>
+      <Button icon="shield" testid="audit-open" onClick={() => (openDialog.value = "audit")}>
+        Audit log of all commands
+      </Button>
     </Dialog>
   );
 }

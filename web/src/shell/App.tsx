@@ -1,7 +1,10 @@
 import { AccountsDialog } from "../account/AccountsDialog";
+import { AuditDialog } from "../account/AuditDialog";
 import { AskedForControl } from "../account/AskedForControl";
 import { Scene } from "../scene/Scene";
 import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
+import { SpaceDialog } from "../review/SpaceDialog";
+import { Alarms } from "./Alarms";
 import { FileDrop } from "./FileDrop";
 import { HelpSheet } from "./HelpSheet";
 import { Toasts } from "./Notices";
@@ -23,6 +26,7 @@ export function App() {
       </aside>
       <main class="centre">
         <Scene onKey={onKey}>
+          <Alarms />
           <Toasts />
         </Scene>
         <Below />
@@ -43,6 +47,8 @@ export function App() {
       {openDialog.value === "help" && <HelpSheet />}
       {openDialog.value === "plans" && <PlansDialog />}
       {openDialog.value === "accounts" && <AccountsDialog />}
+      {openDialog.value === "audit" && <AuditDialog />}
+      {openDialog.value === "space" && <SpaceDialog />}
       <AskedForControl />
       {openDialog.value === "save_as" && <SaveAsDialog />}
     </div>

@@ -1,6 +1,8 @@
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { clock } from "../format";
+import { alarms } from "../store/alarms";
+import { Alarm } from "./Alarms";
 import { Button } from "../ui/Button";
 import { ErrorText } from "../ui/Outcome";
 import { Icon } from "../ui/Icon";
@@ -42,10 +44,11 @@ export function Toasts() {
   );
 }
 
-/** All notices since the page was opened. */
+/** What is wrong with the station now, and all notices since the page was opened. */
 export function NoticeMenu() {
   const all = notices.value;
-  const unseen = all.filter((notice) => notice.id > lastSeen.value && notice.level !== "info").length;
+  const unseen =
+    alarms.value.length + all.filter(({ id, level }) => id > lastSeen.value && level !== "info").length;
   return (
     <Menu
       label="Notices"
@@ -70,10 +73,15 @@ export function NoticeMenu() {
       )}
     >
       {() =>
-        all.length === 0 ? (
+        all.length + alarms.value.length === 0 ? (
           <p class="muted menu-empty">No notices yet.</p>
         ) : (
           <ul>
+            {alarms.value.map((alarm) => (
+              <li key={alarm.kind}>
+                <Alarm alarm={alarm} />
+              </li>
+            ))}
             {all.map((notice) => (
               <li key={notice.id}>
                 <NoticeIcon notice={notice} />

@@ -1,5 +1,6 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage, Snapshot } from "../messages";
+import { alarms } from "./alarms";
 import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
@@ -49,6 +50,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "notice":
       state.notify(message.level, message.error);
+      return;
+    case "alarms":
+      alarms.value = message.alarms;
       return;
     case "vehicle":
     case "track":

@@ -10,7 +10,7 @@ import { setSelection } from "./stream";
 export const viewId = signal<ViewId>(viewIn(location.hash) ?? viewIn(lastView.value) ?? "plan");
 export const study = signal<StudyId>(studyIn(location.hash) ?? "flights");
 
-export const openDialog = signal<"help" | "plans" | "save_as" | "accounts" | null>(null);
+export const openDialog = signal<"help" | "plans" | "save_as" | "accounts" | "audit" | "space" | null>(null);
 /** On narrow screens the side panels are drawers: at most one is open. */
 export const drawer = signal<"left" | "right" | null>(null);
 /** A file is being dragged over the page. */

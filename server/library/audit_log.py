@@ -1,0 +1,116 @@
+"""The log of commands for people: whether it is whole, its newest entries, and all of it as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from server.library.whole_files import storage_errors
+from telemetry.errors import RecordingError
+from telemetry.link.audit import END_BYTES
+from telemetry.link.audit_chain import Checked, check_file, parsed
+from telemetry.link.keys import audit_key_file
+from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.topics.messages import LinkStatus, Topic
+
+COLUMNS = ("t_utc", "operator", "words", "result")
+ADVICE = "Keep a copy of the log and of the recordings, and find out who could write to the data directory."
+
+
+@dataclass(frozen=True, slots=True)
+class AuditVerdict:
+    """``faults``: nothing of this happens by itself. ``notes``: what was lost without anybody's doing."""
+
+    lines: int
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
+    checked_utc_s: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        whole = () if self.faults else (f"The audit log is whole: {self.lines} lines.",)
+        return (*self.faults, *whole, *self.notes)
+
+
+def read_key(folder: Path) -> bytes:
+    """This machine's key; empty: there is none."""
+    file = audit_key_file(folder)
+    return file.read_bytes() if file.is_file() else b""
+
+
+def look_through(log: Path, key: bytes, *, report: object = None) -> AuditVerdict:
+    """Holds it against the key and against what the recordings beside it have seen of it. Waits for the disk.
+
+    ``report``: workers give one. Raises StorageError.
+    """
+    del report
+    with storage_errors(log):
+        checked = check_file(log, key)
+        faults = (*_broken(checked), *_missing(log.parent, checked))
+    notes = tuple(_torn(line, is_last=line == checked.lines) for line in checked.torn)
+    return AuditVerdict(checked.lines, faults, notes, time.time())
+
+
+def newest_entries(log: Path, count: int) -> list[dict[str, Any]]:
+    """The newest first; lines that are no entries are left out."""
+    with log.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - END_BYTES))
+        lines = file.read().splitlines()
+    entries = (parsed(line) for line in reversed(lines))
+    return [entry for entry in entries if entry is not None][:count]
+
+
+def as_table(log: Path) -> str:
+    """All of it as CSV."""
+    table = io.StringIO(newline="")
+    writer = csv.writer(table)
+    writer.writerow(COLUMNS)
+    for line in log.read_bytes().splitlines():
+        entry = parsed(line) or {"words": json.dumps(line.decode(errors="replace")), "result": "not readable"}
+        t_utc_s = entry.get("t_utc_s")
+        told = datetime.fromtimestamp(t_utc_s, UTC).isoformat() if isinstance(t_utc_s, int | float) else ""
+        writer.writerow([told, *(_cell(entry.get(name, "")) for name in COLUMNS[1:])])
+    return table.getvalue()
+
+
+def _cell(value: object) -> str:
+    """A program that opens the table must not take a name for a formula."""
+    text = str(value)
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+
+
+def _broken(checked: Checked) -> list[str]:
+    broken = checked.broken
+    return [] if broken is None else [f"The audit log is BROKEN at line {broken.line}. {broken.why}"]
+
+
+def _torn(line: int, *, is_last: bool) -> str:
+    if is_last:
+        return "The last entry was cut off by a power cut. The chain goes on behind it."
+    return f"The entry of line {line} was cut off by a power cut. The chain goes on behind it."
+
+
+def _missing(folder: Path, checked: Checked) -> Iterator[str]:
+    """Lines that a recording of this machine knew and the log has not any more. Behind a break nothing can be told."""
+    if checked.broken is not None:
+        return
+    aside = (line for path in folder.glob("audit-until-*.jsonl") for line in path.read_bytes().splitlines())
+    known = checked.hashes | {(parsed(line) or {}).get("hash") for line in aside}
+    for path in sorted((folder / "recordings").glob("*.mcap")):
+        try:
+            with open_recording(path) as recording:
+                last = recording.latest(Topic.LINK, recording.end_utc_s)
+        except RecordingError:
+            continue  # it has its own words in Review
+        status = None if last is None else last.message
+        if isinstance(status, LinkStatus) and status.audit_head.strip("0") and status.audit_head not in known:
+            yield f"LINES ARE MISSING: {path.name} was recorded when the log had a line that it has not any more."
