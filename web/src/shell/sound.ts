@@ -12,7 +12,7 @@ interface Alarm {
 
 /** Short and rising: something is ahead. */
 const OBSTACLE: Alarm = { tones_hz: [880, 1175, 880], tone_s: 0.13, period_ms: 1600 };
-/** Long and falling: server, link or vehicle is lost. */
+/** Long and falling: server, link or vehicle is lost, or the line is too slow to fly by. */
 const LOSS: Alarm = { tones_hz: [740, 494, 330], tone_s: 0.4, period_ms: 2400 };
 
 const GAP_S = 0.04;

@@ -1,17 +1,22 @@
 import { computed, effect, signal } from "@preact/signals";
 import { adopted, linkState, vehicle } from "./flying";
-import { failed, type Failed } from "./reach";
+import { failed, late_s, type Failed } from "./reach";
 
-/** What is lost while the vehicle may be in the air: nothing is louder, until somebody has seen it. */
+/**
+ * What is lost while the vehicle may be in the air: nothing is louder, until somebody has seen it. Over a slow line what
+ * the page shows has long changed.
+ */
 
-export type Loss = Failed | "vehicle";
+export type Loss = Failed | "vehicle" | "slow";
 
 /** Unless it was disarmed when it was last heard. */
 const mayFly = computed(() => adopted.value !== null && vehicle.value?.armed !== false);
 
 export const loss = computed<Loss | null>(() => {
   if (!mayFly.value) return null;
-  return failed.value ?? (linkState.value === "lost" ? "vehicle" : null);
+  if (failed.value !== null) return failed.value;
+  if (linkState.value === "lost") return "vehicle";
+  return late_s.value === null ? null : "slow";
 });
 
 const seen = signal<Loss | null>(null);
