@@ -140,6 +140,16 @@ def browser(chromium_path: str) -> Iterator[Browser]:
 
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
+    yield from _flat_page(browser)
+
+
+@pytest.fixture
+def other_page(browser: Browser) -> Iterator[Page]:
+    """Of somebody else, in a browser of their own."""
+    yield from _flat_page(browser)
+
+
+def _flat_page(browser: Browser) -> Iterator[Page]:
     """Its 3D view stays empty: what it costs to render in software would slow down everything else."""
     with _watched(browser) as context:
         context.route(

@@ -28,8 +28,8 @@ describe("how far this page's word reaches", () => {
       null,
     ]);
     lease.value = { ...lease.value, mine: false };
-    expect(whyNotCommand.value).toContain("You observe");
-    expect(whyNotAsk.value).toContain("You observe");
+    expect(whyNotCommand.value).toContain("You look on");
+    expect(whyNotAsk.value).toContain("You look on");
     expect(whyUnheard.value).toBeNull();
   });
 

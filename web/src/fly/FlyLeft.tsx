@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { adopted, isInAir, linkStatus } from "../store/flying";
 import { closeReview, isReplaying, review } from "../store/review";
 import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
@@ -22,9 +23,11 @@ function ReviewOpen() {
           ? "A recording is open for review: the 3D view shows it, not the vehicle."
           : "A recording is open for review. It lies over no surface model that is known here, so the 3D view does not show it."}
       </p>
-      <Button testid="close-review" onClick={() => void closeReview()}>
-        Close the recording
-      </Button>
+      <Changes>
+        <Button testid="close-review" onClick={() => void closeReview()}>
+          Close the recording
+        </Button>
+      </Changes>
     </div>
   );
 }
@@ -78,7 +81,9 @@ export function FlyLeft() {
       </div>
       {standLeft.value && adopted.value && (
         <div class="ways">
-          <Manoeuvres />
+          <Changes>
+            <Manoeuvres />
+          </Changes>
         </div>
       )}
       <NextAction />

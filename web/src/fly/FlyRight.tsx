@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { Avoidance } from "../obstacles/Avoidance";
 import { AheadLine, MissionAhead } from "../obstacles/MissionAhead";
 import { Looking } from "../obstacles/Looking";
@@ -27,7 +28,9 @@ function Evasion() {
   return (
     <footer class="evasion">
       <AheadLine />
-      <Avoidance />
+      <Changes>
+        <Avoidance />
+      </Changes>
     </footer>
   );
 }

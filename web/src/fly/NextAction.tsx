@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { openReview, recordings } from "../store/review";
 import { goTo } from "../store/view";
 import {
@@ -175,13 +176,17 @@ export function NextAction() {
   return (
     <footer class="primary-action" data-testid="next-action" data-step={step.id}>
       <Outcome place={NEXT} />
-      <LastFlight />
+      <Changes>
+        <LastFlight />
+      </Changes>
       <TransferBar />
       {hint && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}
       {observer && <p class="muted action-hint">{whoIsInCharge()}</p>}
       {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}
-      <Primary step={step} isCut={cut !== null} />
+      <Changes>
+        <Primary step={step} isCut={cut !== null} />
+      </Changes>
     </footer>
   );
 }

@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { useRef, useState } from "preact/hooks";
 import type { AlertDoc } from "../messages";
 import { endingsOf, parted, type Endings } from "../store/alerts";
@@ -45,28 +46,30 @@ function Actions({ first, others }: { first: AlertDoc; others: readonly AlertDoc
           Ways past it
         </Button>
       )}
-      {unseen.length > 1 && (
-        <Button
-          disabled={isBusy}
-          title="Acknowledge all alerts"
-          testid="alert-acknowledge-all"
-          onClick={() => void acknowledge(null)}
-        >
-          All {unseen.length}
-        </Button>
-      )}
-      {!first.acknowledged && (
-        <Button
-          class="acknowledge"
-          icon="check"
-          title="Acknowledge this alert (K)"
-          disabled={isBusy}
-          testid="alert-acknowledge"
-          onClick={() => void acknowledge(first.alert.id)}
-        >
-          Acknowledge <kbd>K</kbd>
-        </Button>
-      )}
+      <Changes>
+        {unseen.length > 1 && (
+          <Button
+            disabled={isBusy}
+            title="Acknowledge all alerts"
+            testid="alert-acknowledge-all"
+            onClick={() => void acknowledge(null)}
+          >
+            All {unseen.length}
+          </Button>
+        )}
+        {!first.acknowledged && (
+          <Button
+            class="acknowledge"
+            icon="check"
+            title="Acknowledge this alert (K)"
+            disabled={isBusy}
+            testid="alert-acknowledge"
+            onClick={() => void acknowledge(first.alert.id)}
+          >
+            Acknowledge <kbd>K</kbd>
+          </Button>
+        )}
+      </Changes>
     </>
   );
 }

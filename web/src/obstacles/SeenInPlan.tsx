@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { count } from "../format";
 import { pending } from "../store/outcomes";
 import { whyNotAsk } from "../store/reach";
@@ -20,14 +21,16 @@ export function SeenInPlan() {
           : "What was seen is on the surface model"}
         : path and certificate keep clear of it. What only the radar has seen may be higher than that.
       </p>
-      <Button
-        disabled={pending.value.has(SEEN) || whyNotAsk.value !== null}
-        title={whyNotAsk.value ?? "Back to the surface model as it was read"}
-        testid="take-seen-out"
-        onClick={() => void planWithSeen(false)}
-      >
-        Take them out
-      </Button>
+      <Changes>
+        <Button
+          disabled={pending.value.has(SEEN) || whyNotAsk.value !== null}
+          title={whyNotAsk.value ?? "Back to the surface model as it was read"}
+          testid="take-seen-out"
+          onClick={() => void planWithSeen(false)}
+        >
+          Take them out
+        </Button>
+      </Changes>
       <Outcome place={SEEN} />
     </div>
   );

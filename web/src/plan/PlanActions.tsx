@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { whyNotCommand } from "../store/reach";
@@ -50,7 +51,9 @@ export function PlanActions() {
       {why && <p class="muted action-hint">{why}</p>}
       {hasVehicle ? (
         <div class="two-actions">
-          <Upload />
+          <Changes>
+            <Upload />
+          </Changes>
           <ExportMenu isPrimary={false} />
         </div>
       ) : (

@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { useEffect, useState } from "preact/hooks";
 import { age, count, duration, latLon, length, metres, number, percent } from "../format";
 import type { ResultDoc } from "../messages";
@@ -56,9 +57,11 @@ function FromAnotherModel({ result: { other_surface: text } }: { result: ResultD
   const settle = () => edit("Plan on this surface model", "terrain", (doc) => ({ ...doc, planned_on: null }));
   return (
     <OtherSurface text={text}>
-      <Button testid="settle-surface" title="The points are meant for this surface model" onClick={settle}>
-        Plan on this one
-      </Button>
+      <Changes>
+        <Button testid="settle-surface" title="The points are meant for this surface model" onClick={settle}>
+          Plan on this one
+        </Button>
+      </Changes>
     </OtherSurface>
   );
 }
@@ -96,7 +99,11 @@ function Reasons({ result }: { result: ResultDoc }) {
           <div>
             <p>{reason.text}</p>
             {reason.mend && <p class="mend">{reason.mend}</p>}
-            {OF_HOME.has(reason.code) && <MoveHome result={result} />}
+            {OF_HOME.has(reason.code) && (
+              <Changes>
+                <MoveHome result={result} />
+              </Changes>
+            )}
           </div>
         </li>
       ))}

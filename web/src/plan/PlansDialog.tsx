@@ -3,6 +3,7 @@ import { useState } from "preact/hooks";
 import { count, day } from "../format";
 import type { PlanEntry } from "../messages";
 import { Button } from "../ui/Button";
+import { Changes } from "../ui/Changes";
 import { Dialog } from "../ui/Dialog";
 import { ErrorBox } from "../ui/Outcome";
 import { openDialog } from "../store/view";
@@ -39,7 +40,7 @@ function PlanRow({ entry }: { entry: PlanEntry }) {
       <td class="number">{day(entry.saved_utc)}</td>
       <td class="actions">
         {!isOpen && (
-          <>
+          <Changes>
             <Button onClick={() => void closeIf(openPlan(entry.id))}>Open</Button>
             <Button
               kind={isConfirming ? "danger" : "quiet"}
@@ -49,7 +50,7 @@ function PlanRow({ entry }: { entry: PlanEntry }) {
             >
               {isConfirming ? "Delete for good" : undefined}
             </Button>
-          </>
+          </Changes>
         )}
       </td>
     </tr>
@@ -72,12 +73,14 @@ export function PlansDialog() {
     <Dialog title="Plans" testid="plans-dialog" onClose={close}>
       <ErrorBox place="plans" />
       <div class="row">
-        <Button icon="plus" testid="plan-new" onClick={() => void closeIf(newPlan())}>
-          New plan
-        </Button>
-        <Button icon="copy" testid="plan-save-as" onClick={() => (openDialog.value = "save_as")}>
-          Save as…
-        </Button>
+        <Changes>
+          <Button icon="plus" testid="plan-new" onClick={() => void closeIf(newPlan())}>
+            New plan
+          </Button>
+          <Button icon="copy" testid="plan-save-as" onClick={() => (openDialog.value = "save_as")}>
+            Save as…
+          </Button>
+        </Changes>
         <span class="muted">{count(plans.length, "plan")}; each saves itself</span>
       </div>
       <div class="table-scroll">

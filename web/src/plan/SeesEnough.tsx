@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { metres, withUnit } from "../format";
 import type { AvoidanceStatus, PerceptionSettings, SeesEnough as Speeds } from "../messages";
 import { document_ } from "../store/state";
@@ -67,9 +68,11 @@ export function SeesEnough() {
         Faster than seen ahead: {SENSOR_WORDS[slowest.sensor].toLowerCase()} {metres(slowest.depth_m)} deep
         stops it from {speed}, the plan flies up to {withUnit(profile.max_speed_m_s, "m/s", 1)}.
       </p>
-      <Button testid="fly-as-seen" onClick={slow}>
-        Fly {speed}
-      </Button>
+      <Changes>
+        <Button testid="fly-as-seen" onClick={slow}>
+          Fly {speed}
+        </Button>
+      </Changes>
     </div>
   );
 }

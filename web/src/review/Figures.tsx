@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { DASH, clearance, demanded, deviation, duration, metres, timecode, withUnit } from "../format";
 import type { ReviewDoc, ReviewFigures } from "../messages";
 import { Icon, type IconName } from "../ui/Icon";
@@ -45,14 +46,16 @@ function Distance({ figures }: { figures: ReviewFigures }) {
         </span>
       </div>
       {min_distance_t_s !== null && (
-        <button
-          type="button"
-          class="link"
-          data-testid="seek-nearest"
-          onClick={() => seek(Math.max(0, min_distance_t_s))}
-        >
-          Go to it, at {timecode(min_distance_t_s)}
-        </button>
+        <Changes>
+          <button
+            type="button"
+            class="link"
+            data-testid="seek-nearest"
+            onClick={() => seek(Math.max(0, min_distance_t_s))}
+          >
+            Go to it, at {timecode(min_distance_t_s)}
+          </button>
+        </Changes>
       )}
     </>
   );

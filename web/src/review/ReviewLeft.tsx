@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { useState } from "preact/hooks";
 import { bytes, count, day, duration } from "../format";
 import type { RecordingDoc } from "../messages";
@@ -222,16 +223,18 @@ function Play() {
     <footer class="primary-action">
       <Outcome place={PLAYING} />
       {!isOpen && <p class="muted action-hint">{opening.value ? "Opening…" : "Choose a recording first"}</p>}
-      <Button
-        kind="primary"
-        class="wide"
-        icon={playing ? "pause" : "play"}
-        disabled={!isOpen}
-        testid="play"
-        onClick={togglePlaying}
-      >
-        {playing ? "Pause" : "Play"}
-      </Button>
+      <Changes>
+        <Button
+          kind="primary"
+          class="wide"
+          icon={playing ? "pause" : "play"}
+          disabled={!isOpen}
+          testid="play"
+          onClick={togglePlaying}
+        >
+          {playing ? "Pause" : "Play"}
+        </Button>
+      </Changes>
     </footer>
   );
 }

@@ -1,4 +1,5 @@
 import { Button } from "../ui/Button";
+import { Changes } from "../ui/Changes";
 import { chooseFiles } from "../ui/choose_files";
 import { useDemo } from "../store/plans";
 import { sendTerrain } from "../store/files";
@@ -25,12 +26,14 @@ export function EmptyState() {
         plans paths that hug it.
       </p>
       <div class="row">
-        <Button kind="primary" icon="import" testid="empty-open" onClick={choose}>
-          Open a GeoTIFF…
-        </Button>
-        <Button icon="terrain" testid="empty-demo" onClick={() => void useDemo()}>
-          Use the demo terrain
-        </Button>
+        <Changes>
+          <Button kind="primary" icon="import" testid="empty-open" onClick={choose}>
+            Open a GeoTIFF…
+          </Button>
+          <Button icon="terrain" testid="empty-demo" onClick={() => void useDemo()}>
+            Use the demo terrain
+          </Button>
+        </Changes>
       </div>
     </div>
   );

@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { metres, number } from "../format";
 import type { ViewDoc } from "../messages";
 import { SensorMark } from "../obstacles/SensorMark";
@@ -153,22 +154,24 @@ export function MapLegend() {
       aria-label="Maps of obstacles"
       data-testid="map-legend"
     >
-      {all.map((entry) => (
-        <button
-          type="button"
-          key={entry.layer}
-          title={entry.title}
-          aria-pressed={view.value[entry.layer]}
-          data-testid={`layer-${entry.layer.slice("show_".length)}`}
-          onClick={() => toggle(entry.layer)}
-        >
-          <span class="eye" aria-hidden="true" />
-          <Sample entry={entry} />
-          {entry.label}
-          {entry.map && <Coarser name={entry.map} />}
-        </button>
-      ))}
-      {isAny(hasSensors) && <MergedMaps />}
+      <Changes>
+        {all.map((entry) => (
+          <button
+            type="button"
+            key={entry.layer}
+            title={entry.title}
+            aria-pressed={view.value[entry.layer]}
+            data-testid={`layer-${entry.layer.slice("show_".length)}`}
+            onClick={() => toggle(entry.layer)}
+          >
+            <span class="eye" aria-hidden="true" />
+            <Sample entry={entry} />
+            {entry.label}
+            {entry.map && <Coarser name={entry.map} />}
+          </button>
+        ))}
+        {isAny(hasSensors) && <MergedMaps />}
+      </Changes>
       <span class="probability-scale" aria-hidden="true">
         likely → sure
       </span>

@@ -1,4 +1,5 @@
 import { Button } from "../ui/Button";
+import { Changes } from "../ui/Changes";
 import type { ViewDoc } from "../messages";
 import { result, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
@@ -27,19 +28,21 @@ export function ViewTools() {
   return (
     <div class="view-tools">
       <div class="overlay layers" role="group" aria-label="Layers">
-        {LAYERS.filter(isThere).map(({ layer, label, title }) => (
-          <button
-            type="button"
-            key={layer}
-            title={title}
-            aria-pressed={view.value[layer]}
-            data-testid={`layer-${layer.slice("show_".length)}`}
-            onClick={() => toggle(layer)}
-          >
-            <span class="eye" aria-hidden="true" />
-            {label}
-          </button>
-        ))}
+        <Changes>
+          {LAYERS.filter(isThere).map(({ layer, label, title }) => (
+            <button
+              type="button"
+              key={layer}
+              title={title}
+              aria-pressed={view.value[layer]}
+              data-testid={`layer-${layer.slice("show_".length)}`}
+              onClick={() => toggle(layer)}
+            >
+              <span class="eye" aria-hidden="true" />
+              {label}
+            </button>
+          ))}
+        </Changes>
       </div>
       <div class="overlay cameras" role="group" aria-label="Camera">
         {followed.value && (

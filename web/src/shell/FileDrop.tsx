@@ -2,6 +2,7 @@ import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
 import { droppedFiles } from "../store/dropped";
+import { isObserver, whyObserver } from "../store/flying";
 import { isRadarLog, isRecording, takeFiles } from "../store/files";
 import { dragging, goTo, study, viewId } from "../store/view";
 import { bringIn, isRadarSamples } from "../studies/radar";
@@ -12,6 +13,30 @@ import { carriesFiles } from "../ui/choose_files";
 function isSamples(file: File): boolean {
   const looksAtThem = viewId.value === "review" && study.value === "radar";
   return isRadarSamples(file) || (looksAtThem && /\.csv$/i.test(file.name));
+}
+
+function Kinds() {
+  return (
+    <>
+      <Icon name="import" size={40} />
+      <p class="drop-title">Drop to open</p>
+      <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
+      <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
+      <p>Recorded flight: .tlog, .mcap</p>
+      <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
+    </>
+  );
+}
+
+/** The veil takes the drop all the same: the browser would leave the console to open the file. */
+function Refused({ why }: { why: string }) {
+  return (
+    <>
+      <Icon name="eye" size={40} />
+      <p class="drop-title">Nothing is opened</p>
+      <p>{why}.</p>
+    </>
+  );
 }
 
 /** Files may be dropped anywhere. While one is dragged a veil covers the page, the 3D view included, and takes
@@ -35,7 +60,7 @@ export function FileDrop() {
   const drop = async (event: DragEvent) => {
     event.preventDefault();
     end();
-    if (!event.dataTransfer) return;
+    if (!event.dataTransfer || isObserver.value) return;
     const files = await droppedFiles(event.dataTransfer);
     takeRecordings(files.filter(isRecording));
     takeRadarLogs(files.filter(isRadarLog));
@@ -53,14 +78,7 @@ export function FileDrop() {
       onDrop={(event) => void drop(event)}
       onClick={end}
     >
-      <div class="drop-card">
-        <Icon name="import" size={40} />
-        <p class="drop-title">Drop to open</p>
-        <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
-        <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
-        <p>Recorded flight: .tlog, .mcap</p>
-        <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
-      </div>
+      <div class="drop-card">{whyObserver.value ? <Refused why={whyObserver.value} /> : <Kinds />}</div>
     </div>
   );
 }

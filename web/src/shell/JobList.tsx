@@ -1,6 +1,7 @@
 import { percent } from "../format";
 import { Bar } from "../ui/Bar";
 import { Button } from "../ui/Button";
+import { Changes } from "../ui/Changes";
 import { ErrorBox } from "../ui/Outcome";
 import { cancelJob, sending } from "../store/files";
 import { runningJobs } from "../store/state";
@@ -40,13 +41,15 @@ export function JobList() {
           </span>
           <Bar label={job.label} share={job.share} />
           <span class="job-share">{job.share === null ? "" : percent(job.share)}</span>
-          <Button
-            kind="quiet"
-            icon="cross"
-            title={`Cancel: ${job.label}`}
-            testid="job-cancel"
-            onClick={job.cancel}
-          />
+          <Changes>
+            <Button
+              kind="quiet"
+              icon="cross"
+              title={`Cancel: ${job.label}`}
+              testid="job-cancel"
+              onClick={job.cancel}
+            />
+          </Changes>
         </div>
       ))}
       {all.length > 1 && <span class="muted">and {all.length - 1} more</span>}

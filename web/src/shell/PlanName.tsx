@@ -3,6 +3,7 @@ import { redo, undo } from "../store/plans";
 import { edit } from "../store/plan";
 import { document_, link, plan, saving } from "../store/state";
 import { Button } from "../ui/Button";
+import { Changes } from "../ui/Changes";
 import { TextField } from "../ui/fields";
 import { openDialog } from "../store/view";
 
@@ -23,13 +24,15 @@ export function PlanName() {
   const rename = (name: string) => name && edit("Rename plan", "plan", (doc) => ({ ...doc, name }));
   return (
     <div class="plan-name">
-      <TextField
-        bare
-        label="Plan name"
-        testid="plan-name"
-        value={document_.value?.name ?? ""}
-        onChange={rename}
-      />
+      <Changes>
+        <TextField
+          bare
+          label="Plan name"
+          testid="plan-name"
+          value={document_.value?.name ?? ""}
+          onChange={rename}
+        />
+      </Changes>
       <Button
         kind="quiet"
         icon="folder"
@@ -48,22 +51,24 @@ export function UndoRedo() {
   const redoTitle = `Redo ${state?.redo_label ?? ""}`.trim();
   return (
     <div class="group undo-redo">
-      <Button
-        kind="quiet"
-        icon="undo"
-        title={`${undoTitle} (Ctrl+Z)`}
-        testid="undo"
-        disabled={!state?.can_undo && !saving.value}
-        onClick={undo}
-      />
-      <Button
-        kind="quiet"
-        icon="redo"
-        title={`${redoTitle} (Ctrl+Shift+Z)`}
-        testid="redo"
-        disabled={!state?.can_redo}
-        onClick={redo}
-      />
+      <Changes>
+        <Button
+          kind="quiet"
+          icon="undo"
+          title={`${undoTitle} (Ctrl+Z)`}
+          testid="undo"
+          disabled={!state?.can_undo && !saving.value}
+          onClick={undo}
+        />
+        <Button
+          kind="quiet"
+          icon="redo"
+          title={`${redoTitle} (Ctrl+Shift+Z)`}
+          testid="redo"
+          disabled={!state?.can_redo}
+          onClick={redo}
+        />
+      </Changes>
     </div>
   );
 }

@@ -2,7 +2,7 @@ import { withUnit } from "../format";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { theme } from "../store/prefs";
-import { isObserver, me, notInCharge } from "../store/flying";
+import { me, whyObserver } from "../store/flying";
 import { late_s } from "../store/reach";
 import { link } from "../store/state";
 import { SoundSwitch } from "./SoundSwitch";
@@ -128,14 +128,12 @@ export function StatusBar() {
       <PlanDrawerButton />
       <Brand />
       <Tabs />
-      <fieldset class="changes" disabled={isObserver.value}>
-        <PlanName />
-        <UndoRedo />
-      </fieldset>
+      <PlanName />
+      <UndoRedo />
       <span class="spring" />
       <JobList />
-      {isObserver.value && (
-        <Chip icon="eye" text="Observer" title={notInCharge.value ?? ""} testid="chip-observer" />
+      {whyObserver.value && (
+        <Chip icon="eye" text="Observer" title={whyObserver.value} testid="chip-observer" />
       )}
       <LinkBadge />
       <button

@@ -255,8 +255,7 @@ function Operator() {
       />
       {!mine && holder && (
         <span class="muted operator-holder">
-          {holder}
-          {silent ? ", silent" : ""}
+          {holder} is in charge{silent ? ", silent" : ""}
         </span>
       )}
       {waits && (

@@ -4,6 +4,7 @@ import { acknowledgeFirst } from "../obstacles/obstacle_orders";
 import { switchSound } from "./sound";
 import { openHelpPages } from "../help/HelpPages";
 import { chase } from "../scene/camera";
+import { isObserver } from "../store/flying";
 import { acknowledgeLoss, isLossCalling } from "../store/losses";
 import { seekBy, togglePlaying } from "../store/review";
 import { stepFrame } from "../studies/radar";
@@ -36,7 +37,11 @@ function stop(): void {
   else setSelection({ tool: "select" });
 }
 
+/** What would lead an observer to what they cannot do; all else that changes something does nothing for them. */
+const NOT_FOR_OBSERVERS: ReadonlySet<Hit["id"]> = new Set(["save", "open"]);
+
 function act(hit: Hit): void {
+  if (isObserver.value && NOT_FOR_OBSERVERS.has(hit.id)) return;
   switch (hit.id) {
     case "undo":
       return void undo();
@@ -65,7 +70,7 @@ function act(hit: Hit): void {
     case "view":
       return goTo(hit.view ?? "plan");
     case "acknowledge":
-      return isLossCalling.value ? acknowledgeLoss() : acknowledgeFirst();
+      return isLossCalling.value ? acknowledgeLoss() : void (isObserver.value || acknowledgeFirst());
     case "sound":
       return void switchSound(!sound.value);
     case "play":

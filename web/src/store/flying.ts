@@ -63,11 +63,14 @@ export const lease = signal<LeaseDoc>({
 /** Who this page is; unknown until the server has said it. */
 export const me = signal<MeDoc | null>(null);
 export const isObserver = computed(() => me.value?.role === "observer");
+/** Why this page changes nothing; null: it does. */
+export const whyObserver = computed(() =>
+  isObserver.value ? "You are an observer: you see everything and change nothing" : null,
+);
 /** Why this page commands nothing; null: it does. */
-export const notInCharge = computed(() => {
-  if (isObserver.value) return "You are an observer: you see everything and change nothing";
-  return lease.value.mine ? null : "You observe: take control first";
-});
+export const notInCharge = computed(
+  () => whyObserver.value ?? (lease.value.mine ? null : "You look on: take control first"),
+);
 export const nodes = signal<readonly NodeDoc[]>([]);
 export const recorder = signal<{ status: RecorderStatus; received_ms: number } | null>(null);
 

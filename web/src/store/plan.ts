@@ -1,6 +1,7 @@
 import type { PlanDoc, PlanState } from "../messages";
 import { ApiError, asErrorDoc, requestJson } from "../net/api";
 import { EditQueue, type Edit } from "./edits";
+import { isObserver } from "./flying";
 import { editedPlace, notifyText, setError, setPlan } from "./state";
 
 /** The page's one edit queue, and the requests that it leads to. */
@@ -28,6 +29,7 @@ export function edit(
   change: Edit["change"],
   options: { coalesce?: boolean } = {},
 ): void {
+  if (isObserver.value) return;
   queue.edit({ label: label.slice(0, 60), place, change, coalesce: options.coalesce ?? false });
   setError(place, null);
   editedPlace.value = place;
@@ -99,6 +101,7 @@ async function mergeStale(place: string): Promise<void> {
 
 /** A request that answers with the plan's new state: undo, open, shortest order ... */
 export async function command(path: string, place: string, body?: object): Promise<boolean> {
+  if (isObserver.value) return false;
   await allSent();
   try {
     queue.takeAnswer(await requestJson<PlanState>("POST", path, body));

@@ -10,6 +10,7 @@ import type {
 } from "../messages";
 import { asErrorDoc } from "../net/api";
 import { now_ms } from "./clock";
+import { isObserver } from "./flying";
 import { forgetMoving } from "./moving";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { order } from "./outcomes";
@@ -130,7 +131,7 @@ const ask = (body: PlayReview) => void requests.send(body).catch(report);
 export const length_s = () => review.value?.duration_s ?? 0;
 
 export function togglePlaying(): void {
-  if (!review.value) return;
+  if (!review.value || isObserver.value) return;
   const at_s = playhead(replay.value, performance.now()) ?? 0;
   const isAtEnd = at_s >= length_s() - 0.05;
   ask(isPlaying.value ? { playing: false } : { playing: true, ...(isAtEnd ? { at_s: 0 } : {}) });
@@ -144,7 +145,7 @@ let settling: ReturnType<typeof setTimeout> | undefined;
 
 /** Goes to a time; while dragging (`isOver` false) the page stays with the pointer. */
 export function seek(at_s: number, isOver = true): void {
-  if (!review.value) return;
+  if (!review.value || isObserver.value) return;
   const kept_s = Math.min(length_s(), Math.max(0, at_s));
   seeking.value = { at_s: kept_s, isOver };
   ask({ playing: isPlaying.value, at_s: kept_s });

@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import type { ClientMessage, FrameView, SelectionDoc, ViewDoc } from "../messages";
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
+import { isObserver } from "./flying";
 import { giveUpOrders } from "./outcomes";
 import { receive } from "./reduce";
 import { nextChange } from "./shared";
@@ -24,11 +25,13 @@ export const connect = () => stream.connect();
 export const send = (message: ClientMessage) => stream.send(message);
 
 export function setView(fields: Partial<ViewDoc>): void {
+  if (isObserver.value) return;
   view.value = { ...view.value, ...fields };
   send({ type: "set_view", view: view.value, change: nextChange() });
 }
 
 export function setSelection(fields: Partial<SelectionDoc>): void {
+  if (isObserver.value) return;
   selection.value = { ...selection.value, ...fields };
   send({ type: "set_selection", selection: selection.value, change: nextChange() });
 }

@@ -1,3 +1,4 @@
+import { Changes } from "../ui/Changes";
 import { useEffect, useState } from "preact/hooks";
 import { day, duration, percent } from "../format";
 import { LIMITS, type ScenarioRunDoc } from "../messages";
@@ -138,30 +139,32 @@ function Start() {
   const [now, chosen] = [running.value, chosenScenario.value];
   return (
     <footer class="primary-action">
-      {now && <Running of={now} />}
-      {chosen?.command_line_only && (
-        <p class="muted action-hint">Too long for a browser: run it on the command line</p>
-      )}
-      <NumberField
-        label="Seed of scene, noise and wind"
-        unit=""
-        value={seed}
-        {...LIMITS.RunScenario.seed}
-        step={1}
-        whole
-        testid="scenario-seed"
-        onChange={setSeed}
-      />
-      <Button
-        kind="primary"
-        class="wide"
-        icon="play"
-        disabled={!chosen || chosen.command_line_only || now !== null || pending.value.has(RUNS)}
-        testid="scenario-run"
-        onClick={() => chosen && void run(chosen.name, seed)}
-      >
-        Run {chosen?.name ?? ""}
-      </Button>
+      <Changes>
+        {now && <Running of={now} />}
+        {chosen?.command_line_only && (
+          <p class="muted action-hint">Too long for a browser: run it on the command line</p>
+        )}
+        <NumberField
+          label="Seed of scene, noise and wind"
+          unit=""
+          value={seed}
+          {...LIMITS.RunScenario.seed}
+          step={1}
+          whole
+          testid="scenario-seed"
+          onChange={setSeed}
+        />
+        <Button
+          kind="primary"
+          class="wide"
+          icon="play"
+          disabled={!chosen || chosen.command_line_only || now !== null || pending.value.has(RUNS)}
+          testid="scenario-run"
+          onClick={() => chosen && void run(chosen.name, seed)}
+        >
+          Run {chosen?.name ?? ""}
+        </Button>
+      </Changes>
     </footer>
   );
 }

@@ -1,8 +1,8 @@
 import type { ComponentChildren } from "preact";
-import { isObserver, notInCharge } from "../store/flying";
 import { computation, editedPlace, errors } from "../store/state";
 import type { ErrorDoc } from "../messages";
 import { openSections } from "../store/prefs";
+import { Changes } from "./Changes";
 import { ErrorBox, ErrorPanel } from "./Outcome";
 import { Icon, type IconName } from "./Icon";
 
@@ -53,13 +53,7 @@ export function Section({ id, title, icon, summary, startsOpen = false, isUrgent
         <div class="section-body" id={`section-${id}`}>
           <ErrorBox place={id} />
           {wrong && <ErrorPanel error={wrong} />}
-          <fieldset
-            class="changes"
-            disabled={isObserver.value}
-            title={isObserver.value ? (notInCharge.value ?? "") : undefined}
-          >
-            {children}
-          </fieldset>
+          <Changes>{children}</Changes>
         </div>
       )}
     </section>
