@@ -15,7 +15,8 @@ import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
 
 from server.schemas import AlarmDoc, AlarmsMessage, ErrorDoc
-from telemetry.link.audit import audit_key_file, open_audit
+from telemetry.link.audit import open_audit
+from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import certified, connect, enter, hold, open_demo
