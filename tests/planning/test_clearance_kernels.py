@@ -155,7 +155,7 @@ def test_the_pyramid_holds_the_maxima_and_marks_the_unknown():
     assert pyramid.maxima_m[-1] == np.inf
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 1.0, 3.0]), st.sampled_from([0, 0, 2]))
 def test_the_return_height_matches_the_oracle(seed, clearance_m, holes):
     """From everywhere on the line, not only from its places."""

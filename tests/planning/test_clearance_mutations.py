@@ -25,7 +25,7 @@ def test_no_mutation_that_brute_force_finds_unsafe_is_certified():
     assert certify(dsm, flown_line(mission, dsm), params).certified
     rng = np.random.default_rng(20260)
     certified = refused = rightly_refused = 0
-    for _ in range(500):
+    for _ in range(300):
         line = flown_line(mutated(mission, rng), dsm)
         if certify(dsm, line, params).certified:
             certified += 1
@@ -33,6 +33,6 @@ def test_no_mutation_that_brute_force_finds_unsafe_is_certified():
         else:
             refused += 1
             rightly_refused += refused <= 25 and not is_safe(cells, line, params)
-    assert certified > 110
-    assert refused > 110
+    assert certified > 66
+    assert refused > 66
     assert rightly_refused > 15

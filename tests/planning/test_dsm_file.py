@@ -94,7 +94,7 @@ def reads(files: dict[str, Path]) -> dict[str, tuple[Dsm, Read]]:
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(st.tuples(*[st.floats(0.0, 1.0)] * 4))
 def test_any_part_is_the_one_of_the_whole_model(
     reads: dict[str, tuple[Dsm, Read]], kind: str, shares: tuple[float, ...]

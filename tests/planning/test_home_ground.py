@@ -175,7 +175,7 @@ def test_a_drop_that_takes_the_last_millimetre_is_refused() -> None:
 
 def test_slopes_count_with_the_reach_of_the_position_error() -> None:
     slope = math.tan(math.radians(30.0))
-    cells = np.broadcast_to(slope * 0.5 * np.arange(100)[None, :], (100, 100)).astype(np.float32)
+    cells = np.tile(slope * 0.5 * np.arange(100), (100, 1)).astype(np.float32)
     line = line_of((25.25, 25.25, 60.0), (35.0, 25.25, 60.0))
     line = replace(line, home_alt_dsm_m=float(cells[50, 50]))
     drops_m = []

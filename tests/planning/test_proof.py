@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ HARDLY_KNOWN = ("landslide, difference",)
 @pytest.mark.parametrize("kind", GRIDS)
 def test_the_certificate_is_what_the_slow_proof_finds(tmp_path: Path, kind: str) -> None:
     prover = Prover(seeded(tmp_path, kind, 1))
-    found = [one for seed in range(4) if (one := prover.prove(seed))]
+    found = list(islice((one for seed in range(8) if (one := prover.prove(seed))), 2))
     assert found
     assert all(-MOST_UNDER_M <= one.over_m <= MOST_OVER_M for one in found)
 
