@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import subprocess
 import sys
 import time
@@ -36,10 +37,12 @@ from telemetry.agent.link_messages import (
 )
 from telemetry.errors import SensorLinkError
 from telemetry.topics.messages import Topic, VehicleText
+from tests.server.cli_runs import Run, hedgehop
 from tests.server.running import Running, running
 
 pytestmark = pytest.mark.xdist_group("sensor-link")
 PATIENCE_S = 60.0
+Driven = Callable[..., Run]
 
 
 @pytest.fixture(scope="module")
@@ -207,63 +210,64 @@ def test_the_command_sends_what_a_driver_writes(server: Running, token: str, tmp
     file = tmp_path / "token.txt"
     file.write_text(f"{token}\n")
     lines = [json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]]}) for _ in range(5)]
-    done = driven(server, file, lines, "--json")
+    command = [sys.executable, "-m", "server", "agent", server.origin, "--token-file", str(file), "--json"]
+    done = subprocess.run(
+        command, input="\n".join(lines), capture_output=True, text=True, timeout=3 * PATIENCE_S, check=False
+    )
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert (answer["sent"], answer["received"], answer["refused"]) == (5, 5, 0)
     assert len(server.flying.published) == 5
 
 
-def driven(server: Running, token_file: Path, lines: list[str], *options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "server", "agent", server.origin, "--token-file", str(token_file), *options],
-        input="\n".join(lines),
-        capture_output=True,
-        text=True,
-        timeout=3 * PATIENCE_S,
-        check=False,
-    )
-
-
-def test_a_bad_line_silences_no_sensor(server: Running, token: str, tmp_path: Path) -> None:
+@pytest.fixture
+def driven(server: Running, token: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Driven]:
+    """The command, fed with lines of a driver by a pipe."""
     file = tmp_path / "token.txt"
     file.write_text(token)
+    reads, writes = os.pipe()
+
+    def run(lines: list[str], *options: str) -> Run:
+        with open(writes, "w") as driver:
+            driver.write("\n".join(lines))
+        return hedgehop("agent", server.origin, "--token-file", file, *options)
+
+    with open(reads) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        yield run
+
+
+def test_a_bad_line_silences_no_sensor(server: Running, driven: Driven) -> None:
     good = json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]]})
     far = json.dumps({"type": "cloud", "points": [[1, 2, 3], [float("nan"), 0, 0], [500, 0, 0], [0, 0, -900]]})
-    done = driven(server, file, [good, good[:-4], "[" * 10_000, good, far, good[:-4]], "--json")
-    assert done.returncode == 0, done.stderr
-    answer = json.loads(done.stdout)
+    done = driven([good, good[:-4], "[" * 10_000, good, far, good[:-4]], "--json")
+    assert done.code == 0, done.err
+    answer = done.json
     assert (answer["received"], answer["refused"]) == (3, 0)
     assert answer["lines"]["good"] == 3
     assert answer["lines"]["reasons"] == {"no JSON": 3}
     assert (answer["points_not_finite"], answer["points_out_of_reach"]) == (1, 2)
-    assert done.stderr.count("is left out") == 1
-    assert "Line 2 is left out, no JSON: " in done.stderr
+    assert done.err.count("is left out") == 1
+    assert "Line 2 is left out, no JSON: " in done.err
     texts = [m.text for topic, m in server.flying.published if topic == Topic.TEXT and isinstance(m, VehicleText)]
     assert len(texts) == 1
     assert "driver: A bad line was left out. The last: line 2, no JSON" in texts[0]
 
 
-def test_what_was_lost_is_told_to_people(server: Running, token: str, tmp_path: Path) -> None:
-    file = tmp_path / "token.txt"
-    file.write_text(token)
+def test_what_was_lost_is_told_to_people(driven: Driven) -> None:
     many = json.dumps({"type": "radar", "targets": [[1, 40, 0, 0, 30]] * 1001})
     far = json.dumps({"type": "cloud", "points": [[1, 2, 3], [float("nan"), 0, 0], [500, 0, 0]]})
-    done = driven(server, file, [many, "{", far])
-    assert done.returncode == 0, done.stderr
-    assert "points left out of clouds: 1 without numbers, 1 beyond 164 m" in done.stderr
-    assert "refused by the ground station: 1; the last: radar: 20020 bytes are not 0 to 1000 rows" in done.stderr
-    assert "driver: good lines 2, bad ones 1 (1 no JSON); the last: line 2, no JSON" in done.stderr
+    done = driven([many, "{", far])
+    assert done.code == 0, done.err
+    assert "points left out of clouds: 1 without numbers, 1 beyond 164 m" in done.err
+    assert "refused by the ground station: 1; the last: radar: 20020 bytes are not 0 to 1000 rows" in done.err
+    assert "driver: good lines 2, bad ones 1 (1 no JSON); the last: line 2, no JSON" in done.err
 
 
-def test_a_driver_that_writes_nothing_else_than_bad_lines_is_wrong_input(
-    server: Running, token: str, tmp_path: Path
-) -> None:
-    file = tmp_path / "token.txt"
-    file.write_text(token)
-    done = driven(server, file, ["x y z", "123"], "--json")
-    assert done.returncode == 2
-    error = json.loads(done.stdout)["error"]
+def test_a_driver_that_writes_nothing_else_than_bad_lines_is_wrong_input(driven: Driven) -> None:
+    done = driven(["x y z", "123"], "--json")
+    assert done.code == 2
+    error = done.json["error"]
     assert error["where"] == "standard input"
     assert "None of the first 2 lines is a reading" in error["what"]
     assert "line 2, no JSON object" in error["what"]
