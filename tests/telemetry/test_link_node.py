@@ -21,8 +21,8 @@ from telemetry.bus import Bus
 from telemetry.bus.link_client import COMMAND_S, LinkClient
 from telemetry.bus.node_lock import running_node
 from telemetry.errors import AddressError, BusError, MissionUnknownError, NoVehicleError
-from telemetry.link.audit import audit_key_file
 from telemetry.link.audit_chain import check_chain
+from telemetry.link.keys import audit_key_file
 from telemetry.link.session import AVOIDS_AGAIN
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic, VehicleText
