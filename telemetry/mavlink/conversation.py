@@ -50,15 +50,27 @@ class BootClock:
 
 
 class RoundTrip:
-    """Learnt from the answers that came. Exponential average; only messages that were sent once may be measured."""
+    """Learnt from the answers that came. Exponential average; only messages that were sent once may be measured (Karn).
 
-    def __init__(self, *, unknown_s: float = 0.25, shortest_s: float = 0.1, longest_s: float = 1.0) -> None:
+    Until one was, it waits twice as long after each repetition: a slow radio is not filled with them, and soon there
+    is an answer to measure.
+    """
+
+    def __init__(self, *, unknown_s: float = 0.25, shortest_s: float = 0.125, longest_s: float = 1.0) -> None:
         self._unknown_s, self._shortest_s, self._longest_s = unknown_s, shortest_s, longest_s
         self._mean_s: float | None = None
 
     def measure(self, round_trip_s: float) -> None:
         before_s = round_trip_s if self._mean_s is None else self._mean_s
         self._mean_s = 0.8 * before_s + 0.2 * round_trip_s
+
+    @property
+    def mean_s(self) -> float | None:
+        return self._mean_s
+
+    def repeats(self) -> None:
+        """Something is sent again."""
+        self._unknown_s = min(2 * self._unknown_s, self._longest_s)
 
     @property
     def patience_s(self) -> float:

@@ -12,8 +12,9 @@ from telemetry.mavlink.items import item_from_message
 from telemetry.mavlink.verify import digest
 from telemetry.topics.messages import Item, OnboardMission
 
-LIST_EVERY_S = 0.4
-BEGIN_AGAIN_S = 4.0
+LIST_EVERY_S = 0.25
+BEGIN_AGAIN_S = (3.0, 8.0)
+BEGIN_AGAIN_TRIES = 12
 """PX4 ends a reading that displeases it, and then answers no request any more."""
 SILENT_S = 15.0
 REFUSED_S = 10.0
@@ -84,16 +85,25 @@ class MissionDownload:
             return self._fail(self._endless())
         if self._count is None:
             return self._ask_for_list(now_s) if now_s - self._list_s >= LIST_EVERY_S else []
-        if now_s - self._moved_s >= BEGIN_AGAIN_S:
-            self._forget()
-            self._window = WINDOW if self._firmware == "ardupilot" else 1
-            return self._ask_for_list(now_s)
+        if now_s - self._moved_s >= self._begin_again_s:
+            return self._begin_again(WINDOW if self._firmware == "ardupilot" else 1, now_s)
         lost = [seq for seq, at_s in self._asked_s.items() if now_s - at_s >= self._round_trip.patience_s]
         return self._lost(lost, now_s) if lost else []
 
     def cancel(self, now_s: float) -> list[Action]:
         error = TransferError("Reading the mission was cancelled.", advice="Read it again before the start.")
         return [] if self._over else [self._ack(CANCELLED), *self._fail(error)]
+
+    @property
+    def _begin_again_s(self) -> float:
+        shortest_s, longest_s = BEGIN_AGAIN_S
+        return min(max(BEGIN_AGAIN_TRIES * self._round_trip.patience_s, shortest_s), longest_s)
+
+    def _begin_again(self, window: int, now_s: float) -> list[Action]:
+        """The link may have become slower than was learnt: repetitions that come late are what PX4 dislikes."""
+        self._forget()
+        self._window, self._round_trip = window, RoundTrip()
+        return self._ask_for_list(now_s)
 
     def _ask_for_list(self, now_s: float) -> list[Action]:
         self._list_s = now_s
@@ -133,6 +143,7 @@ class MissionDownload:
     def _lost(self, lost: list[int], now_s: float) -> list[Action]:
         """ArduPilot: ask for what is missing, in any order. Others: from the gap on, one at a time from now on."""
         self._asked_again.update(lost)
+        self._round_trip.repeats()
         if self._firmware == "ardupilot":
             return [self._request(seq, now_s) for seq in lost]
         gap, self._window = min(lost), 1
@@ -155,8 +166,7 @@ class MissionDownload:
                 )
             )
         if self._count is not None:
-            self._forget()
-            self._window, self._list_s = 1, now_s
+            return self._begin_again(1, now_s)
         return []
 
     def _finish(self) -> list[Action]:

@@ -59,7 +59,7 @@ class MissionSending:
         """Something was lost or came twice in this attempt."""
         self._words = VehicleWords()
         self._phase: Literal["count", "items", "complete"] = "count"
-        self._round_trip, self._in_pairs = RoundTrip(), firmware == "ardupilot"
+        self._round_trip, self._in_pairs, self._is_px4 = RoundTrip(), True, firmware == "px4"
         self._attempts = 0
         self._seq = self._asked = self._highest_sent = self._furthest = -1
         self._refusal: tuple[Refusal, float] | None = None
@@ -124,7 +124,7 @@ class MissionSending:
         return self._on_tick_of_items(now_s)
 
     def _on_tick_of_items(self, now_s: float) -> list[Action]:
-        if self._is_last and now_s - self._moved_s >= LAST_ACK_S:
+        if self._highest_sent == len(self._rows) - 1 and now_s - self._moved_s >= LAST_ACK_S:
             return self._complete()
         if now_s - self._heard_s >= BEGIN_AGAIN_S and self._seq >= 0:
             return self._ask_anew(now_s)
@@ -140,8 +140,9 @@ class MissionSending:
         return actions
 
     def _resend(self, now_s: float) -> list[Action]:
-        """Either the item or the request for the next one was lost. ArduPilot takes the next one without asking."""
+        """Either the item or the request for the next one was lost. Vehicles take the next one without asking."""
         self.disturbed = True
+        self._round_trip.repeats()
         more = self._send_row(self._seq + 1, now_s) if self._in_pairs and not self._is_last else []
         return [*self._send_row(self._seq, now_s), *more]
 
@@ -173,14 +174,24 @@ class MissionSending:
             return []
         if self._phase != "items":
             self._phase, self._moved_s = "items", now_s
-        elif seq == self._seq + 1 and self._moved_s == self._sent_s:
-            self._round_trip.measure(now_s - self._sent_s)
+        elif seq == self._seq and self._is_on_its_way(now_s):
+            return []
+        elif seq == self._seq + 1 and (self._moved_s == self._sent_s or self._round_trip.mean_s is None):
+            self._round_trip.measure(now_s - self._moved_s)
         self.disturbed |= seq != self._seq + 1
         if not self._is_late(seq) and seq != self._seq:
             self._seq, self._moved_s = seq, now_s
             self._furthest = max(seq, self._furthest)
         self._asked = seq
-        return [Progress("sending", max(seq - self.rows_before, 0), len(self._items)), *self._send_row(seq, now_s)]
+        # PX4 passes over an item that it does not want yet, and takes it without asking if it does.
+        ahead = self._is_px4 and self._in_pairs and self.disturbed and seq + 1 < len(self._rows)
+        more = self._send_row(seq + 1, now_s) if ahead else []
+        progress = Progress("sending", max(seq - self.rows_before, 0), len(self._items))
+        return [progress, *self._send_row(seq, now_s), *more]
+
+    def _is_on_its_way(self, now_s: float) -> bool:
+        """PX4 asks again after a quarter of a second, also where the way there and back takes longer."""
+        return now_s - self._sent_s < (self._round_trip.mean_s or 0.0)
 
     def _is_late(self, seq: int) -> bool:
         """An old request that came the long way; one that begins again goes on asking."""

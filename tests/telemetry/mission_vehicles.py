@@ -185,14 +185,19 @@ class Px4:
         if message.count > self.capacity:
             return [ack(sender(message), NO_SPACE)]
         self.state, self.partner, self.count, self.arriving = "receiving", sender(message), message.count, []
-        self.heard_s = now_s
+        self.heard_s, self.expected = now_s, 0
         return self._request(now_s)
 
     def _on_mission_item_int(self, message: Any, now_s: float) -> list[Any]:
-        if self.state != "receiving" or message.seq != len(self.arriving):
+        if self.state == "idle":  # the last item once more, it assumes, also where it had given up before the end
+            return [ack(sender(message), ACCEPTED if message.seq + 1 == self.expected else ERROR)]
+        if self.state == "sending":
+            return [ack(sender(message), ERROR)]
+        if message.seq != len(self.arriving):
             return []
         self.heard_s = now_s
         self.arriving.append(message)
+        self.expected = len(self.arriving)
         if len(self.arriving) < self.count:
             return self._request(now_s)
         self.stored, self.state, self.completed = self.arriving, "idle", self.completed + 1
