@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
 import pytest
@@ -56,18 +56,28 @@ class Board:
         return await self.until(job_id, lambda job: job.state != "running")
 
 
-def run(use: Callable[[Board], Awaitable[None]], *, kept_after_end_s: float = 60.0) -> None:
-    async def whole() -> None:
-        lane = Lane("test")
-        async with asyncio.TaskGroup() as group:
-            background = Background(group)
-            try:
-                await use(Board(lane, background, kept_after_end_s))
-            finally:
-                background.stop()
-                await lane.close()
+Run = Callable[..., None]
 
-    asyncio.run(whole())
+
+@pytest.fixture(scope="module")
+def run() -> Iterator[Run]:
+    """Runs with one lane for all: a worker takes seconds to start."""
+    with asyncio.Runner() as runner:
+        lane = Lane("test")
+
+        def run(use: Callable[[Board], Awaitable[None]], *, kept_after_end_s: float = 60.0) -> None:
+            async def whole() -> None:
+                async with asyncio.TaskGroup() as group:
+                    background = Background(group)
+                    try:
+                        await use(Board(lane, background, kept_after_end_s))
+                    finally:
+                        background.stop()
+
+            runner.run(whole())
+
+        yield run
+        runner.run(lane.close())
 
 
 async def sleeping(lane: Lane, progress: Progress) -> None:
@@ -78,7 +88,7 @@ async def nothing(lane: Lane, progress: Progress) -> None:
     progress("Working", 0.25)
 
 
-def test_progress_and_the_end_are_told() -> None:
+def test_progress_and_the_end_are_told(run: Run) -> None:
     async def use(board: Board) -> None:
         job_id = board.start("a", nothing)
         done = await board.ended(job_id)
@@ -89,7 +99,7 @@ def test_progress_and_the_end_are_told() -> None:
     run(use)
 
 
-def test_errors_are_told_and_the_next_job_runs() -> None:
+def test_errors_are_told_and_the_next_job_runs(run: Run) -> None:
     async def defect(lane: Lane, progress: Progress) -> None:
         raise ZeroDivisionError("a secret detail")
 
@@ -107,7 +117,7 @@ def test_errors_are_told_and_the_next_job_runs() -> None:
     run(use)
 
 
-def test_running_and_waiting_jobs_are_cancelled() -> None:
+def test_running_and_waiting_jobs_are_cancelled(run: Run) -> None:
     async def use(board: Board) -> None:
         first, second, third = (board.start(name, sleeping) for name in "abc")
         await board.until(first, lambda job: job.step == "asleep")
@@ -126,7 +136,7 @@ def test_running_and_waiting_jobs_are_cancelled() -> None:
     run(use)
 
 
-def test_ended_jobs_leave_the_board() -> None:
+def test_ended_jobs_leave_the_board(run: Run) -> None:
     async def use(board: Board) -> None:
         job_id = board.start("a", nothing)
         await board.ended(job_id)
@@ -139,7 +149,7 @@ def test_ended_jobs_leave_the_board() -> None:
     run(use, kept_after_end_s=0.0)
 
 
-def test_too_many_waiting_jobs_are_refused() -> None:
+def test_too_many_waiting_jobs_are_refused(run: Run) -> None:
     async def use(board: Board) -> None:
         jobs = [board.start(str(number), sleeping) for number in range(WAITING_MAX)]
         with pytest.raises(BusyError):
@@ -152,7 +162,7 @@ def test_too_many_waiting_jobs_are_refused() -> None:
     run(use)
 
 
-def test_an_awaited_job_returns_or_raises() -> None:
+def test_an_awaited_job_returns_or_raises(run: Run) -> None:
     async def answer(lane: Lane, progress: Progress) -> int:
         return 42
 
