@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
+import shutil
+import stat
 import sys
 from collections import OrderedDict
+from typing import TextIO
+
+MOST_BYTES = 20 * 1024**2
+"""Of a log that somebody keeps in a file; as much again of what was before."""
 
 
 class OneLineFormatter(logging.Formatter):
@@ -41,12 +49,39 @@ class Repeats(logging.Filter):
         return counted[1] <= self._most
 
 
+class LimitedStderr(logging.StreamHandler[TextIO]):
+    """Standard error. A file that it was led to is begun anew when it is full; what was in it stands in ``NAME.1``."""
+
+    def __init__(self, stream: TextIO, *, most_bytes: int = MOST_BYTES) -> None:
+        super().__init__(stream)
+        self._most_bytes = most_bytes
+
+    def emit(self, record: logging.LogRecord) -> None:
+        super().emit(record)
+        with contextlib.suppress(OSError, ValueError):  # a terminal, a pipe, no file at all
+            number = self.stream.fileno()
+            about = os.fstat(number)
+            if stat.S_ISREG(about.st_mode) and about.st_size > self._most_bytes:
+                _begin_anew(number)
+
+
+def _begin_anew(number: int) -> None:
+    """Other processes write to the same file: it is emptied, not replaced."""
+    with contextlib.suppress(OSError):  # on a full disk, or where the file has no name any more, what was in it goes
+        name = os.readlink(f"/proc/self/fd/{number}")
+        flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
+        with open(name, "rb") as old, open(os.open(f"{name}.1", flags, 0o600), "wb") as kept:
+            shutil.copyfileobj(old, kept)
+    os.ftruncate(number, 0)
+    os.lseek(number, 0, os.SEEK_SET)  # else what follows would stand behind a hole as long as the old file
+
+
 def one_line(text: str) -> str:
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
 
 
 def configure_logging(level: str) -> None:
-    handler = logging.StreamHandler(sys.stderr)
+    handler = LimitedStderr(sys.stderr)
     handler.setFormatter(OneLineFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     handler.addFilter(Repeats())
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
