@@ -135,7 +135,7 @@ async def _lifespan(
         stack.callback(background.stop)
         await asyncio.to_thread(_complete_routes, app)
         try:
-            parts = await _open(settings, library, make_workspace, open_flying, background, stack, demo)
+            parts = await _open(settings, library, make_workspace, open_flying, background, stack, demo, tls)
         except DescribedError as error:
             app.state.start_error = error
             raise
@@ -177,6 +177,7 @@ async def _open(
     background: Background,
     stack: AsyncExitStack,
     demo: bool,
+    tls: Tls | None,
 ) -> Parts:
     """Opens everything in order; ``stack`` closes it in reverse, also when a later step fails."""
     auth = await asyncio.to_thread(
@@ -204,7 +205,11 @@ async def _open(
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
     alarms = Alarms(hub)
     audit = AuditWatch(library.root, workspace.board, alarms)
-    return Parts(settings, auth, hub, library, host, workspace, flying, radar, scenarios, LoopLag(), alarms, audit)
+    trust_port = settings.trust_port if tls is not None and tls.offer(settings) else None
+    lag = LoopLag()
+    return Parts(
+        settings, auth, hub, library, host, workspace, flying, radar, scenarios, lag, alarms, audit, trust_port
+    )
 
 
 def _tell_of_disk(parts: Parts, full: ErrorDoc | None) -> None:

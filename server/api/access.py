@@ -49,6 +49,8 @@ class Parts:
     loop_lag: LoopLag
     alarms: Alarms
     audit: AuditWatch
+    trust_port: int | None
+    """Where a device comes to trust our certificate; None: it has not to."""
 
 
 def parts_of(connection: HTTPConnection) -> Parts:

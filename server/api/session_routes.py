@@ -74,8 +74,16 @@ async def sign_out(who: Who, request: Request) -> Response:
 
 
 def sign_in_page(request: Request, message: str, status_code: int) -> Response:
-    page = render("signin.html", message=message, has_password=parts_of(request).auth.has_password)
+    parts = parts_of(request)
+    trust_page = None if parts.trust_port is None else f"http://{_host(request)}:{parts.trust_port}/"
+    page = render("signin.html", message=message, has_password=parts.auth.has_password, trust_page=trust_page)
     return HTMLResponse(page, status_code, {"content-security-policy": inline_policy(page)})
+
+
+def _host(request: Request) -> str:
+    """Under which the page was found: there the other one is found, too."""
+    host = request.url.hostname or ""
+    return f"[{host}]" if ":" in host else host
 
 
 @lru_cache(maxsize=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import ipaddress
 import json
@@ -14,7 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import httpx
@@ -24,10 +25,12 @@ from websockets.sync.client import connect
 
 from server.app import AnnouncingServer
 from server.door import certificates, tls
+from server.door.alarms import Alarms
 from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
 from server.door.tls import Tls
 from server.errors import CertificateError, StartError
 from server.scene.host import SUBPROTOCOL
+from server.schemas import AlarmsMessage, ServerMessage
 from server.settings import Settings
 from tests.server.test_process import free_port
 
@@ -203,6 +206,42 @@ def test_the_link_is_https_and_signs_in_who_trusts_the_authority(
     assert "loop" in health
     with pytest.raises(httpx.ConnectError, match="self-signed certificate"):
         httpx.get(f"{station.origin}/api/health")
+
+
+def test_who_signs_in_is_led_to_where_a_device_comes_to_trust_it(station: Secure, client: httpx.Client) -> None:
+    page = client.get("/signin").text
+    host = station.origin.removeprefix("https://").rpartition(":")[0]
+    port = station.trust_page.rstrip("/").rpartition(":")[2]
+    assert f'href="http://{host}:{port}/"' in page
+
+
+def test_a_renewal_that_fails_is_an_alarm_until_it_succeeds(
+    files: CertificateFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[list[str]] = []
+
+    class Pages:
+        def publish(self, message: ServerMessage) -> None:
+            assert isinstance(message, AlarmsMessage)
+            told.append([alarm.error.what for alarm in message.alarms])
+
+    async def whole() -> None:
+        faults = iter([CertificateError("The clock is wrong."), CertificateError("The clock is wrong."), None])
+
+        def renew(now: datetime) -> bool:
+            if fault := next(faults, None):
+                raise fault
+            return False
+
+        monkeypatch.setattr(files, "renew", renew)
+        monkeypatch.setattr(tls, "LOOK_EVERY_S", 0.01)
+        running = asyncio.create_task(Tls(files.server, None, own=files).run(Alarms(Pages())))
+        while len(told) < 2:
+            await asyncio.sleep(0.01)
+        running.cancel()
+
+    asyncio.run(asyncio.wait_for(whole(), 30))
+    assert told == [["The console's certificate could not be renewed. The clock is wrong."], []]
 
 
 def test_the_stream_rides_on_it_and_other_origins_do_not(station: Secure, cookie: str) -> None:
