@@ -45,8 +45,12 @@ function SessionRow({ session }: { session: SessionDoc }) {
   );
 }
 
-const wayIn = (account: AccountDoc) =>
-  account.has_password ? "password" : account.invited_until_utc_s ? "invited" : "no way in: make a link";
+function wayIn({ name, has_password, invited_until_utc_s }: AccountDoc): string {
+  if (has_password) return "password";
+  if (invited_until_utc_s) return "invited";
+  const isIn = sessions.value.some((session) => session.name === name);
+  return isIn ? "signed in, without a password" : "no way in: make a link";
+}
 
 function AccountRow({ account }: { account: AccountDoc }) {
   return (
@@ -74,7 +78,7 @@ function NewAccount() {
     if (await addAccount(name, role)) setName("");
   };
   return (
-    <div class="row">
+    <div class="row wrap new-account">
       <input
         aria-label="Name"
         placeholder="Name"
@@ -104,7 +108,7 @@ function Invitation() {
   const made = invitation.value;
   if (!made) return null;
   return (
-    <p data-testid="invitation">
+    <p class="invitation" data-testid="invitation">
       This link signs {made.name} in once, until {when(made.expires_utc_s)}:
       <br />
       <code>{made.link}</code>
@@ -115,7 +119,7 @@ function Invitation() {
 function OwnPassword() {
   const [password, setPassword] = useState("");
   return (
-    <div class="row">
+    <div class="row wrap new-account">
       <input
         type="password"
         aria-label="New password"
@@ -141,7 +145,7 @@ function ForOperators() {
   return (
     <>
       <h3>Accounts</h3>
-      <table>
+      <table class="people">
         <tbody>
           {accounts.value.map((account) => (
             <AccountRow key={account.name} account={account} />
@@ -151,7 +155,7 @@ function ForOperators() {
       <NewAccount />
       <Invitation />
       <h3>Sessions</h3>
-      <table>
+      <table class="people">
         <tbody>
           {sessions.value.map((session) => (
             <SessionRow key={session.id} session={session} />

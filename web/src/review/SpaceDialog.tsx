@@ -42,9 +42,11 @@ function Row({ recording }: { recording: RecordingDoc }) {
   };
   return (
     <tr data-testid="space-row">
-      <th scope="row">{recording.started_utc ? day(recording.started_utc) : recording.name}</th>
-      <td>{recording.plan_name || recording.name}</td>
-      <td class="number">{recording.duration_s === null ? "" : duration(recording.duration_s)}</td>
+      <th scope="row">
+        {recording.started_utc ? day(recording.started_utc) : "date unknown"}
+        <span class="muted name">{recording.plan_name || recording.name}</span>
+      </th>
+      <td class="number optional">{recording.duration_s === null ? "" : duration(recording.duration_s)}</td>
       <td class="number">{bytes(recording.bytes)}</td>
       <td class="actions">
         <Changes>
@@ -99,12 +101,13 @@ export function SpaceDialog() {
         <p>No recording is left to be deleted: remove other files from the disk of the data directory.</p>
       ) : (
         <div class="table-scroll" tabIndex={0}>
-          <table class="plans">
+          <table class="plans space">
             <thead>
               <tr>
                 <Head by="date" label="Date" />
-                <th scope="col">Flight</th>
-                <th scope="col">Length</th>
+                <th scope="col" class="optional">
+                  Length
+                </th>
                 <Head by="size" label="Size" />
                 <th>
                   <span class="visually-hidden">Actions</span>
