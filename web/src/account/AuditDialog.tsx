@@ -55,7 +55,7 @@ function Newest({ entries }: { entries: readonly AuditEntryDoc[] }) {
   if (entries.length === 0) return null;
   return (
     <div class="table-scroll" tabIndex={0}>
-      <table class="plans">
+      <table class="people">
         <caption class="visually-hidden">Newest entries first</caption>
         <thead>
           <tr>
