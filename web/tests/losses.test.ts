@@ -2,6 +2,7 @@ import { beforeEach, describe, expect, it, vi } from "vitest";
 import { now_ms } from "../src/store/clock";
 import { lease, linkStatus, nodes, takeFlying } from "../src/store/flying";
 import { acknowledgeLoss, isLossCalling, loss } from "../src/store/losses";
+import { forgetClock, takeClock } from "../src/store/server_clock";
 import { link } from "../src/store/state";
 import { linkStatus as status, vehicleMessage, vehicleState } from "./flight_samples";
 
@@ -26,6 +27,18 @@ describe("a loss in flight", () => {
     expect(loss.value).toBe("link");
     link.value = "silent";
     expect(loss.value).toBe("server");
+  });
+
+  it("is of a line over which the vehicle is shown where it was seconds ago", () => {
+    takeClock({ v: 1, type: "clock", page_ms: 0, now_mono_s: 100.2 }, 10);
+    takeFlying(vehicleMessage({ now_mono_s: 102.2 }), 6500);
+    expect(loss.value).toBe("slow");
+    expect(isLossCalling.value).toBe(true);
+    acknowledgeLoss();
+    expect(isLossCalling.value).toBe(false);
+    link.value = "silent";
+    expect(isLossCalling.value).toBe(true);
+    forgetClock();
   });
 
   it("calls until it was seen, and anew when it is another or comes again", () => {
