@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from server.door.connections import limited_protocol, raise_file_limit, usual_connections
+from server.door.handshake import behind_tls
 from server.door.slow_lines import PageWebSocket
 from server.door.tls import Tls
 from server.errors import ServerError, StartError
@@ -110,18 +111,19 @@ def origin_file(settings: Settings) -> Path:
 
 
 def server_config(app: FastAPI, settings: Settings, tls: Tls | None = None) -> uvicorn.Config:
+    connections = usual_connections()
+    protocol = limited_protocol(connections)
     return uvicorn.Config(
         app,
         host=settings.host,
         port=settings.port,
-        ssl_context_factory=None if tls is None else lambda config, default: tls.context,
         log_config=None,
         # The guard writes one line per request, without the queries that hold sign-in tokens.
         access_log=False,
         server_header=False,
         # Meshes deflate slowly and little: a 36 MB one took 2.2 s with, 0.3 s without.
         ws_per_message_deflate=False,
-        http=limited_protocol(usual_connections()),
+        http=protocol if tls is None else behind_tls(protocol, tls.context, connections),
         ws=PageWebSocket,
         ws_max_size=WEBSOCKET_LIMIT_BYTES,
         timeout_graceful_shutdown=SHUTDOWN_S,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import ipaddress
 import json
 import os
 import re
+import socket
 import ssl
 import stat
 import subprocess
@@ -17,6 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any, cast
 
 import httpx
 import pytest
@@ -27,6 +30,8 @@ from server.app import AnnouncingServer
 from server.door import certificates, tls
 from server.door.alarms import Alarms
 from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
+from server.door.connections import FROM_ONE_PLACE_MAX, Connections
+from server.door.handshake import behind_tls
 from server.door.tls import Tls
 from server.errors import CertificateError, StartError
 from server.scene.host import SUBPROTOCOL
@@ -281,6 +286,70 @@ def test_old_versions_and_plain_text_are_refused(station: Secure) -> None:
     ):
         with pytest.raises(httpx.TransportError):
             attempt()
+
+
+def test_strangers_who_never_shake_hands_give_way(station: Secure, client: httpx.Client) -> None:
+    port = int(station.origin.rpartition(":")[2])
+    with contextlib.ExitStack() as held:
+        strangers = [
+            held.enter_context(socket.create_connection(("127.0.0.1", port), 30.0))
+            for _ in range(FROM_ONE_PLACE_MAX + 8)
+        ]
+        assert client.get("/api/health").status_code == 200
+        assert strangers[0].recv(1) == b""
+
+
+def test_one_who_dawdles_over_the_handshake_is_cut_off_and_one_who_asks_at_once_is_answered(
+    files: CertificateFiles, tmp_path: Path
+) -> None:
+    """The request may come in the same packet as the handshake's end, before anybody is there to read it."""
+
+    async def whole() -> None:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        files.renew(now_utc())
+        context.load_cert_chain(files.server)
+        made = behind_tls(cast(Any, Echo), context, Connections(4, 4), handshake_s=1.0)
+        server = await asyncio.get_running_loop().create_server(made, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        reader, dawdling = await asyncio.open_connection("127.0.0.1", port)
+        async with asyncio.timeout(20):
+            with contextlib.suppress(ConnectionResetError):
+                assert await reader.read() == b""
+        dawdling.close()
+        trusting = ssl.create_default_context(cafile=files.authority)
+        incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        client = trusting.wrap_bio(incoming, outgoing, server_hostname="localhost")
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        async with asyncio.timeout(20):
+            while True:
+                try:
+                    client.do_handshake()
+                    break
+                except ssl.SSLWantReadError:
+                    writer.write(outgoing.read())
+                    incoming.write(await reader.read(65536))
+            client.write(b"at once")
+            writer.write(outgoing.read())
+            while True:
+                try:
+                    assert client.read() == b"at once"
+                    break
+                except ssl.SSLWantReadError:
+                    incoming.write(await reader.read(65536))
+        writer.close()
+        await writer.wait_closed()
+        server.close()
+        await server.wait_closed()
+
+    asyncio.run(whole())
+
+
+class Echo(asyncio.Protocol):
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+
+    def data_received(self, data: bytes) -> None:
+        self._transport.write(data)
 
 
 def test_a_tablet_gets_the_authority_and_nothing_else(station: Secure) -> None:
