@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 
 from tests.trust.attempts import attempt_rows
+from tests.trust.growth import growth_row
 from tests.trust.link import link_rows
 from tests.trust.missions import missions_row
 from tests.trust.rows import Row
@@ -18,6 +19,7 @@ def main() -> int:
     parser.add_argument("--uploads", type=int, default=50, help="for each kind of vehicle (R1, R3)")
     parser.add_argument("--cuts", type=int, default=500, help="for each kind of vehicle (R2)")
     parser.add_argument("--frames", type=int, default=1_000_000, help="hostile datagrams (R7)")
+    parser.add_argument("--hours", type=float, default=2.0, help="of flight on a virtual clock (R15)")
     options = parser.parse_args()
     started_s = time.perf_counter()
     rows = []
@@ -33,6 +35,7 @@ def main() -> int:
 def _rows(options: argparse.Namespace) -> Iterator[Row]:
     yield from link_rows(uploads=options.uploads, cuts=options.cuts, commands=200, frames=options.frames)
     yield missions_row(options.mutations)
+    yield growth_row(options.hours)
     yield from attempt_rows()
 
 

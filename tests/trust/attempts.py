@@ -60,7 +60,6 @@ HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 NOT_MEASURED = (
     Row("R14", "50 browsers: none later than one alone, by more than twice", "not measured", "needs a quiet machine"),
-    Row("R15", "No growth in 24 simulated hours", "not measured", "no accelerated flight of that length is run"),
 )
 
 

@@ -9,6 +9,7 @@ import pytest
 from tests.conftest import ROOT
 from tests.telemetry.mission_vehicles import ArduCopter
 from tests.trust import attempts, link
+from tests.trust.growth import LongFlight, growth_row
 from tests.trust.missions import missions_row
 
 
@@ -34,6 +35,23 @@ def test_a_vehicle_that_stores_something_else_fails_its_row() -> None:
 def test_a_check_that_passes_what_is_unsafe_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.trust.missions.is_safe", lambda *_: False)
     assert missions_row(5).verdict == "FAILS"
+
+
+def test_a_short_flight_grows_by_nothing() -> None:
+    assert growth_row(0.02).verdict == "holds"
+
+
+def test_a_link_that_keeps_every_state_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept: list[object] = []
+    publish = LongFlight.publish
+
+    def keeps(self: LongFlight, topic: str, message: Any) -> None:
+        kept.append([topic])
+        publish(self, topic, message)
+
+    monkeypatch.setattr(LongFlight, "publish", keeps)
+    monkeypatch.setattr("tests.trust.growth.MOST_OBJECTS", 100)
+    assert growth_row(0.02).verdict == "FAILS"
 
 
 def test_every_file_of_the_table_is_there_and_one_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
