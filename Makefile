@@ -6,6 +6,7 @@ WORKERS ?= 2
 PYTEST_ARGS ?=
 LOCK_ARGS ?=
 TRUST_ARGS ?=
+SOAK_ARGS ?=
 
 STAMPS := .venv/.stamps
 VENV_PYTHON := .venv/bin/python
@@ -30,7 +31,7 @@ else \
 fi
 endef
 
-.PHONY: help setup demo test check docs screenshots coverage bench proof trust wheel lock clean
+.PHONY: help setup demo test check docs screenshots coverage bench proof trust soak wheel lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -76,6 +77,9 @@ proof: $(STAMPS)/test ## prove the certificates of over 200 missions by a slow i
 
 trust: $(STAMPS)/test $(STAMPS)/kernels ## try the promises of docs/security.md, print which hold (TRUST_ARGS=--help)
 	@$(VENV_PYTHON) -m tests.trust $(TRUST_ARGS)
+
+soak: $(STAMPS)/test web/dist/index.html $(STAMPS)/kernels ## fly, and kill, stop and starve processes meanwhile (SOAK_ARGS=--help)
+	@$(VENV_PYTHON) -m tests.soak $(SOAK_ARGS)
 
 wheel: $(STAMPS)/project web/dist/index.html ## build one wheel with the console inside, for machines without a checkout
 	$(call step,The wheel,rm -f dist/hedgehop-*.whl && $(VENV_PYTHON) -m pip wheel --disable-pip-version-check \
