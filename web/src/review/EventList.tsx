@@ -57,13 +57,13 @@ export function EventList({ review }: { review: ReviewDoc }) {
       {review.events.length === 0 ? (
         <p class="muted">None were recorded.</p>
       ) : (
-        <ol>
-          <Changes>
+        <Changes>
+          <ol>
             {review.events.map((event, index) => (
               <Row key={`${event.t_s} ${index}`} event={event} isNow={index === now} />
             ))}
-          </Changes>
-        </ol>
+          </ol>
+        </Changes>
       )}
     </section>
   );
