@@ -58,9 +58,6 @@ HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("S14", "The bus is the user's alone", (f"{T}test_bus_sockets.py",)),
     ("S15", "Names in files are text wherever they are shown", ("tests/planning/test_formats_safe_text.py",)),
 )
-NOT_MEASURED = (
-    Row("R14", "50 browsers: none later than one alone, by more than twice", "not measured", "needs a quiet machine"),
-)
 
 
 def attempt_rows() -> Iterator[Row]:
@@ -71,7 +68,6 @@ def attempt_rows() -> Iterator[Row]:
         figure = f"{passed} tests passed" + (f", {failed} failed" if failed else "")
         figure += f", {skipped} skipped: what they try was not tried" if skipped else ""
         yield Row(name, promise, judged(passed > 0 and not failed), figure, f"pytest {' '.join(files)}")
-    yield from NOT_MEASURED
 
 
 def _results(files: list[str]) -> dict[str, tuple[int, int, int]]:

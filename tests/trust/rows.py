@@ -6,12 +6,12 @@ import textwrap
 from dataclasses import dataclass
 from typing import Literal
 
-Verdict = Literal["holds", "FAILS", "not measured"]
+Verdict = Literal["holds", "FAILS"]
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """``by``: the command that tries it again; empty where there is none."""
+    """``by``: the command that tries it again."""
 
     name: str
     promise: str
@@ -20,9 +20,9 @@ class Row:
     by: str = ""
 
     def __str__(self) -> str:
-        words = f"{self.name:<4}{self.verdict:<14}{self.promise}"
+        words = f"{self.name:<4}{self.verdict:<7}{self.promise}"
         rest = [self.figure, self.by and f"by {self.by}"]
-        return "\n".join([words, *(textwrap.indent(line, " " * 18) for line in rest if line)])
+        return "\n".join([words, *(textwrap.indent(line, " " * 11) for line in rest if line)])
 
 
 def judged(held: bool) -> Verdict:
