@@ -20,9 +20,9 @@ settings.load_profile("patient")
 
 LONGEST_ID = 80
 
-LONG_GROUPS = ("real-time", "browser", "process")
+LONG_GROUPS = ("real-time", "process")
 """In their order. The first has all that must keep up with the clock, so that no two of its tests do beside each other:
-flights with sensors, and what a page says of a vehicle that is heard just now."""
+flights with sensors, and pages in a browser."""
 
 ROOT = Path(__file__).resolve().parent.parent
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")

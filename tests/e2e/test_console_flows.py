@@ -16,7 +16,7 @@ from playwright.sync_api import Page, expect
 from tests.e2e.stations import Station
 from tests.e2e.steps import certified, choose, drawn, open_demo, visit, wait_until
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 MOVE_HANDLE_RGB = (51, 145, 238)
 """viser's handle for moving in the plane, a square beside the selected point."""

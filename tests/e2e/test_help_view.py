@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from tests.e2e.stations import Station
 from tests.e2e.steps import visit
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 def test_help_is_read_beside_the_console(station: Station, page: Page) -> None:

@@ -15,7 +15,7 @@ from planning.formats.detect import read_mission
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, visit, wait_until
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 def test_plan_on_a_real_model_from_sign_in_to_export(

@@ -17,7 +17,7 @@ from tests.server.test_cli_radar import echo
 from tests.telemetry.test_adc_files import dca1000_bytes
 from tests.telemetry.test_ti_config import GOOD, config
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 FRAMES = 12
 

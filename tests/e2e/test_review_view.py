@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, play, visit
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from tests.e2e.steps import certified, connect, enter, hold, open_demo
 from tests.server.station import ok
 from tests.telemetry.frames import heartbeat, packed
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 ENTRANCES = "button, input, select, textarea, summary"
 

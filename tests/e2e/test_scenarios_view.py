@@ -13,7 +13,7 @@ from tests.e2e.stations import Station
 from tests.e2e.steps import LONG_MS, visit
 from tests.server.test_scenario_runs import PART
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 QUICKEST = "corner-reflector"
 PATIENCE_MS = 3 * LONG_MS

@@ -8,7 +8,7 @@ from playwright.sync_api import Frame, Page
 from tests.e2e.stations import Station
 from tests.e2e.steps import drawn, open_demo
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 SIZES = ((1440, 900), (1180, 820), (1100, 768), (1024, 768), (820, 1180), (390, 844))
 NARROW_PX = 576

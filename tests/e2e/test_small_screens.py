@@ -15,7 +15,7 @@ from tests.e2e.stations import Station
 from tests.e2e.steps import visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 QUAD = Candidate("q", "udpin:127.0.0.1:14550", "127.0.0.1:14551", 1, 1, "ardupilot", 2)
 WAYS = (

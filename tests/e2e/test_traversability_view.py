@@ -15,7 +15,7 @@ from server.door.sensor_token import sensor_token
 from tests.e2e.stations import Station
 from tests.e2e.steps import choose, drawn, open_demo
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 TIFF = (b"II*\x00", b"II+\x00")
 

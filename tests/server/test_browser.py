@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.server.running import PASSWORD, Running, running
 
-pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 CONSOLE = """<!doctype html><title>Console</title><link rel="icon" href="data:,">
 <iframe id="view" width="600" height="400"></iframe><script type="module" src="/assets/main.js"></script>"""

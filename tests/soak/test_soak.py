@@ -63,7 +63,7 @@ def test_faults_follow_from_their_seed() -> None:
     assert {fault.how for fault in first} == {"kill", "stop", "pause", "starve"}
 
 
-@pytest.mark.xdist_group("process")
+@pytest.mark.xdist_group("real-time")
 @pytest.mark.slow
 def test_a_flight_goes_on_without_its_link_and_recorder_for_a_while() -> None:
     started_s = time.monotonic()
