@@ -96,7 +96,7 @@ def own_station(tmp_path: Path, console: None) -> Iterator[Station]:
         yield station
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def sighted(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[Station]:
     """A station whose demo stands in a world with things that the surface model does not know."""
     with _running(tmp_path_factory.mktemp("data"), "--demo-world") as station:
