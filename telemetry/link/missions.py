@@ -10,15 +10,17 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 from mapping.geometry.frames import apart_m
 from planning.formats.commands import FLOWN_TO
 from planning.mav_cmd import MavCmd
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
+from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard
 from telemetry.mavlink.flight_keeper import sequence_of
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
 from telemetry.topics.requests import StartAuto
 from telemetry.topics.vehicle import VehicleState
 
@@ -31,6 +33,8 @@ GROUND, AIR = 1, 0
 NEAR_M = 1.0
 HEIGHT_TOLERANCE_M = 0.5
 SLOWEST_CLIMB_M_S, SLOWEST_FLIGHT_M_S = 0.3, 0.5
+CAREFUL_M_S = 2.0
+"""To a place from which on no speed is known."""
 PATIENCE_S = 30.0
 MODE_SHOWS_S = 5.0
 GUIDED = "GUIDED"
@@ -163,6 +167,18 @@ class JoinMission:
         self._climb_to_m = request.climb_to_m
         self._place = self._find_place()
         self.is_active = self.is_done = False
+        self._is_up = False
+
+    @property
+    def remaining(self) -> RemainingMission | None:
+        """The way there and what follows; None during the take-off. Where no script can fly that, it holds there."""
+        onboard, place = self._vehicle.onboard.mission, self._place
+        if not self._is_up or onboard is None:
+            return None
+        rest = remaining_from(onboard, self._item) or RemainingMission((), "hold")
+        speed_m_s = rest.targets[0].speed_m_s if rest.targets else CAREFUL_M_S
+        there = GuidedTarget(self._item, place.lat_deg, place.lon_deg, self._climb_to_m, speed_m_s)
+        return replace(rest, targets=(there, *rest.targets))
 
     async def take_off(self) -> None:
         vehicle, orders = self._vehicle, self._vehicle.orders
@@ -200,7 +216,7 @@ class JoinMission:
                 lambda state: state.mode == GUIDED, timeout_s=MODE_SHOWS_S, what="change to GUIDED"
             )
         await self._wait(lambda state: _climbed(state, height_m), height_m / SLOWEST_CLIMB_M_S, "climb")
-        away_m = _away_m(vehicle.state, place)
+        away_m, self._is_up = _away_m(vehicle.state, place), True
         await vehicle.obey(vehicle.orders.go_to(place.lat_deg, place.lon_deg, height_m))
         at_place = f"reach the place of item {self._item}"
         await self._wait(lambda state: _away_m(state, place) < NEAR_M, away_m / SLOWEST_FLIGHT_M_S, at_place)

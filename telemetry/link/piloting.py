@@ -233,7 +233,7 @@ class Pilot:
             flies = script is not None and script.phase == "flying"
             return RemainingMission(script.left, script.end, "guided") if flies and script is not None else None
         if self.join is not None and self.join.is_active:
-            return None
+            return self.join.remaining
         return remaining_flight(self.vehicle.onboard.mission, state)
 
     def _remaining_after(self, request: FlyManoeuvre) -> RemainingMission:
@@ -256,6 +256,7 @@ class Pilot:
     def _yield_to_avoidance(self) -> None:
         """What is under way sends nothing any more."""
         self._procedures.end()
+        self.join = None
         if self.script is not None:
             self.script.stop(SUPERSEDED)
             self.script = None

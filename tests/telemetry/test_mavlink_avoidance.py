@@ -151,6 +151,25 @@ def test_in_auto_it_climbs_over_a_wall_and_the_flight_ends_as_planned() -> None:
     run(whole)
 
 
+def test_on_the_way_to_where_a_flight_goes_on_it_climbs_over_a_wall_too() -> None:
+    """That way is none of the mission's: it was once flown straight into a house that only the sensors knew of."""
+
+    async def whole() -> None:
+        async with before_a_wall() as (bench, simulator):
+            report = await upload(bench)
+            await switch_on(bench)
+            last = len(report.onboard.items) - 1
+            await start(bench, StartAuto(ME, report.onboard.digest, from_item=last, climb_to_m=10.0))
+            await taken_off(bench, simulator)
+            await until(lambda: avoidance(bench).state == "offset")
+            assert simulator.vehicle.truth.p_neu[2] > 17.0
+            await landed(bench, simulator)
+            assert bench.flight.broke_off_at is None
+            assert not simulator.vehicle.autopilot.crashed
+
+    run(whole)
+
+
 def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_order() -> None:
     async def whole() -> None:
         async with before_a_wall() as (bench, simulator):
