@@ -156,7 +156,9 @@ class Answering:
         _refuse_in_mission(session.pilot)
         await self._record(request, f"upload {len(request.items)} items")
         _refuse_in_mission(session.pilot)  # a start may have come while the disk was waited for
-        return await session.transfers.upload(request)
+        report = await session.transfers.upload(request)
+        session.pilot.uploaded(report.onboard)
+        return report
 
     async def _download(self, request: requests.Download) -> object:
         transfers = self._link.need_session().transfers

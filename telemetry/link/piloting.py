@@ -18,6 +18,7 @@ from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, 
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
+from telemetry.topics.messages import OnboardMission
 from telemetry.topics.requests import FlyManoeuvre, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 
@@ -52,6 +53,8 @@ class Pilot:
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
         self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
         self._script_since_s: float | None = None
+        self._flown: OnboardMission | None = None
+        """What was on board in the last flight."""
         self._started_digest: str | None = None
         """Of the mission that is under way, if it was started from here."""
         self._known_foreign = False
@@ -94,10 +97,17 @@ class Pilot:
             self._follow_script(self.script)
         if not self.flight.is_under_way:
             self._started_digest = None
+        elif self.vehicle.onboard.mission is not None:
+            self._flown = self.vehicle.onboard.mission
         joining = self.join is not None and self.join.is_active
         if self.script is None:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
         self._watch_mission(state)
+
+    def uploaded(self, onboard: OnboardMission) -> None:
+        """Where a flight broke off is a place of that flight's route; other heights are no other route."""
+        if self._flown is None or not _same_route(self._flown, onboard):
+            self.flight.begin_anew()
 
     def _watch_mission(self, state: VehicleState) -> None:
         """A vehicle that flies by another mission than the one that was checked is stopped, once."""
@@ -332,3 +342,9 @@ class Pilot:
         self.avoidance.stop()
         if self.script_flies and self.script is not None:
             self.script.stop(SUPERSEDED)
+
+
+def _same_route(one: OnboardMission, other: OnboardMission) -> bool:
+    return [(i.command, i.lat_deg, i.lon_deg) for i in one.items] == [
+        (i.command, i.lat_deg, i.lon_deg) for i in other.items
+    ]

@@ -44,6 +44,11 @@ class FlightKeeper:
         self._completed = self._was_armed = False
         self.status = FlightStatus(way="auto", phase="arming", target=first, targets=targets, since_utc_s=t_utc_s)
 
+    def begin_anew(self) -> None:
+        """Another mission is on board: it is not gone on with where the last flight broke off."""
+        if not self.is_under_way:
+            self.status = replace(self.status, broke_off_at=None)
+
     def cancel(self, hint: str) -> None:
         """The start was refused; the vehicle is where it was."""
         self.status = FlightStatus(hint=hint)

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -127,6 +128,11 @@ def test_a_mission_is_paused_resumed_broken_off_and_gone_on_with() -> None:
             at = bench.flight.broke_off_at
             assert at is not None
             assert at >= 3
+            await upload(bench, tuple(replace(item, alt_m=item.alt_m + 1.0) for item in items(8)))
+            assert bench.flight.broke_off_at == at  # its heights only are others: home was moved
+            await upload(bench, items(2))
+            assert bench.flight.broke_off_at is None  # of another route nothing was flown
+            report = await upload(bench, items(8))
             await start(bench, StartAuto(ME, report.onboard.digest, from_item=at, climb_to_m=25.0))
             await until(lambda: (bench.state.alt_rel_home_m or 0.0) > 24.0)
             assert bench.state.mode == "GUIDED"
