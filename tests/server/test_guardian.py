@@ -128,12 +128,14 @@ def wait(condition: object) -> None:
 @pytest.fixture
 def guarded() -> Iterator[object]:
     made: list[Guarded] = []
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may have it ignored
 
     def make(what: str, **options: float) -> Guarded:
         made.append(Guarded(what, **options))
         return made[-1]
 
     yield make
+    signal.signal(signal.SIGHUP, before)
     for each in made:
         each.close()
 
