@@ -81,6 +81,8 @@ class Answering:
             requests.SetSigning: self._set_signing,
             requests.Upload: self._upload,
             requests.Download: self._download,
+            requests.UploadPlaces: self._upload_places,
+            requests.DownloadPlaces: self._download_places,
             requests.ReadParameters: self._read_parameters,
             requests.HighestToken: self._highest_token,
             requests.StartAuto: self._start_auto,
@@ -163,6 +165,17 @@ class Answering:
     async def _download(self, request: requests.Download) -> object:
         transfers = self._link.need_session().transfers
         return await transfers.download()
+
+    async def _upload_places(self, request: requests.UploadPlaces) -> object:
+        session = self._link.need_session()
+        _refuse_in_mission(session.pilot)
+        words = f"upload {request.kind} of {len(request.items)} items" if request.items else f"clear {request.kind}"
+        await self._record(request, words)
+        _refuse_in_mission(session.pilot)  # a start may have come while the disk was waited for
+        return await session.transfers.upload_places(request)
+
+    async def _download_places(self, request: requests.DownloadPlaces) -> object:
+        return await self._link.need_session().transfers.download_places(request.kind)
 
     async def _read_parameters(self, request: requests.ReadParameters) -> object:
         transfers = self._link.need_session().transfers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import Literal
@@ -9,11 +10,12 @@ from typing import Literal
 from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.actions import Progress
+from telemetry.mavlink.conversation import PLACE_LISTS
 from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.parameters import ParameterRead
 from telemetry.mavlink.upload import MissionUpload
-from telemetry.topics.messages import ErrorInfo, OnboardMission, TransferStatus, UploadReport
-from telemetry.topics.requests import Upload
+from telemetry.topics.messages import ErrorInfo, Item, OnboardMission, PlaceList, TransferStatus, UploadReport
+from telemetry.topics.requests import Upload, UploadPlaces
 
 TELL_EVERY_S = 0.05
 Phase = Literal["sending", "reading_back", "done", "failed"]
@@ -67,6 +69,31 @@ class Transfers:
             return onboard
         finally:
             vehicle.onboard.transfer_ends(known, time.monotonic())
+
+    async def upload_places(self, request: UploadPlaces) -> UploadReport:
+        """Raises TelemetryError; then nobody knows which fence or rally points are on board."""
+        self._make_way()
+        vehicle, about = self._vehicle, PLACE_LISTS[request.kind]
+        no_home = (math.nan, math.nan, math.nan)
+        machine = MissionUpload(
+            request.items,
+            no_home,
+            firmware=vehicle.firmware,
+            target=vehicle.target,
+            now_s=time.monotonic(),
+            about=about,
+        )
+        report = await self._run(machine, "upload", len(request.items))
+        assert isinstance(report, UploadReport)
+        return report
+
+    async def download_places(self, kind: PlaceList) -> tuple[Item, ...]:
+        self._make_way()
+        vehicle, about = self._vehicle, PLACE_LISTS[kind]
+        machine = MissionDownload(firmware=vehicle.firmware, target=vehicle.target, now_s=time.monotonic(), about=about)
+        onboard = await self._run(machine, "download", 0)
+        assert isinstance(onboard, OnboardMission)
+        return onboard.items
 
     async def read_back(self) -> OnboardMission:
         """A download that nobody asked for."""

@@ -1,10 +1,13 @@
-"""A conversation with a vehicle: its two ends, a restart meanwhile, and how long to wait before asking again."""
+"""A conversation with a vehicle: its two ends, what it is about, a restart meanwhile, and how long to wait before
+asking again."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from planning.model import Firmware
 from telemetry.mavlink.actions import Message
+from telemetry.topics.messages import PlaceList
 
 GROUND_STATION = (255, 190)
 """System and component that ground stations use."""
@@ -30,6 +33,34 @@ class Endpoints:
             and message.target_system in (self.own[0], 0)
             and message.target_component in (self.own[1], 0)
         )
+
+
+@dataclass(frozen=True, slots=True)
+class ItemList:
+    """One of the lists that a vehicle keeps; the same protocol transfers each."""
+
+    mission_type: int
+    """MAV_MISSION_TYPE"""
+    name: str
+    """As people are told."""
+
+    @property
+    def unknown(self) -> str:
+        """What to do when nobody knows any more what is on board."""
+        return f"The {self.name} on board is now unknown: upload again before the start."
+
+    @property
+    def mixture(self) -> str:
+        """What to do when an upload ended in the middle: vehicles replace items in place."""
+        return f"The {self.name} on board may now be a mixture: upload again before the start."
+
+    def has_home_row(self, firmware: Firmware) -> bool:
+        """Whether the vehicle keeps its home before the first item."""
+        return self.mission_type == MISSION.mission_type and firmware == "ardupilot"
+
+
+MISSION, FENCE, RALLY = ItemList(0, "mission"), ItemList(1, "fence"), ItemList(2, "list of rally points")
+PLACE_LISTS: dict[PlaceList, ItemList] = {"fence": FENCE, "rally": RALLY}
 
 
 class BootClock:

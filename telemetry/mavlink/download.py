@@ -1,4 +1,5 @@
-"""Reading the mission on board, sans-IO: several items are asked for at once, until messages get lost."""
+"""Reading the mission or another list on board, sans-IO: several items are asked for at once, until messages get
+lost."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import RefusedError, SilentError, TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.conversation import GROUND_STATION, BootClock, Endpoints, RoundTrip
+from telemetry.mavlink.conversation import GROUND_STATION, MISSION, BootClock, Endpoints, ItemList, RoundTrip
 from telemetry.mavlink.items import item_from_message
 from telemetry.mavlink.verify import digest
 from telemetry.topics.messages import Item, OnboardMission
@@ -35,9 +36,11 @@ class MissionDownload:
         own: tuple[int, int] = GROUND_STATION,
         now_s: float = 0.0,
         lossy: bool = False,
+        about: ItemList = MISSION,
     ) -> None:
         """``lossy``: the link is known to lose messages."""
-        self._firmware, self._endpoints = firmware, Endpoints(target, own)
+        self._firmware: Firmware = firmware
+        self._endpoints, self._about = Endpoints(target, own), about
         self._window = 1 if lossy and firmware != "ardupilot" else WINDOW
         self._boot, self._round_trip = BootClock(), RoundTrip()
         self._over, self._most_items = False, 0
@@ -64,14 +67,16 @@ class MissionDownload:
         self._any_heard_s = now_s
         if self._boot.has_restarted(message):
             return self._fail(
-                TransferError("The vehicle restarted while its mission was read.", advice="Read it again.")
+                TransferError(f"The vehicle restarted while its {self._about.name} was read.", advice="Read it again.")
             )
         handler = {
             "MISSION_COUNT": self._on_count,
             "MISSION_ITEM_INT": self._on_item,
             "MISSION_ACK": self._on_ack,
         }.get(message.get_type())
-        if handler is None or not self._endpoints.is_for_us(message) or message.mission_type != 0:
+        if handler is None or not self._endpoints.is_for_us(message):
+            return []
+        if message.mission_type != self._about.mission_type:
             return []
         self._heard_s = now_s
         return handler(message, now_s)
@@ -91,7 +96,9 @@ class MissionDownload:
         return self._lost(lost, now_s) if lost else []
 
     def cancel(self, now_s: float) -> list[Action]:
-        error = TransferError("Reading the mission was cancelled.", advice="Read it again before the start.")
+        error = TransferError(
+            f"Reading the {self._about.name} was cancelled.", advice="Read it again before the start."
+        )
         return [] if self._over else [self._ack(CANCELLED), *self._fail(error)]
 
     @property
@@ -107,7 +114,8 @@ class MissionDownload:
 
     def _ask_for_list(self, now_s: float) -> list[Action]:
         self._list_s = now_s
-        return [Send(mavlink.MAVLink_mission_request_list_message(*self._endpoints.vehicle, 0))]
+        kind = self._about.mission_type
+        return [Send(mavlink.MAVLink_mission_request_list_message(*self._endpoints.vehicle, kind))]
 
     def _on_count(self, message: Message, now_s: float) -> list[Action]:
         if self._count == message.count:
@@ -138,7 +146,8 @@ class MissionDownload:
 
     def _request(self, seq: int, now_s: float) -> Action:
         self._asked_s[seq] = now_s
-        return Send(mavlink.MAVLink_mission_request_int_message(*self._endpoints.vehicle, seq, 0))
+        kind = self._about.mission_type
+        return Send(mavlink.MAVLink_mission_request_int_message(*self._endpoints.vehicle, seq, kind))
 
     def _lost(self, lost: list[int], now_s: float) -> list[Action]:
         """ArduPilot: ask for what is missing, in any order. Others: from the gap on, one at a time from now on."""
@@ -161,7 +170,7 @@ class MissionDownload:
         if now_s - self._refused_since_s > REFUSED_S:
             return self._fail(
                 RefusedError(
-                    "The vehicle does not let its mission be read now.",
+                    f"The vehicle does not let its {self._about.name} be read now.",
                     advice="Wait until no other ground station is transferring one, then read it again.",
                 )
             )
@@ -177,7 +186,7 @@ class MissionDownload:
         rows = [self._rows[seq] for seq in range(len(self._rows))]
         items = tuple(map(item_from_message, rows))
         home: Item | None = None
-        if self._firmware == "ardupilot":
+        if self._about.has_home_row(self._firmware):
             home, items = (items[0], items[1:]) if items else (None, ())
         return OnboardMission(
             items=items,
@@ -188,7 +197,8 @@ class MissionDownload:
         )
 
     def _ack(self, result: int) -> Action:
-        return Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, result, 0))
+        kind = self._about.mission_type
+        return Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, result, kind))
 
     def _fail(self, error: TransferError | RefusedError | SilentError) -> list[Action]:
         self._over = True
@@ -197,14 +207,15 @@ class MissionDownload:
     def _silent(self, now_s: float) -> SilentError:
         heard = now_s - self._any_heard_s < SILENT_S / 2
         known = f"{len(self._rows)} of {self._count} items came" if self._count is not None else "none of it came"
+        about = self._about.name
         return SilentError(
-            f"The vehicle {'answers nothing about its mission' if heard else 'has fallen silent'}: {known}.",
-            advice="The mission on board is unknown. Check the link and read it again.",
+            f"The vehicle {f'answers nothing about its {about}' if heard else 'has fallen silent'}: {known}.",
+            advice=f"The {self._about.name} on board is unknown. Check the link and read it again.",
         )
 
     def _endless(self) -> TransferError:
         known = f"{len(self._rows)} of {self._count} items came" if self._count is not None else "none of it came"
         return TransferError(
-            f"Reading the mission took too long: {known}.",
-            advice="The mission on board is unknown. Improve the link and read it again.",
+            f"Reading the {self._about.name} took too long: {known}.",
+            advice=f"The {self._about.name} on board is unknown. Improve the link and read it again.",
         )

@@ -7,13 +7,14 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from planning.formats.commands import POSITIONED
+from planning.mav_cmd import FENCES, MavCmd
 from planning.model import Firmware, Home, Mission, MissionItem
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Message
 from telemetry.topics.messages import Item, OnboardMission
 
-PLACED = POSITIONED - {206}
-"""Commands with latitude, longitude and altitude; 206 sets the distance between photos and has no place."""
+PLACED = (POSITIONED - {MavCmd.DO_SET_CAM_TRIGG_DIST}) | FENCES | {MavCmd.NAV_RALLY_POINT}
+"""Commands with latitude, longitude and altitude; the one that sets the distance between photos has none."""
 DEG_E7 = 1e7
 _INT32 = 2**31 - 1
 _FIELDS = ("latitude", "longitude")
@@ -62,7 +63,9 @@ def _home(onboard: OnboardMission) -> Home:
     return Home(lat_deg, lon_deg, math.nan if alt_m is None else alt_m, "AMSL")
 
 
-def item_message(item: Item, seq: int, *, target: tuple[int, int], number: int, firmware: Firmware) -> Message:
+def item_message(
+    item: Item, seq: int, *, target: tuple[int, int], number: int, firmware: Firmware, mission_type: int = 0
+) -> Message:
     """MISSION_ITEM_INT. Raises TransferError when a place cannot be written down at all.
 
     ``number`` names the item in that error. ArduPilot refuses most parameters that are not given: it gets 0.
@@ -73,7 +76,7 @@ def item_message(item: Item, seq: int, *, target: tuple[int, int], number: int, 
     x, y = (
         _whole(value * scale, number, field) for value, field in zip((item.lat_deg, item.lon_deg), _FIELDS, strict=True)
     )
-    current = int(seq == 0 and firmware == "px4")
+    current = int(seq == 0 and firmware == "px4" and mission_type == 0)
     return mavlink.MAVLink_mission_item_int_message(
         target[0],
         target[1],
@@ -89,6 +92,7 @@ def item_message(item: Item, seq: int, *, target: tuple[int, int], number: int, 
         x,
         y,
         item.alt_m,
+        mission_type,
     )
 
 

@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 from telemetry.errors import RefusedError, TelemetryError, TransferError
+from telemetry.mavlink.conversation import MISSION, ItemList
 from telemetry.mavlink.texts import VehicleWords
 from telemetry.topics.messages import Item
 
@@ -43,15 +44,18 @@ class Refusal:
     """Of the item, 1 is the first; 0 is the home row, None the mission as a whole."""
 
 
-def refusal_error(refusal: Refusal, items: tuple[Item, ...], words: VehicleWords) -> TelemetryError:
+def refusal_error(
+    refusal: Refusal, items: tuple[Item, ...], words: VehicleWords, about: ItemList = MISSION
+) -> TelemetryError:
     """What is told of it; ``words`` were heard since the upload began."""
     if refusal.result == NO_SPACE:
-        return _no_space(len(items), words)
+        return _no_space(len(items), words, about)
     if refusal.number is None:
         return RefusedError(
-            f"The vehicle does not take a mission now.{words.sentence()}",
+            f"The vehicle does not take a {about.name} now.{words.sentence()}",
             where=f"mission result {refusal.result}",
-            advice="Wait until it is ready and no other ground station is transferring a mission, then upload again.",
+            advice=f"Wait until it is ready and no other ground station is transferring a {about.name}, then upload"
+            " again." + ("" if about is MISSION else f" Some firmware keeps no {about.name} at all."),
         )
     if refusal.number == 0:
         return RefusedError(
@@ -59,24 +63,24 @@ def refusal_error(refusal: Refusal, items: tuple[Item, ...], words: VehicleWords
             where="home",
             advice="Correct the plan's home and upload again.",
         )
-    return _item_error(refusal.result, refusal.number, items[refusal.number - 1], words)
+    return _item_error(refusal.result, refusal.number, items[refusal.number - 1], words, about)
 
 
-def broken_off(number: int, total: int, words: VehicleWords) -> TelemetryError:
+def broken_off(number: int, total: int, words: VehicleWords, about: ItemList = MISSION) -> TelemetryError:
     """The vehicle ended the transfer again and again, without a word about an item."""
     return TransferError(
         f"The vehicle broke the upload off at item {number} of {total}.{words.sentence()}",
         where=f"item {number}",
-        advice="The mission on board is now a mixture. Check the link and upload again.",
+        advice=f"Check the link. {about.mixture}",
     )
 
 
-def _item_error(result: int, number: int, item: Item, words: VehicleWords) -> TelemetryError:
+def _item_error(result: int, number: int, item: Item, words: VehicleWords, about: ItemList) -> TelemetryError:
     field, value, advice = _what_is_wrong(result, item)
     return RefusedError(
         f"The vehicle refused item {number}: {field} {value}.{words.sentence()}",
         where=f"item {number}",
-        advice=f"{advice} The mission on board is now a mixture: upload again before the start.",
+        advice=f"{advice} {about.mixture}",
     )
 
 
@@ -93,18 +97,20 @@ def _what_is_wrong(result: int, item: Item) -> tuple[str, str, str]:
     }.get(result, ("a value is not valid in command", str(item.command), "Correct it in the plan."))
 
 
-def _no_space(count: int, words: VehicleWords) -> TelemetryError:
+def _no_space(count: int, words: VehicleWords, about: ItemList) -> TelemetryError:
     found = next((match for match in map(_CAPACITY.search, words.texts) if match), None)
     capacity = int(found[1]) if found else None
     if capacity == 0:
         return RefusedError(
-            f"The vehicle takes no mission yet.{words.sentence()}",
+            f"The vehicle takes no {about.name} yet.{words.sentence()}",
             advice="It is still starting: wait until it is ready and upload again.",
         )
     limit = f"at most {capacity} items" if capacity else "less"
     return RefusedError(
-        f"The mission has {count} items, the vehicle holds {limit}.{words.sentence()}",
-        advice="Allow a larger excess height, or plan a shorter route, so that fewer items are needed.",
+        f"The {about.name} has {count} items, the vehicle holds {limit}.{words.sentence()}",
+        advice="Allow a larger excess height, or plan a shorter route, so that fewer items are needed."
+        if about is MISSION
+        else "Use fewer corners, circles or points.",
     )
 
 

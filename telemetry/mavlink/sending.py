@@ -1,4 +1,4 @@
-"""Handing a mission's items to a vehicle, sans-IO, until it says that it has them or nothing more can be learnt."""
+"""Handing a list's items to a vehicle, sans-IO, until it says that it has them or nothing more can be learnt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import SilentError, TelemetryError
 from telemetry.mavlink.actions import Action, Failed, Message, Progress, Send
-from telemetry.mavlink.conversation import Endpoints, RoundTrip
+from telemetry.mavlink.conversation import Endpoints, ItemList, RoundTrip
 from telemetry.mavlink.items import home_message, item_message
 from telemetry.mavlink.refusals import (
     ACCEPTED,
@@ -36,7 +36,6 @@ BEGIN_AGAIN_S, SILENT_S = 5.0, 15.0
 REFUSED_S = 10.0
 """An upload that another ground station abandoned is given up by the vehicle after 8 s."""
 ATTEMPTS = 6
-UNKNOWN = "The mission on board is now unknown: upload again before the start."
 
 
 class MissionSending:
@@ -49,10 +48,11 @@ class MissionSending:
         *,
         firmware: Firmware,
         endpoints: Endpoints,
+        about: ItemList,
         now_s: float,
     ) -> None:
-        self._items, self._endpoints = items, endpoints
-        self.rows_before = int(firmware == "ardupilot")
+        self._items, self._endpoints, self._about = items, endpoints, about
+        self.rows_before = int(about.has_home_row(firmware))
         """Rows that the vehicle keeps before the first item: ArduPilot's home."""
         self._rows = self._encode(items, home, firmware)
         self.disturbed = False
@@ -69,9 +69,9 @@ class MissionSending:
     def _encode(
         self, items: tuple[Item, ...], home: tuple[float, float, float], firmware: Firmware
     ) -> tuple[Message, ...]:
-        target, first = self._endpoints.vehicle, self.rows_before
+        target, first, kind = self._endpoints.vehicle, self.rows_before, self._about.mission_type
         rows = tuple(
-            item_message(item, seq, target=target, number=seq + 1 - first, firmware=firmware)
+            item_message(item, seq, target=target, number=seq + 1 - first, firmware=firmware, mission_type=kind)
             for seq, item in enumerate(items, start=first)
         )
         return (home_message(*home, target=target), *rows) if first else rows
@@ -97,7 +97,7 @@ class MissionSending:
         return self._attempts < ATTEMPTS
 
     def broken_off(self) -> TelemetryError:
-        return broken_off(max(self._furthest + 1 - self.rows_before, 0), len(self._items), self._words)
+        return broken_off(max(self._furthest + 1 - self.rows_before, 0), len(self._items), self._words, self._about)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         """Of the vehicle."""
@@ -106,7 +106,7 @@ class MissionSending:
         kind = message.get_type()
         if kind not in ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") or self._refusal is not None:
             return []
-        if not self._endpoints.is_for_us(message) or message.mission_type != 0:
+        if not self._endpoints.is_for_us(message) or message.mission_type != self._about.mission_type:
             return []
         self._heard_s = now_s
         return self._on_ack(message.type, now_s) if kind == "MISSION_ACK" else self._on_request(message.seq, now_s)
@@ -114,7 +114,7 @@ class MissionSending:
     def on_tick(self, now_s: float) -> list[Action]:
         if self._refusal is not None:
             refusal, until_s = self._refusal
-            return [Failed(refusal_error(refusal, self._items, self._words))] if now_s >= until_s else []
+            return [Failed(refusal_error(refusal, self._items, self._words, self._about))] if now_s >= until_s else []
         if self._phase == "complete":
             return []
         if now_s - self._heard_s > SILENT_S:
@@ -161,7 +161,8 @@ class MissionSending:
 
     def _send_count(self, now_s: float) -> list[Action]:
         self._sent_s = now_s
-        return [Send(mavlink.MAVLink_mission_count_message(*self._endpoints.vehicle, len(self._rows), 0))]
+        count = (len(self._rows), self._about.mission_type)
+        return [Send(mavlink.MAVLink_mission_count_message(*self._endpoints.vehicle, *count))]
 
     def _send_row(self, seq: int, now_s: float) -> list[Action]:
         self._sent_s, self._highest_sent = now_s, max(seq, self._highest_sent)
@@ -244,4 +245,4 @@ class MissionSending:
         does = "is heard but does not answer the upload" if heard else "has fallen silent"
         number = self._furthest + 1 - self.rows_before
         at = f"at item {number} of {len(self._items)}" if number > 0 else "before the first item"
-        return SilentError(f"The vehicle {does}, {at}.", advice=f"Check the link. {UNKNOWN}")
+        return SilentError(f"The vehicle {does}, {at}.", advice=f"Check the link. {self._about.unknown}")

@@ -1,4 +1,5 @@
-"""Replacing the mission on board, sans-IO, and reading it back: only what was read back counts."""
+"""Replacing the mission on board, its fence or its rally points, sans-IO, and reading it back: only what was read
+back counts."""
 
 from __future__ import annotations
 
@@ -7,10 +8,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.model import Firmware
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send, ended
-from telemetry.mavlink.conversation import GROUND_STATION, BootClock, Endpoints
+from telemetry.mavlink.conversation import GROUND_STATION, MISSION, BootClock, Endpoints, ItemList
 from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.refusals import CANCELLED
-from telemetry.mavlink.sending import UNKNOWN, MissionSending
+from telemetry.mavlink.sending import MissionSending
 from telemetry.mavlink.verify import compare
 from telemetry.topics.messages import Item, OnboardMission, UploadReport
 
@@ -21,7 +22,8 @@ class MissionUpload:
     """Ends in Done(UploadReport), or in Failed: then nobody knows what is on board.
 
     ``home``: lat_deg, lon_deg, alt_amsl_m for ArduPilot's home row, which the vehicle replaces by its own.
-    Raises TransferError for a mission that cannot be put on the wire at all.
+    ``about``: which of the vehicle's lists is replaced. Without items the vehicle's fence or rally points are cleared;
+    a mission has some. Raises TransferError for a list that cannot be put on the wire at all.
     """
 
     def __init__(
@@ -32,13 +34,17 @@ class MissionUpload:
         firmware: Firmware,
         target: tuple[int, int],
         own: tuple[int, int] = GROUND_STATION,
+        about: ItemList = MISSION,
         now_s: float = 0.0,
     ) -> None:
-        if not items:
+        if not items and about is MISSION:
             raise TransferError("The mission has no items.", advice="Plan a mission first.")
         self._firmware: Firmware = firmware
+        self._about = about
         self._items, self._endpoints, self._boot = items, Endpoints(target, own), BootClock()
-        self._sending = MissionSending(items, home, firmware=firmware, endpoints=self._endpoints, now_s=now_s)
+        self._sending = MissionSending(
+            items, home, firmware=firmware, endpoints=self._endpoints, about=about, now_s=now_s
+        )
         self._download: MissionDownload | None = None
         self._over = False
         self._started_s = now_s
@@ -48,15 +54,16 @@ class MissionUpload:
         return [Progress("sending", 0, len(self._items)), *self._sending.begin(now_s)]
 
     def cancel(self, now_s: float) -> list[Action]:
-        stop = Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, CANCELLED, 0))
-        error = TransferError("The upload was cancelled.", advice=UNKNOWN)
+        kind = self._about.mission_type
+        stop = Send(mavlink.MAVLink_mission_ack_message(*self._endpoints.vehicle, CANCELLED, kind))
+        error = TransferError("The upload was cancelled.", advice=self._about.unknown)
         return [] if self._over else [stop, *self._end(Failed(error))]
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         if self._over or not self._endpoints.is_from_vehicle(message):
             return []
         if self._boot.has_restarted(message):
-            advice = f"Wait until it is ready. {UNKNOWN}"
+            advice = f"Wait until it is ready. {self._about.unknown}"
             return self._end(Failed(TransferError("The vehicle restarted during the upload.", advice=advice)))
         actions = self._sending.on_message(message, now_s)
         if self._download is not None and self._sending.is_complete:
@@ -100,6 +107,7 @@ class MissionUpload:
             own=self._endpoints.own,
             now_s=now_s,
             lossy=self._sending.disturbed,
+            about=self._about,
         )
         return self._download.start(now_s)
 

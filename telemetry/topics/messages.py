@@ -219,6 +219,10 @@ class OnboardMission:
     digest: str
 
 
+PlaceList = Literal["fence", "rally"]
+"""The lists that a vehicle keeps beside its mission."""
+
+
 @dataclass(frozen=True, slots=True)
 class UploadReport:
     verified: bool

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.topics.messages import GuidedTarget, Item
+from telemetry.topics.messages import GuidedTarget, Item, PlaceList
 from telemetry.topics.obstacles import AvoidBy
 
 TOKEN_AHEAD_MS = 24 * 3600 * 1000
@@ -85,6 +85,22 @@ class Upload(OperatorRequest):
 @dataclass(frozen=True, slots=True)
 class Download(OperatorRequest):
     """-> OnboardMission"""
+
+
+@dataclass(frozen=True, slots=True)
+class UploadPlaces(OperatorRequest):
+    """Replaces the fence or the rally points on board and reads them back; no items clear the list. Refused while a
+    mission is being flown. -> UploadReport"""
+
+    kind: PlaceList
+    items: tuple[Item, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DownloadPlaces(OperatorRequest):
+    """-> tuple[Item, ...], of the fence or the rally points on board"""
+
+    kind: PlaceList
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +214,8 @@ LinkRequest = (
     | SetSigning
     | Upload
     | Download
+    | UploadPlaces
+    | DownloadPlaces
     | ReadParameters
     | HighestToken
     | Arm

@@ -184,6 +184,9 @@ class Px4:
             return []
         if message.count > self.capacity:
             return [ack(sender(message), NO_SPACE)]
+        if message.count == 0:
+            self.stored, self.state = [], "idle"
+            return [ack(sender(message), ACCEPTED)]
         self.state, self.partner, self.count, self.arriving = "receiving", sender(message), message.count, []
         self.heard_s, self.expected = now_s, 0
         return self._request(now_s)

@@ -124,11 +124,11 @@ def test_a_part_of_the_mission_can_be_replaced() -> None:
 
 
 @pytest.mark.parametrize("mission_type", [1, 2])
-def test_there_are_no_fences_and_no_rally_points(mission_type: int) -> None:
+def test_fence_and_rally_lists_are_empty_at_first_and_of_no_other_type(mission_type: int) -> None:
     bench = ready()
     assert bench.send(wire.MAVLink_mission_request_list_message(1, 1, mission_type))[0].count == 0
     assert bench.send(wire.MAVLink_mission_clear_all_message(1, 1, mission_type))[0].type == ACCEPTED
-    assert bench.send(wire.MAVLink_mission_count_message(1, 1, 3, mission_type))[0].type == UNSUPPORTED
+    assert bench.send(wire.MAVLink_mission_count_message(1, 1, 3, 7))[0].type == UNSUPPORTED
 
 
 def test_a_lost_item_is_asked_for_again() -> None:

@@ -20,8 +20,8 @@ from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Parameters
 from telemetry.simulation.simulator.ground_below import Ground, Obstacles, SurfaceGround
 from telemetry.simulation.simulator.neu_frame import NeuFrame
+from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.mavlink import Endpoint
-from telemetry.simulation.simulator.protocol.mission_protocol import Reply
 from telemetry.simulation.simulator.protocol.transports import Transport, open_transport, parse_where
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 

@@ -14,8 +14,9 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.autopilot.pilot import HomeSet, Reached, StateChanged, Text
 from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, Commands, read_order, whole
+from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.message_streams import Streams
-from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol, Reply
+from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
 from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterProtocol
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
