@@ -20,7 +20,7 @@ from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing
 from telemetry.mavlink.commands import CommandRun
 from telemetry.mavlink.conversation import BootClock
 from telemetry.mavlink.orders import Order, Orders
-from telemetry.mavlink.parameters import BYTEWISE
+from telemetry.mavlink.parameters.values import BYTEWISE
 from telemetry.mavlink.reduce import reduce
 from telemetry.mavlink.texts import Texts
 from telemetry.topics.messages import LOST_S, STALE_S, Candidate

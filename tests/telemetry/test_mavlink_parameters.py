@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Send, ended
-from telemetry.mavlink.parameters import ASK_AGAIN_S, TRIES, ParameterRead
+from telemetry.mavlink.parameters.reading import ASK_AGAIN_S, TRIES, ParameterRead
 from tests.telemetry.frames import attitude, heard
 
 

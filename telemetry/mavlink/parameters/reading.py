@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import struct
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Send
+from telemetry.mavlink.parameters.values import parameter_value
+from telemetry.topics.parameters import NAME_BYTES
 
 ASK_AGAIN_S = 0.3
 TRIES = 12
 """Over a link that loses 30 % in each direction one value in 3,000 is not heard then; with 5 it was one in 30."""
-NAME_BYTES = 16
-_INTEGER_FORMATS = {1: "<B3x", 2: "<b3x", 3: "<H2x", 4: "<h2x", 5: "<I", 6: "<i"}
-"""struct formats of MAV_PARAM_TYPE 1 to 6 within the four bytes of a float."""
-BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 
 
 class ParameterRead:
@@ -74,12 +69,3 @@ class ParameterRead:
     def _finish(self) -> list[Action]:
         self._open = []
         return [Done(dict(self._values))]
-
-
-def parameter_value(message: Message, *, bytewise: bool) -> float | None:
-    """Of a PARAM_VALUE."""
-    value = message.param_value
-    layout = _INTEGER_FORMATS.get(message.param_type)
-    if bytewise and layout is not None:
-        return float(struct.unpack(layout, struct.pack("<f", value))[0])
-    return float(value) if math.isfinite(value) else None
