@@ -120,16 +120,33 @@ def test_only_its_own_ground_station_feeds_the_failsafe() -> None:
 
 
 def test_parameters_are_listed_read_and_set() -> None:
-    bench = Bench()
-    listed = bench.send(wire.MAVLink_param_request_list_message(1, 1))
+    bench = Bench(heartbeat=False)
+    assert bench.send(wire.MAVLink_param_request_list_message(1, 1)) == []
+    bench.advance(0.2)
+    listed = [heard.message for heard in bench.heard if heard.message.get_type() == "PARAM_VALUE"]
     assert [value.param_id for value in listed] == list(SPECS)
+    assert [value.param_index for value in listed] == list(range(len(SPECS)))
     assert {value.param_count for value in listed} == {len(SPECS)}
-    by_name = bench.send(wire.MAVLink_param_request_read_message(1, 1, b"RTL_ALT", -1))[0]
-    by_index = bench.send(wire.MAVLink_param_request_read_message(1, 1, b"", by_name.param_index))[0]
+    by_index = bench.send(wire.MAVLink_param_request_read_message(1, 1, b"", list(SPECS).index("RTL_ALT")))[0]
     assert (by_index.param_id, by_index.param_value, by_index.param_type) == ("RTL_ALT", 1500.0, 6)
+    by_name = bench.send(wire.MAVLink_param_request_read_message(1, 1, b"RTL_ALT", -1))[0]
+    assert (by_name.param_value, by_name.param_index) == (1500.0, 65535)
     assert bench.send(wire.MAVLink_param_set_message(1, 1, b"RTL_ALT", 1e9, 9))[0].param_value == 300_000
     assert bench.send(wire.MAVLink_param_set_message(1, 1, b"NO_SUCH", 1.0, 9)) == []
     assert bench.send(wire.MAVLink_param_request_read_message(1, 1, b"", 9999)) == []
+
+
+def test_a_change_is_heard_by_every_ground_station_and_a_list_by_the_one_that_asked() -> None:
+    bench = Bench(heartbeat=False)
+    bench.endpoint.connect("other")
+    request = bench.endpoint.on_message
+    change = wire.MAVLink_param_set_message(1, 1, b"RTL_ALT", 2000.0, 6)
+    assert {peer for peer, _ in request(change, "gcs", 0.0)} == {"gcs", "other"}
+    assert request(wire.MAVLink_param_request_list_message(1, 1), "other", 0.1) == []
+    values = [(peer, message) for peer, message in bench.endpoint.on_slice(0.2) if message.get_type() == "PARAM_VALUE"]
+    assert {peer for peer, _ in values} == {"other"}
+    bench.endpoint.disconnect("other")
+    assert not any(message.get_type() == "PARAM_VALUE" for _, message in bench.endpoint.on_slice(0.4))
 
 
 def test_hedgehops_reducer_understands_all_of_it() -> None:

@@ -87,6 +87,7 @@ class Endpoint:
 
     def disconnect(self, peer: Hashable) -> None:
         self._peers.pop(peer, None)
+        self._parameters.forget(peer)
 
     def on_message(self, message: Any, peer: Hashable, wall_s: float) -> list[Reply]:
         """Answers, in the order in which they go out."""
@@ -99,12 +100,14 @@ class Endpoint:
             return []
         if kind in MISSION_MESSAGES:
             return self._missions.on_message(message, peer, wall_s) + self._tell_first(peer, wall_s)
+        if kind.startswith("PARAM_"):
+            return self._on_parameter(message, peer) + self._tell()
         replies = self._answer(kind, message, peer)
         return [(peer, reply) for reply in replies] + self._tell()
 
     def on_slice(self, wall_s: float) -> list[Reply]:
         """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
-        out = self._missions.on_tick(wall_s)
+        out = self._missions.on_tick(wall_s) + self._parameters.on_tick(wall_s)
         out += [reply for due_s, reply in self._news if due_s <= wall_s]
         self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]
         out += self._tell()
@@ -124,8 +127,6 @@ class Endpoint:
     def _answer(self, kind: str, message: Any, peer: Hashable) -> list[MAVLink_message]:
         if kind in ("COMMAND_LONG", "COMMAND_INT"):
             return self._on_command(message, peer)
-        if kind.startswith("PARAM_"):
-            return self._parameters.on_message(message)
         if kind == "SET_MODE":
             self._commands.set_mode(message.base_mode, message.custom_mode)
         elif kind in ("SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"):
@@ -138,6 +139,11 @@ class Endpoint:
         elif kind == "TIMESYNC" and message.tc1 == 0:
             return [wire.MAVLink_timesync_message(int(self.vehicle.now_s * 1e9), message.ts1)]
         return []
+
+    def _on_parameter(self, message: Any, peer: Hashable) -> list[Reply]:
+        if message.get_type() != "PARAM_SET":
+            return self._parameters.on_message(message, peer)
+        return [reply for value in self._parameters.on_set(message) for reply in self._to_all(value)]
 
     def _on_heartbeat(self, message: Any) -> None:
         if message.get_srcSystem() == self.vehicle.parameters["MAV_GCS_SYSID"]:
