@@ -13,16 +13,20 @@ from telemetry.bus.node_lock import running_node, silence_counts
 from telemetry.errors import BusError, OvertakenError
 from telemetry.liveness import Liveness
 from telemetry.topics.messages import OnboardMission, UploadReport
+from telemetry.topics.parameters import ParameterList, ParameterWritten
 from telemetry.topics.requests import (
     Connect,
     Download,
     HighestToken,
     LinkRequest,
+    ListParameters,
+    Looks,
     Operator,
     ReadParameters,
     StartAuto,
     StartGuided,
     Upload,
+    WriteParameters,
 )
 
 NAME = "link"
@@ -32,6 +36,7 @@ START_S = 90.0
 """Modes, arming and take-off, one after the other."""
 DOWNLOAD_S = 180.0
 UPLOAD_S, UPLOAD_PER_ITEM_S = 240.0, 5.0
+LIST_S, WRITE_S, WRITE_PER_CHANGE_S = 630.0, 30.0, 20.0
 APPEARS_S = 0.5
 """A link node that is there is found by then; only ``Connect`` waits for one that is being started."""
 HUNG_S, LOOK_EVERY_S = 0.9, 0.1
@@ -41,6 +46,8 @@ _ANSWERS: dict[type, Any] = {
     Upload: UploadReport,
     Download: OnboardMission,
     ReadParameters: dict[str, float | None],
+    ListParameters: ParameterList,
+    WriteParameters: tuple[ParameterWritten, ...],
     HighestToken: int,
 }
 IssueAbove = Callable[[Operator, int], Operator | None]
@@ -59,6 +66,10 @@ class LinkClient:
     @overload
     async def call(self, request: ReadParameters) -> dict[str, float | None]: ...
     @overload
+    async def call(self, request: ListParameters) -> ParameterList: ...
+    @overload
+    async def call(self, request: WriteParameters) -> tuple[ParameterWritten, ...]: ...
+    @overload
     async def call(self, request: LinkRequest) -> Any: ...
     async def call(self, request: LinkRequest) -> Any:
         """Raises what the link raised; BusError when the node is not there or died over it.
@@ -69,7 +80,7 @@ class LinkClient:
             try:
                 return await self._call(request)
             except OvertakenError:
-                if isinstance(request, ReadParameters | HighestToken):
+                if isinstance(request, Looks):
                     raise
                 operator = self._issue_above(request.operator, await self._call(HighestToken()))
                 if operator is None:
@@ -109,4 +120,8 @@ def _patience_s(request: LinkRequest) -> float:
         return UPLOAD_S + UPLOAD_PER_ITEM_S * len(request.items)
     if isinstance(request, Download):
         return DOWNLOAD_S
+    if isinstance(request, ListParameters):
+        return LIST_S
+    if isinstance(request, WriteParameters):
+        return WRITE_S + WRITE_PER_CHANGE_S * len(request.changes)
     return START_S if isinstance(request, StartAuto | StartGuided) else COMMAND_S

@@ -10,6 +10,8 @@ from telemetry.errors import NotAllowedError, NoVehicleError, OvertakenError, Te
 from telemetry.link.link import Link
 from telemetry.link.piloting import Pilot
 from telemetry.topics import requests
+from telemetry.topics.parameters import MOST_CHANGES
+from telemetry.topics.vehicle import VehicleState
 
 
 class OperatorRight:
@@ -84,6 +86,8 @@ class Answering:
             requests.UploadPlaces: self._upload_places,
             requests.DownloadPlaces: self._download_places,
             requests.ReadParameters: self._read_parameters,
+            requests.ListParameters: self._list_parameters,
+            requests.WriteParameters: self._write_parameters,
             requests.HighestToken: self._highest_token,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
@@ -93,7 +97,7 @@ class Answering:
         }
 
     async def answer(self, request: requests.LinkRequest) -> object:
-        if not isinstance(request, requests.ReadParameters | requests.HighestToken):
+        if not isinstance(request, requests.Looks):
             self._right.check(request.operator)
         result = "no answer was waited for"
         try:
@@ -181,6 +185,22 @@ class Answering:
         transfers = self._link.need_session().transfers
         return await transfers.read_parameters(request.names)
 
+    async def _list_parameters(self, request: requests.ListParameters) -> object:
+        del request
+        return await self._link.need_session().transfers.list_parameters()
+
+    async def _write_parameters(self, request: requests.WriteParameters) -> object:
+        session, changes = self._link.need_session(), request.changes
+        names = {change.name for change in changes}
+        if not 0 < len(changes) == len(names) <= MOST_CHANGES:
+            what = f"{len(changes)} changes of {len(names)} parameters were asked for at once."
+            raise NotAllowedError(what, advice=f"Give each once, and at most {MOST_CHANGES}.")
+        _refuse_armed(session.vehicle.state, request.even_armed)
+        words = ", ".join(f"{change.name} {change.value:.9g}" for change in changes)
+        await self._record(request, f"write {words}{' even armed' if request.even_armed else ''}")
+        _refuse_armed(session.vehicle.state, request.even_armed)  # it may have been armed while the disk was waited for
+        return await session.transfers.write_parameters(changes, even_armed=request.even_armed)
+
     async def _highest_token(self, request: requests.HighestToken) -> int:
         del request
         return self._right.highest
@@ -231,6 +251,14 @@ def _refuse_in_mission(pilot: Pilot) -> None:
     if pilot.flies_mission:
         what = "A mission is being flown: replacing it would send the vehicle somewhere else."
         raise NotAllowedError(what, advice="Land first.")
+
+
+def _refuse_armed(state: VehicleState, even_armed: bool) -> None:
+    if even_armed or (state.heartbeat_t_mono_s is not None and not state.armed):
+        return
+    what = "The vehicle is armed." if state.armed else "Whether the vehicle is armed is not known."
+    advice = "Land and disarm it, or ask for writing even while it is armed."
+    raise NotAllowedError(f"{what} Parameters change how it flies at once.", advice=advice)
 
 
 def _refuse_while(busy: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
 from collections.abc import Callable
@@ -12,9 +13,12 @@ from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.actions import Progress
 from telemetry.mavlink.conversation import PLACE_LISTS
 from telemetry.mavlink.download import MissionDownload
-from telemetry.mavlink.parameters import ParameterRead
+from telemetry.mavlink.parameters.listing import ParameterListRead
+from telemetry.mavlink.parameters.reading import ParameterRead
+from telemetry.mavlink.parameters.writing import ParameterWrite
 from telemetry.mavlink.upload import MissionUpload
 from telemetry.topics.messages import ErrorInfo, Item, OnboardMission, PlaceList, TransferStatus, UploadReport
+from telemetry.topics.parameters import ParameterChange, ParameterList, ParameterWritten
 from telemetry.topics.requests import Upload, UploadPlaces
 
 TELL_EVERY_S = 0.05
@@ -27,6 +31,7 @@ class Transfers:
         self._machine: MissionUpload | MissionDownload | None = None
         self._is_own_idea = False
         self._told_s = 0.0
+        self._writing = asyncio.Lock()
 
     @property
     def is_busy(self) -> bool:
@@ -108,6 +113,26 @@ class Transfers:
         values = await vehicle.exchanges.run(machine)
         assert isinstance(values, dict)
         return values
+
+    async def list_parameters(self) -> ParameterList:
+        vehicle = self._vehicle
+        machine = ParameterListRead(target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
+        found = await vehicle.exchanges.run(machine)
+        assert isinstance(found, ParameterList)
+        return found
+
+    async def write_parameters(
+        self, changes: tuple[ParameterChange, ...], *, even_armed: bool
+    ) -> tuple[ParameterWritten, ...]:
+        """One writing at a time: another's read-back must not pass for ours."""
+        vehicle = self._vehicle
+        machine = ParameterWrite(
+            changes, target=vehicle.target, bytewise=vehicle.sends_integers_bytewise, even_armed=even_armed
+        )
+        async with self._writing:
+            written = await vehicle.exchanges.run(machine)
+        assert isinstance(written, tuple)
+        return written
 
     def _make_way(self) -> None:
         if self._machine is None:

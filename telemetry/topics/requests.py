@@ -13,6 +13,7 @@ from typing import Literal
 
 from telemetry.topics.messages import GuidedTarget, Item, PlaceList
 from telemetry.topics.obstacles import AvoidBy
+from telemetry.topics.parameters import ParameterChange
 
 TOKEN_AHEAD_MS = 24 * 3600 * 1000
 """A clock may be set back by so much without anything being noticed of it."""
@@ -111,6 +112,22 @@ class ReadParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class ListParameters:
+    """-> ParameterList: all that the vehicle has; TransferError when some did not come"""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteParameters(OperatorRequest):
+    """Writes one after the other and reads each back. -> tuple[ParameterWritten, ...], in their order
+
+    At most ``MOST_CHANGES``, each name once. Refused while the vehicle is armed, or may be, unless ``even_armed``.
+    """
+
+    changes: tuple[ParameterChange, ...]
+    even_armed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class HighestToken:
     """Which one the link has seen: whoever issues them issues a higher one. -> int"""
 
@@ -206,6 +223,8 @@ class FlyRest(OperatorRequest):
     targets: tuple[GuidedTarget, ...]
 
 
+Looks = ReadParameters | ListParameters | HighestToken
+"""Requests to the link that change nothing: anybody may ask them."""
 LinkRequest = (
     Connect
     | Disconnect
@@ -217,6 +236,8 @@ LinkRequest = (
     | UploadPlaces
     | DownloadPlaces
     | ReadParameters
+    | ListParameters
+    | WriteParameters
     | HighestToken
     | Arm
     | Disarm
