@@ -19,6 +19,8 @@ WHOLE_RANGES: dict[int, tuple[int, int]] = {
     6: (-(2**31), 2**31 - 1),
 }
 """By MAV_PARAM_TYPE: the smallest and the largest."""
+SINGLE = 2.0**-22
+"""Share of a value: two steps of single precision, which vehicles keep."""
 MOST_CHANGES = 20
 """Of one request, which is one line in the log of commands."""
 

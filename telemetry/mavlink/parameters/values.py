@@ -8,14 +8,12 @@ import struct
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.actions import Message
-from telemetry.topics.parameters import WHOLE_RANGES, Parameter
+from telemetry.topics.parameters import SINGLE, WHOLE_RANGES, Parameter
 
 BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 _FORMATS = {1: "<B3x", 2: "<b3x", 3: "<H2x", 4: "<h2x", 5: "<I", 6: "<i"}
 """struct formats of MAV_PARAM_TYPE 1 to 6 within the four bytes of a float."""
 _MAGIC_V1, _HEADER_V1, _HEADER_V2 = 0xFE, 6, 10
-SAME_SHARE = 2.0**-22
-"""Of a value: two steps of single precision."""
 
 
 def parameter_of(message: Message, *, bytewise: bool) -> Parameter:
@@ -67,4 +65,4 @@ def same_value(one: float, other: float, kind: int, *, bytewise: bool) -> bool:
     """As the vehicle can tell them apart: in single precision, but for integers that come bytewise."""
     if kind in WHOLE_RANGES and (bytewise or max(abs(one), abs(other)) < 2**24):
         return one == other
-    return math.isclose(one, other, rel_tol=SAME_SHARE)
+    return math.isclose(one, other, rel_tol=SINGLE)

@@ -1,0 +1,1 @@
+"""Parameters outside the vehicle: files of ground stations, comparing, what the autopilot's makers say of each."""
