@@ -28,6 +28,8 @@ class _Lazy(TyperGroup):
 
     places: ClassVar[dict[str, tuple[str, str]]]
     """Of each command: its function below this package, and the epilog of its help."""
+    with_negative: ClassVar[frozenset[str]] = frozenset()
+    """Commands whose arguments may begin with a minus."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -46,7 +48,10 @@ class _Lazy(TyperGroup):
         place, epilog = self.places[cmd_name]
         module, _, function = place.rpartition(".")
         alone = typer.Typer(**_PLAIN)
-        alone.command(cmd_name, epilog=epilog)(getattr(importlib.import_module(__name__ + module), function))
+        settings = {"ignore_unknown_options": cmd_name in self.with_negative}
+        alone.command(cmd_name, epilog=epilog, context_settings=settings)(
+            getattr(importlib.import_module(__name__ + module), function)
+        )
         return typer.main.get_command(alone)
 
 
@@ -67,6 +72,7 @@ class _Commands(_Lazy):
         "agent": (".agent_command.agent", examples.AGENT),
         "audit": (".audit_command.audit", examples.AUDIT),
         "bench": ("bench", examples.BENCH),
+        "params": ("", ""),
         "radar": ("", ""),
         "account": ("", ""),
     }
@@ -76,6 +82,17 @@ class _RadarCommands(_Lazy):
     places: ClassVar = {
         "process": (".radar_command.process", examples.RADAR_PROCESS),
         "tracks": (".radar_tracks_command.tracks", examples.RADAR_TRACKS),
+    }
+
+
+class _ParamsCommands(_Lazy):
+    with_negative: ClassVar = frozenset({"set"})
+    places: ClassVar = {
+        "get": (".params.commands.get", examples.PARAMS_GET),
+        "set": (".params.commands.set_", examples.PARAMS_SET),
+        "save": (".params.commands.save", examples.PARAMS_SAVE),
+        "load": (".params.commands.load", examples.PARAMS_LOAD),
+        "compare": (".params.commands.compare", examples.PARAMS_COMPARE),
     }
 
 
@@ -95,7 +112,10 @@ radar = typer.Typer(
 account = typer.Typer(
     name="account", help="Who may sign in.", no_args_is_help=True, rich_markup_mode="rich", cls=_AccountCommands
 )
-_GROUPS = {"radar": radar, "account": account}
+params = typer.Typer(
+    name="params", help="The vehicle's parameters.", no_args_is_help=True, rich_markup_mode="rich", cls=_ParamsCommands
+)
+_GROUPS = {"radar": radar, "account": account, "params": params}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

@@ -62,6 +62,28 @@ FLY = _examples(
     ("Waypoint by waypoint, kept on file", "hedgehop fly flight/mission.waypoints --link tcp:10.0.0.7:5760 "
      "--mode guided --dsm dsm.tif --record flight.mcap"),
 )  # fmt: skip
+PARAMS_GET = _examples(
+    ("One", "hedgehop params get RTL_ALT --link udpin:0.0.0.0:14550"),
+    ("By pattern, with units and help", "hedgehop params get 'FENCE_*' --link /dev/ttyUSB0:57600 --about apm.pdef.xml"),
+    ("For a script", "hedgehop params get --link tcp:10.0.0.7:5760 --json > parameters.json"),
+)
+PARAMS_SET = _examples(
+    ("One", "hedgehop params set RTL_ALT 1900 --link udpin:0.0.0.0:14550"),
+    ("Several", "hedgehop params set WPNAV_SPEED 300 LAND_SPEED 40 --link udpin:0.0.0.0:14550"),
+)
+PARAMS_SAVE = _examples(
+    ("For Mission Planner and MAVProxy", "hedgehop params save before.param --link udpin:0.0.0.0:14550"),
+    ("For QGroundControl", "hedgehop params save before.params --link udpin:0.0.0.0:14550"),
+)
+PARAMS_LOAD = _examples(
+    ("What differs", "hedgehop params load before.param --link udpin:0.0.0.0:14550"),
+    ("Without calibrations, which belong to one vehicle", "hedgehop params load other.param --leave-out 'COMPASS_*' "
+     "--leave-out 'INS_*' --link udpin:0.0.0.0:14550"),
+)  # fmt: skip
+PARAMS_COMPARE = _examples(
+    ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
+    ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
+)
 SIM = _examples(
     ("A vehicle for a ground station on this machine", "hedgehop sim --link udpout:127.0.0.1:14550 "
      "--home -37.1244507,175.6892879,803.15"),

@@ -1,0 +1,1 @@
+"""``hedgehop params``: the vehicle's parameters."""
