@@ -31,7 +31,8 @@ def _say_link(settings: Settings, accounts: Accounts, name: str) -> None:
     file = origin_file(settings)
     origin = file.read_text(encoding="ascii") if file.is_file() else f"http://127.0.0.1:{settings.port}"
     link = f"{origin}/login?token={accounts.invite(name)}"
-    say(f"This link signs {name or 'the owner of this machine'} in once, within {INVITED_S / 3600:g} hours:\n  {link}")
+    say(f"This link signs {name or 'the owner of this machine'} in once, within {INVITED_S / 3600:g} hours:")
+    say(f"  {link}")
 
 
 @command
