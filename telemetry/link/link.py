@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
+from dataclasses import dataclass, replace
 from typing import Any
 
 from telemetry.errors import NotAllowedError, NoVehicleError
@@ -31,6 +32,19 @@ from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSetti
 from telemetry.topics.tracks import TracksStatus
 
 TICK_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
+
+    vehicle: Candidate
+    since_s: float
+    may_fly: bool
+    avoid_by: AvoidBy | None
+    """Avoidance was on when that node ended."""
+    is_given_up: bool = False
+    """It was not heard for so long that it counts as gone; it is still known when it does come back."""
 
 
 class Link:
@@ -63,10 +77,7 @@ class Link:
         self._told_flight: FlightStatus | None = None
         self._told_avoidance: AvoidanceStatus | None = None
         self._settings: PerceptionSettings | None = None
-        self._expected: Candidate | None = None
-        """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
-        self._again: tuple[Candidate, AvoidBy] | None = None
-        """The vehicle for which avoidance was on when the node before this one ended."""
+        self._expected: Expected | None = None
         self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell, self.keys)
         self._ranges = RangeReader()
 
@@ -115,10 +126,9 @@ class Link:
         line = self.lines[candidate.address]
         self.session = Session(candidate, line, self._around, self._ranges, self._settings)
         self.session.begin()
-        self._expected = None
-        again, self._again = self._again, None
-        if again is not None and is_same_vehicle(again[0], candidate):
-            self.session.avoid_again(again[1])
+        before, self._expected = self._expected, None
+        if before is not None and before.avoid_by is not None and is_same_vehicle(before.vehicle, candidate):
+            self.session.avoid_again(before.avoid_by, was_in_flight=before.may_fly)
 
     def _go_on_from(self, session: Session, candidate: Candidate) -> None:
         """The vehicle that was lost is heard from elsewhere: what it flies, and what it was asked, stays."""
@@ -127,20 +137,36 @@ class Link:
         self._tell()
 
     @property
+    def _waited_for(self) -> Expected | None:
+        return None if self._expected is None or self._expected.is_given_up else self._expected
+
+    @property
+    def _lost_from_sight(self) -> Expected | None:
+        """What may be in the air is a vehicle that is lost, not none: it stays in sight, and whoever looks is told."""
+        expected = self._waited_for
+        return expected if expected is not None and expected.may_fly else None
+
+    @property
     def avoids_by(self) -> AvoidBy | None:
         """Of the adopted vehicle; of the one before this node's start until it is heard again."""
         if self.session is None:
-            return None if self._again is None else self._again[1]
+            return None if self._expected is None else self._expected.avoid_by
         return self.session.pilot.avoidance.avoids_by
 
-    def expect(self, vehicle: Candidate | None) -> None:
-        """None: it was not heard again for so long that it counts as gone."""
+    @property
+    def may_fly(self) -> bool:
+        """The adopted vehicle, or the one that is waited for, is not known to be disarmed."""
         if self.session is None:
-            self._expected = vehicle
+            return self._expected is None or self._expected.may_fly
+        state = self.session.vehicle.state
+        return state.heartbeat_t_mono_s is None or state.armed
 
-    def avoid_again(self, vehicle: Candidate, by: AvoidBy) -> None:
-        """As soon as this vehicle is heard again: it was on when the node before this one ended."""
-        self._again = (vehicle, by)
+    def expect(self, vehicle: Candidate, *, may_fly: bool, avoid_by: AvoidBy | None) -> None:
+        self._expected = Expected(vehicle, time.monotonic(), may_fly, avoid_by)
+
+    def give_up_expected(self) -> None:
+        if self._expected is not None:
+            self._expected = replace(self._expected, is_given_up=True)
 
     def release(self, *, forget_wish: bool = True) -> None:
         if self.session is not None:
@@ -153,6 +179,9 @@ class Link:
 
     def need_session(self, *, live: bool = True) -> Session:
         """Raises NoVehicleError; ``live``: also when the link to the vehicle is lost."""
+        if self._lost_from_sight is not None:
+            what = "The link has restarted and has not heard the vehicle again yet."
+            raise NoVehicleError(what, advice="Take the pilot's transmitter if it must act now.")
         if self.session is None:
             raise NoVehicleError("No vehicle is adopted.", advice="Connect to it and adopt it first.")
         vehicle = self.session.vehicle
@@ -236,7 +265,8 @@ class Link:
     def _beat(self, message: Message) -> bool:
         """To the far ends that the operator has named, and to the adopted vehicle; to nobody else."""
         session, anyone = self.session, False
-        vehicle = self._expected if session is None else session.vehicle.candidate
+        expected = self._waited_for
+        vehicle = session.vehicle.candidate if session else expected and expected.vehicle
         for line in self.lines.values():
             peer = vehicle.peer if vehicle is not None and vehicle.address == line.text else None
             if peer is None and not line.address.names_far_end:
@@ -276,14 +306,14 @@ class Link:
             self.spawn(self.commands.record(AUTOPILOT, f"avoidance: {status.state}", must=False))
 
     def status(self) -> LinkStatus:
-        now_s, vehicle = time.monotonic(), self.session and self.session.vehicle
+        now_s, vehicle, awaited = time.monotonic(), self.session and self.session.vehicle, self._lost_from_sight
         return LinkStatus(
             t_mono_s=now_s,
             connections=tuple(line.status() for line in self.lines.values()),
             candidates=self.peers.candidates(now_s),
-            adopted=vehicle.candidate if vehicle else None,
-            state=vehicle.link_state if vehicle else "none",
-            silent_s=vehicle.silent_s if vehicle else None,
+            adopted=vehicle.candidate if vehicle else awaited and awaited.vehicle,
+            state=vehicle.link_state if vehicle else "lost" if awaited else "none",
+            silent_s=vehicle.silent_s if vehicle else awaited and now_s - awaited.since_s,
             quality=vehicle.quality if vehicle else None,
             round_trip_s=vehicle.round_trip_s if vehicle else None,
             heartbeat_hz=self._heartbeat.hz(asyncio.get_running_loop().time()),

@@ -81,10 +81,11 @@ class Session:
         self._around.changed()
         self._read_back()
 
-    def avoid_again(self, by: AvoidBy) -> None:
+    def avoid_again(self, by: AvoidBy, *, was_in_flight: bool) -> None:
         """It was on, with its operator's consent, when the link before this one ended."""
         self.pilot.avoidance.enable(by)
-        self._on_text(ALERT, AVOIDS_AGAIN)
+        if was_in_flight:
+            self._on_text(ALERT, AVOIDS_AGAIN)
         self._around.spawn(self._around.commands.record(AUTOPILOT, "avoidance on again", must=False))
 
     def close(self) -> None:

@@ -48,6 +48,8 @@ class Memory:
     adopted: Candidate | None = None
     flight: FlightStatus = field(default_factory=FlightStatus)
     highest_token: int = 0
+    may_fly: bool = True
+    """The vehicle was not known to be disarmed."""
     avoid_by: AvoidBy | None = None
     """Avoidance is on for the adopted vehicle, its operator has consented; None: off, or its pilot has taken over."""
 
@@ -78,7 +80,8 @@ class LinkNode:
     async def take_up(self, memory: Memory, links: list[str]) -> None:
         """What the node before this one had; then what this one was started with."""
         adopted = memory.adopted
-        self._link.expect(adopted)
+        if adopted is not None:
+            self._link.expect(adopted, may_fly=memory.may_fly, avoid_by=memory.avoid_by)
         for wanted in memory.connections:
             was_there = adopted is not None and adopted.address == wanted.address
             await self._link.connect(
@@ -89,8 +92,6 @@ class LinkNode:
                 await self._link.connect(address, adopt=True)
         self._memory, self._expected = memory, adopted is not None
         self._link.flight.take_up(memory.flight)
-        if adopted is not None and memory.avoid_by is not None:
-            self._link.avoid_again(adopted, memory.avoid_by)
 
     async def run(self) -> None:
         """Until nobody needs it any more: no server for a minute, and no armed vehicle that can be heard."""
@@ -133,8 +134,8 @@ class LinkNode:
         if adopted is None and self._is_expected:
             adopted = self._memory.adopted
         elif adopted is None:
-            self._link.expect(None)
-        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.avoids_by)
+            self._link.give_up_expected()
+        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.may_fly, link.avoids_by)
         if memory != self._memory:
             self._memory = memory
             await asyncio.to_thread(write_memory, self._file, memory)

@@ -44,12 +44,21 @@ class Node:
         self._processes: list[subprocess.Popen[bytes]] = []
         self.last: dict[type, Any] = {}
         self.texts: list[str] = []
+        self.links_since_start: list[LinkStatus] = []
 
     def start(self, *arguments: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "telemetry.nodes.link", "--runtime", str(self.runtime), *arguments]
         process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL)
         self._processes.append(process)
         return process
+
+    def kill_and_start_again(self) -> None:
+        process = self._processes[-1]
+        process.kill()
+        process.wait()
+        self.last.clear()
+        self.links_since_start.clear()
+        self.start()
 
     def end(self) -> None:
         for process in self._processes:
@@ -75,6 +84,8 @@ class Node:
     async def listen(self, bus: Bus) -> None:
         async for _, message in bus.subscribe("**", keep_all=True):
             self.last[type(message)] = message
+            if isinstance(message, LinkStatus):
+                self.links_since_start.append(message)
             if isinstance(message, VehicleText):
                 self.texts.append(message.text)
 
@@ -120,7 +131,7 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
         where: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 4.0, "boot_s": 0.5}
         options = SimOptions(LAT_DEG, LON_DEG, ALT_M, **where, parameters=QUICKLY_DOWN)
         async with flying(options) as simulator, station(tmp_path) as (node, client):
-            process = node.start("--link", simulator.address.replace("tcpin", "tcp"))
+            node.start("--link", simulator.address.replace("tcpin", "tcp"))
             await until(lambda: node.status.state == "live" and node.state.ready_to_arm and node.state.estimator_ok)
             assert running_node(node.runtime, "link") is not None
             report = await client.call(Upload(ME, items(6), LAT_DEG, LON_DEG, ALT_M))
@@ -128,18 +139,21 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             assert await client.call(ReadParameters(("RTL_ALT",))) == {"RTL_ALT": 1500.0}
             with pytest.raises(MissionUnknownError):
                 await client.call(StartAuto(ME, "another"))
+            await client.call(SetAvoidance(ME, enabled=True, by="sidestep"))
+            node.kill_and_start_again()
+            await until(lambda: node.avoidance.enabled and node.status.mission_state == "verified")
+            assert AVOIDS_AGAIN not in node.texts, "on the ground there was nothing to avoid"
+            await until(lambda: node.state.ready_to_arm)
             await client.call(StartAuto(ME, report.onboard.digest))
             await until(lambda: node.flight.phase == "flying")
-            await client.call(SetAvoidance(ME, enabled=True, by="sidestep"))
             facts = running_node(node.runtime, "link")
             assert facts is not None
             assert not facts.replaceable
             since = node.flight.since_utc_s
 
-            process.kill()
-            process.wait()
-            node.last.clear()
-            node.start()
+            node.kill_and_start_again()
+            await until(lambda: node.status.state == "live")
+            assert all(status.adopted for status in node.links_since_start), "a vehicle in the air is lost, not none"
             await until(lambda: node.status.mission_state == "verified" and node.flight.phase == "flying")
             assert node.status.mission_digest == report.onboard.digest
             assert node.flight.since_utc_s == since
@@ -157,9 +171,10 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
             assert {"done"} <= {entry.get("result") for entry in entries}
             words = [entry["words"] for entry in entries if "result" not in entry]
             assert words[0] == "upload 8 items"
-            assert words[-3:] == [
-                f"start mission {report.onboard.digest[:12]} at item 1",
+            assert words[-4:] == [
                 "avoidance on by sidestep",
+                "avoidance on again",
+                f"start mission {report.onboard.digest[:12]} at item 1",
                 "avoidance on again",
             ]
 

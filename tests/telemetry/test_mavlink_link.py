@@ -102,17 +102,36 @@ def test_the_vehicle_of_the_node_before_gets_its_heartbeat_before_it_says_anythi
         vehicle, other = UdpVehicle(port), UdpVehicle(port)
         before = Candidate("old", f"udpin:127.0.0.1:{port}", f"127.0.0.1:{vehicle.port}", 1, 1, "ardupilot", 2)
         async with console() as bench:
-            bench.link.expect(before)
+            bench.link.expect(before, may_fly=False, avoid_by=None)
             await bench.handle(Connect(ME, before.address, True))
             await until(lambda: len(vehicle.of("HEARTBEAT")) >= 2)
             assert (vehicle.kinds(), other.heard, bench.status.adopted) == ({"HEARTBEAT"}, [], None)
-            bench.link.expect(None)
+            bench.link.give_up_expected()
             silent_since = len(bench.of(LinkStatus))
             vehicle.heard.clear()
             await until(lambda: len(bench.of(LinkStatus)) > silent_since + 3)
             assert vehicle.heard == []
         vehicle.close()
         other.close()
+
+    run(whole)
+
+
+def test_a_vehicle_that_may_fly_is_lost_from_sight_until_the_restarted_link_hears_it_or_gives_it_up() -> None:
+    async def whole() -> None:
+        address = f"udpin:127.0.0.1:{free_port()}"
+        before = Candidate("old", address, "127.0.0.1:9", 1, 1, "ardupilot", 2)
+        async with console() as bench:
+            bench.link.expect(before, may_fly=True, avoid_by=None)
+            await bench.handle(Connect(ME, address, True))
+            await until(lambda: bench.status.state == "lost")
+            assert bench.status.adopted == before
+            with pytest.raises(NoVehicleError, match="not heard the vehicle again"):
+                await bench.handle(Arm(ME))
+            bench.link.give_up_expected()
+            await until(lambda: (bench.status.state, bench.status.adopted) == ("none", None))
+            with pytest.raises(NoVehicleError, match="No vehicle"):
+                await bench.handle(Arm(ME))
 
     run(whole)
 
