@@ -51,13 +51,13 @@ class LatchedAlerts:
     def give_up(self, sensor: Sensor, now_mono_s: float) -> tuple[str, ...]:
         """What a sensor's node has not told again counts as over: it has died, or been started anew. Their ids.
 
-        Not what this server says of the node itself.
+        Not what this server says of the node itself, or of avoidance.
         """
         silent = tuple(
             key
             for key, doc in self._docs.items()
             if doc.alert.sensor == sensor
-            and doc.alert.kind != "sensor"
+            and doc.alert.kind not in ("sensor", "avoidance")
             and not doc.over
             and now_mono_s - self._heard_mono_s[key] > UNHEARD_S
         )

@@ -149,7 +149,7 @@ class Watch:
         if self._blind is None and text and self._vehicle is not None and self._vehicle.in_air:
             sensor: Sensor = before.sensors[0] if before.sensors else "radar"
             now_s = self._now_mono_s()
-            self._blind = ObstacleAlert(f"blind-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
+            self._blind = ObstacleAlert(f"blind-{now_s:.1f}", sensor, "avoidance", "begins", now_s, 0.0, now_s, text)
             self._tell_own(self._blind)
 
     def on_settings(self, settings: PerceptionSettings) -> None:

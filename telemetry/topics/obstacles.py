@@ -225,9 +225,9 @@ class ObstacleAlert:
     id: str
     """One per obstacle and sensor, from begin to end."""
     sensor: Sensor
-    kind: Literal["obstacle", "conflict", "approach", "divergence", "sensor"]
+    kind: Literal["obstacle", "conflict", "approach", "divergence", "sensor", "avoidance"]
     """conflict: on the mission ahead, beyond the regions; approach: a track whose closest approach will be too near;
-    divergence, sensor: of the sensor itself."""
+    divergence, sensor: of the sensor itself; avoidance: it does not watch any more, by whatever cause."""
     phase: Literal["begins", "goes_on", "ends"]
     t_mono_s: float
     """When the frame was measured that showed it."""

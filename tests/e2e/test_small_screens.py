@@ -1,16 +1,31 @@
-"""On small screens the ways past an obstacle cover neither the alert nor an instrument, and need no panel opened."""
+"""On small screens nothing covers what counts: ways past an obstacle, alerts, and what has failed."""
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
+from typing import Literal
 
 import pytest
 from playwright.sync_api import FloatRect, Page, WebSocketRoute, expect
 
-from server.schemas import LinkMessage, ObstaclesMessage, PerceptionMessage
+from server.schemas import (
+    LinkMessage,
+    MeMessage,
+    NodesMessage,
+    ObstaclesMessage,
+    PerceptionMessage,
+    RecorderMessage,
+    TextMessage,
+    VehicleMessage,
+)
+from server.schemas.account_docs import MeDoc
+from server.schemas.flight_docs import NodeDoc
 from server.schemas.obstacle_docs import AlertDoc, ManoeuvreDoc, ObstaclesState
-from telemetry.topics.messages import Candidate, LinkStatus
+from server.schemas.strict_model import Message
+from telemetry.topics.messages import Candidate, LinkStatus, RecorderStatus, VehicleText
+from telemetry.topics.vehicle import VehicleState
 from tests.e2e.stations import Station
 from tests.e2e.steps import visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status
@@ -45,7 +60,7 @@ AHEAD = (
 def test_the_ways_past_it_stand_beside_alert_and_instruments(
     station: Station, page: Page, size: tuple[int, int]
 ) -> None:
-    page.context.route_web_socket(re.compile(r"/ws$"), _with_something_ahead)
+    _with_messages(page, AHEAD)
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -64,7 +79,7 @@ def test_the_ways_past_it_stand_beside_alert_and_instruments(
 
 @pytest.mark.parametrize("width", [1440, 1180, 1024, 820, 390])
 def test_nothing_sticks_out_of_panels_and_strip(station: Station, page: Page, width: int) -> None:
-    page.context.route_web_socket(re.compile(r"/ws$"), _with_something_ahead)
+    _with_messages(page, AHEAD)
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     page.set_viewport_size({"width": width, "height": 844})
@@ -80,6 +95,70 @@ def test_nothing_sticks_out_of_panels_and_strip(station: Station, page: Page, wi
             opens.click()
 
 
+LOST = (
+    LinkMessage(link=LinkStatus(10.0, adopted=QUAD, state="live")),
+    VehicleMessage(
+        source="live",
+        now_mono_s=10.0,
+        follow=None,
+        state=VehicleState(1, 1, armed=True, mode="GUIDED", heartbeat_t_mono_s=10.0, battery_share=0.97),
+    ),
+    RecorderMessage(recorder=RecorderStatus(10.0, True, "flight.mcap", started_utc_s=1000.0, bytes=40_000_000)),
+    TextMessage(source="live", text=VehicleText(1000.0, 1, "The link has restarted: nothing avoided meanwhile.")),
+    NodesMessage(
+        nodes=[
+            NodeDoc(name="link", state="restarting", restarts=1, text="It was killed."),
+            NodeDoc(name="radar", state="silent", restarts=0, text="Nothing is heard of it."),
+        ]
+    ),
+)
+
+
+@pytest.mark.parametrize("role", ["operator", "observer"])
+@pytest.mark.parametrize("is_server_lost", [False, True], ids=["link", "server"])
+def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
+    station: Station, page: Page, *, is_server_lost: bool, role: Literal["operator", "observer"]
+) -> None:
+    me = MeMessage(me=MeDoc(name="Ann", role=role, owner=False))
+    sides = _with_messages(page, (*LOST, me))
+    visit(page, station)
+    page.get_by_test_id("tab-fly").click()
+    expect(page.get_by_test_id("chip-link")).to_contain_text("Link failed")
+    if is_server_lost:
+        sides.pop().close(code=4408)
+        page.context.route_web_socket(re.compile(r"/ws$"), lambda side: side.close(code=4408))
+        expect(page.get_by_test_id("link-state")).to_contain_text("No connection")
+    found = {}
+    for width in (1440, 1180, 1024, 820, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        for bar in (".status-bar", ".vehicle-strip"):
+            if collisions := page.locator(bar).evaluate(COLLISIONS):
+                found[width, bar] = collisions
+        for testid in ("hold-position", "return-home", "safety-why", "loss-acknowledge"):
+            assert page.get_by_test_id(testid).is_visible(), (width, testid)
+    assert found == {}
+
+
+COLLISIONS = """(bar) => {
+  const sides = bar.getBoundingClientRect();
+  const isSeen = (part) => part.getClientRects().length > 0 && getComputedStyle(part).clipPath === "none";
+  const kinds = "button, input, .chip, .saved, .link-badge, .safety-why, .tabs, .operator-holder";
+  const parts = [...bar.querySelectorAll(kinds)]
+    .filter((part) => isSeen(part) && !part.closest(".tabs button"))
+    .map((part) => ({ part, box: part.getBoundingClientRect(), is: part.dataset.testid ?? part.className }))
+    .filter(({ box }) => box.width > 1 && box.height > 1);
+  const out = parts.filter(({ box }) => box.right > sides.right + 1 || box.left < sides.left - 1);
+  const found = out.map(({ is, box }) => `${is} sticks out, to ${box.right}`);
+  for (const [i, one] of parts.entries())
+    for (const two of parts.slice(i + 1)) {
+      if (one.part.contains(two.part) || two.part.contains(one.part)) continue;
+      const wide = Math.min(one.box.right, two.box.right) - Math.max(one.box.left, two.box.left);
+      const high = Math.min(one.box.bottom, two.box.bottom) - Math.max(one.box.top, two.box.top);
+      if (wide > 1 && high > 1) found.push(`${one.is} lies over ${two.is}`);
+    }
+  return found;
+}"""
+
 STICK_OUT = """(panel) => {
   const sides = panel.getBoundingClientRect();
   return [...panel.querySelectorAll(":not(.visually-hidden, .visually-hidden *, svg *)")].filter((part) => {
@@ -90,20 +169,27 @@ STICK_OUT = """(panel) => {
 }"""
 
 
-def _with_something_ahead(page_side: WebSocketRoute) -> None:
-    """What the station itself says of vehicles is left out."""
-    server = page_side.connect_to_server()
-    told = {"link", "obstacles", "perception", "tracks"}
+def _with_messages(page: Page, messages: Sequence[Message]) -> list[WebSocketRoute]:
+    """The page hears these, and nothing that the station itself says of such things. Returned: its ends of streams."""
+    told = {"tracks", "perception", *(json.loads(message.model_dump_json())["type"] for message in messages)}
+    sides = list[WebSocketRoute]()
 
-    def pass_on(text: str | bytes) -> None:
-        kind = json.loads(text)["type"]
-        if kind not in told:
-            page_side.send(text)
-        if kind == "snapshot":
-            for message in AHEAD:
-                page_side.send(message.model_dump_json())
+    def opened(page_side: WebSocketRoute) -> None:
+        server = page_side.connect_to_server()
+        sides.append(page_side)
 
-    server.on_message(pass_on)
+        def pass_on(text: str | bytes) -> None:
+            kind = json.loads(text)["type"]
+            if kind not in told:
+                page_side.send(text)
+            if kind == "snapshot":
+                for message in messages:
+                    page_side.send(message.model_dump_json())
+
+        server.on_message(pass_on)
+
+    page.context.route_web_socket(re.compile(r"/ws$"), opened)
+    return sides
 
 
 def _box(page: Page, testid: str) -> FloatRect:

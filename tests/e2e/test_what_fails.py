@@ -120,7 +120,7 @@ def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Pa
             connect(page, vehicle)
             expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
             line.is_slow = True
-            expect(page.get_by_test_id("link-state")).to_contain_text(re.compile(r"Slow line: \d+\ss late|silent"))
+            expect(page.get_by_test_id("link-state")).to_contain_text(re.compile(r"Page \d+\ss late|silent"))
             expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
             line.is_slow = False
             expect(page.get_by_test_id("link-state")).to_contain_text("Connected")

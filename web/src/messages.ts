@@ -315,7 +315,7 @@ export interface Obstacle {
 export interface ObstacleAlert {
   id: string;
   sensor: "radar" | "vision" | "ranges";
-  kind: "obstacle" | "conflict" | "approach" | "divergence" | "sensor";
+  kind: "obstacle" | "conflict" | "approach" | "divergence" | "sensor" | "avoidance";
   phase: "begins" | "goes_on" | "ends";
   t_mono_s: number;
   t_utc_s: number;

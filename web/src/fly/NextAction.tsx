@@ -180,7 +180,7 @@ export function NextAction() {
         <LastFlight />
       </Changes>
       <TransferBar />
-      {hint && <p class="muted action-hint">{hint}</p>}
+      {hint && cut === null && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}
       {observer && <p class="muted action-hint">{whoIsInCharge()}</p>}
       {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}

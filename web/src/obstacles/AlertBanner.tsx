@@ -1,6 +1,6 @@
 import { Changes } from "../ui/Changes";
 import { useRef, useState } from "preact/hooks";
-import type { AlertDoc } from "../messages";
+import type { AlertDoc, ObstacleAlert } from "../messages";
 import { endingsOf, parted, type Endings } from "../store/alerts";
 import { now_ms } from "../store/clock";
 import { alerts } from "../store/obstacles";
@@ -15,7 +15,7 @@ import { Figures, Place, State } from "./AlertFigures";
 import { SensorMark } from "./SensorMark";
 import { ALERTS, acknowledge } from "./obstacle_orders";
 import { hasWays } from "./manoeuvres";
-import { alertTitle, bearingWord, distance, heightDifference, spoken } from "./obstacle_words";
+import { alertSensor, alertTitle, bearingWord, distance, heightDifference, spoken } from "./obstacle_words";
 
 /** Further alerts, one line each. */
 const MOST_LINES = 2;
@@ -81,11 +81,16 @@ interface HeadProps {
   onShrink: (() => void) | null;
 }
 
+function AlertMark({ alert }: { alert: ObstacleAlert }) {
+  const sensor = alertSensor(alert);
+  return sensor && <SensorMark sensor={sensor} />;
+}
+
 function Head({ entry, isReplay, onShrink }: HeadProps) {
   return (
     <header>
       <Icon name={entry.over ? "check" : "warning"} size={24} />
-      <SensorMark sensor={entry.alert.sensor} />
+      <AlertMark alert={entry.alert} />
       <strong>{alertTitle(entry.alert)}</strong>
       {isReplay && <span class="replay-word small">REPLAY</span>}
       {!isReplay && isReplaying.value && <span class="live-tag">LIVE</span>}
@@ -108,7 +113,7 @@ function Line({ entry }: { entry: AlertDoc }) {
   return (
     <li class={stageOf(entry)} data-testid="alert-line">
       <Icon name="warning" size={16} />
-      <SensorMark sensor={alert.sensor} />
+      <AlertMark alert={alert} />
       <span class="alert-line-text" title={alert.text}>
         {alert.obstacle
           ? `${distance(alert.obstacle.distance_m)} · ${bearingWord(alert.obstacle)} · ${heightDifference(alert.obstacle.height_difference_m)}`

@@ -4,7 +4,7 @@ import { isInAir, type Source } from "../store/flying";
 import { goTo } from "../store/view";
 import { hasSensors, watching } from "../store/obstacles";
 import { pending } from "../store/outcomes";
-import { whyNotAsk } from "../store/reach";
+import { whyNotAsk, whyUnheard } from "../store/reach";
 import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -37,6 +37,7 @@ function ConflictLine({ conflict }: { conflict: NonNullable<Ahead["conflict"]> }
 }
 
 function Clear({ ahead, watches }: { ahead: Ahead; watches: boolean }) {
+  if (whyUnheard.value !== null) return <p class="muted">Not known now. {whyUnheard.value}.</p>;
   if (!watches) return <p class="muted">Not watched: no sensor sees anything now.</p>;
   if (ahead.corridor_m <= 0) return <p class="muted">There is no mission ahead to look along.</p>;
   return (
@@ -109,6 +110,7 @@ export function AheadLine() {
   const { conflict, corridor_m } = aheadOf(statuses);
   const show = () => document.getElementById("mission-ahead")?.scrollIntoView({ block: "start" });
   const clear = corridor_m > 0 ? "clear of what was seen" : "no mission to look along";
+  const known = statuses.length > 0 ? clear : "not watched";
   return (
     <button
       type="button"
@@ -125,7 +127,7 @@ export function AheadLine() {
         {conflict ? (
           <strong>Conflict {conflictWhere(conflict)}</strong>
         ) : (
-          `Ahead: ${statuses.length > 0 ? clear : "not watched"}`
+          `Ahead: ${whyUnheard.value === null ? known : "not known now"}`
         )}
       </span>
     </button>

@@ -17,6 +17,7 @@ const KIND_WORDS: Record<ObstacleAlert["kind"], string> = {
   approach: "on a collision course",
   divergence: "positions disagree",
   sensor: "sensor trouble",
+  avoidance: "does not watch",
 };
 
 /** A small distance in decimetres, a larger one in metres: nobody reads decimetres in a hurry. */
@@ -45,7 +46,13 @@ export function signedHeight(value_m: number): string {
 export const timeTo = (value_s: number | null) =>
   value_s === null ? "not getting nearer" : `contact in ${withUnit(value_s, "s", value_s < 10 ? 1 : 0)}`;
 
-export const alertTitle = ({ sensor, kind }: ObstacleAlert) => `${SENSOR_WORDS[sensor]}: ${KIND_WORDS[kind]}`;
+/** Whose alert it is; avoidance, which several sensors serve, is nobody's. */
+export const alertSensor = ({ sensor, kind }: ObstacleAlert) => (kind === "avoidance" ? null : sensor);
+
+export const alertTitle = (alert: ObstacleAlert) => {
+  const sensor = alertSensor(alert);
+  return `${sensor ? SENSOR_WORDS[sensor] : "Avoidance"}: ${KIND_WORDS[alert.kind]}`;
+};
 
 /** What is said aloud once, when it begins; its figures go on changing, in silence. */
 export function spoken(entry: AlertDoc): string {

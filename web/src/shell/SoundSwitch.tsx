@@ -15,7 +15,8 @@ export function SoundWaits() {
     <Chip
       icon="silent"
       level="near"
-      text="Sound is off until you press"
+      text="Press for sound"
+      title="Alarms are silent until you click or press a key on this page"
       testid="chip-sound"
       class="sound-waits"
     />

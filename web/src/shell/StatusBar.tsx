@@ -33,13 +33,12 @@ const LINK_WORDS = {
   open: "Connected",
   connecting: "Connecting…",
   silent: "The server is silent",
-  lost: "Connection lost – retrying",
+  lost: "No connection – retrying",
 } as const;
 
 function LinkBadge() {
   const state = late_s.value === null ? link.value : "slow";
-  const text =
-    late_s.value === null ? LINK_WORDS[link.value] : `Slow line: ${withUnit(late_s.value, "s")} late`;
+  const text = late_s.value === null ? LINK_WORDS[link.value] : `Page ${withUnit(late_s.value, "s")} late`;
   return (
     <span class={`link-badge ${state}`} role="status" data-testid="link-state">
       <span class="dot" aria-hidden="true" />

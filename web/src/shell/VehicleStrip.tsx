@@ -181,7 +181,8 @@ function LossCalls() {
 /** The newest message that nobody has acknowledged, and nodes that ended: to be seen in every view. */
 function Alerts() {
   const worst = latched.value[0];
-  const node = troubledNodes.value[0];
+  // Of a link that has failed the link's own chip and the words beside Hold tell.
+  const node = troubledNodes.value.find(({ name }) => name !== "link" || !hasLinkFailed.value);
   return (
     <>
       {worst && (
@@ -205,9 +206,10 @@ function Alerts() {
         <Chip
           icon="warning"
           text={`${nodeWord(node.name)} ${NODE_STATES[node.state] ?? node.state}`}
-          level={node.name === "link" && hasLinkFailed.value ? "bad" : "near"}
+          level="near"
           title={node.text}
           testid="chip-node"
+          class="node"
         />
       )}
     </>

@@ -31,6 +31,7 @@ const KINDS: Record<ObstacleAlert["kind"], number> = {
   conflict: 1,
   divergence: 2,
   sensor: 3,
+  avoidance: 1,
 };
 
 /** Coarsely, so that two obstacles do not change places with every frame, under the hand that acknowledges one. */

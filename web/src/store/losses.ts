@@ -1,5 +1,6 @@
-import { computed, effect, signal } from "@preact/signals";
+import { computed, effect, signal, untracked } from "@preact/signals";
 import { adopted, linkState, vehicle } from "./flying";
+import { forgetSaid } from "./outcomes";
 import { failed, late_s, type Failed } from "./reach";
 
 /**
@@ -17,6 +18,10 @@ export const loss = computed<Loss | null>(() => {
   if (failed.value !== null) return failed.value;
   if (linkState.value === "lost") return "vehicle";
   return late_s.value === null ? null : "slow";
+});
+
+effect(() => {
+  if (failed.value !== null) untracked(forgetSaid);
 });
 
 const seen = signal<Loss | null>(null);

@@ -23,6 +23,11 @@ export function say(place: string, text: string | null): void {
     );
 }
 
+/** What was done may no longer be so, and nobody can look. */
+export function forgetSaid(): void {
+  for (const place of Object.keys(outcomes.value)) say(place, null);
+}
+
 function setPending(place: string, isPending: boolean): void {
   const next = new Set(pending.value);
   if (isPending) next.add(place);
