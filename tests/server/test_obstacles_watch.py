@@ -46,7 +46,7 @@ def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_see
     watch.on_avoidance(sees)
     watch.on_avoidance(blind)
     (lost,) = [each.alert for each in watch.state.alerts]
-    assert (lost.kind, lost.sensor, lost.phase) == ("sensor", "vision", "begins")
+    assert (lost.kind, lost.sensor, lost.phase) == ("avoidance", "vision", "begins")
     assert "sees nothing any more" in lost.text
     watch.on_avoidance(replace(blind, text="still"))
     assert len([message for message in told if message.type == "alert"]) == 1
@@ -70,7 +70,7 @@ def test_avoidance_is_gone_with_the_link_process_and_back_with_its_word() -> Non
     assert watch.state.avoidance.state == "lost"
     assert watch.state.avoidance.largest_speed_m_s is None, "it sees far enough for no speed"
     (gone,) = [each.alert for each in watch.state.alerts]
-    assert (gone.kind, gone.phase) == ("sensor", "begins")
+    assert (gone.kind, gone.phase) == ("avoidance", "begins")
     assert "transmitter" in gone.text
     watch.on_link_process(answers=True)
     assert watch.state.avoidance == sees

@@ -47,6 +47,10 @@ describe("an obstacle in words", () => {
     expect(spoken(alertDoc("a", { over: true }))).toBe("Over. Radar: obstacle.");
     const trouble = alert("b", { sensor: "vision", kind: "divergence", obstacle: null, text: "4 m apart." });
     expect(spoken(alertDoc("b", { alert: trouble }))).toBe("Camera: positions disagree. 4 m apart.");
+    const gone = { ...trouble, kind: "avoidance" as const, text: "Take the transmitter." };
+    expect(spoken(alertDoc("c", { alert: gone })), "no sensor is to blame").toBe(
+      "Avoidance: does not watch. Take the transmitter.",
+    );
   });
 
   it("on the mission ahead says how far, when, and before which item", () => {
