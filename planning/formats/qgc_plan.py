@@ -7,6 +7,7 @@ import math
 
 from mapping.version import __version__
 from planning.formats.commands import POSITIONED, home_altitude_note, millimetres_up, plain_frame
+from planning.formats.fence_plan import fence_json, heights_json, rally_json
 from planning.formats.planned_for import planned_for_json
 from planning.formats.qgc_plan_reader import ALTITUDE_MODE, DEFAULT_SPEED_M_S, FIRMWARE_TYPE, QUADROTOR, read_plan
 from planning.formats.safe_text import clean_name
@@ -27,8 +28,8 @@ def write_plan(mission: Mission) -> str:
         "version": 1,
         "groundStation": "Hedgehop",
         "mission": _mission(mission),
-        "geoFence": {"version": 2, "polygons": [], "circles": []},
-        "rallyPoints": {"version": 2, "points": []},
+        "geoFence": fence_json(mission.fence),
+        "rallyPoints": rally_json(mission.rally),
         "hedgehop": _provenance(mission),
     }
     return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
@@ -81,6 +82,7 @@ def _provenance(mission: Mission) -> dict[str, object]:
         "surface_model": mission.surface_sha256 or None,
         "surface_name": clean_name(mission.surface_name) or None,
         "planned_for": None if mission.planned_for is None else planned_for_json(mission.planned_for),
+        **heights_json(mission.fence),
     }
 
 

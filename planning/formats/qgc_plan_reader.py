@@ -7,6 +7,7 @@ from typing import Any
 
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
+from planning.formats.fence_plan import read_fence_json, read_rally_json
 from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
@@ -44,7 +45,8 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
     raw_ours = plan.get("hedgehop")
     ours: Json = raw_ours if isinstance(raw_ours, dict) else {}
     home = _home(mission.get("plannedHomePosition"), ours, file)
-    warnings += swapped_against_home(home, items) + _ignored(plan)
+    warnings += swapped_against_home(home, items)
+    fence, rally = read_fence_json(plan, file, warnings), read_rally_json(plan, file)
     home = home_or_first_place(home, items, warnings)
     raw = ours.get("planned_for")
     planned = None if raw is None else read_planned_for(raw, _at(file, "$.hedgehop.planned_for"), warnings)
@@ -60,6 +62,8 @@ def read_plan(data: bytes | str, name: str = "mission.plan") -> Mission:
         planned,
         surface,
         clean_name(called) if isinstance(called, str) else "",
+        fence,
+        rally,
     )
 
 
@@ -176,20 +180,6 @@ def _home(value: object, ours: Json, file: str) -> Home | None:
     datum = ours.get("vertical_datum")
     alt_m = math.nan if alt is None else finite(alt, "The home altitude", where)
     return Home(lat, lon, alt_m, clean_name(datum) if isinstance(datum, str) else None)
-
-
-def _ignored(plan: Json) -> list[str]:
-    fence, rally = plan.get("geoFence"), plan.get("rallyPoints")
-    fences = (
-        sum(len(fence[k]) for k in ("polygons", "circles") if isinstance(fence.get(k), list))
-        if isinstance(fence, dict)
-        else 0
-    )
-    points = len(rally["points"]) if isinstance(rally, dict) and isinstance(rally.get("points"), list) else 0
-    return [
-        *([f"{fences} geofence shapes of the plan were not read."] if fences else []),
-        *([f"{points} rally points of the plan were not read."] if points else []),
-    ]
 
 
 def _firmware(mission: Json) -> Firmware:

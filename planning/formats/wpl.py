@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Iterator
 
 from mapping.version import __version__
 from planning.errors import FormatError
@@ -12,7 +13,7 @@ from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import planned_for_line, read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
 from planning.formats.swapped import swapped_against_home
-from planning.mav_cmd import MavCmd, MavFrame
+from planning.mav_cmd import FENCES, MavCmd, MavFrame
 from planning.model import Home, Mission, MissionItem, PlannedFor
 
 HEADER = "QGC WPL 110"
@@ -64,16 +65,13 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
     do not say which, so their datum is None.
     """
     lines = decode_text(name, data).splitlines()
-    _check_header(clean_name(name), lines[0] if lines else "")
     notes, home, items, warnings = _notes_of(lines), None, [], []
-    for number, line in enumerate(lines[1:], start=2):
-        if line.strip() and not line.lstrip().startswith("#"):
-            check_count(len(items), "mission items", clean_name(name))
-            item = _item(line.split(), f"{clean_name(name)}, line {number}")
-            if items or home or item.command != MavCmd.NAV_WAYPOINT or line.split()[0] != "0":
-                items.append(item)
-            else:
-                home = _home(item, notes, warnings)
+    for number, item in _rows(lines, clean_name(name)):
+        if items or home or not _is_home(number, item):
+            _refuse_fence(item, clean_name(name))
+            items.append(item)
+        else:
+            home = _home(item, notes, warnings)
     home = home if home and (home.lat_deg or home.lon_deg) else None
     warnings += swapped_against_home(home, items)
     home = home_or_first_place(home, items, warnings)
@@ -90,6 +88,44 @@ def read_wpl(data: bytes | str, name: str = "mission.waypoints") -> Mission:
         surface_digest(notes.get("surface_model")),
         clean_name(notes.get("surface_name", "")),
     )
+
+
+def read_lists(data: bytes | str, name: str) -> tuple[tuple[MissionItem, ...], dict[str, str]]:
+    """Rows of a fence or of rally points, without the home row that some programs write, and what comments say."""
+    lines = decode_text(name, data).splitlines()
+    rows = list(_rows(lines, clean_name(name)))
+    first = 1 if rows and _is_home(*rows[0]) else 0
+    return tuple(item for _, item in rows[first:]), _notes_of(lines)
+
+
+def write_lists(items: Iterable[MissionItem], notes: Iterable[str] = ()) -> str:
+    """Rows of a fence or of rally points as ground stations load them: from sequence 0 on, without home."""
+    rows = [_row(index, item, "ardupilot") for index, item in enumerate(items)]
+    return "\n".join([HEADER, f"# product: Hedgehop {__version__}", *notes, *rows]) + "\n"
+
+
+def _rows(lines: list[str], file: str) -> Iterator[tuple[str, MissionItem]]:
+    """Sequence number as written, and item, of each row. Raises FormatError for another header."""
+    _check_header(file, lines[0] if lines else "")
+    count = 0
+    for number, line in enumerate(lines[1:], start=2):
+        if line.strip() and not line.lstrip().startswith("#"):
+            check_count(count, "mission items", file)
+            count += 1
+            yield line.split()[0], _item(line.split(), f"{file}, line {number}")
+
+
+def _is_home(number: str, item: MissionItem) -> bool:
+    return number == "0" and item.command == MavCmd.NAV_WAYPOINT
+
+
+def _refuse_fence(item: MissionItem, file: str) -> None:
+    if item.command in FENCES or item.command == MavCmd.NAV_RALLY_POINT:
+        raise FormatError(
+            "This is a fence or a list of rally points, not a mission.",
+            where=file,
+            advice="Give it with --fence, beside the mission.",
+        )
 
 
 def _check_header(where: str, line: str) -> None:

@@ -115,7 +115,27 @@ def test_swapped_coordinates_are_noticed():
     assert any("swapped" in w for w in mission.warnings)
 
 
-def test_fence_and_rally_points_are_not_dropped_in_silence():
+def test_a_plan_keeps_its_fence_and_its_rally_points():
     plan = json.loads(plan_with([simple()]))
-    plan |= {"geoFence": {"polygons": [{}], "circles": []}, "rallyPoints": {"points": [[1, 2, 3]]}}
-    assert len(read_plan(json.dumps(plan)).warnings) == 2
+    ring = [[47.0, 8.0], [47.0, 8.001], [47.001, 8.001]]
+    plan |= {
+        "geoFence": {
+            "polygons": [{"polygon": ring, "inclusion": True, "version": 1}],
+            "circles": [{"circle": {"center": [47.0, 8.0], "radius": 30.5}, "inclusion": False, "version": 1}],
+        },
+        "rallyPoints": {"points": [[47.0, 8.0, 30]]},
+    }
+    mission = read_plan(json.dumps(plan))
+    assert mission.fence.polygons[0].corners_lat_lon_deg == ((47.0, 8.0), (47.0, 8.001), (47.001, 8.001))
+    assert (mission.fence.circles[0].radius_m, mission.fence.circles[0].inclusion) == (30.5, False)
+    assert mission.rally[0].alt_rel_home_m == 30
+    again = read_plan(write_plan(mission))
+    assert (again.fence, again.rally) == (mission.fence, mission.rally)
+
+
+def test_a_fence_that_cannot_be_read_stops_the_plan():
+    plan = json.loads(plan_with([simple()]))
+    plan |= {"geoFence": {"polygons": [{}], "circles": []}}
+    with pytest.raises(FormatError) as caught:
+        read_plan(json.dumps(plan))
+    assert caught.value.where.endswith("$.geoFence.polygons[0]")
