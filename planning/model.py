@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from mapping.geometry.arrays import F64, I64
+from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Firmware, Way
 from planning.terrain import SMALL_HOLE_M2
 
@@ -225,6 +226,8 @@ class Mission:
     """Of the surface model's file that it was planned over; empty: the file does not say."""
     surface_name: str = ""
     """Of that file, as far as the mission's says; a name proves nothing, two may share one."""
+    fence: Fence = NO_FENCE
+    rally: tuple[RallyPoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,6 +261,10 @@ class FlownLine:
     """Where a landing item ends the flight, its column is judged as home's is; None without one."""
     notes: tuple[str, ...] = ()
     """What had to be assumed about home; does not stand in the way of a certificate."""
+    fence: Fence = NO_FENCE
+    """That the flight is held against."""
+    rally: tuple[RallyPoint, ...] = ()
+    """To which the vehicle may fly instead of home."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from affine import Affine
 from mapping.geometry.arrays import F64
 from planning.certificate.clearance import certify
 from planning.certificate.model import Certificate, ClearanceParams
+from planning.fence.model import RallyPoint
 from planning.formats.commands import has_position
 from planning.missions.flown import flown_line
 from planning.model import FlownLine, Mission
@@ -100,7 +101,8 @@ def was_enough(
     """
     if _is_whole(ground.dsm, model):
         return True
-    to_cut_m = _to_cut_m(ground.dsm, model, np.vstack([line.points_m[:, :2], [line.home_xy_m]]))
+    places_m = [line.points_m[:, :2], [line.home_xy_m], rally_places(model, line.rally)]
+    to_cut_m = _to_cut_m(ground.dsm, model, np.vstack(places_m))
     found_m = max(
         float(certificate.trend_distance_m.max()),
         *(leg.min_distance_m for leg in certificate.legs),
@@ -137,10 +139,19 @@ def certify_part(
 
 
 def mission_places(model: SurfaceModel, mission: Mission) -> F64:
-    """(N, 2) projected places of home and of all items that have one."""
+    """(N, 2) projected places of home, of all items that have one, and of rally points."""
     places = [(item.lat_deg, item.lon_deg) for item in mission.items if has_position(item)]
     home = mission.home
-    return model.xy_from_lat_lon(np.array([*places, (home.lat_deg, home.lon_deg)]))
+    flown_m = model.xy_from_lat_lon(np.array([*places, (home.lat_deg, home.lon_deg)]))
+    return np.vstack([flown_m, rally_places(model, mission.rally)])
+
+
+def rally_places(model: SurfaceModel, rally: tuple[RallyPoint, ...]) -> F64:
+    """(N, 2) projected places of those that lie on the model: of others it knows nothing, however large its part."""
+    lat_lon_deg = np.array([(point.lat_deg, point.lon_deg) for point in rally]).reshape(-1, 2)
+    xy_m = model.xy_from_lat_lon(lat_lon_deg)
+    west, south, east, north = model.bounds_m
+    return xy_m[((xy_m >= (west, south)) & (xy_m <= (east, north))).all(axis=1)]
 
 
 def hole_assumptions(holes: HoleReport, max_hole_m2: float) -> dict[str, object]:

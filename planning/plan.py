@@ -25,7 +25,7 @@ from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.model import FlownLine, Home, Mission, MissionParams, SampledPath, Surfaces, Timing, VehicleProfile
-from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, was_enough
+from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
 from planning.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import MIN_SEGMENT_M, sampled_path
 from planning.route.poi import check_pois
@@ -168,10 +168,15 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
 
 
 def _signed(mission: Mission, job: _Job) -> Mission:
-    """With what it was planned for, and over which surface model."""
-    model = job.model
+    """With what it was planned for, over which surface model, and within which fence."""
+    model, request = job.model, job.request
     return replace(
-        mission, planned_for=job.request.planned_for, surface_sha256=model.sha256, surface_name=clean_name(model.name)
+        mission,
+        planned_for=request.planned_for,
+        surface_sha256=model.sha256,
+        surface_name=clean_name(model.name),
+        fence=request.fence,
+        rally=request.rally,
     )
 
 
@@ -189,18 +194,21 @@ def read_back(mission: Mission, dsm: Dsm) -> FlownLine:
     Raises MissionError when a file does not describe the flight that was planned: then a writer is wrong.
     """
     meant = flown_line(mission, dsm)
+    plan = qgc_plan.read_plan(qgc_plan.write_plan(mission))
     lines = {
         "mission.waypoints": flown_line(wpl.read_wpl(wpl.write_wpl(mission)), dsm),
-        "mission.plan": flown_line(qgc_plan.read_plan(qgc_plan.write_plan(mission)), dsm),
+        "mission.plan": flown_line(plan, dsm),
     }
+    same_fence = (plan.fence, plan.rally) == (mission.fence, mission.rally)
     for name, line in lines.items():
-        if not _same_flight(line, meant):
+        if not (_same_flight(line, meant) and same_fence):
             raise MissionError(
                 "The exported file does not describe the flight that was planned.",
                 where=name,
                 advice="Do not fly this plan; report it with the points and the surface model.",
             )
-    return lines["mission.waypoints"]
+    # WPL holds no fence; the `.plan` does.
+    return replace(lines["mission.waypoints"], fence=mission.fence, rally=mission.rally)
 
 
 def _same_flight(line: FlownLine, meant: FlownLine) -> bool:
@@ -231,11 +239,12 @@ def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, t
 
 
 def _points(model: SurfaceModel, request: PlanRequest) -> np.ndarray:
-    """(N, 2) projected places that were asked for, home among them where it was given, and a survey's area."""
+    """(N, 2) projected places that were asked for: points, home where it was given, a survey's area, rally points."""
     places = [(poi.lat_deg, poi.lon_deg) for poi in request.pois]
     home = [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else []
     area = [] if request.survey is None else request.survey.polygon_lat_lon_deg
-    return model.xy_from_lat_lon(np.array([*places, *home, *area]))
+    asked_m = model.xy_from_lat_lon(np.array([*places, *home, *area]))
+    return np.vstack([asked_m, rally_places(model, request.rally)])
 
 
 def _home(model: SurfaceModel, request: PlanRequest) -> tuple[Home, str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from planning import limits
 from planning.certificate.model import ClearanceParams
 from planning.errors import ParameterError
+from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Way
 from planning.missions.vehicle_profile import path_params
 from planning.missions.vehicle_terms import budget_of
@@ -38,6 +39,8 @@ class PlanRequest:
     """The area and the pattern that the points come from; None: they are points of interest."""
     way: Way = "auto"
     """How it is flown: the autopilot departs from the line by that much."""
+    fence: Fence = NO_FENCE
+    rally: tuple[RallyPoint, ...] = ()
 
     @property
     def planned_for(self) -> PlannedFor:

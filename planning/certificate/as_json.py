@@ -27,6 +27,7 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "rtl_height_needed_m": certificate.rtl_height_needed_m,
         "home_column_clear": certificate.home_column_clear,
         "home": None if certificate.home is None else asdict(certificate.home),
+        "fence": None if certificate.fence is None else asdict(certificate.fence),
         "max_height_above_ground_m": certificate.max_height_above_ground_m,
         "reasons": [asdict(reason) for reason in certificate.reasons],
         "legs": [asdict(leg) for leg in certificate.legs],

@@ -21,6 +21,7 @@ from pyproj import Proj
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.certificate.as_json import certificate_json
+from planning.certificate.fenced import fence_reason, fence_verdict, rally_reasons
 from planning.certificate.heights import height_range
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
 from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
@@ -36,8 +37,9 @@ from planning.certificate.reasons import (
     return_reason,
     scale_reason,
 )
-from planning.certificate.returns import NEAR_M, SLOPE, return_altitude, return_altitudes
+from planning.certificate.returns import NEAR_M, SLOPE
 from planning.certificate.unjudged import unjudged_reasons
+from planning.certificate.ways_home import distance_flown, near_return, places_along, return_height
 from planning.errors import MissionError, ParameterError
 from planning.model import FlownLine
 from planning.terrain.cells.cells import Layout
@@ -46,8 +48,6 @@ from planning.terrain.dsm import SCALE_TOLERANCE, Dsm, SurfaceModel, true_cells
 __all__ = ["certificate_json", "certify"]
 
 
-RETURN_STEP_M = 0.5
-"""Ways home are judged from pieces of the line at most this long; inside one, the lower altitude counts."""
 LONGEST_LINE_M = 100_000.0
 """Farther than any battery: a longer line is a mistaken coordinate."""
 
@@ -94,8 +94,8 @@ def _judged(
     stand = home_stand(at_home, line, params)
     low_line = lowered(line, stand)
     low_points_m = layout.in_frame(low_line.points_m)
-    needed_m, needed_from = _return_height(pyramid, layout, low_line, params)
-    near_m, near_from = _near_return(pyramid, layout, low_line, params)
+    needed_m, needed_from = return_height(pyramid, layout, low_line, params)
+    near_m, near_from = near_return(pyramid, layout, low_line, params)
     nearest_low = _nearest_low(pyramid, line, low_points_m, stand, distance_m)
     stand = _with_distance(stand, nearest_low)
     planned_m = float(distance_m.min())
@@ -104,6 +104,7 @@ def _judged(
     if home_problem is not None and (spare_m >= 0.0 or at_home.obstacle is not None):
         stand = replace(stand, better=better_home(ground, line.home_xy_m, params, spare_m=spare_m))
         home_problem = home_reason(at_home, stand, nearest_low, planned_m, params)
+    fence = fence_verdict(dsm, line, params)
     highest_leg = int(np.argmax(highest_m))
     scale = _scale(dsm, worst)
     too_near = not planned_m >= params.required_clearance_m
@@ -115,6 +116,8 @@ def _judged(
         return_reason(needed_m, needed_from, dsm, params),
         near_return_reason(near_m, near_from, needed_m, dsm, params),
         landing_reason(_landing_obstacle(ground, line, params)),
+        *rally_reasons(dsm, ground, pyramid, layout, low_line, params),
+        fence_reason(fence),
         height_reason(float(highest_m[highest_leg]), highest_leg, int(line.leg_item[highest_leg]), params),
         scale_reason(scale, SCALE_TOLERANCE),
     ]
@@ -135,6 +138,7 @@ def _judged(
         assumptions=_assumptions(dsm, line, params, scale),
         budget=params.budget,
         home=stand,
+        fence=fence,
     )
 
 
@@ -164,27 +168,6 @@ def _check(line: FlownLine, params: ClearanceParams, trend_step_m: float) -> Non
             f"The line is {length_m / 1000:.0f} km long; at most {LONGEST_LINE_M / 1000:.0f} km are judged.",
             advice="Check that the mission belongs to this surface model.",
         )
-
-
-def places_along(points_m: F64, step_m: float) -> tuple[F64, F64]:
-    """Places at most ``step_m`` apart along the (K, 3) polyline, every vertex among them.
-
-    Returns (M, 3) places and (M,) the horizontal distance flown up to each.
-    """
-    legs = np.diff(points_m, axis=0)
-    parts = np.maximum(1, np.ceil(np.linalg.norm(legs, axis=1) / step_m)).astype(np.int64)
-    leg = np.repeat(np.arange(len(legs)), parts)
-    share = (np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[leg]
-    places = points_m[:-1][leg] + share[:, None] * legs[leg]
-    s_m = distance_flown(points_m)
-    along = s_m[:-1][leg] + share * np.diff(s_m)[leg]
-    return np.vstack([places, points_m[-1:]]), np.append(along, s_m[-1])
-
-
-def distance_flown(points_m: F64) -> F64:
-    """(K,) horizontal distance from the first of (K, 3) points to each."""
-    steps = np.hypot(*np.diff(points_m[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _legs(line: FlownLine, distance_m: F64, share: F64, lowest_m: F64) -> tuple[LegClearance, ...]:
@@ -219,37 +202,6 @@ def _is_unknown_near(pyramid: MaxPyramid, layout: Layout, worst: WorstPoint, dis
     far_above = layout.in_frame(np.array([[worst.x_m, worst.y_m, 1e6]]))
     unknown_m, _ = nearest_distances(pyramid, far_above, far_above)
     return bool(unknown_m[0] <= distance_m.min() + 1e-6)
-
-
-def _return_height(
-    pyramid: MaxPyramid, layout: Layout, line: FlownLine, params: ClearanceParams
-) -> tuple[float, F64 | None]:
-    """Height above home that every way home needs, 0 when none needs any, and the place that needs it."""
-    places_m, _ = places_along(line.points_m, RETURN_STEP_M)
-    return _needed(pyramid, layout, line, places_m, places_m, params)
-
-
-def _near_return(
-    pyramid: MaxPyramid, layout: Layout, line: FlownLine, params: ClearanceParams
-) -> tuple[float, F64 | None]:
-    """As `_return_height`, regarding that close to home autopilots do not climb to the return height."""
-    places_m, _ = places_along(line.points_m, RETURN_STEP_M)
-    raised_m = places_m.copy()
-    raised_m[:, 2] = return_altitudes(
-        places_m, np.array(line.home_xy_m), line.home_alt_dsm_m, rtl_height_m=params.rtl_height_m, step_m=RETURN_STEP_M
-    )
-    return _needed(pyramid, layout, line, places_m, raised_m, params)
-
-
-def _needed(
-    pyramid: MaxPyramid, layout: Layout, line: FlownLine, places_m: F64, flown_m: F64, params: ClearanceParams
-) -> tuple[float, F64 | None]:
-    """Height above home, and the place, that returns flown at the altitudes of ``flown_m`` do not reach."""
-    home_xy_m = layout.in_frame(np.array([line.home_xy_m]))[0]
-    altitude_m, place = return_altitude(pyramid, layout.in_frame(flown_m), home_xy_m, params.required_clearance_m)
-    if place < 0:
-        return 0.0, None
-    return max(0.0, altitude_m - line.home_alt_dsm_m), places_m[place]
 
 
 def _nearest_low(

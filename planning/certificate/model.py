@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from mapping.geometry.arrays import F64
+from planning.fence.judge import FenceVerdict
 from planning.margins.budget import ClearanceBudget
 
 SET_DOWN_M = 0.1
@@ -131,6 +132,8 @@ class Certificate:
     budget: ClearanceBudget | None = None
     """What the required clearance is for, term by term."""
     home: HomeStand | None = None
+    fence: FenceVerdict | None = None
+    """None: the mission has no fence."""
 
     @property
     def kept_m(self) -> float:

@@ -98,6 +98,7 @@ class _Flight:
         self.datum = dsm.vertical_datum or "unknown"
         self.unjudged: list[Unjudged] = []
         self.notes: list[str] = []
+        self.fence, self.rally = mission.fence, mission.rally
         self.home_xy_m = self._home_place(mission, dsm)
         self.home_alt_m = self._home_altitude(mission, dsm)
         self.points: list[tuple[float, float, float]] = []
@@ -249,4 +250,6 @@ class _Flight:
             unjudged=tuple(self.unjudged),
             landing_xy_m=self.landing_xy_m,
             notes=tuple(self.notes),
+            fence=self.fence,
+            rally=self.rally,
         )

@@ -26,6 +26,7 @@ _CERTIFICATE_KEYS = (
     "rtl_height_needed_m",
     "home_column_clear",
     "home",
+    "fence",
     "max_height_above_ground_m",
     "reasons",
 )

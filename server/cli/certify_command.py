@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -25,6 +26,7 @@ from planning.report.summary import certificate_summary, dsm_summary
 from planning.terrain.dsm import Dsm
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command
+from server.cli.shared.fence_given import fence_given
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.mission_vehicle import judged_by
 from server.cli.shared.output import answer, end_progress, progress, say_notes
@@ -43,10 +45,13 @@ def certify(
     model: o.ModelOptions,
     given: Annotated[o.VehicleOptions, Without("max_items")],
     demands: o.ClearanceOptions,
+    keep_to: o.FenceOptions,
 ) -> None:
     """Prove the clearance of a mission made anywhere, against your own surface model."""
     limits.SURFACE["fill_hole_area_m2"].check(model.max_hole_m2)
     flight = read_flight(mission.name, read_small(mission))
+    fence, rally = fence_given(keep_to.fence, flight)
+    flight = replace(flight, fence=fence, rally=rally)
     request = judged_by(flight, given, demands, demands.flown_as)
     vehicle, params = request.profile, request.clearance()
     timer = StepTimer(progress)

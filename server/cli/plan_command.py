@@ -21,6 +21,7 @@ from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
 from server.cli.shared.command import command
+from server.cli.shared.fence_given import fence_given
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.output import say_notes
 from server.cli.shared.planning_run import request_of, run, vehicle_of
@@ -76,6 +77,8 @@ def plan(
             advice="`hedgehop survey` plans lines over an area.",
         )
     waiting = _with_loiter(points.pois, at.loiter_s)
+    fence, rally = fence_given(options.fence.fence, points.mission)
+    request = replace(request, fence=fence, rally=rally)
 
     def request_for(model: SurfaceModel) -> PlanRequest:
         say_notes(*points.warnings, *warn_swapped(points.pois, model))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -17,6 +17,7 @@ from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
 from server.cli.shared.command import Without, command
+from server.cli.shared.fence_given import fence_given
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.output import say_notes
 from server.cli.shared.planning_run import request_of, run, vehicle_of
@@ -62,6 +63,8 @@ def survey(
         )
     camera = vehicle.camera
     request = request_of(options, vehicle)
+    fence, rally = fence_given(options.fence.fence, None)
+    request = replace(request, fence=fence, rally=rally)
     corners = _corners(polygon)
 
     def request_for(model: SurfaceModel) -> PlanRequest:

@@ -17,9 +17,10 @@ from affine import Affine
 from pyproj import CRS
 from scipy.spatial import KDTree
 
-from planning.certificate.clearance import certify, places_along
+from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.model import ClearanceParams
+from planning.certificate.ways_home import places_along
 from planning.model import FlownLine
 from planning.terrain.cells.squares import squares
 from planning.terrain.dsm import Dsm

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import get_num_threads
 
-from planning.certificate.clearance import distance_flown, places_along
 from planning.certificate.heights import height_range
 from planning.certificate.nearest import SMALL_MODEL_PX, nearest_distances, threads_for
 from planning.certificate.pyramid import LEAF_PX, max_pyramid
 from planning.certificate.returns import return_altitude, return_altitudes
+from planning.certificate.ways_home import distance_flown, places_along
 from tests.reference import clearance as oracle
 
 

@@ -13,10 +13,11 @@ from affine import Affine
 from pyproj import CRS, Proj
 from scipy import ndimage
 
-from planning.certificate.clearance import certify, places_along
+from planning.certificate.clearance import certify
 from planning.certificate.model import ClearanceParams
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
+from planning.certificate.ways_home import places_along
 from planning.missions.flown import flown_line
 from planning.model import Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm

@@ -202,6 +202,17 @@ class MissionOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class FenceOptions:
+    """Where the vehicle may be."""
+
+    PANEL: ClassVar = "Fence"
+    fence: Annotated[
+        Path | None,
+        Option(metavar="FILE", help="Fence and rally points to keep to: .plan, .waypoints, .kml, .kmz or .geojson."),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
 class PlanOptions:
     """Everything that ``plan`` and ``survey`` ask alike."""
 
@@ -211,6 +222,7 @@ class PlanOptions:
     vehicle: PlannedVehicle = PlannedVehicle()
     clearance: PlannedClearance = PlannedClearance()
     mission: MissionOptions = MissionOptions()
+    fence: FenceOptions = FenceOptions()
 
 
 def of_vehicle(*groups: PathOptions | VehicleOptions | ClearanceOptions) -> dict[str, float]:

@@ -21,6 +21,8 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
         f"  way home: {_way_home(summary)}",
         f"  home: {_home(summary)}",
     ]
+    if (fence := summary["fence"]) is not None:
+        lines.append(f"  fence: {_fence(fence)}")
     if (survey := summary.get("survey")) is not None:
         lines.append(f"  photos: {_photos(survey)}")
     lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
@@ -35,6 +37,18 @@ def _photos(survey: dict[str, Any]) -> str:
         f"{_percent(survey['twice_share'])} at least twice; overlap over the surface "
         f"{_percent(survey['front_overlap'])} front, {_percent(survey['side_overlap'])} side "
         f"({_percent(survey['asked_front_overlap'])}, {_percent(survey['asked_side_overlap'])} asked)"
+    )
+
+
+def _fence(fence: dict[str, Any]) -> str:
+    """The nearest that the flight comes to what its fence forbids."""
+    verb = "kept" if fence["keeps"] else "NOT kept"
+    if fence["min_distance_m"] is None:
+        return f"{verb}; it has no shapes, only heights"
+    part = {"line": "the line", "home": "a way home", "rally": "a way to a rally point"}[fence["part"]]
+    return (
+        f"{verb}: {part} comes within {metres(fence['min_distance_m'])} of {fence['shape']} at "
+        f"{fence['lat_deg']:.7f}, {fence['lon_deg']:.7f}; the vehicle needs {metres_up(fence['margin_m'])}"
     )
 
 

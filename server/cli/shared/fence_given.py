@@ -1,0 +1,41 @@
+"""The fence and the rally points that a plan is held against: those of --fence, or of the mission's own file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from planning.fence.model import Fence, RallyPoint
+from planning.formats.fence_files import read_fence
+from planning.model import Mission
+from server.cli.shared.files_in_out import read_small
+from server.cli.shared.output import say_notes
+
+
+def fence_given(path: Path | None, mission: Mission | None) -> tuple[Fence, tuple[RallyPoint, ...]]:
+    """``mission``: of the file with the points or the flight. Raises FormatError."""
+    own = (Fence(), ()) if mission is None else (mission.fence, mission.rally)
+    if path is None:
+        if mission is not None and (mission.fence or mission.rally):
+            say_notes(f"{fence_words(*own)} of the mission's own file.")
+        return own
+    found = read_fence(path.name, read_small(path))
+    if own[0] or own[1]:
+        say_notes("--fence is taken instead of the fence and the rally points in the mission's own file.")
+    say_notes(*found.warnings)
+    return found.fence, found.rally
+
+
+def fence_words(fence: Fence, rally: tuple[RallyPoint, ...]) -> str:
+    """What there is, counted."""
+    counts = (
+        (len(fence.polygons), "polygon", "polygons"),
+        (len(fence.circles), "circle", "circles"),
+        (len(rally), "rally point", "rally points"),
+    )
+    words = [f"{count} {one if count == 1 else many}" for count, one, many in counts if count]
+    heights = [
+        f"{name} at {value_m:g} m above home"
+        for name, value_m in (("floor", fence.floor_rel_home_m), ("ceiling", fence.ceiling_rel_home_m))
+        if value_m is not None
+    ]
+    return f"Fence: {', '.join([*words, *heights])}"
