@@ -63,6 +63,8 @@ class _Commands(_Lazy):
         "certify": (".certify_command.certify", examples.CERTIFY),
         "survey": (".survey_command.survey", examples.SURVEY),
         "upload": (".upload_command.upload", examples.UPLOAD),
+        "fence": (".places_command.fence", examples.FENCE),
+        "rally": (".places_command.rally", examples.RALLY),
         "fly": (".fly_command.fly", examples.FLY),
         "sim": (".sim_command.sim", examples.SIM),
         "review": (".review_command.review", examples.REVIEW),

@@ -27,6 +27,7 @@ from planning.terrain.dsm import Dsm
 from server.cli.review_command import tell
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command
+from server.cli.shared.fence_given import fence_stays
 from server.cli.shared.files_in_out import check_new, read_small
 from server.cli.shared.flight_progress import FlightProgress
 from server.cli.shared.mission_vehicle import judged_by
@@ -86,7 +87,7 @@ def fly(
     request = judged_by(flight, given, demands, mode)
     model = None if dsm is None else read_around(dsm, StepTimer(progress), how, partial(mission_places, mission=flight))
     other = None if model is None else other_surface(flight, model)
-    say_notes(other, *flight.warnings)
+    say_notes(other, *flight.warnings, fence_stays(flight))
     if model is None:
         say_notes("without --dsm neither the ground at home nor the clearance is checked.")
     options = FlyOptions(

@@ -12,11 +12,12 @@ from telemetry.bus import Bus
 from telemetry.bus.node_lock import running_node, silence_counts
 from telemetry.errors import BusError, OvertakenError
 from telemetry.liveness import Liveness
-from telemetry.topics.messages import OnboardMission, UploadReport
+from telemetry.topics.messages import Item, OnboardMission, UploadReport
 from telemetry.topics.parameters import ParameterList, ParameterWritten
 from telemetry.topics.requests import (
     Connect,
     Download,
+    DownloadPlaces,
     HighestToken,
     LinkRequest,
     ListParameters,
@@ -26,6 +27,7 @@ from telemetry.topics.requests import (
     StartAuto,
     StartGuided,
     Upload,
+    UploadPlaces,
     WriteParameters,
 )
 
@@ -45,6 +47,8 @@ TRANSMITTER = "Take the transmitter if the vehicle must act now."
 _ANSWERS: dict[type, Any] = {
     Upload: UploadReport,
     Download: OnboardMission,
+    UploadPlaces: UploadReport,
+    DownloadPlaces: tuple[Item, ...],
     ReadParameters: dict[str, float | None],
     ListParameters: ParameterList,
     WriteParameters: tuple[ParameterWritten, ...],
@@ -60,9 +64,11 @@ class LinkClient:
         self._liveness = Liveness(hung_s=HUNG_S, busy_s=HUNG_S, start_s=HUNG_S)
 
     @overload
-    async def call(self, request: Upload) -> UploadReport: ...
+    async def call(self, request: Upload | UploadPlaces) -> UploadReport: ...
     @overload
     async def call(self, request: Download) -> OnboardMission: ...
+    @overload
+    async def call(self, request: DownloadPlaces) -> tuple[Item, ...]: ...
     @overload
     async def call(self, request: ReadParameters) -> dict[str, float | None]: ...
     @overload
@@ -116,9 +122,9 @@ class LinkClient:
 
 
 def _patience_s(request: LinkRequest) -> float:
-    if isinstance(request, Upload):
+    if isinstance(request, Upload | UploadPlaces):
         return UPLOAD_S + UPLOAD_PER_ITEM_S * len(request.items)
-    if isinstance(request, Download):
+    if isinstance(request, Download | DownloadPlaces):
         return DOWNLOAD_S
     if isinstance(request, ListParameters):
         return LIST_S

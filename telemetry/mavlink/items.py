@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -21,7 +22,12 @@ _FIELDS = ("latitude", "longitude")
 
 
 def items_from_mission(mission: Mission) -> tuple[Item, ...]:
-    """A planned mission as the wire knows it; NaN ("not given") becomes None."""
+    """A planned mission as the wire knows it."""
+    return wire_items(mission.items)
+
+
+def wire_items(items: Iterable[MissionItem]) -> tuple[Item, ...]:
+    """NaN ("not given") becomes None."""
     return tuple(
         Item(
             command=item.command,
@@ -32,7 +38,7 @@ def items_from_mission(mission: Mission) -> tuple[Item, ...]:
             alt_m=item.alt_m,
             autocontinue=item.autocontinue,
         )
-        for item in mission.items
+        for item in items
     )
 
 
@@ -41,7 +47,12 @@ def mission_from_onboard(onboard: OnboardMission, firmware: Firmware, *, home: H
 
     ``home``: instead of the vehicle's own, which is above mean sea level (unknown: NaN).
     """
-    items = tuple(
+    return Mission(home=home or _home(onboard), items=mission_items(onboard.items), firmware=firmware)
+
+
+def mission_items(items: Iterable[Item]) -> tuple[MissionItem, ...]:
+    """None becomes NaN ("not given")."""
+    return tuple(
         MissionItem(
             command=item.command,
             frame=item.frame,
@@ -51,9 +62,8 @@ def mission_from_onboard(onboard: OnboardMission, firmware: Firmware, *, home: H
             alt_m=item.alt_m,
             autocontinue=item.autocontinue,
         )
-        for item in onboard.items
+        for item in items
     )
-    return Mission(home=home or _home(onboard), items=items, firmware=firmware)
 
 
 def _home(onboard: OnboardMission) -> Home:

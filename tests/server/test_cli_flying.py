@@ -21,7 +21,7 @@ from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PlannedFor
 from planning.terrain.geotiff import read_dsm, write_dsm
 from server.cli.fly_command import keep_recording
-from server.cli.upload_command import upload_lines
+from server.cli.shared.upload_words import report_lines
 from server.errors import StorageError
 from server.flying.review import recording_of
 from server.flying.review import review as judge
@@ -99,12 +99,12 @@ def test_upload(ground: Ground) -> None:
 def test_upload_in_words() -> None:
     onboard = OnboardMission((), None, None, None, "")
     rounded = (Rounded(2, "altitude", 32.94, 32.93), Rounded(3, "parameter 4", None, 0.0))
-    assert upload_lines(UploadReport(True, onboard, rounded, (), 0.5)) == [
+    assert report_lines(UploadReport(True, onboard, rounded, (), 0.5)) == [
         "VERIFIED: 0 items in 0.5 s, read back",
         "  item 2: altitude 32.94 is kept as 32.93",
         "  item 3: parameter 4 not given is kept as 0",
     ]
-    refused = upload_lines(UploadReport(False, onboard, (), ("Item 3: the command is 20, not 16 as sent.",), 0.5))
+    refused = report_lines(UploadReport(False, onboard, (), ("Item 3: the command is 20, not 16 as sent.",), 0.5))
     assert refused[0].startswith("NOT VERIFIED")
     assert "Item 3" in refused[1]
 

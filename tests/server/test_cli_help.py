@@ -11,7 +11,9 @@ from planning import __version__
 from tests.server.cli_runs import hedgehop
 
 
-@pytest.mark.parametrize("command", ["serve", "plan", "certify", "survey", "upload", "fly", "sim", "review", "bench"])
+@pytest.mark.parametrize(
+    "command", ["serve", "plan", "certify", "survey", "upload", "fence", "rally", "fly", "sim", "review", "bench"]
+)
 def test_help_has_examples(command: str) -> None:
     run = hedgehop(command, "--help")
     assert run.code == 0

@@ -56,6 +56,15 @@ UPLOAD = _examples(
     ("Over a telemetry radio", "hedgehop upload flight/mission.waypoints --link /dev/ttyUSB0:57600"),
     ("For a script", "hedgehop upload flight/mission.plan --link udpin:0.0.0.0:14550 --json"),
 )
+FENCE = _examples(
+    ("A fence that you drew, onto the vehicle", "hedgehop fence udpin:0.0.0.0:14550 upload fence.kml"),
+    ("What is on board, as a plan for QGroundControl", "hedgehop fence /dev/ttyUSB0:57600 download onboard.plan"),
+    ("Away with it", "hedgehop fence udpin:0.0.0.0:14550 clear"),
+)
+RALLY = _examples(
+    ("Places to return to", "hedgehop rally udpin:0.0.0.0:14550 upload rally.plan"),
+    ("For a script", "hedgehop rally udpin:0.0.0.0:14550 download rally.geojson --json"),
+)
 FLY = _examples(
     ("A planned mission, checked against its surface model", "hedgehop fly flight/mission.waypoints "
      "--link udpin:0.0.0.0:14550 --dsm dsm.tif"),

@@ -25,6 +25,15 @@ def fence_given(path: Path | None, mission: Mission | None) -> tuple[Fence, tupl
     return found.fence, found.rally
 
 
+def fence_stays(mission: Mission) -> str | None:
+    """What is to be known of a mission whose file holds more than its items; None: it does not."""
+    if not (mission.fence or mission.rally):
+        return None
+    return (
+        "the file's fence and rally points are not sent with the mission: hedgehop fence and hedgehop rally send them."
+    )
+
+
 def fence_words(fence: Fence, rally: tuple[RallyPoint, ...]) -> str:
     """What there is, counted."""
     counts = (
