@@ -18,6 +18,7 @@ from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import SceneTerrain
 from telemetry.simulation.simulator.scene.ray_bundle import GROUND, NOTHING
 from tests.reference.surface_samples import sample
+from tests.seeds import seeds
 from tests.telemetry.scenes import in_the_air, world
 
 metres = st.floats(-20.0, 20.0)
@@ -35,8 +36,9 @@ INSIDE = {
 def cast(scene, origin, direction, *, most_m: float = 200.0, luck: float = 0.5):
     direction = np.array([direction], dtype=float)
     direction /= np.linalg.norm(direction)
-    near = np.arange(len(scene.placed.rows), dtype=np.int32)
-    hits = scene.cast(np.array(origin, dtype=float), direction, np.array([luck]), most_m=most_m, near=near)
+    origin = np.array(origin, dtype=float)
+    near = scene.ahead(origin, direction[0], within_m=most_m, half_angle_rad=math.pi)
+    hits = scene.cast(origin, direction, np.array([luck]), most_m=most_m, near=near)
     return float(hits.distance_m[0]), int(hits.what[0])
 
 
@@ -123,6 +125,30 @@ def test_the_ground_is_met_where_the_planning_floor_meets_it(seed, origin, direc
     else:
         assert what == GROUND
         assert found == pytest.approx(expected.distance, abs=1e-5)
+
+
+@seeds(4)
+def test_of_many_things_the_first_on_its_way_is_met(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    _, terrain = hill(seed)
+    shapes = [
+        {"type": "tree", "at_m": at, "height_m": 9, "crown_base_m": 2, "crown_radius_m": 2.5, "leaf_path_m": 1}
+        if k % 2
+        else {"type": "box", "at_m": at, "size_m": [4, 2, 6], "heading_deg": 9 * k}
+        for k, at in enumerate(random.uniform(0, 55, (40, 2)).tolist())
+    ]
+    scene = world(*shapes, terrain=terrain)
+    origin, luck = np.array([27.0, 27.0, 7.0]), random.uniform(0.01, 0.99, 800)
+    rays = random.standard_normal((800, 3)) * (1.0, 1.0, 0.2)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    near = scene.ahead(origin, np.array([0.0, 1.0, 0.0]), within_m=200.0, half_angle_rad=math.pi)
+    together = scene.cast(origin, rays, luck, most_m=200.0, near=near)
+    alone = [scene.cast(origin, rays, luck, most_m=200.0, near=near[k : k + 1]) for k in range(len(near))]
+    np.testing.assert_array_equal(together.distance_m, np.min([hits.distance_m for hits in alone], axis=0))
+    for hits in alone:
+        first = (hits.distance_m == together.distance_m) & (hits.what >= 0)
+        np.testing.assert_array_equal(together.what[first], hits.what[first])
+    assert {int(what) for what in together.what} > {GROUND, NOTHING}
 
 
 def test_a_surface_model_lies_in_the_frame_as_its_coordinates_say(shared_data) -> None:
