@@ -68,9 +68,10 @@ class Serving:
         return self.http.put("/api/plan", json={"base_revision": plan["revision"], "label": "x", "document": document})
 
     def workers(self) -> list[int]:
-        """Process ids of its children."""
+        """Process ids of its children but the nodes, which stand in sessions of their own."""
         threads = Path(f"/proc/{self.process.pid}/task").iterdir()
-        return [int(child) for thread in threads for child in (thread / "children").read_text().split()]
+        children = [int(child) for thread in threads for child in (thread / "children").read_text().split()]
+        return [pid for pid in children if os.getsid(pid) != pid]
 
 
 @contextlib.contextmanager
@@ -113,7 +114,8 @@ def test_a_data_directory_that_cannot_be_used(tmp_path: Path) -> None:
     assert "cannot be written" in refused(Path("/proc/hedgehop"), free_port())
 
 
-def test_a_kill_leaves_no_process_and_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
+def test_a_kill_leaves_no_worker_and_the_demo_is_there_at_once_the_second_time(tmp_path: Path) -> None:
+    """Nodes are taken over by the second one (``test_supervisor``), or end by themselves (``test_node``)."""
     with serving(tmp_path, "--demo") as first:
         terrain = ok(first.http.post("/api/terrains/demo")).json()
         handles = [os.pidfd_open(pid) for pid in first.workers()]

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from telemetry.bus import Bus
-from telemetry.bus.node_lock import running_node, running_nodes
+from telemetry.bus.node import GIVEN_UP_S, UNATTENDED_S, NodeContext
+from telemetry.bus.node_lock import NodeLock, running_node, running_nodes
 from telemetry.topics.messages import ServerAlive, Topic
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +24,7 @@ BODY = """
 import asyncio, sys
 from pathlib import Path
 from telemetry.errors import ConnectionFailedError
+from telemetry.bus import node
 from telemetry.bus.node import run_node
 
 async def main(bus, context):
@@ -35,6 +37,12 @@ async def main(bus, context):
         return
     if what == "replaceable":
         context.set_replaceable(True)
+    if what == "unattended":
+        node.UNATTENDED_S = 0.5
+        while context.is_needed():
+            print("needed", flush=True)
+            await asyncio.sleep(0.05)
+        return
     try:
         while True:
             seen_s = context.server_seen_s()
@@ -168,6 +176,33 @@ def test_it_knows_that_a_server_lives(nodes: Nodes) -> None:
 
     asyncio.run(whole())
     assert process.poll() is None
+
+
+def test_without_a_server_it_ends_by_itself(nodes: Nodes) -> None:
+    process = nodes.start("sensors", "unattended")
+    out, log = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, out) == (0, "needed\n" * (len(out) // 7))
+    assert "The sensors node has ended." in log
+
+
+def test_a_flight_goes_on_without_a_server_while_its_vehicle_is_heard(tmp_path: Path, monkeypatch) -> None:
+    now_s = 1000.0
+    monkeypatch.setattr(time, "monotonic", lambda: now_s)
+    tmp_path.chmod(0o700)
+    with NodeLock(tmp_path, "link", []) as lock:
+        context = NodeContext(lock)
+        now_s += UNATTENDED_S - 1
+        assert context.is_needed()
+        now_s += 2
+        assert not context.is_needed()
+        assert context.is_needed(now_s)
+        heard_s = now_s
+        now_s += GIVEN_UP_S - 1
+        assert context.is_needed(heard_s)
+        now_s += 2
+        assert not context.is_needed(heard_s)
+        context.note_server(ServerAlive(now_s, 1))
+        assert context.is_needed()
 
 
 @pytest.mark.parametrize("name", ["link", "recorder"])
