@@ -167,8 +167,9 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secure]:
         [*hedgehop, "tls", "--data-dir", str(data_dir)], capture_output=True, text=True, check=True
     ).stderr
     port, trust_port = free_port(), free_port()
+    soon = "from server.door import tls; from server.cli import main; tls.LOOK_EVERY_S = 1.0; main()"
     process = subprocess.Popen(
-        [*hedgehop, "serve", "--host", "0.0.0.0", "--port", str(port), "--data-dir", str(data_dir)],
+        [sys.executable, "-c", soon, "serve", "--host", "0.0.0.0", "--port", str(port), "--data-dir", str(data_dir)],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "HEDGEHOP_TRUST_PORT": str(trust_port)},
