@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -54,6 +55,7 @@ class Stopping:
     def distance_m(self, speed_m_s: float) -> float:
         return speed_m_s * self.latency_s + self.braking.distance_m(speed_m_s) + self.keep_m
 
+    @functools.lru_cache(maxsize=128)  # noqa: B019 - equal ones are one; asked many times between two frames of a sensor
     def largest_speed_m_s(self, depth_m: float) -> float:
         """From which a region this deep is just enough to stop in; 0 where it is no deeper than what is kept."""
         low, high = 0.0, FASTEST_M_S
