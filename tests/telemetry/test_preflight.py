@@ -214,7 +214,11 @@ def test_a_return_height_that_is_not_enough() -> None:
 
 def test_return_settings_of_each_firmware() -> None:
     assert return_settings({"RTL_RETURN_ALT": 45.0}, "px4").height_m == 45.0
-    assert return_settings({"RTL_RETURN_ALT": 45.0, "RTL_CONE_ANG": 30.0}, "px4").steep_enough is False
+    for half_deg, within_m, steep_enough in (
+        (45.0, 10.0, True), (30.0, 10.0, True), (0.0, 50.0, True), (65.0, 10.0, False), (45.0, 20.0, False),
+    ):  # fmt: skip
+        px4 = {"RTL_RETURN_ALT": 45.0, "RTL_CONE_ANG": half_deg, "RTL_MIN_DIST": within_m}
+        assert return_settings(px4, "px4").steep_enough is steep_enough
     assert return_settings({"RTL_ALT": math.nan}, "ardupilot").height_m is None
     assert return_settings({"RTL_ALT_M": 12.0}, "ardupilot").value_for(12.3) == "RTL_ALT_M 13 m"
 

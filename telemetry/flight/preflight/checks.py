@@ -165,7 +165,9 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
         return Row("rtl_height", "accept", text, f"Make sure it is {rounded_up(needed_m)} m or more.")
     if not settings.steep_enough:
         text = "Close to home the vehicle climbs less on its return than the certificate takes for granted."
-        return Row("rtl_height", "accept", text, "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45).")
+        return Row(
+            "rtl_height", "accept", text, "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45, RTL_MIN_DIST to 10)."
+        )
     need = (
         f"the ways home need {rounded_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planning.certificate.commands import STRAIGHT
-from planning.certificate.returns import SLOPE
+from planning.certificate.returns import NEAR_M, SLOPE
 from planning.mav_cmd import MavCmd
 from planning.model import Firmware
 from telemetry.flight.guided.targets import GROUND_SPEEDS
@@ -18,9 +18,11 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
         *("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
         *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
     ),
-    "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG"),
+    "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST"),
 }
 """What to read before a start. ArduPilot 4.7 counts in metres what earlier versions count in centimetres."""
+NEAR_HALF_DEG = 45.0
+"""Of PX4's cone, from the vertical: the larger, the lower it flies close to home; 0 switches the cone off."""
 CRUISE, HOME, JERK = ("WP_SPD", "WPNAV_SPEED"), ("RTL_SPEED_MS", "RTL_SPEED"), ("PSC_JERK_NE", "PSC_JERK_XY")
 """ArduPilot's names, those of 4.7 and newer first."""
 IN_CM = frozenset({"WPNAV_SPEED", "RTL_SPEED"})
@@ -47,8 +49,9 @@ def return_settings(parameters: Mapping[str, float | None], firmware: Firmware) 
     """From what was read; names that the vehicle does not have may be missing or None."""
     known = {name: value for name, value in parameters.items() if value is not None and math.isfinite(value)}
     if firmware == "px4":
-        angle_deg = known.get("RTL_CONE_ANG", 45.0)
-        return ReturnSettings(known.get("RTL_RETURN_ALT"), "RTL_RETURN_ALT", angle_deg >= 45.0)
+        half_deg, within_m = known.get("RTL_CONE_ANG", NEAR_HALF_DEG), known.get("RTL_MIN_DIST", NEAR_M)
+        steep_enough = half_deg <= 0.0 or (half_deg <= NEAR_HALF_DEG and within_m <= NEAR_M)
+        return ReturnSettings(known.get("RTL_RETURN_ALT"), "RTL_RETURN_ALT", steep_enough)
     slope = known.get("RTL_CONE_SLOPE", SLOPE)
     steep_enough = slope <= 0.0 or slope >= SLOPE  # 0 switches the cone off
     if "RTL_ALT_M" in known:
