@@ -10,10 +10,13 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
+from planning.formats.wpl import write_wpl
+from planning.terrain.geotiff import write_dsm
 from telemetry.link.audit import AUDIT_FILE
 from telemetry.parameters.files import read_parameter_file
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS
 from tests.server.cli_runs import Run, hedgehop
+from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import simulated_vehicle
 
 pytestmark = pytest.mark.xdist_group("cli-flying")
@@ -198,3 +201,33 @@ def test_a_wrong_line_of_a_file_is_named_before_anything_is_connected(tmp_path: 
     run: Run = hedgehop("params", "load", file, "--link", "tcp:127.0.0.1:1", "--json")
     assert (run.code, run.json["error"]["where"]) == (2, "x.param, line 2")
     assert "Connecting" not in run.err
+
+
+def test_review_says_what_to_set_on_this_plan_and_its_own_command_mends_it(tmp_path: Path) -> None:
+    dsm, flight = tmp_path / "plain.tif", tmp_path / "flight.waypoints"
+    write_dsm(dsm, PLAIN)
+    around = [(150.0, 200.0, 6.0), (250.0, 200.0, 6.0), (250.0, 150.0, 6.0)]
+    flight.write_text(write_wpl(mission(around, home=(150.0, 150.0))))  # the tower stands on the way home
+    with simulated_vehicle(HOME, "--boot-s", 1, "--parameter", "RTL_ALT=100") as link:
+        run = hedgehop("params", "review", flight, "--dsm", dsm, "--link", link, "--json")
+        assert run.code == 1, run.err
+        findings = {f["parameter"]: f for f in run.json["findings"]}
+        states = [f["state"] for f in run.json["findings"]]
+        assert states == sorted(states, key=("bad", "look", "good").index)
+        assert run.json["to_change"] == states.count("bad") > 2
+        assert findings["RTL_ALT"]["state"] == "bad"
+        better = findings["RTL_ALT"]["better"]
+        assert better % 100 == 0
+        people = hedgehop("params", "review", flight, "--dsm", dsm, "--link", link)
+        command = next(line.split() for line in people.out.splitlines() if " set RTL_ALT " in line)
+        assert command == ["hedgehop", "params", "set", "RTL_ALT", f"{better:.0f}", "--link", link]
+        assert hedgehop(*command[1:]).code == 0
+        again = hedgehop("params", "review", flight, "--dsm", dsm, "--link", link, "--json")
+        assert next(f for f in again.json["findings"] if f["parameter"] == "RTL_ALT")["state"] == "good"
+        assert again.json["to_change"] == run.json["to_change"] - 1
+
+
+def test_a_model_without_a_mission_is_wrong_input(tmp_path: Path) -> None:
+    run = hedgehop("params", "review", "--dsm", tmp_path / "x.tif", "--link", "tcp:127.0.0.1:1")
+    assert run.code == 2
+    assert "Give a mission." in run.err

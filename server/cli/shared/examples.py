@@ -89,6 +89,11 @@ PARAMS_LOAD = _examples(
     ("Without calibrations, which belong to one vehicle", "hedgehop params load other.param --leave-out 'COMPASS_*' "
      "--leave-out 'INS_*' --link udpin:0.0.0.0:14550"),
 )  # fmt: skip
+PARAMS_REVIEW = _examples(
+    ("On a plan, over its surface model", "hedgehop params review flight/mission.waypoints --dsm dsm.tif "
+     "--link udpin:0.0.0.0:14550"),
+    ("For any low flight", "hedgehop params review --link udpin:0.0.0.0:14550"),
+)  # fmt: skip
 PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
