@@ -29,7 +29,8 @@ class Transfers:
     def __init__(self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None]) -> None:
         self._vehicle, self._tell = vehicle, tell
         self._machine: MissionUpload | MissionDownload | None = None
-        self._is_own_idea = False
+        self._own_idea: MissionDownload | None = None
+        """The newest download that nobody asked for."""
         self._told_s = 0.0
         self._writing = asyncio.Lock()
 
@@ -62,9 +63,10 @@ class Transfers:
     async def download(self, *, own_idea: bool = False) -> OnboardMission:
         """``own_idea``: nobody asked, so nobody is told of its progress and an upload may push it aside."""
         self._make_way()
-        self._is_own_idea = own_idea
         vehicle = self._vehicle
         machine = MissionDownload(firmware=vehicle.firmware, target=vehicle.target, now_s=time.monotonic())
+        if own_idea:
+            self._own_idea = machine
         vehicle.onboard.transfer_begins(replaces=False)
         known: OnboardMission | None = None
         try:
@@ -137,7 +139,7 @@ class Transfers:
     def _make_way(self) -> None:
         if self._machine is None:
             return
-        if not self._is_own_idea:
+        if self._machine is not self._own_idea:
             advice = "Wait until it is over."
             raise NotAllowedError("A mission is being transferred already.", advice=advice)
         self._vehicle.exchanges.perform(self._machine, self._machine.cancel(time.monotonic()))
@@ -151,27 +153,27 @@ class Transfers:
         def progress(news: Progress) -> None:
             nonlocal last
             last = news
-            self._progress(direction, news)
+            self._progress(machine, direction, news)
 
         try:
             result = await self._vehicle.exchanges.run(machine, progress=progress)
         except TelemetryError as error:
-            self._publish(TransferStatus(direction, "failed", last.done, last.total, ErrorInfo.of(error)))
+            self._publish(machine, TransferStatus(direction, "failed", last.done, last.total, ErrorInfo.of(error)))
             raise
         else:
-            self._publish(TransferStatus(direction, "done", last.total, last.total))
+            self._publish(machine, TransferStatus(direction, "done", last.total, last.total))
         finally:
             if self._machine is machine:
-                self._machine, self._is_own_idea = None, False
+                self._machine = None
         return result
 
-    def _progress(self, direction: Literal["upload", "download"], news: Progress) -> None:
+    def _progress(self, machine: object, direction: Literal["upload", "download"], news: Progress) -> None:
         now_s = time.monotonic()
         if now_s - self._told_s >= TELL_EVERY_S or news.done in (0, news.total):
             self._told_s = now_s
             phase: Phase = "sending" if news.phase == "sending" else "reading_back"
-            self._publish(TransferStatus(direction, phase, news.done, news.total))
+            self._publish(machine, TransferStatus(direction, phase, news.done, news.total))
 
-    def _publish(self, status: TransferStatus) -> None:
-        if not self._is_own_idea:
+    def _publish(self, machine: object, status: TransferStatus) -> None:
+        if machine is not self._own_idea:
             self._tell(status)
