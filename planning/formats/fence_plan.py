@@ -10,16 +10,17 @@ from typing import Any
 from planning.errors import FormatError
 from planning.fence.model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, fence, polygon
 from planning.formats.fence_items import rally_point
-from planning.formats.safe_text import check_count, check_lat_lon, finite
+from planning.formats.safe_text import check_count, check_lat_lon, clean_name, finite
 
 Json = dict[str, Any]
+VERSION = 2
 FLOOR, CEILING = "fence_floor_rel_home_m", "fence_ceiling_rel_home_m"
 
 
 def fence_json(shapes: Fence) -> Json:
     """`geoFence`"""
     return {
-        "version": 2,
+        "version": VERSION,
         "polygons": [
             {"version": 1, "inclusion": each.inclusion, "polygon": [list(c) for c in each.corners_lat_lon_deg]}
             for each in shapes.polygons
@@ -37,7 +38,7 @@ def fence_json(shapes: Fence) -> Json:
 
 def rally_json(rally: tuple[RallyPoint, ...]) -> Json:
     """`rallyPoints`"""
-    return {"version": 2, "points": [[p.lat_deg, p.lon_deg, p.alt_rel_home_m] for p in rally]}
+    return {"version": VERSION, "points": [[p.lat_deg, p.lon_deg, p.alt_rel_home_m] for p in rally]}
 
 
 def heights_json(shapes: Fence) -> Json:
@@ -48,6 +49,7 @@ def heights_json(shapes: Fence) -> Json:
 def read_fence_json(plan: Json, file: str, warnings: list[str]) -> Fence:
     """Of a whole `.plan`. Raises FormatError with the JSON path: a fence that is only half read protects nobody."""
     raw, where = _section(plan, "geoFence", file), f"{file}, $.geoFence"
+    _check_version(raw, where)
     polygons = [_polygon(each, f"{where}.polygons[{k}]") for k, each in enumerate(_list(raw, "polygons", where))]
     circles = [_circle(each, f"{where}.circles[{k}]") for k, each in enumerate(_list(raw, "circles", where))]
     if raw.get("breachReturn") is not None:
@@ -66,6 +68,7 @@ def read_fence_json(plan: Json, file: str, warnings: list[str]) -> Fence:
 def read_rally_json(plan: Json, file: str) -> tuple[RallyPoint, ...]:
     """Of a whole `.plan`."""
     raw, where = _section(plan, "rallyPoints", file), f"{file}, $.rallyPoints"
+    _check_version(raw, where)
     points = _list(raw, "points", where)
     return tuple(_rally_point(each, f"{where}.points[{k}]") for k, each in enumerate(points))
 
@@ -81,6 +84,17 @@ def _section(plan: Json, key: str, file: str) -> Json:
     if not isinstance(raw, dict):
         raise FormatError(f"The plan's $.{key} should be an object.", where=f"{file}, $.{key}", advice="Save it again.")
     return raw
+
+
+def _check_version(raw: Json, where: str) -> None:
+    """An older spelling has other names: its shapes would be overlooked."""
+    version = raw.get("version", VERSION)
+    if version != VERSION:
+        raise FormatError(
+            f"Version {clean_name(version)} of it is not read, only {VERSION}.",
+            where=where,
+            advice="Save the plan again with a current QGroundControl.",
+        )
 
 
 def _list(raw: Json, key: str, where: str) -> list[Any]:

@@ -71,6 +71,12 @@ def import_terrain(
     return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
 
 
+FENCE_LEFT = (
+    "The file's fence and rally points were not taken: flights are held against them by hedgehop plan and hedgehop"
+    " certify."
+)
+
+
 def read_points(
     upload: Path, filename: str, terrain_dir: Path | None, *, report: Progress
 ) -> tuple[PlanDoc, tuple[str, ...]]:
@@ -82,10 +88,12 @@ def read_points(
     except ValidationError as error:
         fault = error_doc(error)
         raise FormatError(fault.what, where=f"{filename}, {fault.where}", advice="Split or correct the file.") from None
+    mission, remarks = points.mission, list(points.warnings)
+    if mission is not None and (mission.fence or mission.rally):
+        remarks.append(FENCE_LEFT)
     if terrain_dir is not None and looks_swapped(points.pois, load_terrain(terrain_dir)):
-        swapped = "Latitude and longitude seem swapped: exchanged, these points lie on the surface model."
-        return document, (*points.warnings, swapped)
-    return document, points.warnings
+        remarks.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
+    return document, tuple(remarks)
 
 
 def import_orthophoto(

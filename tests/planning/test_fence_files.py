@@ -149,6 +149,7 @@ WPL = "QGC WPL 110\n"
         ("hello", "This is no fence"),
         ('{"fileType": "Other"}', "no plan of QGroundControl"),
         ('{"fileType": "Plan", "geoFence": []}', "should be an object"),
+        ('{"fileType": "Plan", "geoFence": {"version": 1, "polygon": [[47, 8]]}}', "Version 1 of it is not read"),
         ('{"fileType": "Plan", "geoFence": {"polygons": 3}}', "should be a list"),
         ('{"fileType": "Plan", "rallyPoints": {"points": [[47, 8]]}}', "latitude, longitude, height"),
         ('{"fileType": "Plan", "geoFence": {"circles": [{"inclusion": 1}]}}', "should be an object"),

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from planning.certificate.clearance import certify
 from planning.certificate.model import ClearanceParams
+from planning.fence.model import Fence, RallyPoint, circle
 from planning.missions.flown import flown_line
 from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
@@ -63,6 +64,17 @@ def hill(height_m: float = 3.0) -> Dsm:
     cells = np.array(PLAIN.elevation_m)
     cells[140:160, 70:90] += height_m
     return PLAIN.with_elevation(cells)
+
+
+def test_what_is_on_board_is_held_against_the_plans_fence() -> None:
+    place = (PLANNED.home.lat_deg, PLANNED.home.lon_deg)
+    wide = Fence(circles=(circle(*place, 900.0, inclusion=True, where="test"),))
+    assert checked(fence=wide).ok()
+    found = checked(fence=Fence(circles=(circle(*place, 5.0, inclusion=True, where="test"),)))
+    assert row(found, "clearance").state == "bad"
+    assert "leaves inclusion circle 1" in row(found, "clearance").text
+    far = checked(rally=(RallyPoint(0.0, 0.0, 20.0),))
+    assert "Rally point 1" in row(far, "clearance").text
 
 
 def test_all_is_well() -> None:

@@ -13,6 +13,7 @@ from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_stand import ground_at
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError
+from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.missions.flown import AMSL_FRAMES, flown_line
@@ -108,16 +109,20 @@ def check(
     planned_home: Home | None,
     firmware: Firmware = "ardupilot",
     rereferenced_m: float | None = None,
+    fence: Fence = NO_FENCE,
+    rally: tuple[RallyPoint, ...] = (),
 ) -> Preflight:
     """Judge a start. Pure; takes up to seconds on a large model: not for the event loop.
 
     ``clearance`` is what the plan demands; the return height in it gives way to the vehicle's own. Without a
     surface model the rows that need one can be accepted at most. ``rereferenced_m``: heights were moved by so much.
+    ``fence`` and ``rally`` are the plan's: what is on board is held against them too.
     """
     settings = return_settings(parameters, firmware)
     home = actual_home(state, dsm)
     shift_m = _shift(home, planned_home, dsm)
     mission = _mission(onboard, firmware, home, dsm)
+    mission = None if mission is None else replace(mission, fence=fence, rally=rally)
     surface = fill_holes(dsm)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
     demanded = replace(clearance, rtl_height_m=height_m, set_down_m=0.0)

@@ -9,7 +9,7 @@ from typing import Literal
 
 from planning.certificate.model import ClearanceParams
 from planning.missions.flown import flown_line
-from planning.model import Home, Mission, VehicleProfile
+from planning.model import Mission, VehicleProfile
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from telemetry.errors import ConnectionFailedError, NotAllowedError, NoVehicleError, TransferError
@@ -110,13 +110,13 @@ async def prepare(client: Asks, watch: Watch, mission: Mission, options: FlyOpti
     """The mission on board, its heights counted from where the vehicle stands, and checked."""
     await _await_position(watch, options, report)
     upload = await send(client, mission, options.operator, report)
-    preflight = await _check(client, watch, upload, mission.home, options, None)
+    preflight = await _check(client, watch, upload, mission, options, None)
     planned, attempts = mission, 1
     while preflight.needs_rereference and attempts < HOME_ATTEMPTS:
         mission, moved_m = _from_here(planned, watch, options)
         report(f"The ground at the vehicle is {moved_m:+.2f} m from the planned home's: heights are moved to suit it")
         upload = await send(client, mission, options.operator, report)
-        preflight = await _check(client, watch, upload, mission.home, options, moved_m)
+        preflight = await _check(client, watch, upload, mission, options, moved_m)
         attempts += 1
     for row in preflight.rows:
         report(f"  {row.code}: {row.text}")
@@ -198,7 +198,7 @@ async def _await_position(watch: Watch, options: FlyOptions, report: Report) -> 
 
 
 async def _check(
-    client: Asks, watch: Watch, upload: UploadReport, home: Home, options: FlyOptions, moved_m: float | None
+    client: Asks, watch: Watch, upload: UploadReport, planned: Mission, options: FlyOptions, moved_m: float | None
 ) -> Preflight:
     state = _state(watch)
     firmware = "px4" if state.autopilot == "px4" else "ardupilot"
@@ -211,9 +211,11 @@ async def _check(
         dsm=options.dsm,
         profile=options.profile,
         clearance=options.clearance,
-        planned_home=home,
+        planned_home=planned.home,
         firmware=firmware,
         rereferenced_m=moved_m,
+        fence=planned.fence,
+        rally=planned.rally,
     )
 
 
