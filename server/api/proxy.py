@@ -1,6 +1,7 @@
 """viser's page and socket on Hedgehop's own origin: ``/view/{page_id}/`` and ``/view/{page_id}``.
 
-A page id belongs to a live ``/ws`` stream of the same session; when that ends, so does its 3D view. Messages to the
+A page id belongs to a live ``/ws`` stream of the same session; soon after that has ended for good, so does its 3D
+view. Messages to the
 browser pass as they are; those from the browser pass ``server.scene.filter``.
 """
 
@@ -100,7 +101,7 @@ async def _bridge(websocket: WebSocket, page: Page, host: SceneHost) -> None:
             await until_first(
                 _to_browser(upstream, websocket),
                 _to_viser(websocket, upstream, messages),
-                page.gone.wait(),
+                page.view_over.wait(),
             )
     if messages.dropped:
         log.warning("The 3D view of page %s sent what it must not: %s", page.page_id, dict(messages.dropped))

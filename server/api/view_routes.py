@@ -15,7 +15,10 @@ router = APIRouter()
 @router.websocket("/ws")
 @needs(Need.OBSERVER)
 async def stream(websocket: WebSocket) -> None:
-    """A snapshot, then what changes. The guard has refused foreign origins before this."""
+    """A snapshot, then what changes. ``?page=`` names the page of the stream before this one, which had broken off.
+
+    The guard has refused foreign origins before this.
+    """
     parts = parts_of(websocket)
     try:
         identity = identity_of(websocket)
@@ -32,6 +35,7 @@ async def stream(websocket: WebSocket) -> None:
             websocket,
             session_key=key,
             session_remaining_s=identity.remaining_s,
+            page_id=websocket.query_params.get("page"),
             may_change=identity.may_change,
             snapshot=parts.workspace.snapshot,
             present=lambda: [me, parts.alarms.message, *parts.workspace.present(), *parts.flying.present_for(key)],

@@ -2,9 +2,9 @@
 
 State (plan, library, view, selection, cursor, each job, each vehicle, each sensor) is latest-wins: a newer message
 takes the place of the one still waiting. Notices, alerts and the vehicle's own words must arrive: each waits on its
-own, and a page that lets the queue fill up is cut off, as is one that takes nothing for five seconds. It
-reconnects and starts from a fresh snapshot. What a page changes for all is answered behind the new state, so that it
-can tell older states from its own.
+own, and a page that lets the queue fill up is cut off, as is one that takes nothing for five seconds. It reconnects,
+starts from a fresh snapshot and goes on with the 3D view that it had. What a page changes for all is answered behind
+the new state, so that it can tell older states from its own.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ PAGES_MAX = 200
 WAITING_MAX = 256
 SEND_TIMEOUT_S, CLOSE_TIMEOUT_S = 120.0, 5.0
 """A large message over a slow line takes long; a line that takes nothing is cut much sooner (``slow_lines``)."""
+VIEW_KEPT_S = 15.0
+"""Of a page whose stream has ended and may come back. To draw it anew costs most where the line is bad already."""
 MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
@@ -75,9 +77,11 @@ def key_of(message: schemas.ServerMessage) -> object | None:
 class Page:
     """One browser page: its queue, and the reason why it has to go once there is one."""
 
-    def __init__(self, session_key: str, *, may_change: bool = True) -> None:
-        self.page_id = secrets.token_urlsafe(16)
+    def __init__(self, session_key: str, *, may_change: bool = True, before: Page | None = None) -> None:
+        self.page_id = secrets.token_urlsafe(16) if before is None else before.page_id
         self.session_key, self.may_change = session_key, may_change
+        self.view_over = asyncio.Event() if before is None else before.view_over
+        """Its 3D view ends: later than its stream, which may come back."""
         self.heard_mono_s = time.monotonic()
         self.gone = asyncio.Event()
         self.close_code = CLOSE_GOING_AWAY
@@ -112,6 +116,8 @@ class Hub:
 
     def __init__(self) -> None:
         self._pages: dict[str, Page] = {}
+        self._left: dict[str, tuple[Page, asyncio.TimerHandle]] = {}
+        self._is_closed = False
         self._greetings: list[schemas.NoticeMessage] = []
 
     def greet_with(self, notices: list[schemas.NoticeMessage]) -> None:
@@ -155,14 +161,52 @@ class Hub:
         self.send(page_id, schemas.NoticeMessage(level="error", error=error_doc(error)))
 
     def close_session(self, session_key: str) -> None:
-        """Cuts off the pages of a session that was signed out."""
+        """Cuts off the pages of a session that was signed out, and the views of those whose stream had just ended."""
         for page in list(self._pages.values()):
             if page.session_key == session_key:
                 page.cut_off(CLOSE_SIGNED_OUT)
+        for page, _ in list(self._left.values()):
+            if page.session_key == session_key:
+                self._end_view(page)
 
     def close(self) -> None:
+        self._is_closed = True
         for page in list(self._pages.values()):
             page.cut_off(CLOSE_GOING_AWAY)
+        for page, _ in list(self._left.values()):
+            self._end_view(page)
+
+    def _comes(self, session_key: str, page_id: str | None, *, may_change: bool) -> Page:
+        """The page that it was a moment ago, if its session says so: its 3D view has stayed."""
+        known = self._left[page_id][0] if page_id in self._left else self._pages.get(page_id or "")
+        is_known = known is not None and (known.session_key, known.may_change) == (session_key, may_change)
+        before = known if is_known else None
+        if before is not None:
+            before.cut_off(CLOSE_SLOW)
+            self._stays(before)
+        page = Page(session_key, may_change=may_change, before=before)
+        self._pages[page.page_id] = page
+        return page
+
+    def _leaves(self, page: Page) -> None:
+        page.cut_off(CLOSE_GOING_AWAY)
+        if self._pages.get(page.page_id) is not page:
+            return  # it has come back before its old stream was seen to end
+        del self._pages[page.page_id]
+        may_return = page.close_code in (CLOSE_SLOW, CLOSE_GOING_AWAY) and len(self._left) < PAGES_MAX
+        if self._is_closed or not may_return:
+            page.view_over.set()
+            return
+        ends = asyncio.get_running_loop().call_later(VIEW_KEPT_S, self._end_view, page)
+        self._left[page.page_id] = page, ends
+
+    def _stays(self, page: Page) -> None:
+        if (left := self._left.pop(page.page_id, None)) is not None:
+            left[1].cancel()
+
+    def _end_view(self, page: Page) -> None:
+        self._stays(page)
+        page.view_over.set()
 
     async def serve(
         self,
@@ -170,16 +214,19 @@ class Hub:
         *,
         session_key: str,
         session_remaining_s: float,
+        page_id: str | None = None,
         may_change: bool = True,
         snapshot: Callable[[str], schemas.Snapshot],
         present: Callable[[], Iterable[schemas.ServerMessage]] = tuple,
         on_message: OnMessage,
     ) -> None:
-        """Runs one accepted socket until either side ends it; ``present`` is what follows the snapshot at once."""
+        """Runs one accepted socket until either side ends it; ``present`` is what follows the snapshot at once.
+
+        ``page_id``: of the page's stream before this one, whose 3D view it would go on with.
+        """
         if len(self._pages) >= PAGES_MAX:
             raise BusyError(f"{PAGES_MAX} pages are open already.", advice="Close some of them.")
-        page = Page(session_key, may_change=may_change)
-        self._pages[page.page_id] = page
+        page = self._comes(session_key, page_id, may_change=may_change)
         try:
             # Taken in the same step as the registration: no change can fall between snapshot and deltas.
             self.send(page.page_id, snapshot(page.page_id))
@@ -191,8 +238,7 @@ class Hub:
                 _wait(page.gone, session_remaining_s, page),
             )
         finally:
-            self._pages.pop(page.page_id, None)
-            page.cut_off(CLOSE_GOING_AWAY)
+            self._leaves(page)
             await _close(websocket, page.close_code)
 
     async def _sender(self, websocket: WebSocket, page: Page) -> None:

@@ -17,6 +17,9 @@ PATIENCE_MS = 90_000
 LONG_MS = 3 * PATIENCE_MS
 """A flight goes by the clock."""
 
+STREAM = re.compile(r"/ws(\?|$)")
+"""A page's own stream, also when it comes back as the page that it was."""
+
 
 def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATIENCE_MS) -> None:
     end_s = time.monotonic() + timeout_ms / 1000

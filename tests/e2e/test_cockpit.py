@@ -12,7 +12,7 @@ from server.schemas import LinkMessage, ObstaclesMessage
 from server.schemas.obstacle_docs import AlertDoc, ObstaclesState
 from telemetry.topics.messages import Candidate, LinkStatus
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import connect, enter, open_demo, visit
+from tests.e2e.steps import STREAM, connect, enter, open_demo, visit
 from tests.server.obstacle_messages import alert, approach, obstacle
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
@@ -34,7 +34,7 @@ def test_keys_count_from_the_first_moment_on(station: Station, page: Page) -> No
 
 
 def test_an_alert_that_is_over_shrinks_to_a_chip_with_a_count(station: Station, page: Page) -> None:
-    page.context.route_web_socket(re.compile(r"/ws$"), _with_two_that_are_over)
+    page.context.route_web_socket(STREAM, _with_two_that_are_over)
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     banner, chip = page.get_by_test_id("alert-banner"), page.get_by_test_id("alert-chip")

@@ -19,7 +19,7 @@ from telemetry.link.audit import open_audit
 from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import certified, connect, enter, hold, open_demo
+from tests.e2e.steps import STREAM, certified, connect, enter, hold, open_demo
 from tests.server.station import ok
 from tests.telemetry.frames import heartbeat, packed
 
@@ -229,7 +229,7 @@ def test_from_the_alarm_of_a_full_disk_the_largest_recording_goes_in_two_presses
     (other,) = (recording for recording in listed if recording["name"] == "other.tlog")
     ok(station.http.delete(f"/api/recordings/{other['id']}"))
 
-    page.context.route_web_socket(re.compile(r"/ws$"), _with_a_full_disk)
+    page.context.route_web_socket(STREAM, _with_a_full_disk)
     enter(page, station)
     page.get_by_test_id("alarm-space").click()
     rows = page.get_by_test_id("space-row")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
-from playwright.sync_api import Frame, Page
+from playwright.sync_api import Frame, Page, WebSocketRoute, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import drawn, open_demo
+from tests.e2e.steps import STREAM, drawn, open_demo, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -35,6 +37,27 @@ def test_nothing_lies_over_the_picture(station: Station, page_3d: Page) -> None:
         assert view.evaluate(IN_FRONT) == [], f"{width} px: something covers the picture"
         assert not view.locator(".mantine-Paper-root:visible, [data-floating-window]:visible").count()
     assert min(widths_px) < NARROW_PX < max(widths_px)
+
+
+def test_a_stream_that_breaks_off_leaves_the_3d_view_as_it_is(station: Station, page: Page) -> None:
+    streams = list[WebSocketRoute]()
+
+    def opened(page_side: WebSocketRoute) -> None:
+        streams.append(page_side)
+        page_side.connect_to_server()
+
+    page.context.route_web_socket(STREAM, opened)
+    visit(page, station)
+    handle = page.get_by_test_id("view-frame").element_handle()
+    view = handle.content_frame() if handle is not None else None
+    assert view is not None
+    view.wait_for_load_state()
+    view.evaluate("() => { window.isTheSame = true }")
+    streams[0].close(code=4408)
+    wait_until(page, lambda: len(streams) == 2)
+    expect(page.get_by_test_id("link-state")).to_have_class(re.compile(r"\bopen\b"))
+    assert page.get_by_test_id("view-frame").count() == 1
+    assert view.evaluate("() => window.isTheSame") is True
 
 
 def _view(page: Page) -> Frame:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from typing import Literal
 
@@ -27,7 +26,7 @@ from server.schemas.strict_model import Message
 from telemetry.topics.messages import Candidate, LinkStatus, RecorderStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 from tests.e2e.stations import Station
-from tests.e2e.steps import visit
+from tests.e2e.steps import STREAM, visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
@@ -126,7 +125,7 @@ def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
     expect(page.get_by_test_id("chip-link")).to_contain_text("Link failed")
     if is_server_lost:
         sides.pop().close(code=4408)
-        page.context.route_web_socket(re.compile(r"/ws$"), lambda side: side.close(code=4408))
+        page.context.route_web_socket(STREAM, lambda side: side.close(code=4408))
         expect(page.get_by_test_id("link-state")).to_contain_text("No connection")
     found = {}
     for width in (1440, 1180, 1024, 820, 390):
@@ -188,7 +187,7 @@ def _with_messages(page: Page, messages: Sequence[Message]) -> list[WebSocketRou
 
         server.on_message(pass_on)
 
-    page.context.route_web_socket(re.compile(r"/ws$"), opened)
+    page.context.route_web_socket(STREAM, opened)
     return sides
 
 

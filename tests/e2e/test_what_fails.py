@@ -18,7 +18,7 @@ from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 from server.schemas import NodeDoc, NodesMessage
 from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import connect, enter, open_demo, upload
+from tests.e2e.steps import STREAM, connect, enter, open_demo, upload
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -31,7 +31,7 @@ class Stream:
         self._left_out: frozenset[str] = frozenset()
         self.is_silent = False
         """As a server that hangs: its sockets stay open."""
-        context.route_web_socket(re.compile(r"/ws$"), self._opened)
+        context.route_web_socket(STREAM, self._opened)
 
     def link_is(self, state: Literal["running", "silent", "restarting"]) -> None:
         """Of the process that commands the vehicle, whatever it is in truth."""

@@ -74,7 +74,7 @@ class Bench:
         self.heard: list[tuple[str, object]] = []
         self._tasks: list[asyncio.Task[None]] = []
 
-    async def join(self, *, session: str = "s", remaining_s: float = 1000.0) -> FakeSocket:
+    async def join(self, *, session: str = "s", remaining_s: float = 1000.0, page_id: str | None = None) -> FakeSocket:
         socket = FakeSocket()
 
         async def on_message(page_id: str, message: object) -> None:
@@ -86,6 +86,7 @@ class Bench:
                     cast(WebSocket, socket),
                     session_key=session,
                     session_remaining_s=remaining_s,
+                    page_id=page_id,
                     snapshot=snapshot,
                     on_message=on_message,
                 )
@@ -285,6 +286,53 @@ def test_signing_out_closes_the_pages_of_that_session_only() -> None:
         assert (mine.close_code, other.close_code) == (CLOSE_SIGNED_OUT, None)
 
     run(scenario)
+
+
+def test_a_page_that_comes_back_is_the_one_that_it_was_to_its_own_session_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server.door.hub.VIEW_KEPT_S", 0.3)
+
+    async def whole(bench: Bench) -> None:
+        first = await bench.join()
+        page_id = first.sent[0]["page_id"]
+        page = bench.hub.page(page_id)
+        assert page is not None
+        first.leaves()
+        await settled()
+        assert bench.hub.page(page_id) is None
+        stranger = await bench.join(session="other", page_id=page_id)
+        assert stranger.sent[0]["page_id"] != page_id
+        again = await bench.join(page_id=page_id)
+        assert again.sent[0]["page_id"] == page_id
+        await asyncio.sleep(0.4)
+        assert not page.view_over.is_set(), "its view stays with it"
+        faster = await bench.join(page_id=page_id)
+        assert faster.sent[0]["page_id"] == page_id, "the old stream's end was not seen yet"
+        again.leaves()
+        await settled()
+        assert bench.hub.page(page_id) is not None
+        faster.leaves()
+        await asyncio.wait_for(page.view_over.wait(), 5)
+        late = await bench.join(page_id=page_id)
+        assert late.sent[0]["page_id"] != page_id
+
+    run(whole)
+
+
+def test_signing_out_ends_the_view_of_a_page_whose_stream_has_just_broken_off() -> None:
+    async def whole(bench: Bench) -> None:
+        left, stays = await bench.join(session="out"), await bench.join(session="in")
+        pages = [bench.hub.page(socket.sent[0]["page_id"]) for socket in (left, stays)]
+        left.leaves()
+        stays.leaves()
+        await settled()
+        bench.hub.close_session("out")
+        assert [page is not None and page.view_over.is_set() for page in pages] == [True, False]
+        bench.hub.close()
+        assert all(page is not None and page.view_over.is_set() for page in pages)
+
+    run(whole)
 
 
 def test_an_expired_session_ends_its_stream() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -139,7 +140,22 @@ def test_hostile_messages_reach_no_callback(served: Running) -> None:
     upload.remove()
 
 
-def test_the_view_ends_with_its_page(served: Running) -> None:
+def test_the_view_outlives_a_broken_stream_and_ends_with_its_page(
+    served: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with served.socket() as stream:
+        page_id = page_id_of(stream)
+        kept = view(served, page_id)
+        kept.recv(timeout=10)
+    with served.socket(f"/ws?page={page_id}") as stream:
+        assert page_id_of(stream) == page_id
+        with contextlib.suppress(TimeoutError):
+            while True:
+                kept.recv(timeout=0.5)
+        assert kept.close_code is None
+    kept.close()
+
+    monkeypatch.setattr("server.door.hub.VIEW_KEPT_S", 0.1)
     with served.socket() as stream:
         socket = view(served, page_id_of(stream))
         socket.recv(timeout=10)

@@ -9,7 +9,7 @@ class FakeSocket {
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: string }) => void) | null = null;
   onclose: ((event: { code: number }) => void) | null = null;
-  constructor() {
+  constructor(readonly url: string) {
     FakeSocket.all.push(this);
   }
   send(text: string): void {
@@ -36,7 +36,7 @@ beforeEach(() => {
   }).connect();
   socket = FakeSocket.all[0] as FakeSocket;
   socket.onopen?.();
-  socket.says({ type: "snapshot" });
+  socket.says({ type: "snapshot", page_id: "p/1" });
 });
 
 afterEach(() => {
@@ -50,6 +50,14 @@ function sleep(ms: number): void {
   const woken_ms = performance.now() + ms;
   vi.spyOn(performance, "now").mockImplementation(() => woken_ms);
 }
+
+describe("a stream that breaks off", () => {
+  it("comes back as the page that it was, whose 3D view has stayed", () => {
+    socket.onclose?.({ code: 1006 });
+    vi.advanceTimersByTime(1000);
+    expect(FakeSocket.all.map((each) => each.url)).toEqual(["ws://x/ws", "ws://x/ws?page=p%2F1"]);
+  });
+});
 
 describe("a server that falls silent", () => {
   it("is pinged at once and every second, and is there as long as it answers", () => {

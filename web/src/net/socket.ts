@@ -28,7 +28,7 @@ export function retryDelay_ms(attempt: number, random: number): number {
   return full * (0.75 + 0.25 * random);
 }
 
-/** The `/ws` stream; it reconnects by itself and the server's snapshot brings the page up to date. */
+/** The `/ws` stream; it reconnects by itself, as the page that it was: its 3D view stays, and the snapshot brings the rest up to date. */
 export class Stream {
   private socket: WebSocket | null = null;
   private attempt = 0;
@@ -36,6 +36,7 @@ export class Stream {
   private looked_ms = 0;
   private pinged_ms = 0;
   private state: LinkState = "connecting";
+  private page: string | null = null;
 
   constructor(
     private readonly url: string,
@@ -43,7 +44,8 @@ export class Stream {
   ) {}
 
   connect(): void {
-    const socket = new WebSocket(this.url);
+    const again = this.page === null ? "" : `?page=${encodeURIComponent(this.page)}`;
+    const socket = new WebSocket(`${this.url}${again}`);
     this.socket = socket;
     socket.onopen = () => this.ping(performance.now());
     socket.onmessage = (event) => this.read(event.data);
@@ -95,7 +97,10 @@ export class Stream {
       this.events.unreadable(`protocol version ${message.v}; this page speaks ${PROTOCOL_VERSION}`);
       return;
     }
-    if (message.type === "snapshot") this.attempt = 0;
+    if (message.type === "snapshot") {
+      this.attempt = 0;
+      this.page = message.page_id;
+    }
     if (message.type === "snapshot" || this.state === "silent") this.becomes("open");
     this.events.message(message);
   }
