@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import pytest
 from pymavlink import mavutil
 
 from planning.formats.wpl import write_wpl
 from planning.terrain.geotiff import write_dsm
+from server.cli.params.session import ParameterSession
+from telemetry.bus.link_client import LinkClient
 from telemetry.link.audit import AUDIT_FILE
 from telemetry.parameters.files import read_parameter_file
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS
+from telemetry.topics.requests import ReadParameters
+from telemetry.topics.vehicle import VehicleState
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import simulated_vehicle
@@ -138,6 +144,20 @@ def test_more_than_one_batch_and_names_that_the_vehicle_does_not_have(link: str,
     assert {name for name, outcome in by_name.items() if outcome != "set"} == {"NO_SUCH_THING"}
     file.write_text("".join(f"{name} {SPECS[name].default}\n" for name in numbers))
     assert hedgehop("params", "load", file, "--link", link).code == 0
+
+
+def test_many_names_are_asked_for_a_few_at_a_time() -> None:
+    asked: list[int] = []
+
+    class Link:
+        async def call(self, request: ReadParameters) -> dict[str, float | None]:
+            asked.append(len(request.names))
+            return dict.fromkeys(request.names, 1.0)
+
+    session = ParameterSession(cast(LinkClient, Link()), VehicleState(1, 1))
+    names = [f"P{number}" for number in range(25)]
+    assert asyncio.run(session.named(names)) == dict.fromkeys(names, 1.0)
+    assert asked == [10, 10, 5]
 
 
 def test_two_vehicles(link: str) -> None:

@@ -66,7 +66,7 @@ KEPT_BY_VEHICLES = (
 
 @command
 def get(
-    names: Annotated[list[str] | None, Argument(metavar="[NAME|PATTERN]...", help="RTL_ALT 'FENCE_*'.")] = None,
+    names: Annotated[list[str] | None, Argument(metavar="NAME|PATTERN", help="RTL_ALT 'FENCE_*'.")] = None,
     *,
     link: o.Link,
     search: Annotated[str | None, Option(metavar="TEXT", help="Only those whose name or description has this.")] = None,
@@ -127,7 +127,7 @@ async def _read(
 
 @command
 def set_(
-    pairs: Annotated[list[str], Argument(metavar="NAME VALUE|NAME=VALUE...", help="RTL_ALT 1900 or RTL_ALT=1900.")],
+    pairs: Annotated[list[str], Argument(metavar="NAME VALUE|NAME=VALUE", help="RTL_ALT 1900 or RTL_ALT=1900.")],
     *,
     link: o.Link,
     even_armed: EvenArmed = False,

@@ -38,7 +38,7 @@ MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 @command
 def review(
     mission: Annotated[
-        Path | None, Argument(metavar="[MISSION]", help="The mission that is to be flown: .waypoints or .plan.")
+        Path | None, Argument(metavar="MISSION", help="The mission that is to be flown: .waypoints or .plan.")
     ] = None,
     *,
     link: o.Link,

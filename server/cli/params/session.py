@@ -17,6 +17,9 @@ from telemetry.topics.parameters import MOST_CHANGES, Parameter, ParameterChange
 from telemetry.topics.requests import ListParameters, ReadParameters, WriteParameters
 from telemetry.topics.vehicle import VehicleState
 
+MOST_NAMES = 10
+"""Asked for at once: ArduPilot keeps 20 questions and drops what comes above, which would look as if it had no such
+parameter."""
 Told = Callable[[ParameterWritten], None]
 
 
@@ -39,7 +42,10 @@ class ParameterSession:
 
     async def named(self, names: Sequence[str]) -> dict[str, float | None]:
         """None for what the vehicle does not have or does not answer to."""
-        return await self.link.call(ReadParameters(tuple(names)))
+        found: dict[str, float | None] = {}
+        for begin in range(0, len(names), MOST_NAMES):
+            found |= await self.link.call(ReadParameters(tuple(names[begin : begin + MOST_NAMES])))
+        return found
 
     async def write(
         self, changes: Sequence[ParameterChange], told: Told, *, even_armed: bool, begun: bool = False
