@@ -169,10 +169,19 @@ def play(page: Page, testid: str = "play") -> None:
 
 def play_alert(page: Page) -> None:
     """From the event before the first alert on, with the instruments beside it."""
-    page.get_by_test_id("review-part-events").click()
-    events = page.get_by_test_id("review-event")
-    expect(events.and_(page.locator("[data-kind=alert]")).first).to_be_visible()
-    kinds = events.evaluate_all("events => events.map((event) => event.dataset.kind)")
-    events.nth(kinds.index("alert") - 1).click()
-    page.get_by_test_id("review-part-instruments").click()
-    play(page)
+    events, banner = page.get_by_test_id("review-event"), page.get_by_test_id("alert-banner")
+
+    def is_shown() -> bool:
+        """Again where it was over before a slow page had come to draw it."""
+        page.get_by_test_id("review-part-events").click()
+        expect(events.and_(page.locator("[data-kind=alert]")).first).to_be_visible()
+        kinds = events.evaluate_all("events => events.map((event) => event.dataset.kind)")
+        events.nth(kinds.index("alert") - 1).click()
+        page.get_by_test_id("review-part-instruments").click()
+        play(page)
+        with contextlib.suppress(AssertionError):
+            expect(banner).to_contain_text("REPLAY", timeout=20_000)
+            return True
+        return False
+
+    wait_until(page, is_shown, LONG_MS)
