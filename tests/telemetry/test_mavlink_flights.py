@@ -172,7 +172,7 @@ def test_speeds_are_set_again_and_a_replaced_mission_is_not_resumed() -> None:
 
 def test_the_way_home_of_the_script_can_be_paused() -> None:
     async def whole() -> None:
-        async with simulated(speedup=5.0) as (bench, _):
+        async with simulated(speedup=5.0, parameters=()) as (bench, _):  # it creeps down: no stall is longer
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await start(bench, StartGuided(ME, TARGETS[:1], 10.0))
             await phase(bench, "returning")

@@ -24,7 +24,7 @@ POLE_NORTH_M, POLE_EAST_M = 22.0, 0.3
 """Between two waypoints."""
 NORTH_PER_DEG = 111_195.0
 STANDS_M = 2.0
-FRAME_S, NEARLY_REAL, STRAIGHT = 0.04, 1.5, 4.0
+FRAME_S, NEARLY_REAL, STRAIGHT = 0.04, 1.5, 3.0
 """Frames come in real time: a vehicle that steps aside is little faster than they are."""
 
 
