@@ -135,12 +135,15 @@ def test_a_list_that_never_stands_still_is_given_up() -> None:
     assert str(MOST_BEGINNINGS) in run.error.what
 
 
-def test_a_change_by_somebody_else_meanwhile_counts() -> None:
+@pytest.mark.parametrize("number", [65535, 7])
+def test_a_change_by_somebody_else_meanwhile_counts(number: int) -> None:
+    """ArduPilot says it without its number, PX4 with it."""
+
     class Changed(ArduPilotParameters):
         def on_message(self, message: Any, now_s: float) -> list[Any]:
             if message.get_type() == "PARAM_REQUEST_READ":
                 self.table["P0007"] = (8.0, 9)
-                return [self.value("P0007", 65535), *super().on_message(message, now_s)]
+                return [self.value("P0007", number), *super().on_message(message, now_s)]
             return super().on_message(message, now_s)
 
     lost: list[int] = []

@@ -105,9 +105,13 @@ class ParameterListRead:
         asked_s = self._missing.pop(index, None)
         if asked_s is not None and index not in self._asked_again:
             self._round_trip.measure(now_s - asked_s)
-        if index >= self._count or index in self._found:
+        if index >= self._count:
             return []
-        self._found[index], self._index[parameter.name], self._new_s = parameter, index, now_s
+        is_new = index not in self._found
+        self._found[index] = parameter  # the latest counts: PX4 says a change with its number
+        if not is_new:
+            return []
+        self._index[parameter.name], self._new_s = index, now_s
         if len(self._found) == self._count:
             self._over = True
             return [Done(ParameterList(tuple(self._found[index] for index in range(self._count))))]
