@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from server.api.access import Need, identity_of, needs, parts_of
-from server.door.hub import Page
+from server.door.page import Page
 from server.errors import NotFoundError, SignInError
 from server.scene.filter import MessageFilter
 from server.scene.host import CLIENT_HTML, SUBPROTOCOL, SceneHost

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, WebSocket
 
 from server.api.access import Need, identity_of, needs, parts_of
-from server.door.hub import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
+from server.door.page import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
 from server.errors import BusyError, SignInError
 from server.schemas import MeDoc, MeMessage
 

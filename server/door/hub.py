@@ -13,23 +13,21 @@ import asyncio
 import contextlib
 import json
 import logging
-import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable
-from functools import cached_property
-from itertools import count
 
 from pydantic import TypeAdapter, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server import schemas
+from server.door.page import CLOSE_GOING_AWAY, CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Outgoing, Page
 from server.errors import ASK_OPERATOR, BusyError, ObserverError, error_doc
+from server.work.bucket import Bucket
 from server.work.task_group import until_first
 
 log = logging.getLogger("hedgehop.hub")
 
 PAGES_MAX = 200
-WAITING_MAX = 256
 SEND_TIMEOUT_S, CLOSE_TIMEOUT_S = 120.0, 5.0
 """A large message over a slow line takes long; a line that takes nothing is cut much sooner (``slow_lines``)."""
 VIEW_KEPT_S = 15.0
@@ -37,78 +35,12 @@ VIEW_KEPT_S = 15.0
 MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
-CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
-
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
 OBSERVERS_MAY = (schemas.FrameView, schemas.HoldCamera, schemas.Ping)
 """What moves nothing but this page's own camera."""
 _CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera", "ping")
 
 OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
-
-
-class _Outgoing:
-    """A message on its way to several pages: written as JSON once, and only if some page gets it."""
-
-    def __init__(self, message: schemas.ServerMessage) -> None:
-        self._message = message
-
-    @cached_property
-    def text(self) -> str:
-        return self._message.model_dump_json()
-
-
-def key_of(message: schemas.ServerMessage) -> object | None:
-    """Messages of the same key replace each other; None: each one must arrive."""
-    match message:
-        case schemas.NoticeMessage() | schemas.TextMessage() | schemas.AlertMessage() | schemas.AnsweredMessage():
-            return None
-        case schemas.JobMessage():
-            return message.type, message.job.id
-        case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage() | schemas.TracksMessage():
-            return message.type, message.source
-        case schemas.PerceptionMessage():
-            return message.type, message.source, message.sensor
-        case schemas.TrackMessage():
-            return message.type, message.track.source
-    return message.type
-
-
-class Page:
-    """One browser page: its queue, and the reason why it has to go once there is one."""
-
-    def __init__(self, session_key: str, *, may_change: bool = True, before: Page | None = None) -> None:
-        self.page_id = secrets.token_urlsafe(16) if before is None else before.page_id
-        self.session_key, self.may_change = session_key, may_change
-        self.view_over = asyncio.Event() if before is None else before.view_over
-        """Its 3D view ends: later than its stream, which may come back."""
-        self.heard_mono_s = time.monotonic()
-        self.gone = asyncio.Event()
-        self.close_code = CLOSE_GOING_AWAY
-        self._waiting: dict[object, _Outgoing] = {}
-        self._wake = asyncio.Event()
-        self._numbers = count()
-
-    def put(self, message: schemas.ServerMessage, outgoing: _Outgoing) -> None:
-        self._waiting[self._key(message)] = outgoing
-        self._wake.set()
-        if len(self._waiting) > WAITING_MAX:
-            self.cut_off(CLOSE_SLOW)
-
-    def _key(self, message: schemas.ServerMessage) -> object:
-        key = key_of(message)
-        return (message.type, next(self._numbers)) if key is None else key
-
-    async def next_text(self) -> str:
-        while not self._waiting:
-            self._wake.clear()
-            await self._wake.wait()
-        return self._waiting.pop(next(iter(self._waiting))).text
-
-    def cut_off(self, code: int) -> None:
-        if not self.gone.is_set():
-            self.close_code = code
-            self.gone.set()
 
 
 class Hub:
@@ -134,7 +66,7 @@ class Hub:
 
     def publish(self, message: schemas.ServerMessage) -> None:
         """To every page; never waits."""
-        outgoing = _Outgoing(message)
+        outgoing = Outgoing(message)
         for page in list(self._pages.values()):
             page.put(message, outgoing)
 
@@ -142,11 +74,11 @@ class Hub:
         """To every page, what its session (by ``server.door.auth.session_key``) may know."""
         for page in list(self._pages.values()):
             message = make(page.session_key)
-            page.put(message, _Outgoing(message))
+            page.put(message, Outgoing(message))
 
     def publish_to(self, session_key: str, message: schemas.ServerMessage) -> None:
         """To every page of one session."""
-        outgoing = _Outgoing(message)
+        outgoing = Outgoing(message)
         for page in list(self._pages.values()):
             if page.session_key == session_key:
                 page.put(message, outgoing)
@@ -154,7 +86,7 @@ class Hub:
     def send(self, page_id: str, message: schemas.ServerMessage) -> None:
         """To one page; nothing happens when it has gone."""
         if page := self._pages.get(page_id):
-            page.put(message, _Outgoing(message))
+            page.put(message, Outgoing(message))
 
     def notify(self, page_id: str, error: Exception) -> None:
         """Tells one page why what it asked for did not happen."""
@@ -318,22 +250,6 @@ def _unreadable(error: ValueError) -> schemas.NoticeMessage:
         code="unknown_message", what=str(error), advice="Reload the page: it may be older than the server."
     )
     return schemas.NoticeMessage(level="error", error=doc)
-
-
-class Bucket:
-    """A token bucket on a clock that the caller reads: ``rate_per_s`` for ever, ``burst`` at once; may be overdrawn."""
-
-    def __init__(self, rate_per_s: float, burst: float, now_s: float) -> None:
-        self._rate_per_s, self._burst = rate_per_s, burst
-        self._tokens, self._at_s = burst, now_s
-
-    def left(self, now_s: float) -> float:
-        self._tokens = min(self._burst, self._tokens + self._rate_per_s * max(0.0, now_s - self._at_s))
-        self._at_s = now_s
-        return self._tokens
-
-    def spend(self, count: float) -> None:
-        self._tokens -= count
 
 
 async def _wait(gone: asyncio.Event, session_remaining_s: float, page: Page) -> None:

@@ -6,7 +6,6 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from server.door.hub import Bucket
 from server.heard.flown_track import Track
 from server.heard.plan_follower import Follower
 from server.schemas import (
@@ -18,6 +17,7 @@ from server.schemas import (
     TrackMessage,
     VehicleMessage,
 )
+from server.work.bucket import Bucket
 from telemetry.topics.messages import FlightStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 
-from server.door.hub import key_of
+from server.door.page import key_of
 from server.schemas import (
     AlertMessage,
     Pages,

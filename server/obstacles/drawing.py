@@ -13,7 +13,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from server.door.hub import Bucket
 from server.errors import reported
 from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.moving_objects import TracksWatch
@@ -21,6 +20,7 @@ from server.obstacles.obstacle_watch import Watch
 from server.scene.layers.sights import MapLook, Sights
 from server.scene.mirror import CHUNK_M, DETAILS, ChunkKey, MapMirror, coarser
 from server.schemas import MapDrawn, Source
+from server.work.bucket import Bucket
 from telemetry.topics.obstacles import MAP_NAMES, MapName, MapOrigin
 
 log = logging.getLogger("hedgehop.obstacles")

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 
 from server.api.access import _NEEDS, Need, need_of
 from server.door.guard import SAFE_METHODS
-from server.door.hub import CLOSE_SIGNED_OUT
+from server.door.page import CLOSE_SIGNED_OUT
 from server.door.passwords import PasswordHash
 from server.scene.filter import ALLOWED, OF_OBSERVERS, MessageFilter
 from tests.server.running import Running

@@ -8,7 +8,7 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
-from server.door.hub import CLOSE_SIGNED_OUT
+from server.door.page import CLOSE_SIGNED_OUT
 from tests.server.running import PASSWORD, Running
 
 PRIVATE = [

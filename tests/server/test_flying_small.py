@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.door.hub import Bucket
 from server.heard.flown_track import POINTS_MAX, Track
 from server.heard.onboard import rounded_note
 from server.library.terrain_of import FlownOver, covers, terrain_of
 from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
+from server.work.bucket import Bucket
 from telemetry.topics.messages import Rounded
 from telemetry.topics.vehicle import VehicleState
 

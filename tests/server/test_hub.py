@@ -12,7 +12,8 @@ import pytest
 from starlette.websockets import WebSocket, WebSocketState
 
 from server.door import hub as hub_module
-from server.door.hub import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Hub, parse
+from server.door.hub import Hub, parse
+from server.door.page import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, WAITING_MAX
 from server.schemas import (
     CursorMessage,
     ErrorDoc,
@@ -199,7 +200,7 @@ def test_a_page_whose_notices_pile_up_is_cut_off() -> None:
     async def scenario(bench: Bench) -> None:
         socket = await bench.join()
         socket.flowing.clear()
-        for index in range(hub_module.WAITING_MAX + 2):
+        for index in range(WAITING_MAX + 2):
             bench.hub.publish(notice(str(index)))
         socket.flowing.set()
         await settled()

@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
-from server.door.hub import key_of
+from server.door.page import key_of
 from server.heard.node_states import Nodes
 from server.heard.present import Present
 from server.obstacles.moving_objects import TracksWatch

@@ -1,0 +1,79 @@
+"""One browser page as the hub holds it: what waits to be sent to it, and whether it has to go."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from functools import cached_property
+from itertools import count
+
+from server import schemas
+
+WAITING_MAX = 256
+
+CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, CLOSE_GOING_AWAY, CLOSE_TRY_LATER = 1008, 4401, 4408, 1001, 1013
+
+
+class Outgoing:
+    """A message on its way to several pages: written as JSON once, and only if some page gets it."""
+
+    def __init__(self, message: schemas.ServerMessage) -> None:
+        self._message = message
+
+    @cached_property
+    def text(self) -> str:
+        return self._message.model_dump_json()
+
+
+def key_of(message: schemas.ServerMessage) -> object | None:
+    """Messages of the same key replace each other; None: each one must arrive."""
+    match message:
+        case schemas.NoticeMessage() | schemas.TextMessage() | schemas.AlertMessage() | schemas.AnsweredMessage():
+            return None
+        case schemas.JobMessage():
+            return message.type, message.job.id
+        case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage() | schemas.TracksMessage():
+            return message.type, message.source
+        case schemas.PerceptionMessage():
+            return message.type, message.source, message.sensor
+        case schemas.TrackMessage():
+            return message.type, message.track.source
+    return message.type
+
+
+class Page:
+    """One browser page: its queue, and the reason why it has to go once there is one."""
+
+    def __init__(self, session_key: str, *, may_change: bool = True, before: Page | None = None) -> None:
+        self.page_id = secrets.token_urlsafe(16) if before is None else before.page_id
+        self.session_key, self.may_change = session_key, may_change
+        self.view_over = asyncio.Event() if before is None else before.view_over
+        """Its 3D view ends: later than its stream, which may come back."""
+        self.heard_mono_s = time.monotonic()
+        self.gone = asyncio.Event()
+        self.close_code = CLOSE_GOING_AWAY
+        self._waiting: dict[object, Outgoing] = {}
+        self._wake = asyncio.Event()
+        self._numbers = count()
+
+    def put(self, message: schemas.ServerMessage, outgoing: Outgoing) -> None:
+        self._waiting[self._key(message)] = outgoing
+        self._wake.set()
+        if len(self._waiting) > WAITING_MAX:
+            self.cut_off(CLOSE_SLOW)
+
+    def _key(self, message: schemas.ServerMessage) -> object:
+        key = key_of(message)
+        return (message.type, next(self._numbers)) if key is None else key
+
+    async def next_text(self) -> str:
+        while not self._waiting:
+            self._wake.clear()
+            await self._wake.wait()
+        return self._waiting.pop(next(iter(self._waiting))).text
+
+    def cut_off(self, code: int) -> None:
+        if not self.gone.is_set():
+            self.close_code = code
+            self.gone.set()
