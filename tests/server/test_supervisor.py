@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from server.work import supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
@@ -33,7 +34,12 @@ async def main(bus, context):
     if "--deaf" in sys.argv:
         asyncio.get_running_loop().remove_signal_handler(signal.SIGTERM)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    if "--busy" in sys.argv:
+    once = Path(sys.argv[2]) / "busy-once"
+    if "--busy" in sys.argv and not once.exists():
+        once.touch()
+        for _ in range(0 if "--at-once" in sys.argv else 10):  # the first proof is that of its start
+            context.is_needed()
+            await asyncio.sleep(0.1)
         while True:
             pass
     while context.is_needed():
@@ -281,12 +287,17 @@ def test_a_log_keeps_its_newest_part(tmp_path: Path) -> None:
     assert content.endswith(b"\nthe last line\n")
 
 
-@pytest.mark.parametrize("how", ["stopped", "busy"])
-def test_a_link_that_hangs_is_said_then_killed_and_started_again(folder: Path, how: str) -> None:
+@pytest.mark.parametrize("how", ["stopped", "busy", "busy from its start on"])
+def test_a_link_that_hangs_is_said_then_killed_and_started_again(
+    folder: Path, how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "STARVED_S", start_s := 5.0)
+    arguments = {"stopped": [], "busy": ["--busy"], "busy from its start on": ["--busy", "--at-once"]}[how]
+
     async def whole() -> None:
         async with supervised(folder) as watched:
             since_s = time.monotonic()
-            await watched.supervisor.start("link", ["--busy"] if how == "busy" else [])
+            await watched.supervisor.start("link", arguments)
             if how == "stopped":
                 facts = await watched.running("link")
                 await until(lambda: proved_s(folder) > facts.proved_t_mono_s)
@@ -300,7 +311,7 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(folder: Path, h
             state = watched.state("link")
             assert state is not None
             # One that is busy counts as starved where others leave it less than half of a processor.
-            waited_s = [HUNG_S] if how == "stopped" else [HUNG_S, STARVED_S]
+            waited_s = {"stopped": [HUNG_S], "busy": [HUNG_S, STARVED_S]}.get(how, [start_s])
             ended = [f"was ended after it had not answered for {s:.0f} s and was started again" for s in waited_s]
             assert any(words in state.text for words in ended)
             await watched.supervisor.stop("link")
