@@ -7,6 +7,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from tests.conftest import ROOT
@@ -64,24 +65,37 @@ def attempt_rows() -> Iterator[Row]:
     """All tests in one run of pytest, by file."""
     results = _results(sorted({file for _, _, files in HELD for file in files}))
     for name, promise, files in HELD:
-        passed, failed, skipped = (sum(results.get(file, (0, 1, 0))[k] for file in files) for k in range(3))
-        figure = f"{passed} tests passed" + (f", {failed} failed" if failed else "")
+        of_files = [results.get(file, Tried(failed=(f"{file} could not be run",))) for file in files]
+        passed, skipped = sum(each.passed for each in of_files), sum(each.skipped for each in of_files)
+        failed = [words for each in of_files for words in each.failed]
+        figure = f"{passed} tests passed" + (f", {len(failed)} failed: {'; '.join(failed)}" if failed else "")
         figure += f", {skipped} skipped: what they try was not tried" if skipped else ""
         yield Row(name, promise, judged(passed > 0 and not failed), figure, f"pytest {' '.join(files)}")
 
 
-def _results(files: list[str]) -> dict[str, tuple[int, int, int]]:
-    """Passed, failed and skipped tests of each file."""
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A file's tests."""
+
+    passed: int = 0
+    skipped: int = 0
+    failed: tuple[str, ...] = ()
+    """Name and reason of each."""
+
+
+def _results(files: list[str]) -> dict[str, Tried]:
     with tempfile.TemporaryDirectory(prefix="hedgehop-trust-") as folder:
         report = Path(folder) / "report.xml"
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *files]
         subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
         cases = list(ElementTree.parse(report).iter("testcase")) if report.is_file() else []
-    found: dict[str, tuple[int, int, int]] = {}
+    found: dict[str, Tried] = {}
     for case in cases:
         file = case.get("classname", "").replace(".", "/") + ".py"
-        ends = {part.tag for part in case}
-        failed, skipped = bool(ends & {"failure", "error"}), "skipped" in ends
-        before = found.get(file, (0, 0, 0))
-        found[file] = (before[0] + (not failed and not skipped), before[1] + failed, before[2] + skipped)
+        ends = {part.tag: part.get("message", "").partition("\n")[0] for part in case}
+        words = [f"{case.get('name')} ({ends[end]})" for end in ("failure", "error") if end in ends]
+        before, is_skipped = found.get(file, Tried()), "skipped" in ends
+        found[file] = Tried(
+            before.passed + (not words and not is_skipped), before.skipped + is_skipped, (*before.failed, *words)
+        )
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from tests.conftest import ROOT
 from tests.telemetry.mission_vehicles import ArduCopter
 from tests.trust import attempts, link
+from tests.trust.attempts import Tried
 from tests.trust.growth import LongFlight, growth_row
 from tests.trust.missions import missions_row
 
@@ -57,14 +59,24 @@ def test_a_link_that_keeps_every_state_fails_its_row(monkeypatch: pytest.MonkeyP
 def test_every_file_of_the_table_is_there_and_one_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     files = {file for _, _, files in attempts.HELD for file in files}
     assert [file for file in files if not (ROOT / file).is_file()] == []
-    passed = dict.fromkeys(files, (3, 0, 0)) | {"tests/server/test_guard.py": (2, 1, 0)}
+    passed = dict.fromkeys(files, Tried(3)) | {"tests/server/test_guard.py": Tried(2, failed=("test_x (it let in)",))}
     del passed["tests/server/test_hub.py"]
     monkeypatch.setattr(attempts, "_results", lambda _: passed)
-    assert {row.name for row in attempts.attempt_rows() if row.verdict == "FAILS"} == {"S1", "S2", "S6", "R13"}
+    failed = {row.name: row.figure for row in attempts.attempt_rows() if row.verdict == "FAILS"}
+    assert failed.keys() == {"S1", "S2", "S6", "R13"}
+    assert "test_x (it let in)" in failed["S1"]
+    assert "test_hub.py could not be run" in failed["R13"]
 
 
 def test_results_are_counted_by_file() -> None:
     file = "tests/telemetry/test_bus_sockets.py"
-    passed, failed, _ = attempts._results([file])[file]
-    assert passed > 0
-    assert failed == 0
+    tried = attempts._results([file])[file]
+    assert tried.passed > 0
+    assert tried.failed == ()
+
+
+def test_what_failed_is_named_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "test_one.py").write_text("def test_it():\n    assert False, 'the door was open'\n")
+    monkeypatch.setattr(attempts, "ROOT", tmp_path)
+    (tried,) = attempts._results(["test_one.py"]).values()
+    assert (tried.passed, tried.failed) == (0, ("test_it (AssertionError: the door was open)",))
