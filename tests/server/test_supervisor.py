@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from server.work import supervisor
+from server.work import node_process, supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
@@ -248,13 +248,17 @@ def test_a_node_holds_nothing_of_the_server_that_started_it(folder: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_node_that_does_not_listen_is_killed(folder: Path) -> None:
+def test_a_node_that_does_not_listen_is_killed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(node_process, "_END_WITHIN_S", within_s := 2.0)
+
     async def whole() -> None:
         async with supervised(folder) as watched:
             await watched.supervisor.start("recorder", ["--deaf"])
             await watched.running("recorder")
             await until(lambda: "a line of" in (folder / "recorder.log").read_text())
+            asked_s = time.monotonic()
             await watched.supervisor.stop("recorder")
+            assert time.monotonic() - asked_s >= within_s
             assert running_node(folder, "recorder") is None
 
     run(whole)
