@@ -58,7 +58,7 @@ class Transfers:
             known = report.onboard
             return report
         finally:
-            vehicle.onboard.transfer_ends(known, time.monotonic())
+            self._ends(known)
 
     async def download(self, *, own_idea: bool = False) -> OnboardMission:
         """``own_idea``: nobody asked, so nobody is told of its progress and an upload may push it aside."""
@@ -75,7 +75,7 @@ class Transfers:
             known = onboard
             return onboard
         finally:
-            vehicle.onboard.transfer_ends(known, time.monotonic())
+            self._ends(known)
 
     async def upload_places(self, request: UploadPlaces) -> UploadReport:
         """Raises TelemetryError; then nobody knows which fence or rally points are on board."""
@@ -135,6 +135,11 @@ class Transfers:
             written = await vehicle.exchanges.run(machine)
         assert isinstance(written, tuple)
         return written
+
+    def _ends(self, known: OnboardMission | None) -> None:
+        """Not of one that was pushed aside: what it made way for is on its way."""
+        if self._machine is None:
+            self._vehicle.onboard.transfer_ends(known, time.monotonic())
 
     def _make_way(self) -> None:
         if self._machine is None:

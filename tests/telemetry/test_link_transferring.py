@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.link.onboard import OnBoard
 from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Failed, Progress
 from telemetry.topics.messages import Item, OnboardMission, TransferStatus, UploadReport
-from telemetry.topics.requests import Operator, UploadPlaces
+from telemetry.topics.requests import Operator, Upload, UploadPlaces
 
+KNOWN = OnboardMission((), None, None, None, "known")
 REPORT = UploadReport(True, OnboardMission((), None, None, None, ""), (), (), 0.1)
 FENCE = UploadPlaces(Operator("test", 1), "fence", (Item(5003, 0, (50.0, 0.0, 0.0, 0.0), 47.0, 8.0, 0.0),))
 
@@ -35,8 +39,7 @@ class Exchanges:
 
 def bench() -> tuple[Transfers, Exchanges, list[TransferStatus]]:
     exchanges, told = Exchanges(), []
-    onboard = SimpleNamespace(transfer_begins=lambda replaces: None, transfer_ends=lambda mission, now_s: None)
-    vehicle = SimpleNamespace(firmware="ardupilot", target=(1, 1), exchanges=exchanges, onboard=onboard)
+    vehicle = SimpleNamespace(firmware="ardupilot", target=(1, 1), exchanges=exchanges, onboard=OnBoard())
     return Transfers(cast(Any, vehicle), told.append), exchanges, told
 
 
@@ -61,3 +64,25 @@ async def _pushed_aside() -> None:
     assert await sending is REPORT
     assert [status.phase for status in told] == ["sending", "done"]
     assert not transfers.is_busy
+
+
+def test_the_vehicles_answers_to_an_upload_that_pushed_a_read_back_aside_are_nobody_elses() -> None:
+    asyncio.run(_answers())
+
+
+async def _answers() -> None:
+    transfers, exchanges, _ = bench()
+    onboard = transfers._vehicle.onboard
+    reading = asyncio.create_task(transfers.read_back())
+    await asyncio.sleep(0)
+    sending = asyncio.create_task(transfers.upload(Upload(Operator("test", 1), FENCE.items, 47.0, 8.0, 400.0)))
+    await asyncio.sleep(0)
+    await asyncio.gather(reading, return_exceptions=True)
+    onboard.mission = KNOWN
+    request = mavlink.MAVLink_mission_request_int_message(255, 190, 0)
+    assert not onboard.on_message(cast(Any, request), math.inf)
+    exchanges.ends[transfers._machine].set_result(REPORT)
+    await sending
+    assert onboard.mission == REPORT.onboard
+    onboard.mission = KNOWN
+    assert onboard.on_message(cast(Any, request), math.inf), "after it they are of another station's transfer"
