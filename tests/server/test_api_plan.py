@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from websockets.sync.client import ClientConnection
+from websockets.sync.connection import Connection
 
 from server.schemas import Snapshot
 from tests.server.fakes import notice
@@ -108,7 +108,7 @@ def test_the_stream_answers_faulty_messages_and_hides_details(served: Running) -
         assert _next(socket, "notice")["error"]["what"] == "still here"
 
 
-def _next(socket: ClientConnection, kind: str) -> dict[str, Any]:
+def _next(socket: Connection, kind: str) -> dict[str, Any]:
     """What is told of other matters meanwhile, such as who is in charge, is passed over."""
     while True:
         message = json.loads(socket.recv(timeout=10))

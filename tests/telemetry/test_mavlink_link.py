@@ -226,7 +226,9 @@ def test_a_silent_vehicle_is_lost_and_a_command_says_so() -> None:
             async with radio(port):  # from another port of the same host
                 await until(lambda: bench.status.again is not None)
                 assert bench.status.state == "lost"
-                await bench.handle(Adopt(ME, bench.status.again.id))
+                again = bench.status.again
+                assert again is not None
+                await bench.handle(Adopt(ME, again.id))
                 await bench.live()
 
     run(whole)
