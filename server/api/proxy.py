@@ -40,7 +40,11 @@ VIEW_POLICY = (
 # its own, and is a sheet of paper at the lower edge where the view is narrower than 576 px; its lists hang in portals.
 # Its white page would flash before the first picture: a quiet gradient lies behind all, dark enough for white labels
 # in either theme.
-VIEW_STYLE = b"""<style>
+#
+# It connects again only while its own page has the focus, which is mostly the console's: a view whose line was cut
+# would stand still for good.
+VIEW_HEAD = b"""<script>document.hasFocus = () => true;</script>
+<style>
 [data-floating-window], .mantine-Paper-root, [data-portal], .mantine-Notifications-root { display: none !important; }
 html, body { height: 100%; background: linear-gradient(#3a4454, #181c24) !important; }
 #root div:has(canvas) { background: transparent !important; }
@@ -128,4 +132,4 @@ async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: 
 
 @lru_cache(maxsize=1)
 def _client_html() -> bytes:
-    return CLIENT_HTML.read_bytes().replace(b"</head>", VIEW_STYLE + b"</head>", 1)
+    return CLIENT_HTML.read_bytes().replace(b"</head>", VIEW_HEAD + b"</head>", 1)

@@ -18,7 +18,7 @@ from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 from server.schemas import NodeDoc, NodesMessage
 from tests.e2e.conftest import simulated_vehicle
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import STREAM, connect, enter, open_demo, upload
+from tests.e2e.steps import STREAM, connect, enter, open_demo, upload, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -59,11 +59,13 @@ def stream(page: Page) -> Stream:
 SLOW_BYTES_PER_S = 4_000
 
 
-class SlowLine:
-    """A way to a station that takes no more than so much from it, once it is slow; it holds next to nothing itself."""
+class Line:
+    """A way to a station that can be cut, or be slow: then it takes no more than so much and holds next to nothing."""
 
     def __init__(self) -> None:
         self.is_slow = False
+        self.asked: list[str] = []
+        """The first request of each connection."""
         self._to = 0
         self._free_s = 0.0
         self._lock = threading.Lock()
@@ -84,24 +86,40 @@ class SlowLine:
             server = socket.socket()
             self._sockets += [page, server]
             server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            server.connect(("127.0.0.1", self._to))
+            try:
+                server.connect(("127.0.0.1", self._to))
+            except OSError:
+                page.close()
+                server.close()
+                continue
             for source, sink, is_limited in ((page, server, False), (server, page, True)):
                 threading.Thread(target=self._pass_on, args=(source, sink, is_limited), daemon=True).start()
 
     def _pass_on(self, source: socket.socket, sink: socket.socket, is_limited: bool) -> None:
+        is_first = not is_limited
         with contextlib.suppress(OSError):
             while data := source.recv(1460):
+                if is_first:
+                    is_first = False
+                    self.asked.append(data.decode("latin-1").partition("\r\n")[0])
                 if is_limited and self.is_slow:
                     self._wait(len(data))
                 sink.sendall(data)
         with contextlib.suppress(OSError):
             sink.shutdown(socket.SHUT_RDWR)
 
-    def close(self) -> None:
-        for one in self._sockets:
+    def cut(self) -> None:
+        """All that goes over it; what is asked after that passes again."""
+        for one in self._sockets[1:]:
             with contextlib.suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
             one.close()
+        del self._sockets[1:]
+
+    def close(self) -> None:
+        self.cut()
+        self._listening.shutdown(socket.SHUT_RDWR)
+        self._listening.close()
 
     def _wait(self, size: int) -> None:
         with self._lock:
@@ -110,8 +128,38 @@ class SlowLine:
         time.sleep(max(0.0, pause_s))
 
 
+def test_after_its_line_was_cut_a_page_and_its_3d_view_come_back(page_3d: Page, tmp_path: Path, console: None) -> None:
+    line = Line()
+    station = Station(tmp_path / "data", environment={**os.environ, "HEDGEHOP_ALLOWED_HOSTS": line.host})
+    try:
+        line.lead_to(int(station.origin.rpartition(":")[2]))
+        enter(page_3d, station, f"http://{line.host}")
+        page_3d.get_by_test_id("tab-plan").click()  # the console has the focus
+
+        def views() -> list[str]:
+            return [asked for asked in line.asked if asked.startswith("GET /view/") and "/ HTTP" not in asked]
+
+        wait_until(page_3d, lambda: len(views()) == 1)
+        src = page_3d.get_by_test_id("view-frame").get_attribute("src")
+        line.cut()
+        expect(page_3d.get_by_test_id("link-state")).to_have_class(re.compile(r"\bopen\b"))
+
+        def is_connected() -> bool:
+            """Another one was asked for, and since then none: it tries each second."""
+            tried = len(views())
+            page_3d.wait_for_timeout(3000)
+            return 1 < tried == len(views())
+
+        wait_until(page_3d, is_connected)
+        assert page_3d.get_by_test_id("view-frame").get_attribute("src") == src
+        page_3d.close()
+    finally:
+        station.stop()
+        line.close()
+
+
 def test_over_a_slow_line_values_are_as_old_as_they_are(page: Page, tmp_path: Path, console: None) -> None:
-    line = SlowLine()
+    line = Line()
     station = Station(tmp_path / "data", environment={**os.environ, "HEDGEHOP_ALLOWED_HOSTS": line.host})
     try:
         line.lead_to(int(station.origin.rpartition(":")[2]))
