@@ -314,8 +314,9 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(
             assert time.monotonic() - since_s >= HUNG_S
             state = watched.state("link")
             assert state is not None
-            # One that is busy counts as starved where others leave it less than half of a processor.
-            waited_s = {"stopped": [HUNG_S], "busy": [HUNG_S, STARVED_S]}.get(how, [start_s])
+            # One that is busy counts as starved where others leave it less than half of a processor; on a machine that
+            # is busy itself, its proof may not have been written before it hung.
+            waited_s = {"stopped": [HUNG_S], "busy": [HUNG_S, STARVED_S, start_s]}.get(how, [start_s])
             ended = [f"was ended after it had not answered for {s:.0f} s and was started again" for s in waited_s]
             assert any(words in state.text for words in ended)
             await watched.supervisor.stop("link")
