@@ -142,6 +142,22 @@ def fence(
     return Fence(tuple(polygons), tuple(circles), low_m, high_m)
 
 
+def fence_words(fence: Fence, rally: tuple[RallyPoint, ...]) -> str:
+    """What there is, counted."""
+    counts = (
+        (len(fence.polygons), "polygon", "polygons"),
+        (len(fence.circles), "circle", "circles"),
+        (len(rally), "rally point", "rally points"),
+    )
+    words = [f"{count} {one if count == 1 else many}" for count, one, many in counts if count]
+    heights = [
+        f"{name} at {value_m:g} m above home"
+        for name, value_m in (("floor", fence.floor_rel_home_m), ("ceiling", fence.ceiling_rel_home_m))
+        if value_m is not None
+    ]
+    return f"Fence: {', '.join([*words, *heights])}"
+
+
 def _flat_m(ring: list[LatLon]) -> F64:
     """(N, 2) east and north of the first corner."""
     lat_deg, lon_deg = np.array(ring).T

@@ -25,13 +25,16 @@ from planning.formats.fence_shapes import (
     fence_and_rally,
     read_geojson_shapes,
     read_kml_shapes,
+    says_what,
     write_fence_geojson,
     write_fence_kml,
 )
+from planning.formats.geojson import features
+from planning.formats.kml_reader import read_placemarks
 from planning.formats.qgc_plan_reader import FIRMWARE_TYPE, QUADROTOR
 from planning.formats.safe_text import clean_name, decode_text, load_json, said_once
 from planning.formats.wpl import read_lists, write_lists
-from planning.mav_cmd import FENCES
+from planning.mav_cmd import FENCES, MavCmd
 from planning.model import Firmware
 
 WRITTEN = (".plan", ".waypoints", ".txt", ".kml", ".geojson", ".json")
@@ -55,6 +58,22 @@ def read_fence(name: str, data: bytes) -> FenceFile:
             advice="Draw polygons or circles that say inclusion or exclusion.",
         )
     return FenceFile(*found, said_once(warnings))
+
+
+def is_fence(name: str, data: bytes) -> bool:
+    """Whether a file is there for its fence or its rally points: no mission, and no points to fly to."""
+    if is_kml(data):
+        return any(says_what(mark.kind, mark.name, mark.data) for mark in read_placemarks(name, data))
+    text = decode_text(name, data).lstrip()
+    if text.upper().startswith("QGC WPL"):
+        return any(item.command in {*FENCES, MavCmd.NAV_RALLY_POINT} for item in read_lists(text, name)[0])
+    if not text.startswith("{"):
+        return False
+    document = load_json(name, text)
+    if isinstance(document, dict) and "fileType" in document:
+        return False
+    found = [(each["geometry"], each["properties"]) for each in features(document, clean_name(name))]
+    return any(says_what(shape.get("type"), said.get("name"), said) for shape, said in found)
 
 
 def write_fence(name: str, shapes: Fence, rally: Sequence[RallyPoint], *, firmware: Firmware = "ardupilot") -> str:

@@ -21,6 +21,7 @@ from planning.formats.fence_plan import height_or_none
 from planning.formats.kml_reader import read_placemarks
 from planning.formats.safe_text import check_count, clean_name, finite, load_json
 
+_KINDS = ("inclusion", "exclusion")
 FLOOR, CEILING = "floor_rel_home_m", "ceiling_rel_home_m"
 
 
@@ -54,7 +55,7 @@ def read_geojson_shapes(name: str, text: str) -> list[Shape]:
     file = clean_name(name)
     found = geojson.features(load_json(name, text), file)
     check_count(len(found), "features", file)
-    return [_feature_shape(feature, f"{file}, feature {k}") for k, feature in enumerate(found)]
+    return [_feature_shape(feature, f"{file}, feature {k}") for k, feature in enumerate(found, start=1)]
 
 
 def fence_and_rally(shapes: Sequence[Shape], file: str, warnings: list[str]) -> tuple[Fence, tuple[RallyPoint, ...]]:
@@ -82,6 +83,13 @@ def fence_and_rally(shapes: Sequence[Shape], file: str, warnings: list[str]) -> 
     low_m, high_m = (_height(shapes, key) for key in (FLOOR, CEILING))
     made = fence(polygons, circles, floor_rel_home_m=low_m, ceiling_rel_home_m=high_m, where=file)
     return made, tuple(rally)
+
+
+def says_what(kind: object, name: object, properties: Mapping[str, object]) -> bool:
+    """Whether a drawn thing says that it belongs to a fence, or is a rally point; a point does not by its name."""
+    if properties.get("role") == "rally" or properties.get("fence") is not None:
+        return True
+    return kind == "Polygon" and str(name).lower().startswith(_KINDS)
 
 
 def write_fence_geojson(shapes: Fence, rally: Sequence[RallyPoint]) -> str:
@@ -153,7 +161,7 @@ def _inclusion(shape: Shape) -> bool | None:
     """None: the shape does not say."""
     said = shape.properties.get("fence")
     words = str(said if said is not None else shape.name).lower()
-    if words.startswith(("inclusion", "exclusion")):
+    if words.startswith(_KINDS):
         return words.startswith("inclusion")
     if said is not None:
         raise FormatError(

@@ -89,7 +89,7 @@ def features(document: object, file: str) -> list[Json]:
         raw = document.get("features")
     if not isinstance(raw, list):
         raise FormatError("A FeatureCollection needs a list of features.", where=file)
-    return [_checked(feature, f"{file}, feature {k}") for k, feature in enumerate(raw)]
+    return [_checked(feature, f"{file}, feature {k}") for k, feature in enumerate(raw, start=1)]
 
 
 def _checked(feature: object, where: str) -> Json:

@@ -79,7 +79,7 @@ def _from_json(name: str, data: bytes, document: object) -> PoiFile:
     if isinstance(document, dict) and "fileType" in document:
         return _from_mission(read_mission(name, data))
     file = clean_name(name)
-    found = [_from_feature(f, f"{file}, feature {k}") for k, f in enumerate(geojson.features(document, file))]
+    found = [_from_feature(f, f"{file}, feature {k}") for k, f in enumerate(geojson.features(document, file), start=1)]
     return _joined(found)
 
 
