@@ -18,18 +18,22 @@ from telemetry.topics.requests import (
     Connect,
     Download,
     DownloadPlaces,
+    FlyWay,
     HighestToken,
     LinkRequest,
     ListParameters,
+    ListVehicleLogs,
     Looks,
     Operator,
     ReadParameters,
+    ReadVehicleLog,
     StartAuto,
     StartGuided,
     Upload,
     UploadPlaces,
     WriteParameters,
 )
+from telemetry.topics.vehicle_logs import VehicleLog
 
 NAME = "link"
 COMMAND_S = 30.0
@@ -38,6 +42,8 @@ START_S = 90.0
 """Modes, arming and take-off, one after the other."""
 DOWNLOAD_S = 180.0
 UPLOAD_S, UPLOAD_PER_ITEM_S = 240.0, 5.0
+LOGS_S = 330.0
+"""Their list, or one stretch of one."""
 LIST_S, WRITE_S, WRITE_PER_CHANGE_S = 630.0, 30.0, 20.0
 APPEARS_S = 0.5
 """A link node that is there is found by then; only ``Connect`` waits for one that is being started."""
@@ -52,6 +58,8 @@ _ANSWERS: dict[type, Any] = {
     ReadParameters: dict[str, float | None],
     ListParameters: ParameterList,
     WriteParameters: tuple[ParameterWritten, ...],
+    ListVehicleLogs: tuple[VehicleLog, ...],
+    ReadVehicleLog: bytes,
     HighestToken: int,
 }
 IssueAbove = Callable[[Operator, int], Operator | None]
@@ -75,6 +83,10 @@ class LinkClient:
     async def call(self, request: ListParameters) -> ParameterList: ...
     @overload
     async def call(self, request: WriteParameters) -> tuple[ParameterWritten, ...]: ...
+    @overload
+    async def call(self, request: ListVehicleLogs) -> tuple[VehicleLog, ...]: ...
+    @overload
+    async def call(self, request: ReadVehicleLog) -> bytes: ...
     @overload
     async def call(self, request: LinkRequest) -> Any: ...
     async def call(self, request: LinkRequest) -> Any:
@@ -128,6 +140,8 @@ def _patience_s(request: LinkRequest) -> float:
         return DOWNLOAD_S
     if isinstance(request, ListParameters):
         return LIST_S
+    if isinstance(request, ListVehicleLogs | ReadVehicleLog):
+        return LOGS_S
     if isinstance(request, WriteParameters):
         return WRITE_S + WRITE_PER_CHANGE_S * len(request.changes)
-    return START_S if isinstance(request, StartAuto | StartGuided) else COMMAND_S
+    return START_S if isinstance(request, StartAuto | StartGuided | FlyWay) else COMMAND_S

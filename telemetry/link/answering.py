@@ -65,6 +65,7 @@ _COMMANDS: dict[type, _Command] = {
     requests.Resume: _Command("resume", Pilot.resume),
     requests.ReturnHome: _Command("return home", Pilot.return_home, live=False, must=False),
     requests.Land: _Command("land", Pilot.land, live=False, must=False),
+    requests.StopMotors: _Command("stop the motors in the air", Pilot.stop_motors, live=False, must=False),
 }
 
 
@@ -88,9 +89,13 @@ class Answering:
             requests.ReadParameters: self._read_parameters,
             requests.ListParameters: self._list_parameters,
             requests.WriteParameters: self._write_parameters,
+            requests.ListVehicleLogs: self._list_logs,
+            requests.ReadVehicleLog: self._read_log,
             requests.HighestToken: self._highest_token,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
+            requests.FlyWay: self._fly_way,
+            requests.SetSpeed: self._set_speed,
             requests.SetAvoidance: self._set_avoidance,
             requests.FlyManoeuvre: self._fly_manoeuvre,
             requests.FlyRest: self._fly_rest,
@@ -201,6 +206,17 @@ class Answering:
         _refuse_armed(session.vehicle.state, request.even_armed)  # it may have been armed while the disk was waited for
         return await session.transfers.write_parameters(changes, even_armed=request.even_armed)
 
+    async def _list_logs(self, request: requests.ListVehicleLogs) -> object:
+        del request
+        session = self._link.need_session()
+        _refuse_while(session.transfers.is_busy)
+        return await session.logs.list()
+
+    async def _read_log(self, request: requests.ReadVehicleLog) -> object:
+        session = self._link.need_session()
+        _refuse_while(session.transfers.is_busy)
+        return await session.logs.read(request)
+
     async def _highest_token(self, request: requests.HighestToken) -> int:
         del request
         return self._right.highest
@@ -218,6 +234,18 @@ class Answering:
         await self._record(request, f"fly {len(request.targets)} targets in GUIDED")
         _refuse_while(session.transfers.is_busy)
         await session.pilot.start_guided(request)
+
+    async def _fly_way(self, request: requests.FlyWay) -> None:
+        pilot, last = self._link.need_session().pilot, request.targets[-1:]
+        to = "".join(f" to {t.lat_deg:.7f}, {t.lon_deg:.7f}, {t.alt_rel_home_m:.1f} m above home" for t in last)
+        then = ", then land" if request.end == "land" else ""
+        await self._record(request, f"fly a certified way of {len(request.targets)} places{to}{then}")
+        await pilot.fly_way(request)
+
+    async def _set_speed(self, request: requests.SetSpeed) -> None:
+        pilot = self._link.need_session().pilot
+        await self._record(request, f"change the speed to {request.speed_m_s:g} m/s")
+        await pilot.set_speed(request)
 
     async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
         pilot = self._link.need_session().pilot

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
-from telemetry.flight.guided.guided import GuidedScript
+from telemetry.flight.guided.guided import GuidedScript, why_not_from
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance
@@ -19,7 +19,7 @@ from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.topics.messages import OnboardMission
-from telemetry.topics.requests import FlyManoeuvre, StartAuto, StartGuided
+from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
@@ -53,6 +53,8 @@ class Pilot:
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
         self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
         self._script_since_s: float | None = None
+        self._most_m_s: float | None = None
+        """For which the way that is flown is certified; None: it is a mission's."""
         self._flown: OnboardMission | None = None
         """What was on board in the last flight."""
         self._started_digest: str | None = None
@@ -161,24 +163,53 @@ class Pilot:
         await self._procedures.take_over(lambda accepted: self._start_auto(request, accepted))
 
     async def start_guided(self, request: StartGuided) -> None:
-        vehicle = self.vehicle
         self._check_on_ground()
         if not request.targets:
             raise NotAllowedError("The script has no targets.", advice="Plan a mission first.")
-        self.join = None
-        way = await guided_way(vehicle.firmware, self._read_parameter)
-        script = GuidedScript(
-            request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=way.note, feed=way.feed
-        )
-        self.script, self._script_since_s = script, time.time()
+        await self._fly_script(request)
+
+    async def fly_way(self, request: FlyWay) -> None:
+        """From where the vehicle hovers. What was under way ends; a mission that was paused is not gone on with."""
+        if not request.targets or any(not 0.0 < target.speed_m_s <= request.most_m_s for target in request.targets):
+            raise NotAllowedError("The way has no targets, or is faster than certified.", advice="Ask for it again.")
+        if (refusal := why_not_from(request, self.vehicle.state)) is not None:
+            raise refusal  # before anything ends that may hold the vehicle now
+        self._end_current()
+        self._started_digest = None
+        await self._fly_script(request)
+
+    async def _fly_script(self, request: StartGuided | FlyWay) -> None:
+        vehicle, self.join = self.vehicle, None
+        begun: GuidedScript | None = None
 
         async def fly(_: Accepted) -> None:
+            nonlocal begun
+            way = await guided_way(vehicle.firmware, self._read_parameter)
+            begun = script = GuidedScript(
+                request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=way.note, feed=way.feed
+            )
+            self.script, self._script_since_s = script, time.time()
+            self._most_m_s = request.most_m_s if isinstance(request, FlyWay) else None
             try:
                 await vehicle.exchanges.run(script)
             finally:
                 script.stop(SUPERSEDED)
 
-        await self._procedures.take_over(fly, shows=lambda: script.phase not in ("idle", "arming"))
+        await self._procedures.take_over(fly, shows=lambda: begun is not None and begun.phase not in ("idle", "arming"))
+
+    async def set_speed(self, request: SetSpeed) -> None:
+        most_m_s = self._most_m_s
+        if self.script is None or not self.script_flies or most_m_s is None:
+            raise NotAllowedError("No guided way is being flown.", advice="Ask for one, with its speed.")
+        if not 0.0 < request.speed_m_s <= most_m_s:
+            what = f"{request.speed_m_s:g} m/s were asked for; the way is certified for at most {most_m_s:g} m/s."
+            raise NotAllowedError(what, advice="Give a speed within that.")
+        self._tell_script(self.script.set_speed(request.speed_m_s, time.monotonic()))
+
+    async def stop_motors(self) -> None:
+        """Nothing is waited for or asked first."""
+        self._end_current()
+        await self.vehicle.obey(self.vehicle.orders.stop_motors())
 
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
         """Raises NotAllowedError when nothing is flown that could be gone on with."""
@@ -205,6 +236,8 @@ class Pilot:
             return
         if self.script_flies:
             assert self.script is not None
+            if self.script.is_flown:
+                raise NotAllowedError("The way is flown: nothing is paused.", advice="Ask for another one, or return.")
             self._tell_script(self.script.resume(time.monotonic()))
             return
         state = self.vehicle.state
@@ -247,13 +280,17 @@ class Pilot:
         return remaining_flight(self.vehicle.onboard.mission, state)
 
     def _remaining_after(self, request: FlyManoeuvre) -> RemainingMission:
-        """What is flown after the way past an obstacle."""
+        """What is flown after the way past an obstacle. Raises NotAllowedError where that cannot be flown."""
         item = request.rejoin_item
         if item is None:
             return RemainingMission((), "hold")
         remaining = self.avoidance.remaining
         if remaining is None and self.script_flies and self.script is not None:
             remaining = RemainingMission(self.script.left, self.script.end, "guided")
+        if remaining is not None and remaining.way == "guided" and self._most_m_s is not None:
+            # It has no items: nothing of it would be left, and one that ends with landing would land beside its place.
+            what = f"A certified way is flown, not a mission: it has no item {item} to go on from."
+            raise NotAllowedError(what, advice="Hold, then ask for another way.")
         if remaining is not None:
             return RemainingMission(tuple(t for t in remaining.targets if t.item >= item), remaining.end, remaining.way)
         onboard = self.vehicle.onboard.mission

@@ -18,6 +18,7 @@ from telemetry.errors import SilentError, TelemetryError
 from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
+from telemetry.link.log_reading import LogReading
 from telemetry.link.piloting import Pilot
 from telemetry.link.procedures import Spawn
 from telemetry.link.publishing import StatePublisher
@@ -64,7 +65,10 @@ class Session:
             ordered=self._on_order,
         )
         self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic, flies=around.flight.is_under_way)
-        self.transfers = Transfers(self.vehicle, lambda status: around.publish(Topic.TRANSFER, status))
+        self.logs = LogReading(self.vehicle)
+        self.transfers = Transfers(
+            self.vehicle, lambda status: around.publish(Topic.TRANSFER, status), begins=self.logs.give_way
+        )
         self.pilot = Pilot(
             self.vehicle,
             around.flight,

@@ -28,10 +28,12 @@ FAST_HZ: dict[str, float] = {
     "BATTERY_STATUS": 1,
     "EKF_STATUS_REPORT": 1,
     "ESTIMATOR_STATUS": 1,
+    "VIBRATION": 1,
     "SYSTEM_TIME": 1,
     "RC_CHANNELS": 5,
     "WIND": 1,
     "WIND_COV": 1,
+    "FENCE_STATUS": 1,
     "HOME_POSITION": 0.5,
     "OBSTACLE_DISTANCE": 5,
     "DISTANCE_SENSOR": 5,
@@ -41,7 +43,13 @@ SLOW_HZ = {name: 10.0 if hz > 10 else min(hz, 2.0) for name, hz in FAST_HZ.items
 """For a serial radio: about 1.5 kB/s."""
 _NEEDED = ("GLOBAL_POSITION_INT", "ATTITUDE", "SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT")
 """Asked for until they come; the others a vehicle may not have."""
-_OWN_KIND = {"EKF_STATUS_REPORT": "ardupilot", "WIND": "ardupilot", "ESTIMATOR_STATUS": "px4", "WIND_COV": "px4"}
+_OWN_KIND = {
+    "EKF_STATUS_REPORT": "ardupilot",
+    "FENCE_STATUS": "ardupilot",
+    "WIND": "ardupilot",
+    "ESTIMATOR_STATUS": "px4",
+    "WIND_COV": "px4",
+}
 _IDS: dict[str, int] = {kind.msgname: number for number, kind in mavlink.mavlink_map.items()}
 _OLD_STREAMS = ((2, 2), (6, 20), (10, 20), (11, 4), (3, 1), (12, 1))
 """(MAV_DATA_STREAM, Hz): extended status, position, extra 1 to 3, RC channels."""

@@ -26,8 +26,11 @@ Phase = Literal["sending", "reading_back", "done", "failed"]
 
 
 class Transfers:
-    def __init__(self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None]) -> None:
-        self._vehicle, self._tell = vehicle, tell
+    def __init__(
+        self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None], *, begins: Callable[[], None]
+    ) -> None:
+        """``begins`` is called before each transfer of a mission, fence or rally points."""
+        self._vehicle, self._tell, self._begins = vehicle, tell, begins
         self._machine: MissionUpload | MissionDownload | None = None
         self._own_idea: MissionDownload | None = None
         """The newest download that nobody asked for."""
@@ -153,6 +156,7 @@ class Transfers:
     async def _run(
         self, machine: MissionUpload | MissionDownload, direction: Literal["upload", "download"], total: int
     ) -> object:
+        self._begins()
         self._machine, last = machine, Progress("sending" if direction == "upload" else "reading_back", 0, total)
 
         def progress(news: Progress) -> None:

@@ -21,6 +21,8 @@ HOLD_MODES: dict[Autopilot, tuple[str, ...]] = {"ardupilot": ("BRAKE", "GUIDED")
 RETURN_MODES = frozenset({"RTL", "SMART_RTL", "AUTO_RTL"})
 LAND_MODES = frozenset({"LAND", "PRECLAND"})
 ANY_THROTTLE = -1
+FORCE = 21196
+"""Of COMPONENT_ARM_DISARM: whatever the autopilot holds against it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,11 @@ class Orders:
 
     def disarm(self) -> Order:
         return Order(self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0), seen=lambda state: not state.armed)
+
+    def stop_motors(self) -> Order:
+        """Also in the air, where an order to disarm is refused. The same on both autopilots."""
+        message = self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE)
+        return Order(message, seen=lambda state: not state.armed)
 
     def mode(self, name: str) -> Order:
         numbers = mode_numbers(self.autopilot, name)

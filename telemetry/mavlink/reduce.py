@@ -14,13 +14,15 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.modes import mode_name
-from telemetry.topics.vehicle import Autopilot, GnssFix, Landed, VehicleState
+from telemetry.topics.vehicle import Autopilot, FenceBreach, GnssFix, Landed, VehicleState
 
 Changes = dict[str, Any]
 Handler = Callable[[VehicleState, Any, float], Changes]
 
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 _PRE_ARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
+_BREACHES: dict[int, FenceBreach] = {1: "floor", 2: "ceiling", 3: "boundary"}
 _AUTOPILOTS: dict[int, Autopilot] = {
     mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
     mavlink.MAV_AUTOPILOT_PX4: "px4",
@@ -29,7 +31,7 @@ _CRITICAL_STATES = frozenset({5, 6, 8})
 _NO_VEHICLE_TYPES = frozenset({5, 6, 18, 26, 27, 30, 36})
 """MAV_TYPE of antenna tracker, ground station, onboard computer, gimbal, ADSB, camera and battery."""
 _LANDED: dict[int, Landed] = {1: "on_ground", 2: "in_air", 3: "taking_off", 4: "landing"}
-_FIXES: tuple[GnssFix, ...] = ("none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed", "rtk_fixed", "dgps")
+GNSS_FIXES: tuple[GnssFix, ...] = ("none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed", "rtk_fixed", "dgps")
 _PREARM_WORDS = ("PreArm: ", "Preflight Fail: ")
 """How ArduPilot and PX4 begin what is in the way of arming."""
 _TEXT_BYTES = 50
@@ -123,7 +125,7 @@ def _vfr_hud(state: VehicleState, message: Any, _: float) -> Changes:
 def _gps_raw(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     return {
         "gnss_t_mono_s": t_mono_s,
-        "gnss_fix": _FIXES[message.fix_type] if message.fix_type < len(_FIXES) else "3d",
+        "gnss_fix": GNSS_FIXES[message.fix_type] if message.fix_type < len(GNSS_FIXES) else "3d",
         "satellites": None if message.satellites_visible == 255 else message.satellites_visible,
         "hdop": scaled(message.eph, 100, UINT16_MAX),
         "horizontal_accuracy_m": accuracy(message.h_acc),
@@ -133,13 +135,26 @@ def _gps_raw(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     }
 
 
+def _fence_ok(message: Any) -> bool | None:
+    is_on = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled & _FENCE
+    return bool(message.onboard_control_sensors_health & _FENCE) if is_on else None
+
+
+def _fence_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    return {"fence_breach": _BREACHES.get(message.breach_type, "boundary") if message.breach_status else "none"}
+
+
 def _sys_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
     """PX4 tells whether it is ready by the bit of health alone: it never counts the check as present or enabled."""
     checked = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled & _PRE_ARM
     is_told = checked or state.autopilot == "px4"
     ready = bool(message.onboard_control_sensors_health & _PRE_ARM) if is_told else None
+    fence_ok = _fence_ok(message)
     return {
         "ready_to_arm": ready,
+        "fence_ok": fence_ok,
+        # A fence that is switched off tells no more that it is kept again.
+        "fence_breach": None if fence_ok is None and state.fence_ok is not None else state.fence_breach,
         "not_ready_words": () if ready else state.not_ready_words,
         "battery_t_mono_s": t_mono_s,
         "battery_v": scaled(message.voltage_battery, 1000, UINT16_MAX),
@@ -212,17 +227,58 @@ def _extended_sys_state(_: VehicleState, message: Any, __: float) -> Changes:
     return {"landed": _LANDED.get(message.landed_state)}
 
 
-def _ekf_status(_: VehicleState, message: Any, __: float) -> Changes:
+def _ekf_status(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     bad = mavlink.EKF_CONST_POS_MODE | mavlink.EKF_UNINITIALIZED | mavlink.EKF_GPS_GLITCHING
-    return {"estimator_ok": _estimator_ok(message.flags, bad)}
+    ratios = {
+        "velocity": message.velocity_variance,
+        "place": message.pos_horiz_variance,
+        "height": message.pos_vert_variance,
+        "compass": message.compass_variance,
+        "terrain": message.terrain_alt_variance,
+        "airspeed": message.airspeed_variance,
+    }
+    return {
+        "estimator_t_mono_s": t_mono_s,
+        "estimator_ok": _estimator_ok(message.flags, bad),
+        **_worst_ratio(ratios),
+    }
 
 
-def _estimator_status(state: VehicleState, message: Any, __: float) -> Changes:
+def _estimator_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
     """A constant position is what PX4 1.16 and newer take for granted of a vehicle that stands on the ground."""
     bad = mavlink.ESTIMATOR_GPS_GLITCH | mavlink.ESTIMATOR_ACCEL_ERROR
     if state.armed and state.landed != "on_ground":
         bad |= mavlink.ESTIMATOR_CONST_POS_MODE
-    return {"estimator_ok": _estimator_ok(message.flags, bad)}
+    ratios = {
+        "velocity": message.vel_ratio,
+        "place": message.pos_horiz_ratio,
+        "height": message.pos_vert_ratio,
+        "compass": message.mag_ratio,
+        "terrain": message.hagl_ratio,
+        "airspeed": message.tas_ratio,
+    }
+    return {
+        "estimator_t_mono_s": t_mono_s,
+        "estimator_ok": _estimator_ok(message.flags, bad),
+        **_worst_ratio(ratios),
+    }
+
+
+def _worst_ratio(ratios: dict[str, float]) -> Changes:
+    known = {part: value for part, ratio in ratios.items() if (value := finite(ratio)) is not None}
+    part = max(known, key=lambda each: known[each], default=None)
+    return {"estimator_ratio": None if part is None else known[part], "estimator_ratio_of": part}
+
+
+def _vibration(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    """PX4 gives its accelerometers' figure in the third field alone: the other two are of its gyroscopes."""
+    axes = (message.vibration_x, message.vibration_y, message.vibration_z)
+    known = [value for axis in (axes[2:] if state.autopilot == "px4" else axes) if (value := finite(axis)) is not None]
+    return {
+        "vibration_t_mono_s": t_mono_s,
+        "vibration_m_s2": max(known, default=None),
+        "clipped": message.clipping_0 + message.clipping_1 + message.clipping_2,
+    }
 
 
 def _estimator_ok(flags: int, bad: int) -> bool:
@@ -250,9 +306,13 @@ def _rssi(_: VehicleState, message: Any, __: float) -> Changes:
 
 
 def _autopilot_version(_: VehicleState, message: Any, __: float) -> Changes:
-    version = message.flight_sw_version
-    major, minor, patch, release = version >> 24 & 255, version >> 16 & 255, version >> 8 & 255, version & 255
-    return {"firmware_version": f"{major}.{minor}.{patch}{_RELEASES.get(release, '')}" if version else None}
+    return {"firmware_version": firmware_version(message.flight_sw_version)}
+
+
+def firmware_version(number: int) -> str | None:
+    """Of a number that holds major, minor, patch and kind of release in a byte each; None for 0."""
+    major, minor, patch, release = number >> 24 & 255, number >> 16 & 255, number >> 8 & 255, number & 255
+    return f"{major}.{minor}.{patch}{_RELEASES.get(release, '')}" if number else None
 
 
 _HANDLERS: dict[str, Handler] = {
@@ -262,6 +322,7 @@ _HANDLERS: dict[str, Handler] = {
     "VFR_HUD": _vfr_hud,
     "GPS_RAW_INT": _gps_raw,
     "SYS_STATUS": _sys_status,
+    "FENCE_STATUS": _fence_status,
     "STATUSTEXT": _statustext,
     "BATTERY_STATUS": _battery_status,
     "HOME_POSITION": _home_position,
@@ -270,6 +331,7 @@ _HANDLERS: dict[str, Handler] = {
     "EXTENDED_SYS_STATE": _extended_sys_state,
     "EKF_STATUS_REPORT": _ekf_status,
     "ESTIMATOR_STATUS": _estimator_status,
+    "VIBRATION": _vibration,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
     "RC_CHANNELS": _rssi,

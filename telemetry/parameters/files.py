@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -20,6 +21,13 @@ _WRITTEN_EXACTLY_DIGITS = 6
 """MAVProxy cuts what it writes to so many decimals."""
 _KINDS = range(1, 11)
 _DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+
+
+KEPT_BY_VEHICLES = (
+    *("MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "FORMAT_VERSION", "SYSID_SW_MREV", "SYS_NUM_RESETS", "LOG_LASTFILE"),
+    *("STAT_*", "BARO*_GND_PRESS", "GND_ABS_PRESS", "GND_TEMP", "LND_FLIGHT_T_*", "COM_FLIGHT_UUID", "_HASH_CHECK"),
+)
+"""What vehicles count and measure by themselves; a file's value would be a lie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +49,10 @@ class ParameterFile:
     """Each name once, in the file's order."""
     notes: tuple[str, ...] = ()
     """What was left out."""
+
+
+def is_kept_by_vehicles(name: str) -> bool:
+    return any(fnmatchcase(name.upper(), pattern) for pattern in KEPT_BY_VEHICLES)
 
 
 def read_parameter_file(name: str, data: bytes) -> ParameterFile:

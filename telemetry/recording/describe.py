@@ -16,8 +16,10 @@ from telemetry.recording.mcap_files.continuing import ABOUT
 from telemetry.recording.mcap_files.reader import UNFINISHED, own_contents
 from telemetry.recording.mcap_files.scan import glance
 from telemetry.recording.mcap_files.writer import PLAN, VEHICLE
-from telemetry.recording.tlog import Damage, Data, LogFrame, tlog_frames
+from telemetry.recording.tlog import CUT_SHORT, Damage, Data, LogFrame, tlog_frames
 from telemetry.recording.tlog_flight import looks_like_tlog
+from telemetry.recording.vehicle_logs.glance import glance_at
+from telemetry.recording.vehicle_logs.own_flight import OwnKind, kind_of_own_log
 
 _AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 _HEAD_BYTES = 256 * 1024
@@ -32,7 +34,7 @@ class RecordingInfo:
     name: str
     """File name without folder."""
     size_bytes: int
-    kind: Literal["hedgehop", "tlog", "unreadable"] = "unreadable"
+    kind: Literal["hedgehop", "tlog", "dataflash", "ulog", "unreadable"] = "unreadable"
     start_utc_s: float | None = None
     duration_s: float | None = None
     vehicle: str = ""
@@ -53,6 +55,8 @@ def describe_recording(path: Path) -> RecordingInfo:
         with opened(path) as data:
             if is_mcap(data):
                 return _of_mcap(path.name, data)
+            if (kind := kind_of_own_log(data)) is not None:
+                return _of_own_log(path.name, data, kind)
             if looks_like_tlog(data):
                 return _of_tlog(path.name, data)
             raise foreign(path, data)
@@ -99,7 +103,21 @@ def _of_tlog(name: str, data: Data) -> RecordingInfo:
         start_utc_s=min(times),
         duration_s=max(times) - min(times),
         vehicle=_heard(head),
-        fault="The file ends in the middle of a message." if damage.cut_short else None,
+        fault=CUT_SHORT if damage.cut_short else None,
+    )
+
+
+def _of_own_log(name: str, data: Data, kind: OwnKind) -> RecordingInfo:
+    found = glance_at(data, kind)
+    autopilot = {"dataflash": "ArduPilot", "ulog": "PX4"}[kind]
+    return RecordingInfo(
+        name=name,
+        size_bytes=len(data),
+        kind=kind,
+        start_utc_s=found.start_utc_s,
+        duration_s=found.duration_s,
+        vehicle=f"{autopilot} {found.version}".strip(),
+        fault=CUT_SHORT if found.cut_short else None,
     )
 
 

@@ -19,14 +19,12 @@ _FOREIGN: tuple[tuple[bytes, str], ...] = (
     (b"\xff\xd8\xff", "a JPEG image"),
     (b"PK\x03\x04", "a ZIP or KMZ archive"),
     (b"\x1f\x8b", "a compressed file (gzip)"),
-    (b"ULog\x01\x12\x35", "a PX4 ULog"),
-    (b"\xa3\x95", "an ArduPilot dataflash log"),
     (b"#ROSBAG V2.0", "a ROS bag"),
     (b"SQLite format 3", "an SQLite database"),
     (b"%PDF", "a PDF document"),
     (b"\x7fELF", "a program"),
 )
-_ADVICE = "Choose a recording of Hedgehop (.mcap) or the telemetry log of a ground station (.tlog)."
+_ADVICE = "Choose a recording (.mcap), a ground station's log (.tlog) or a vehicle's own log (.bin, .ulg)."
 
 
 @contextmanager

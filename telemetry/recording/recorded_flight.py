@@ -50,7 +50,7 @@ class HomePosition:
 class FlightLog:
     """Everything that review needs. All times are seconds since 1970, of the log's clock."""
 
-    kind: Literal["hedgehop", "tlog"]
+    kind: Literal["hedgehop", "tlog", "dataflash", "ulog"]
     name: str
     """File name without folder."""
     start_utc_s: float
@@ -151,6 +151,8 @@ class StateHistory:
     def mission_flown_until_utc_s(self) -> float:
         """When the last armed stretch in a mission mode ended; before all else when there was none."""
         until = -math.inf
+        if not self.modes or not self.armed:
+            return until
         ends = [t for t, _ in self.modes[1:]] + [math.inf]
         armed_ends = [t for t, _ in self.armed[1:]] + [math.inf]
         for (start, mode), end in zip(self.modes, ends, strict=True):

@@ -18,6 +18,7 @@ from telemetry.recording.mcap_files.reader import Entry, Recording
 from telemetry.recording.recorded_topics import LATEST, MAPS, NOT_REPLAYED, RECORDED
 from telemetry.recording.tlog import Data
 from telemetry.recording.tlog_flight import looks_like_tlog, states_of, survey
+from telemetry.recording.vehicle_logs.own_flight import OwnKind, kind_of_own_log, read_own_states
 from telemetry.topics.deltas import NOTHING, FoldedMap
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapDelta
@@ -111,6 +112,8 @@ def open_source(path: Path, *, raw: bool = False) -> ReplaySource:
         if is_mcap(data):
             recording = Recording(path.name, data)
             return RecordingSource(recording, stack.pop_all(), raw=raw)
+        if (kind := kind_of_own_log(data)) is not None:
+            return _own_source(path, data, kind)
         if looks_like_tlog(data):
             return _tlog_source(path.name, data)
         raise foreign(path, data)
@@ -130,6 +133,14 @@ def _tlog_source(name: str, data: Data) -> TlogSource:
     entries += [Entry(text.t_utc_s, Topic.TEXT, text) for text in facts.texts()]
     entries.sort(key=itemgetter(0))
     return TlogSource(name, entries, seen.start_utc_s, seen.end_utc_s)
+
+
+def _own_source(path: Path, data: Data, kind: OwnKind) -> TlogSource:
+    log, states = read_own_states(path, data, kind)
+    entries = [Entry(t_utc_s, Topic.VEHICLE, state) for t_utc_s, state in states]
+    entries += [Entry(text.t_utc_s, Topic.TEXT, text) for text in log.texts]
+    entries.sort(key=itemgetter(0))
+    return TlogSource(path.name, entries, states[0][0], states[-1][0])
 
 
 class RecordingSource:

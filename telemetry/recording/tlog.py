@@ -20,6 +20,7 @@ TIME_BYTES = 8
 _V1, _V2 = mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2
 _MARKER = re.compile(b"[\xfd\xfe]")
 _SIGNATURE_BYTES = 13
+CUT_SHORT = "The file ends in the middle of a message."
 _LATEST_US = 4_102_444_800_000_000
 """The year 2100; clocks that were never set begin at 1970, so there is no earliest time."""
 _CRC_EXTRA = {number: message.crc_extra for number, message in mavlink.mavlink_map.items()}
@@ -45,6 +46,17 @@ class Damage:
     bytes: int = 0
     cut_short: bool = False
     """The file does not end with a whole record."""
+
+    def words(self, size: int) -> list[str]:
+        """Sentences, of a file of ``size`` bytes."""
+        faults = []
+        if self.spans:
+            lost = 100.0 * self.bytes / size
+            stretches = "1 damaged stretch was" if self.spans == 1 else f"{self.spans} damaged stretches were"
+            faults.append(f"{stretches} skipped, {lost:.1f} % of the file.")
+        if self.cut_short:
+            faults.append(CUT_SHORT)
+        return faults
 
 
 def tlog_frames(data: Data, damage: Damage | None = None, *, start: int = 0) -> Iterator[LogFrame]:

@@ -142,12 +142,7 @@ def mission_flown(facts: FrameFacts, history: StateHistory) -> Mission | None:
 
 
 def _faults(seen: Vehicles, vehicle: tuple[int, int], history: StateHistory, size: int) -> tuple[str, ...]:
-    faults = []
-    if seen.damage.spans:
-        lost = 100.0 * seen.damage.bytes / size
-        faults.append(f"{seen.damage.spans} damaged stretches were skipped, {lost:.1f} % of the file.")
-    if seen.damage.cut_short:
-        faults.append("The file ends in the middle of a message.")
+    faults = seen.damage.words(size)
     others = sorted(v for v in {*seen.positions, *seen.autopilots} if v != vehicle)
     if others:
         names = ", ".join(f"{system}/{component}" for system, component in others)

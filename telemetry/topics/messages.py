@@ -224,6 +224,16 @@ PlaceList = Literal["fence", "rally"]
 
 
 @dataclass(frozen=True, slots=True)
+class PlacesOnboard:
+    """Those lists as they were read."""
+
+    fence: tuple[Item, ...] = ()
+    rally: tuple[Item, ...] = ()
+    unread: str = ""
+    """Why they were not; empty when they were."""
+
+
+@dataclass(frozen=True, slots=True)
 class UploadReport:
     verified: bool
     """The vehicle holds what was sent, but for what it rounded."""
@@ -239,7 +249,7 @@ class GuidedTarget:
     """One waypoint of the paper's navigation script (Melita 2020, section 7)."""
 
     item: int
-    """Number of the mission's item, 1 is the first."""
+    """Number of the mission's item, 1 is the first; 0: it is none of a mission's."""
     lat_deg: float
     lon_deg: float
     alt_rel_home_m: float

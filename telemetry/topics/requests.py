@@ -128,6 +128,22 @@ class WriteParameters(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class ListVehicleLogs(OperatorRequest):
+    """-> tuple[VehicleLog, ...], the newest first. NotAllowedError while the vehicle is armed, or may be"""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadVehicleLog(OperatorRequest):
+    """-> bytes: so many from ``offset`` on, fewer only where the log ends. At most ``MOST_BYTES``, and ``offset`` a
+    multiple of ``BLOCK_BYTES``. ``is_last``: nothing more is read then. NotAllowedError as for the list."""
+
+    number: int
+    offset: int
+    size: int
+    is_last: bool
+
+
+@dataclass(frozen=True, slots=True)
 class HighestToken:
     """Which one the link has seen: whoever issues them issues a higher one. -> int"""
 
@@ -157,12 +173,41 @@ class StartAuto(OperatorRequest):
 
 @dataclass(frozen=True, slots=True)
 class StartGuided(OperatorRequest):
-    """Takes off, hands over the targets one at a time, then returns home (Melita 2020). -> None"""
+    """Takes off, hands over the targets one at a time, then returns home (Melita 2020) or holds there. -> None"""
 
     targets: tuple[GuidedTarget, ...]
     takeoff_alt_rel_home_m: float
     waypoint_radius_m: float = 0.5
-    end: Literal["rtl", "land"] = "rtl"
+    end: Literal["rtl", "land", "hold"] = "rtl"
+
+
+@dataclass(frozen=True, slots=True)
+class FlyWay(OperatorRequest):
+    """Flies a certified way in GUIDED, from where the vehicle hovers; then it holds there or lands. -> None
+
+    ``targets`` are no items of a mission: each is item 0. Refused when the vehicle moves, or is not where the way
+    begins. ``most_m_s``: for no higher speed is it certified.
+    """
+
+    targets: tuple[GuidedTarget, ...]
+    begins_lat_deg: float
+    begins_lon_deg: float
+    begins_alt_rel_home_m: float
+    most_m_s: float
+    waypoint_radius_m: float = 0.5
+    end: Literal["land", "hold"] = "hold"
+
+
+@dataclass(frozen=True, slots=True)
+class SetSpeed(OperatorRequest):
+    """On the rest of the way that is flown in GUIDED, up to the speed for which it is certified. -> None"""
+
+    speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class StopMotors(OperatorRequest):
+    """At once, also in the air: the vehicle falls. -> None"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,11 +283,16 @@ LinkRequest = (
     | ReadParameters
     | ListParameters
     | WriteParameters
+    | ListVehicleLogs
+    | ReadVehicleLog
     | HighestToken
     | Arm
     | Disarm
     | StartAuto
     | StartGuided
+    | FlyWay
+    | SetSpeed
+    | StopMotors
     | Pause
     | Resume
     | ReturnHome

@@ -13,6 +13,8 @@ Autopilot = Literal["ardupilot", "px4", "other"]
 Landed = Literal["on_ground", "taking_off", "in_air", "landing"]
 IN_THE_AIR: frozenset[Landed] = frozenset({"taking_off", "in_air", "landing"})
 GnssFix = Literal["none", "no_fix", "2d", "3d", "dgps", "rtk_float", "rtk_fixed"]
+FenceBreach = Literal["none", "floor", "ceiling", "boundary"]
+EstimatorPart = Literal["velocity", "place", "height", "compass", "airspeed", "terrain"]
 RadarKind = Literal["model", "iq"]
 """Of a simulated radar. model: targets, with errors drawn to the table of the real one's; iq: samples of its
 converters, and the whole chain of processing."""
@@ -96,8 +98,23 @@ class VehicleState:
     wind_speed_m_s: float | None = None
     wind_from_rad: float | None = None
     """Direction that the wind comes from, clockwise from north."""
+    estimator_t_mono_s: float | None = None
     estimator_ok: bool | None = None
     """The autopilot's position estimate is usable."""
+    fence_ok: bool | None = None
+    """The fence bit of SYS_STATUS; None: no fence is switched on, or it is not told."""
+    fence_breach: FenceBreach | None = None
+    """What of its fence the vehicle is beyond, of FENCE_STATUS; None: not told."""
+    estimator_ratio: float | None = None
+    """How far its measurements disagree, the worst kind; 1 is where they are refused (PX4: test ratio; ArduPilot: the
+    innovation over what its filter allows)."""
+    estimator_ratio_of: EstimatorPart | None = None
+
+    vibration_t_mono_s: float | None = None
+    vibration_m_s2: float | None = None
+    """Of the accelerometers, the worst axis that the autopilot tells."""
+    clipped: int | None = None
+    """Samples at the end of an accelerometer's range, all of them since the start."""
 
 
 @dataclass(frozen=True, slots=True)

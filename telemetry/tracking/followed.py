@@ -26,6 +26,9 @@ been seen so often. Echoes of a wall wander over it, too, but not for long."""
 DRIFT_S, DRIFT_M, DRIFT_M_S = 2.0, 1.0, 0.3
 """A slow walker's speed drowns in the noise of each frame; over seconds its way does not."""
 ENOUGH_UPDATES, UNSEEN_S = 5, 0.7
+AGAIN_ECHOES = 3
+"""So many echoes tell again of what stood and was out of sight: by then one of anything near fits its wide gate, and
+one alone would move it and give it a speed with which it leaves its place unseen."""
 _ECHO_M = 3.0
 
 
@@ -105,10 +108,30 @@ class _Memory:
     """As it was when it was first sure of it."""
     drift_enu_m_s: F64 | None = None
     """Its mean velocity since then, where that is no chance."""
+    stood: TrackState | None = None
+    """As it was when it was last seen standing; None: it goes."""
+    again: int = 0
+    """Echoes since it was out of sight, while there are too few of them."""
 
     def known_by(self, state: TrackState) -> TrackState:
-        """With the mean velocity where the frames show none."""
+        """Where it stood while nobody sees it; with the mean velocity where the frames show none."""
+        if self.stood is not None and (self.again or not state.seen):
+            return replace(
+                state,
+                position_enu_m=self.stood.position_enu_m,
+                velocity_enu_m_s=np.zeros(2),
+                covariance=self.stood.covariance,
+            )
         return state if self.drift_enu_m_s is None else replace(state, velocity_enu_m_s=self.drift_enu_m_s)
+
+    def is_back(self, t_s: float) -> bool:
+        """With this echo: whether enough of them tell again of what stood."""
+        if self.stood is not None and t_s - self.seen_s > UNSEEN_S:
+            self.again = 1
+        elif self.again:
+            self.again = (self.again + 1) % AGAIN_ECHOES
+        self.seen_s = t_s
+        return not self.again
 
 
 class TrackMemory:
@@ -127,9 +150,8 @@ class TrackMemory:
 
     def _note(self, state: TrackState, memory: _Memory, blobs: Blobs, echoes: F64, t_s: float) -> None:
         """What nobody sees goes on as it went: its speed is no less for being known worse."""
-        if not state.seen:
+        if not state.seen or not memory.is_back(t_s):
             return
-        memory.seen_s = t_s
         away_m = np.hypot(*(echoes - state.position_enu_m).T)
         if len(away_m) and away_m.min() <= _ECHO_M:
             moves = float(blobs.moving[int(np.argmin(away_m))])
@@ -141,10 +163,11 @@ class TrackMemory:
         memory.drift_enu_m_s = None if shows or memory.confirmed is None else _drift(memory.confirmed, state)
         memory.goes = shows or memory.drift_enu_m_s is not None
         memory.moving = shows and _is_borne_out(state, memory)
+        memory.stood = None if memory.goes else state
 
     def _followed(self, states: list[TrackState], pose: Pose) -> list[Followed]:
-        places = np.array([s.position_enu_m for s in states]).reshape(-1, 2)
         states = [self._of[s.id].known_by(s) for s in states]
+        places = np.array([s.position_enu_m for s in states]).reshape(-1, 2)
         known = [self._of[s.id] for s in states]
         pairs = zip(states, known, strict=True)
         velocities = np.array([s.velocity_enu_m_s if m.goes else (0.0, 0.0) for s, m in pairs])

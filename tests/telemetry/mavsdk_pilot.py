@@ -1,4 +1,5 @@
-"""Flies a vehicle with MAVSDK, as a process of its own: ``python -m tests.telemetry.mavsdk_pilot URL LAT LON``.
+"""Flies a vehicle with MAVSDK, as a process of its own: ``python -m tests.telemetry.mavsdk_pilot URL LAT LON LOG``,
+and reads its newest log into the file LOG.
 
 MAVSDK is a C++ library with threads; away from the test process nothing of it can outlive a test. Prints one line
 of JSON: what it saw.
@@ -14,6 +15,7 @@ from typing import Any
 
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.log_files import LogFilesAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionItem, MissionRawAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
@@ -43,7 +45,7 @@ async def first(values: AsyncIterator[Any], fits: Callable[[Any], bool]) -> Any:
     raise AssertionError("the stream ended")
 
 
-async def fly(url: str, lat_e7: int, lon_e7: int) -> dict[str, Any]:
+async def fly(url: str, lat_e7: int, lon_e7: int, log: str) -> dict[str, Any]:
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as sdk:
         await sdk.add_any_connection(url)
         system = await sdk.first_autopilot(timeout_s=PATIENCE_S)
@@ -63,7 +65,12 @@ async def fly(url: str, lat_e7: int, lon_e7: int) -> dict[str, Any]:
         highest = await first(telemetry.subscribe_position(), lambda position: position.relative_altitude_m > 14)
         await first(telemetry.subscribe_armed(), lambda armed: not armed)
         end = await first(telemetry.subscribe_position(), lambda position: True)
+        logs = LogFilesAsync(system)
+        entries = await logs.get_entries()
+        async for _ in logs.download_log_file(entries[-1], log):
+            pass
         return {
+            "log_bytes": [entry.size_bytes for entry in entries],
             "autopilot": autopilot.name,
             "sent": len(items),
             "kept": [(item.frame, item.command, item.x, item.y, item.z) for item in kept],
@@ -74,4 +81,8 @@ async def fly(url: str, lat_e7: int, lon_e7: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(asyncio.run(asyncio.wait_for(fly(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])), PATIENCE_S))))
+    print(
+        json.dumps(
+            asyncio.run(asyncio.wait_for(fly(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]), PATIENCE_S))
+        )
+    )

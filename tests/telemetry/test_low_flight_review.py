@@ -146,7 +146,7 @@ def test_what_a_return_needs_is_unknown_without_a_model_and_impossible_over_unkn
         return found("ardupilot", replace(PLAN, return_needed_m=needed_m))["RTL_ALT"]
 
     assert at(None).state == "look"
-    assert "give --dsm" in at(None).text
+    assert "without its certificate over the surface model" in at(None).text
     assert at(math.inf).state == "bad"
     assert at(math.inf).better is None
     assert at(-math.inf).state == at(0.0).state == "good"

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from telemetry.mavlink.actions import Action, Done, Failed, Send, ended
 from telemetry.mavlink.upload import MissionUpload
+from telemetry.recording.flight_log import read_flight_log
 from telemetry.topics.messages import Item, UploadReport
 from tests.telemetry.simulator_process import FAST, PATIENCE_S, ROOT, child, simulated_vehicle
 
@@ -28,7 +29,7 @@ ITEMS = (
 @pytest.mark.slow
 def test_mavsdk_uploads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> None:
     with simulated_vehicle(tmp_path, *FAST) as (_, port):
-        place = [f"tcpout://127.0.0.1:{port}", "-371244507", "1756892878"]
+        place = [f"tcpout://127.0.0.1:{port}", "-371244507", "1756892878", str(tmp_path / "newest.bin")]
         done = subprocess.run(
             [sys.executable, "-m", "tests.telemetry.mavsdk_pilot", *place],
             cwd=ROOT,
@@ -43,6 +44,11 @@ def test_mavsdk_uploads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> Non
     assert [row[2:] for row in seen["kept"][2:4]] == [[-371243007, 1756892878, 12.0], [-371243007, 1756894378, 15.0]]
     assert seen["high_m"] > 14
     assert abs(seen["end_m"]) < 0.5
+    own = read_flight_log(tmp_path / "newest.bin")
+    assert (tmp_path / "newest.bin").stat().st_size == seen["log_bytes"][-1]
+    assert [armed for _, armed in own.armed] == [True, False]
+    assert own.track.alt_rel_home_m.max() == pytest.approx(seen["high_m"], abs=1.0)
+    assert own.faults == ()
 
 
 class _Station:

@@ -188,7 +188,6 @@ def test_files_that_are_no_recording(tmp_path: Path, content: bytes, words: str)
 
 def test_foreign_files_of_the_data_folder(shared_data: Path) -> None:
     for name, words in (
-        ("logs/pyulog/sample_log_small.ulg", "ULog"),
         ("dsm/coromandel/coromandel_dsm_050.tif", "TIFF"),
         ("logs/arducopter/mission.waypoints", "text"),
     ):

@@ -292,3 +292,18 @@ def test_a_log_with_other_systems_and_bad_spans(shared_data: Path) -> None:
     assert any(s.armed for s in states)
     assert any(s.mode == "AUTO" for s in states)
     assert all(v is None or math.isfinite(v) for s in states[::50] for v in (s.lat_deg, s.alt_amsl_m, s.battery_v))
+
+
+def test_a_crossed_fence_is_told_by_its_bit_and_by_its_own_message() -> None:
+    bit = mavlink.MAV_SYS_STATUS_GEOFENCE
+    kept, crossed, off = (
+        mavlink.MAVLink_sys_status_message(on, on, health, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+        for on, health in ((bit, bit), (bit, 0), (0, 0))
+    )
+    assert [known(message).fence_ok for message in (kept, crossed, off)] == [True, False, None]
+    beyond = mavlink.MAVLink_fence_status_message(1, 1, mavlink.FENCE_BREACH_MAXALT, 0)
+    within = mavlink.MAVLink_fence_status_message(0, 1, mavlink.FENCE_BREACH_MAXALT, 0)
+    assert known().fence_breach is None
+    assert known(kept, beyond).fence_breach == "ceiling"
+    assert known(kept, beyond, within).fence_breach == "none"
+    assert known(kept, beyond, off).fence_breach is None

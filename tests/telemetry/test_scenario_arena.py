@@ -123,6 +123,12 @@ def test_by_the_nearest_pole_alone_the_other_one_is_not_run_into(seed, number):
     assert one_of(seed, number, nearest_only=True).nearest_gap_m > 0.3
 
 
+@pytest.mark.parametrize(("seed", "number", "nearest_only"), [(15, 22, False), (28, 16, True)])
+def test_a_pole_too_near_to_be_seen_stays_where_it_stood(seed, number, nearest_only):
+    """One late echo had moved it aside and given it a speed: it went away on the map, and was flown into."""
+    assert one_of(seed, number, nearest_only=nearest_only).nearest_gap_m > 0.3
+
+
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
     """What shows that the poles are really in the way, and that nothing but the radar's tracks avoids them."""
     monkeypatch.setattr(Position2GoModel, "frame", lambda self, true, random: np.empty((0, 3)))

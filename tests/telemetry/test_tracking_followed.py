@@ -11,7 +11,7 @@ import pytest
 from mapping.geometry.poses import Pose
 from mapping.tracking.blobs import Blobs
 from mapping.tracking.tracker_params import TrackState
-from telemetry.tracking.followed import DRIFT_S, Followed, TrackMemory
+from telemetry.tracking.followed import AGAIN_ECHOES, DRIFT_S, UNSEEN_S, Followed, TrackMemory
 
 HOVERING = np.array([1.0, 0.0, 0.0, 0.0])
 NOTHING = Blobs(np.empty(0), np.empty(0), np.empty(0), np.empty(0, np.bool_))
@@ -68,3 +68,44 @@ def test_a_slow_walker_is_told_by_its_way() -> None:
 def test_echoes_that_wander_over_what_stands_are_no_way() -> None:
     found = followed(5.0, lambda t: (20.0 + 0.8 * math.sin(2.0 * t), 20.0), lambda t: (0.0, 0.0))
     assert not any(goes(found))
+
+
+def out_of_sight_then(echoes: int, *, lost_again: bool = False, moves: bool = False) -> Followed:
+    """What stood (or moved) 20 m to the north-east for 2 s, was out of sight, and of which then so many echoes told
+    that it is 0.8 m further west and goes there: as a filter makes of one echo in a gate that grew wide.
+    """
+    memory, found = TrackMemory(), list[Followed]()
+    spread = np.diag([SIGMA_M**2, SIGMA_M**2, 0.1**2, 0.1**2])
+    was_seen_for, unseen = 20, round(10 * UNSEEN_S) + 2
+    for k in range(was_seen_for + unseen + echoes + (10 if lost_again else 0)):
+        after = k - was_seen_for - unseen
+        speed = np.array([-0.72, 0.07]) if moves or after >= 0 else np.zeros(2)
+        at = np.array([20.0, 20.0]) if after < 0 else np.array([19.2, 20.0]) + 0.1 * after * speed
+        is_seen = k < was_seen_for or 0 <= after < echoes
+        state = TrackState(1, at, speed, spread, k / 10, min(k, was_seen_for) + 1, is_seen, True)
+        found = memory.observe([state], NOTHING, Pose(100.0 + k / 10, np.zeros(3), np.zeros(3), HOVERING))
+    return found[0]
+
+
+@pytest.mark.parametrize("echoes", range(AGAIN_ECHOES))
+@pytest.mark.parametrize("lost_again", [False, True])
+def test_what_stood_and_is_out_of_sight_is_where_it_stood_whatever_a_single_echo_says(
+    echoes: int, lost_again: bool
+) -> None:
+    one = out_of_sight_then(echoes, lost_again=lost_again)
+    assert one.state.position_enu_m.tolist() == [20.0, 20.0]
+    assert one.offset_m.tolist() == [20.0, 20.0]
+    assert not one.velocity_enu_m_s.any()
+    assert one.sigma_m == pytest.approx(SIGMA_M)
+
+
+def test_echoes_enough_tell_that_it_went_on() -> None:
+    one = out_of_sight_then(AGAIN_ECHOES)
+    assert one.state.position_enu_m[0] < 19.3
+    assert one.velocity_enu_m_s == pytest.approx([-0.72, 0.07])
+
+
+def test_what_went_is_believed_at_once_when_it_is_seen_again() -> None:
+    one = out_of_sight_then(1, moves=True)
+    assert one.state.position_enu_m[0] < 19.3
+    assert one.velocity_enu_m_s.any()

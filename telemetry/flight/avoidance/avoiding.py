@@ -98,11 +98,11 @@ class Avoiding:
         """Of a flight that it has taken over."""
         detour, target = self.detour, self.detour.target
         phase = {"holding": "paused", "ceiling": "paused", "ending": "returning"}.get(detour.phase, "flying")
-        last = detour.remaining.targets[-1].item if detour.remaining.targets else None
+        last = detour.remaining.targets[-1].item or None if detour.remaining.targets else None
         return FlightStatus(
             way=detour.remaining.way,
             phase=phase,  # type: ignore[arg-type]
-            target=None if target is None else target.item,
+            target=None if target is None else target.item or None,
             targets=last,
             since_utc_s=since_utc_s,
             hint=self.status.text,

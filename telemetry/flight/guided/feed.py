@@ -143,7 +143,7 @@ class FedLeg:
     """The place that is led along one leg. ``advance`` it by the clock, then send what ``set_point`` says."""
 
     def __init__(self, start: Place, target: GuidedTarget, bounds: Bounds, feed: Feed, *, speed_m_s: float) -> None:
-        self._start, self._target, self._bounds, self._feed = start, target, bounds, feed
+        self.start, self._target, self._bounds, self._feed = start, target, bounds, feed
         self._along_m, self._speed_m_s, self._accel_m_s2 = 0.0, speed_m_s, 0.0
 
     @property
@@ -167,13 +167,17 @@ class FedLeg:
         self._accel_m_s2 = (self._speed_m_s - before) / seconds if seconds > 0.0 else 0.0
         self._along_m = min(self._bounds.length_m, self._along_m + (before + self._speed_m_s) / 2 * seconds)
 
+    def limit(self, bounds: Bounds) -> None:
+        """Of the same leg: it changes to another speed as it changes to any."""
+        self._bounds = bounds
+
     def catch_up(self, at: Place) -> None:
         """After silence: it goes on from where the vehicle has come to meanwhile, from rest."""
         self._along_m = min(self._bounds.length_m, max(self._along_m, self._reached_m(at)))
         self._speed_m_s = self._accel_m_s2 = 0.0
 
     def set_point(self, home_alt_amsl_m: float, heading_rad: float | None) -> SetPoint:
-        a, b, bounds, feed = self._start, self._target, self._bounds, self._feed
+        a, b, bounds, feed = self.start, self._target, self._bounds, self._feed
         share = self._along_m / bounds.length_m if bounds.length_m else 1.0
         place = Place(
             a.lat_deg + share * (b.lat_deg - a.lat_deg),
@@ -202,6 +206,6 @@ class FedLeg:
         return min(1.0, max(0.0, 1.0 - late_m / CATCH_UP_M))
 
     def _reached_m(self, at: Place) -> float:
-        a, unit = self._start, self._bounds.unit
+        a, unit = self.start, self._bounds.unit
         east_m, north_m = offset_m((a.lat_deg, a.lon_deg), at.lat_deg, at.lon_deg)
         return north_m * unit[0] + east_m * unit[1] + (at.alt_rel_home_m - a.alt_rel_home_m) * unit[2]

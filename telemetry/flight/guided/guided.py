@@ -2,7 +2,8 @@
 
 Take-off, then each target when the one before was reached and its loiter time has passed, then the way home. It never
 skips a target, waits while the link is down, and ends as soon as somebody else chooses another flight mode. A vehicle
-that does not fly straight from place to place is led along the leg (``feed``).
+that does not fly straight from place to place is led along the leg (``feed``). A certified way begins in the air, from
+where it was certified, and may end with holding.
 """
 
 from __future__ import annotations
@@ -21,15 +22,19 @@ from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.flight.guided.script_watches import ModeWatch, Punctuality, Standstill
 from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
-from telemetry.topics.requests import StartGuided
+from telemetry.topics.requests import FlyWay, StartGuided
 from telemetry.topics.vehicle import VehicleState
 
 TAKEOFF_TOLERANCE_M = 0.3
 OFF_THE_GROUND_M = 0.5
 RETURN_AGAIN_S = 2.0
 SLOW_TARGET_SENDINGS = 4
+BEGINS_M, STANDS_M_S = 1.0, 1.0
+"""From where a way begins, and how fast, the vehicle may be: well within the following error of its certificate."""
+THERE = "The way is flown: it holds there."
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +48,7 @@ class GuidedScript:
 
     def __init__(
         self,
-        request: StartGuided,
+        request: StartGuided | FlyWay,
         state: VehicleState,
         *,
         firmware: Firmware,
@@ -59,6 +64,8 @@ class GuidedScript:
         """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
         self._watch, self._punctuality = ModeWatch(), Punctuality()
+        self._targets = request.targets
+        self._takeoff_m = request.takeoff_alt_rel_home_m if isinstance(request, StartGuided) else -math.inf
         self.phase: FlightPhase = "idle"
         self.hint = ""
         self.broke_off_at: int | None = None
@@ -77,17 +84,26 @@ class GuidedScript:
         return self.phase in ("landed", "interrupted")
 
     @property
+    def _is_way(self) -> bool:
+        return isinstance(self._request, FlyWay)
+
+    @property
+    def is_flown(self) -> bool:
+        """All targets were reached."""
+        return self._index >= len(self._targets)
+
+    @property
     def target(self) -> GuidedTarget:
         """That is flown to, or was last."""
-        return self._request.targets[min(self._index, len(self._request.targets) - 1)]
+        return self._targets[min(self._index, len(self._targets) - 1)]
 
     @property
     def left(self) -> tuple[GuidedTarget, ...]:
         """From the target that is flown to."""
-        return self._request.targets[self._index :]
+        return self._targets[self._index :]
 
     @property
-    def end(self) -> Literal["rtl", "land"]:
+    def end(self) -> Literal["rtl", "land", "hold"]:
         """What follows the last target."""
         return self._request.end
 
@@ -100,28 +116,30 @@ class GuidedScript:
         late = "" if self.behind_s is None or self.behind_s < 1 else f"{self.behind_s:.0f} s behind the plan."
         return FlightStatus(
             way="guided",
-            phase=self.phase,
-            target=self.target.item,
-            targets=self._request.targets[-1].item,
+            phase="paused" if self.phase == "arming" and self._is_way else self.phase,
+            target=self.target.item or None,
+            targets=self._targets[-1].item or None,
             since_utc_s=since_utc_s,
             broke_off_at=self.broke_off_at,
             hint=self.hint or self._stands or late or (self._note if self.phase in ("taking_off", "flying") else ""),
         )
 
     def start(self, now_s: float) -> list[Action]:
-        """From the ground only: Failed(NotAllowedError) in flight."""
+        """Failed(NotAllowedError) where it does not begin: a mission's in flight, a certified way anywhere else."""
         self.phase, state = "arming", self._state
-        if not self._request.targets:
+        if not self._targets:
             return self._fail(NotAllowedError("The script has no targets.", advice="Plan a mission first."))
-        if state.armed and state.landed == "in_air":
-            return self._fail(NotAllowedError("The vehicle is already flying.", advice="Land it, then start again."))
+        refusal = why_not_from(self._request, state)
+        if refusal is not None:
+            return self._fail(refusal)
         self._note_home(state)
         if math.isnan(self._home_alt_amsl_m):
             return self._fail(
                 NotAllowedError("The vehicle does not know its height yet.", advice="Wait for its position.")
             )
         self._watch.expect(self._orders.script_modes, before=frozenset({state.mode}))
-        return self._change_mode(self._orders.guided_mode, now_s, then=self._arm)
+        begins = self._set_out if self._is_way else self._arm
+        return self._change_mode(self._orders.guided_mode, now_s, then=begins)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         if self.is_over or not self._endpoints.is_from_vehicle(message):
@@ -151,7 +169,7 @@ class GuidedScript:
     def pause(self, now_s: float) -> list[Action]:
         """Holds the position, during the take-off as soon as it is up; before the take-off it ends the script."""
         if self.phase == "arming":
-            return self._interrupt("Paused before the take-off.")
+            return self._interrupt(f"Paused before {'it set out' if self._is_way else 'the take-off'}.")
         if self.phase == "flying":
             self.phase, self.hint, self._came_from = "paused", "", None
             if self._leading is not None:
@@ -162,7 +180,7 @@ class GuidedScript:
         return []
 
     def resume(self, now_s: float) -> list[Action]:
-        if self.phase != "paused":
+        if self.phase != "paused" or self.is_flown:
             return []
         self.hint = ""
         if self._handover is None:
@@ -170,6 +188,15 @@ class GuidedScript:
             return []
         self.phase = "flying"
         return self._hand_over(now_s)
+
+    def set_speed(self, speed_m_s: float, now_s: float) -> list[Action]:
+        """On all that is left."""
+        self._targets = tuple(replace(target, speed_m_s=speed_m_s) for target in self._targets)
+        if self.phase != "flying":
+            return []
+        if self._leading is not None:
+            self._leading.limit(self.left)
+        return self._set_speed(speed_m_s, now_s)
 
     def stop(self, words: str) -> list[Action]:
         """Ends the script without a command: another one for the vehicle follows."""
@@ -186,7 +213,7 @@ class GuidedScript:
 
     def _climb(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._is_up(state, now_s):
-            up = replace(self._here(), alt_rel_home_m=self._request.takeoff_alt_rel_home_m)
+            up = replace(self._here(), alt_rel_home_m=self._takeoff_m)
             self._stands = self._standstill.words(state, up, "the height of the take-off", now_s)
             return []
         self.phase, self._stands = "flying", ""
@@ -194,7 +221,7 @@ class GuidedScript:
 
     def _is_up(self, state: VehicleState, now_s: float) -> bool:
         height_m = state.alt_rel_home_m
-        up = height_m is not None and height_m >= self._request.takeoff_alt_rel_home_m - TAKEOFF_TOLERANCE_M
+        up = height_m is not None and height_m >= self._takeoff_m - TAKEOFF_TOLERANCE_M
         return up and not self._pending.is_under_way and is_fresh(state, now_s)
 
     def _fly(self, state: VehicleState, now_s: float) -> list[Action]:
@@ -211,11 +238,21 @@ class GuidedScript:
         if now_s - self._reached_s < self.target.loiter_s or not is_fresh(state, now_s):
             return self._lead(state, now_s)
         self._index += 1
-        progress = Progress("flying", self._index, len(self._request.targets))
-        if self._index == len(self._request.targets):
-            self.phase, self._handover = "returning", None
-            return [progress, *self._go_home(now_s)]
-        return [progress, *self._hand_over(now_s)]
+        progress = Progress("flying", self._index, len(self._targets))
+        if not self.is_flown:
+            return [progress, *self._hand_over(now_s)]
+        if self.end == "hold":
+            return [progress, *self._stay_there(now_s)]
+        self.phase, self._handover = "returning", None
+        return [progress, *self._go_home(now_s)]
+
+    def _stay_there(self, now_s: float) -> list[Action]:
+        """Until another command comes: the script goes on watching that it does."""
+        assert self._handover is not None
+        self.phase, self.hint = "paused", THERE
+        if self._leading is not None:
+            self._leading.stop()
+        return self._go_to(self._handover.place, now_s, holds=True)
 
     def _has_arrived(self, state: VehicleState, now_s: float) -> bool:
         assert self._handover is not None
@@ -248,13 +285,17 @@ class GuidedScript:
         message = self._orders.set_mode(mode)
         return self._pending.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
 
+    def _set_out(self, now_s: float) -> list[Action]:
+        self.phase = "flying"
+        return self._hand_over(now_s)
+
     def _arm(self, now_s: float) -> list[Action]:
         message = self._orders.arm()
         return self._pending.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._take_off)
 
     def _take_off(self, now_s: float) -> list[Action]:
         self.phase = "taking_off"
-        message = self._orders.take_off(self._request.takeoff_alt_rel_home_m, self._home_alt_amsl_m)
+        message = self._orders.take_off(self._takeoff_m, self._home_alt_amsl_m)
         return self._pending.begin(message, now_s, once=True, confirm=_is_off_the_ground)
 
     def _hand_over(self, now_s: float) -> list[Action]:
@@ -316,7 +357,7 @@ class GuidedScript:
         return self._send_place(now_s)
 
     def _go_home(self, now_s: float) -> list[Action]:
-        mode = self._orders.end_mode(self._request.end)
+        mode = self._orders.end_mode("rtl" if self.end == "rtl" else "land")
         self._return_at_s = now_s + RETURN_AGAIN_S
         self._watch.expect(frozenset({mode, "LAND"}), before=self._orders.script_modes)
         return self._change_mode(mode, now_s)
@@ -333,7 +374,7 @@ class GuidedScript:
         return []
 
     def _interrupt(self, words: str) -> list[Action]:
-        self.broke_off_at = None if self.phase in ("arming", "returning") else self.target.item
+        self.broke_off_at = None if self.phase in ("arming", "returning") else self.target.item or None
         self.phase, self.hint = "interrupted", words
         return [Done(GuidedEnd(False, words))]
 
@@ -355,6 +396,27 @@ class GuidedScript:
             target = self.target
             return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, self._home_alt_amsl_m)
         return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, self._home_alt_amsl_m)
+
+
+def why_not_from(request: StartGuided | FlyWay, state: VehicleState) -> NotAllowedError | None:
+    in_air = state.armed and state.landed == "in_air"
+    if isinstance(request, StartGuided):
+        return (
+            NotAllowedError("The vehicle is already flying.", advice="Land it, then start again.") if in_air else None
+        )
+    if not (state.armed and is_in_the_air(state)):
+        return NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
+    speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
+    if speed_m_s > STANDS_M_S:
+        what = f"The vehicle moves at {speed_m_s:.1f} m/s: the way was certified from where it hovers."
+        return NotAllowedError(what, advice="Hold, then ask for the way again.")
+    begins = Place(request.begins_lat_deg, request.begins_lon_deg, request.begins_alt_rel_home_m, math.nan)
+    off_m = away_m(state, begins)
+    if not off_m <= BEGINS_M:
+        where = f"{off_m:.1f} m from" if math.isfinite(off_m) else "not known to be"
+        what = f"The vehicle is {where} where the certified way begins."
+        return NotAllowedError(what, advice="Ask for the way again: it is certified anew from there.")
+    return None
 
 
 def _is_off_the_ground(state: VehicleState) -> bool:

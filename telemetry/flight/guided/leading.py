@@ -42,6 +42,11 @@ class Leading:
         self._leg = FedLeg(start, left[0], bounds, self.feed, speed_m_s=speed_m_s)
         self._led_s, self._sent_s, self._turns_until_s = now_s, -math.inf, now_s + TURN_S
 
+    def limit(self, left: Sequence[GuidedTarget]) -> None:
+        """The same targets, at other speeds."""
+        if self._leg is not None:
+            self._leg.limit(bounds_of(self._leg.start, left, self.feed)[0])
+
     def stop(self) -> None:
         self._leg = None
 

@@ -21,6 +21,8 @@ from telemetry.flight.low_flight.table import (
 )
 from telemetry.flight.preflight.parameters import NEAR_HALF_DEG, return_settings
 
+MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
+"""MAV_TYPE: quadrotor, coaxial, hexa-, octo-, tri-, dodeca- and decarotor."""
 LESS_CLIMB = "Close to home the vehicle climbs less on its return than certificates take for granted."
 Rule = Callable[[Settings, LowPlan | None], Iterator[Finding]]
 
@@ -61,7 +63,7 @@ def _return_height(settings: Settings, firmware: Firmware, plan: LowPlan | None)
     if plan is None:
         return Finding("look", own.parameter, f"{at}. Give a mission to know what it needs.", None, value)
     if plan.return_needed_m is None:
-        text = f"{at}. What this plan needs is not known without its surface model: give --dsm."
+        text = f"{at}. What this plan needs is not known without its certificate over the surface model."
         return Finding("look", own.parameter, text, None, value)
     if plan.return_needed_m <= 0.0:
         text = f"{at}. From everywhere on this plan it is high enough itself."

@@ -16,7 +16,7 @@ from telemetry.flight.preflight.parameters import ReturnSettings
 from telemetry.topics.messages import OnboardMission
 from telemetry.topics.vehicle import GnssFix, VehicleState
 
-Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance"]
+Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance", "fence"]
 State = Literal["good", "accept", "bad", "unknown"]
 
 AWAY_M = 3.0
@@ -119,14 +119,15 @@ def amsl_row(mission: Mission | None, state: VehicleState, home: Home) -> Row | 
 
 def gnss_row(state: VehicleState, profile: VehicleProfile) -> Row:
     assumed_m = profile.position_error_m
+    if state.gnss_t_mono_s is None:
+        return Row("gnss", "unknown", "Nothing was heard of GNSS yet.", "Wait for a 3-D fix.")
     if state.gnss_fix not in TYPICAL_ACCURACY_M:
-        state_ = "unknown" if state.gnss_t_mono_s is None else "bad"
         words = {"none": "no receiver", "no_fix": "no fix", "2d": "a 2-D fix only"}[state.gnss_fix]
-        return Row("gnss", state_, f"GNSS has {words}.", "Wait for a 3-D fix.")
+        return Row("gnss", "bad", f"GNSS has {words}.", "Wait for a 3-D fix.")
     if state.estimator_ok is False:
         return Row("gnss", "bad", "The autopilot's position estimate cannot be used yet.", "Wait.")
     fix = state.gnss_fix.replace("_", " ").upper()
-    place_m, height_m, said = _accuracy_m(state)
+    place_m, height_m, said = accuracy_m(state)
     text = (
         f"GNSS is accurate to {place_m:.2f} m in place and {height_m:.2f} m in height, {said} ({fix});"
         f" the plan assumes {assumed_m:.2f} m."
@@ -136,7 +137,7 @@ def gnss_row(state: VehicleState, profile: VehicleProfile) -> Row:
     return Row("gnss", "good", text)
 
 
-def _accuracy_m(state: VehicleState) -> tuple[float, float, str]:
+def accuracy_m(state: VehicleState) -> tuple[float, float, str]:
     """Of place and height, and who says so."""
     place_m, height_m = state.horizontal_accuracy_m, state.vertical_accuracy_m
     typical_m = TYPICAL_ACCURACY_M[state.gnss_fix]

@@ -1,4 +1,4 @@
-"""The vehicle's own settings on which a flight rests, whatever its firmware calls them: its return, and its speeds."""
+"""The vehicle's own settings on which a flight rests, whatever its firmware calls them: return, speeds, fence."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (
         *("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
         *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
+        *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION"),
     ),
-    "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST"),
+    "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "GF_ACTION"),
 }
 """What to read before a start. ArduPilot 4.7 counts in metres what earlier versions count in centimetres."""
 NEAR_HALF_DEG = 45.0

@@ -23,9 +23,10 @@ from planning.terrain.holes import fill_holes
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.preflight import checks
 from telemetry.flight.preflight.checks import Row
+from telemetry.flight.preflight.fence_check import fence_row, flown_within
 from telemetry.flight.preflight.parameters import return_settings
 from telemetry.mavlink.items import mission_from_onboard
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.messages import OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
 
 ANTENNA_M = 0.5
@@ -111,18 +112,23 @@ def check(
     rereferenced_m: float | None = None,
     fence: Fence = NO_FENCE,
     rally: tuple[RallyPoint, ...] = (),
+    aboard: PlacesOnboard | None = None,
 ) -> Preflight:
     """Judge a start. Pure; takes up to seconds on a large model: not for the event loop.
 
     ``clearance`` is what the plan demands; the return height in it gives way to the vehicle's own. Without a
     surface model the rows that need one can be accepted at most. ``rereferenced_m``: heights were moved by so much.
-    ``fence`` and ``rally`` are the plan's: what is on board is held against them too.
+    ``fence`` and ``rally`` are the plan's: what is on board is held against them too. ``aboard``: what the vehicle
+    itself holds of them; None: it was not asked.
     """
     settings = return_settings(parameters, firmware)
     home = actual_home(state, dsm)
     shift_m = _shift(home, planned_home, dsm)
     mission = _mission(onboard, firmware, home, dsm)
-    mission = None if mission is None else replace(mission, fence=fence, rally=rally)
+    planned = (fence, rally)
+    row = None if aboard is None else fence_row(planned, aboard, parameters, firmware)
+    within = planned if aboard is None or (row is not None and row.state == "bad") else flown_within(planned, aboard)
+    mission = None if mission is None else replace(mission, fence=within[0], rally=within[1])
     surface = fill_holes(dsm)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
     demanded = replace(clearance, rtl_height_m=height_m, set_down_m=0.0)
@@ -137,6 +143,7 @@ def check(
         checks.return_row(certificate, settings, clearance),
         checks.battery_row(state, profile, _predicted_s(mission, profile, surface)),
         checks.ready_row(state),
+        *([] if row is None else [row]),
     )
     return Preflight(rows, shift_m, needs, certificate, mission if surface is not None else None, demanded)
 

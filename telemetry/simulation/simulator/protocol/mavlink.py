@@ -13,9 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.autopilot.pilot import HomeSet, Reached, StateChanged, Text
-from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, Commands, read_order, whole
+from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS, RESULTS, Commands, read_order, whole
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
-from telemetry.simulation.simulator.protocol.message_streams import Streams
+from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
+from telemetry.simulation.simulator.protocol.message_streams import FIRMWARE, Streams
 from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
 from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterProtocol
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
@@ -68,6 +70,8 @@ class Endpoint:
         self._parameters = ParameterProtocol(vehicle.parameters)
         self._streams = Streams(vehicle, self._missions)
         self._commands = Commands(self._pilot)
+        self._own_logs = OwnLogs(vehicle, MODE_NUMBERS, FIRMWARE)
+        self._logs = LogProtocol(vehicle, self._own_logs)
         self._peers: dict[Hashable, _Peer] = {}
         self._news: list[tuple[float, Reply]] = []
         """That the other ground stations have not heard yet, and when they will."""
@@ -88,6 +92,7 @@ class Endpoint:
     def disconnect(self, peer: Hashable) -> None:
         self._peers.pop(peer, None)
         self._parameters.forget(peer)
+        self._logs.forget(peer)
 
     def on_message(self, message: Any, peer: Hashable, wall_s: float) -> list[Reply]:
         """Answers, in the order in which they go out."""
@@ -102,12 +107,16 @@ class Endpoint:
             return self._missions.on_message(message, peer, wall_s) + self._tell_first(peer, wall_s)
         if kind.startswith("PARAM_"):
             return self._on_parameter(message, peer) + self._tell()
+        if kind.startswith("LOG_REQUEST_"):
+            self._logs.on_message(message, peer)
+            return self._tell()
         replies = self._answer(kind, message, peer)
         return [(peer, reply) for reply in replies] + self._tell()
 
     def on_slice(self, wall_s: float) -> list[Reply]:
         """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
-        out = self._missions.on_tick(wall_s) + self._parameters.on_tick(wall_s)
+        self._own_logs.on_slice()
+        out = self._missions.on_tick(wall_s) + self._parameters.on_tick(wall_s) + self._logs.on_tick(wall_s)
         out += [reply for due_s, reply in self._news if due_s <= wall_s]
         self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]
         out += self._tell()
@@ -201,9 +210,11 @@ class Endpoint:
     def _tell(self) -> list[Reply]:
         """The autopilot's news, to everybody."""
         out: list[Reply] = []
+        self._own_logs.look()
         for event in self._pilot.take_events():
             match event:
                 case Text(severity, text):
+                    self._own_logs.on_text(text)
                     out += self._to_all(wire.MAVLink_statustext_message(severity, text.encode()[:50]))
                 case Reached(seq):
                     out += self._to_all(wire.MAVLink_mission_item_reached_message(seq))

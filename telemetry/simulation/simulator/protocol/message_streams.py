@@ -24,7 +24,7 @@ CAPABILITIES = (
     | wire.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | wire.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
-FIRMWARE_VERSION = 4 << 24 | 7 << 16
+FIRMWARE, FIRMWARE_VERSION = "4.7.0-dev", 4 << 24 | 7 << 16
 SENSORS_PRESENT, SENSORS_IDLE, SENSORS_IN_USE = 0x5371FC2F, 0x52619C2F, 0x5361FC2F
 HEALTHY_AT_BOOT, HEALTHY_WITH_FIX, HEALTHY_WITH_POSITION = 0x47519C0F, 0x47719C2F, 0x4771FC2F
 EKF_AT_BOOT, EKF_WITH_TILT, EKF_WITH_POSITION = 1024, 167, 831
@@ -63,6 +63,7 @@ class Streams:
             wire.MAVLINK_MSG_ID_SIM_STATE: self._sim_state,
             wire.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery_status,
             wire.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._autopilot_version,
+            wire.MAVLINK_MSG_ID_VIBRATION: self._vibration,
             wire.MAVLINK_MSG_ID_WIND: self._wind,
             wire.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self._ekf_status,
             wire.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
@@ -276,6 +277,11 @@ class Streams:
         if self._vehicle.now_s < self._pilot.boot_s * 6.2 / AS_REAL_BOOT_S:
             flags = EKF_AT_BOOT
         return wire.MAVLink_ekf_status_report_message(flags, 0.01, 0.004, 0.001, 0.005, 0)
+
+    def _vibration(self) -> MAVLink_message:
+        """Of a quiet airframe: a trace on the ground, more with turning rotors."""
+        axes_m_s2 = (3.1, 2.8, 6.4) if self._pilot.flying else (0.1, 0.1, 0.1)
+        return wire.MAVLink_vibration_message(int(self._vehicle.now_s * 1e6), *axes_m_s2, 0, 0, 0)
 
     def _extended_state(self) -> MAVLink_message:
         return wire.MAVLink_extended_sys_state_message(wire.MAV_VTOL_STATE_MC, LANDED_STATES[self._pilot.stage])

@@ -1,0 +1,150 @@
+"""A guided way from the vehicle's real place: judged with what it tells of itself, and the request that flies it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from planning.certificate.model import ClearanceParams
+from planning.fence.model import NO_FENCE, Fence, RallyPoint
+from planning.guided.model import RETURNS, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
+from planning.guided.ways import guided_way
+from planning.margins.words import rounded_down, rounded_up
+from planning.model import VehicleProfile
+from planning.terrain.dsm import Dsm
+from planning.terrain.holes import fill_holes
+from telemetry.errors import NotAllowedError
+from telemetry.flight.guided.handover import is_fresh
+from telemetry.flight.guided.targets import bearing_rad
+from telemetry.flight.preflight.checks import accuracy_m, gnss_row
+from telemetry.flight.preflight.parameters import return_settings
+from telemetry.flight.preflight.preflight import actual_home
+from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.requests import FlyWay, Operator, StartGuided
+from telemetry.topics.vehicle import VehicleState
+
+NO_ITEM = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """The vehicle that is to fly a guided way."""
+
+    profile: VehicleProfile
+    clearance: ClearanceParams
+    """What is demanded of its lines when it is flown in GUIDED."""
+    parameters: Mapping[str, float | None]
+    """As read from it: ``telemetry.flight.preflight.parameters.NAMES``."""
+    fence: Fence = NO_FENCE
+    """On board."""
+    rally: tuple[RallyPoint, ...] = ()
+
+
+def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
+    """Where a way begins. Raises NotAllowedError where the wish does not suit where the vehicle is, or that is old."""
+    flies = state.armed and is_in_the_air(state)
+    if isinstance(wish, TakeOff) and flies:
+        raise NotAllowedError("The vehicle is in the air already.", advice="Ask for another height instead.")
+    if not isinstance(wish, TakeOff) and not flies:
+        raise NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
+    home, lat_deg, lon_deg, up_m = actual_home(state, None), state.lat_deg, state.lon_deg, state.alt_rel_home_m
+    if home is None or lat_deg is None or lon_deg is None or up_m is None or not is_fresh(state, now_s):
+        raise NotAllowedError("Where the vehicle is now is not known.", advice="Wait for its position.")
+    if flies and (state.home_lat_deg is None or state.home_lon_deg is None):
+        raise NotAllowedError("The vehicle does not tell its home: its height is not known.", advice="Wait for it.")
+    return Here((lat_deg, lon_deg), 0.0 if isinstance(wish, TakeOff) else up_m, (home.lat_deg, home.lon_deg))
+
+
+def judged_way(
+    ground: Dsm, seen: Dsm | None, state: VehicleState, wish: Wish, flown: Flown, *, speed_m_s: float, now_s: float
+) -> GuidedWay:
+    """``seen``: the model with what sensors have seen in it, where there is such. Takes up to seconds on a large model.
+
+    Raises NotAllowedError, MissionError and ParameterError.
+    """
+    here, profile = here_of(state, wish, now_s), flown.profile
+    if not 0.0 < speed_m_s <= profile.max_speed_m_s:
+        what = f"{speed_m_s:g} m/s were asked for; the profile's top speed is {profile.max_speed_m_s:g} m/s."
+        raise NotAllowedError(what, advice="Give a speed within that.")
+    demand = Demand(
+        _demanded(state, flown),
+        speed_m_s,
+        profile.max_climb_m_s,
+        profile.max_descent_m_s,
+        fence=flown.fence,
+        rally=flown.rally,
+    )
+    return guided_way(fill_holes(ground if seen is None else seen)[0], ground, here, wish, demand)
+
+
+def _demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
+    """With the vehicle's own return height, and its receiver's accuracy where that is worse than was assumed."""
+    row = gnss_row(state, flown.profile)
+    if row.state in ("bad", "unknown"):
+        raise NotAllowedError(row.text, advice=row.mend)
+    clearance, firmware = flown.clearance, "px4" if state.autopilot == "px4" else "ardupilot"
+    height_m = return_settings(flown.parameters, firmware).height_m
+    worse_m = max(0.0, max(accuracy_m(state)[:2]) - clearance.position_error_m)
+    return replace(
+        clearance,
+        required_clearance_m=clearance.required_clearance_m + worse_m,
+        position_error_m=clearance.position_error_m + worse_m,
+        rtl_height_m=clearance.rtl_height_m if height_m is None else height_m,
+        set_down_m=0.0,
+    )
+
+
+def way_request(
+    operator: Operator, way: GuidedWay, wish: Wish, *, speed_m_s: float, most_m_s: float
+) -> StartGuided | FlyWay:
+    """What flies a way that may be flown."""
+    targets = tuple(
+        GuidedTarget(NO_ITEM, lat_deg, lon_deg, up_m, speed_m_s, heading_rad=_heading(wish, (lat_deg, lon_deg)))
+        for lat_deg, lon_deg, up_m in way.places[1:]
+    )
+    if isinstance(wish, TakeOff):
+        return StartGuided(operator, targets, way.places[-1][2], end="hold")
+    return FlyWay(operator, targets, *way.places[0], most_m_s, end="land" if isinstance(wish, RETURNS) else "hold")
+
+
+def _heading(wish: Wish, at_deg: tuple[float, float]) -> float | None:
+    return bearing_rad(at_deg, wish.lat_lon_deg) if isinstance(wish, Look | Orbit) else None
+
+
+def way_json(way: GuidedWay) -> dict[str, Any]:
+    """Of a judged way, for scripts."""
+    worst = way.certificate.worst
+    return {
+        "certified": way.problem is None,
+        "problem": way.problem,
+        "clearance_m": _finite(way.clearance_m),
+        "required_clearance_m": way.certificate.required_clearance_m,
+        "worst": {"lat_deg": worst.lat_deg, "lon_deg": worst.lon_deg, "alt_rel_home_m": worst.alt_rel_home_m},
+        "raised_m": way.raised_m,
+        "rises_m": way.rises_m,
+        "length_m": way.length_m,
+        "seconds": way.seconds,
+        "places": [dict(zip(("lat_deg", "lon_deg", "alt_rel_home_m"), place, strict=True)) for place in way.places],
+        "reasons": [reason.text for reason in way.certificate.reasons],
+    }
+
+
+def _finite(value_m: float) -> float | None:
+    return value_m if math.isfinite(value_m) else None
+
+
+def way_words(way: GuidedWay) -> str:
+    """In a few short sentences."""
+    kept_m, required_m = max(0.0, way.clearance_m), way.certificate.required_clearance_m
+    parts = [
+        f"{way.length_m:.0f} m, about {way.seconds:.0f} s; at least {rounded_down(kept_m)} m from the surface,"
+        f" required {rounded_up(required_m)} m."
+    ]
+    if way.rises_m > 0.05:
+        parts.append(f"It first climbs {rounded_up(way.rises_m)} m straight up.")
+    if way.raised_m > 0.05:
+        parts.append(f"It ends {rounded_up(way.raised_m)} m higher than asked: lower is not certified.")
+    return " ".join(parts)

@@ -1,0 +1,1 @@
+"""Logs that lie on the vehicle: which there are, and their bytes; sans-IO."""

@@ -1,0 +1,96 @@
+"""The check's row of fence and rally points, on what a vehicle gives back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from planning.fence.model import NO_FENCE, Fence, RallyPoint, circle, polygon
+from planning.model import Firmware
+from telemetry.flight.preflight.checks import Row
+from telemetry.flight.preflight.fence_check import at_fence, fence_row, flown_within, sent_places
+from telemetry.topics.messages import PlacesOnboard
+
+FENCE = Fence(
+    polygons=(polygon([(47.0, 8.0), (47.0, 8.01), (47.01, 8.0)], inclusion=True, where="test"),),
+    circles=(circle(47.001, 8.001, 50.0, inclusion=False, where="test"),),
+    ceiling_rel_home_m=80.0,
+)
+RALLY = (RallyPoint(47.002, 8.002, 30.5),)
+PLANNED = (FENCE, RALLY)
+ACTS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0}
+
+
+def aboard() -> PlacesOnboard:
+    return PlacesOnboard(**sent_places(PLANNED, "ardupilot"))
+
+
+def judged(onboard: PlacesOnboard, planned=PLANNED, parameters=ACTS, firmware: Firmware = "ardupilot") -> Row:
+    row = fence_row(planned, onboard, parameters, firmware)
+    assert row is not None
+    return row
+
+
+def test_the_plans_own_is_good_and_says_what_the_vehicle_does() -> None:
+    row = judged(aboard())
+    assert row.state == "good"
+    assert "1 polygon, 1 circle, 1 rally point on board, the plan's" in row.text
+    assert "At its fence the vehicle returns, or lands where it cannot (FENCE_ACTION 1)." in row.text
+
+
+def test_a_corner_that_lies_elsewhere_or_a_point_that_is_missing_is_not_the_plans() -> None:
+    whole = aboard()
+    shifted = (replace(whole.fence[0], lat_deg=whole.fence[0].lat_deg + 1e-5), *whole.fence[1:])
+    for onboard in (replace(whole, fence=shifted), replace(whole, fence=()), replace(whole, rally=())):
+        row = judged(onboard)
+        assert (row.state, row.mend) == ("bad", "Upload the plan again.")
+
+
+def test_a_fence_that_the_plan_does_not_have_is_flown_within_all_the_same() -> None:
+    row = judged(aboard(), planned=(NO_FENCE, ()))
+    assert row.state == "good"
+    assert "another than the plan's" in row.text
+    assert "hedgehop fence LINK clear" in row.mend
+    within = flown_within((NO_FENCE, ()), aboard())
+    assert within[0] == replace(FENCE, ceiling_rel_home_m=None)
+    assert within[1][0].alt_rel_home_m == 31.0  # as ArduPilot keeps it
+    assert flown_within(PLANNED, aboard()) == PLANNED
+
+
+def test_nothing_anywhere_is_no_row() -> None:
+    assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS, "ardupilot") is None
+
+
+@pytest.mark.parametrize(
+    ("parameters", "firmware", "said"),
+    [
+        (ACTS | {"FENCE_ENABLE": 0.0}, "ardupilot", "FENCE_ENABLE is 0"),
+        (ACTS | {"FENCE_TYPE": 3.0}, "ardupilot", "FENCE_TYPE is 3, without 4"),
+        ({"GF_ACTION": 0.0}, "px4", "GF_ACTION is 0"),
+    ],
+)
+def test_a_fence_that_the_vehicle_does_not_act_on_has_to_be_accepted(parameters, firmware, said) -> None:
+    onboard = PlacesOnboard(**sent_places(PLANNED, firmware))
+    row = judged(onboard, parameters=parameters, firmware=firmware)
+    assert row.state == "accept"
+    assert said in row.text
+
+
+def test_what_could_not_be_read_stands_in_the_way_of_a_plan_with_a_fence_only() -> None:
+    silent = PlacesOnboard(unread="The vehicle does not answer.")
+    assert judged(silent).state == "unknown"
+    assert judged(silent, planned=(NO_FENCE, ())).state == "accept"
+
+
+def test_a_list_that_means_nothing_is_bad() -> None:
+    cut = replace(aboard(), fence=aboard().fence[:2])
+    row = judged(cut, planned=(NO_FENCE, ()))
+    assert row.state == "bad"
+    assert "not understood" in row.text
+
+
+def test_what_is_not_known_of_the_action_is_not_claimed() -> None:
+    assert at_fence({}, "ardupilot") == ""
+    assert "not known here: FENCE_ACTION is 42" in at_fence({"FENCE_ACTION": 42.0}, "ardupilot")
+    assert at_fence({"GF_ACTION": 3.0}, "px4") == "At its fence the vehicle returns (GF_ACTION 3)."

@@ -1,0 +1,59 @@
+"""A proxy between a ground station and a vehicle on UDP that loses datagrams, each way, by a seeded chance."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+from collections.abc import AsyncIterator
+
+Address = tuple[str, int]
+
+
+class _Side(asyncio.DatagramProtocol):
+    def __init__(self, proxy: Proxy) -> None:
+        self._proxy = proxy
+
+    def datagram_received(self, data: bytes, addr: Address) -> None:
+        self._proxy.on_datagram(self, data, addr)
+
+
+class Proxy:
+    """Ground stations talk to ``port``; whoever did so last is answered there."""
+
+    def __init__(self, vehicle_port: int, loss: float, seed: int) -> None:
+        self._vehicle: Address = ("127.0.0.1", vehicle_port)
+        self._random, self.loss, self.lost, self.carried = random.Random(seed), loss, 0, 0
+        self._near, self._far = _Side(self), _Side(self)
+        self._station: Address | None = None
+        self.port = 0
+
+    async def open(self) -> tuple[asyncio.DatagramTransport, asyncio.DatagramTransport]:
+        loop = asyncio.get_running_loop()
+        self._to_station, _ = await loop.create_datagram_endpoint(lambda: self._near, ("127.0.0.1", 0))
+        self._to_vehicle, _ = await loop.create_datagram_endpoint(lambda: self._far, ("127.0.0.1", 0))
+        self.port = self._to_station.get_extra_info("sockname")[1]
+        return self._to_station, self._to_vehicle
+
+    def on_datagram(self, side: _Side, data: bytes, addr: Address) -> None:
+        if side is self._near:
+            self._station = addr
+        if self._random.random() < self.loss:
+            self.lost += 1
+            return
+        self.carried += 1
+        if side is self._near:
+            self._to_vehicle.sendto(data, self._vehicle)
+        elif self._station is not None:
+            self._to_station.sendto(data, self._station)
+
+
+@contextlib.asynccontextmanager
+async def lossy_udp(vehicle_port: int, *, loss: float, seed: int = 0) -> AsyncIterator[Proxy]:
+    proxy = Proxy(vehicle_port, loss, seed)
+    transports = await proxy.open()
+    try:
+        yield proxy
+    finally:
+        for transport in transports:
+            transport.close()
