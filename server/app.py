@@ -16,9 +16,10 @@ from server.door.handshake import behind_tls
 from server.door.slow_lines import PageWebSocket
 from server.door.tls import Tls
 from server.errors import ServerError, StartError
+from server.fleet import Fleet
 from server.library import Library
 from server.settings import Settings
-from server.stations import RUNTIME_FOLDER, Flying
+from server.stations import RUNTIME_FOLDER
 from server.web import create_app
 from server.work.guarded import Guarded
 from server.work.logs import configure_logging
@@ -36,11 +37,12 @@ def run(settings: Settings, *, demo: bool = False) -> None:
     guarded = Guarded.found()  # a spare server waits here, with all its modules loaded
     configure_logging(settings.log_level)
     raise_file_limit()
-    for address in settings.link:
-        parse_address(address)
+    for _, links in settings.vehicles:
+        for address in links:
+            parse_address(address)
     tls = Tls.of(settings)
     with bound_socket(settings.host, settings.port) as listening, closing(Library(settings.data_dir)) as library:
-        app = create_app(settings, library, Workspace, Flying.open, demo=demo, tls=tls)
+        app = create_app(settings, library, Workspace, Fleet.open, demo=demo, tls=tls)
         server = AnnouncingServer(app, settings, tls, guarded)
         server.run(sockets=[listening])
         if not server.started:
@@ -71,7 +73,7 @@ class AnnouncingServer(uvicorn.Server):
         """Called by the event loop ten times a second."""
         if self._guarded is not None and counter % 5 == 0:
             parts = self._app.state.parts
-            if not self._guarded.prove(link_is_open=parts.auth.link_is_open, in_flight=parts.flying.live.armed):
+            if not self._guarded.prove(link_is_open=parts.auth.link_is_open, in_flight=parts.fleet.any_armed):
                 self.should_exit = True
         return await super().on_tick(counter)
 

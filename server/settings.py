@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, SecretStr, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SecretStr, ValidationError, model_validator
 from pydantic_settings import (
     BaseSettings,
     NoDecode,
@@ -19,6 +19,8 @@ from server.errors import StartError, error_doc
 from telemetry.topics.vehicle import RadarKind
 
 GIB = 1024**3
+MOST_VEHICLES = 8
+NAME_CHARS = 24
 
 
 def _split(value: object) -> object:
@@ -26,6 +28,37 @@ def _split(value: object) -> object:
 
 
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)]
+
+
+def named_links(text: str) -> tuple[str, tuple[str, ...]]:
+    """``NAME=LINK[,LINK]``: a vehicle's name and the connections to it. Raises ValueError."""
+    name, _, links = text.partition("=")
+    found = tuple(part.strip() for part in links.split(",") if part.strip())
+    if not name.strip() or len(name.strip()) > NAME_CHARS or not found:
+        raise ValueError(f"{text!r} is no vehicle: write NAME=LINK, the name with at most {NAME_CHARS} characters.")
+    return name.strip(), found
+
+
+def _split_vehicles(value: object) -> object:
+    return tuple(p.strip() for p in value.split(";") if p.strip()) if isinstance(value, str) else value
+
+
+def _checked_vehicles(value: tuple[str, ...]) -> tuple[str, ...]:
+    named = [named_links(text) for text in value]
+    names, links = [name for name, _ in named], [link for _, links in named for link in links]
+    for what, given in (("the same name", names), ("the same connection", links)):
+        if twice := sorted({each for each in given if given.count(each) > 1}):
+            raise ValueError(f"Two vehicles have {what}: {twice[0]}.")
+    return value
+
+
+Vehicles = Annotated[
+    tuple[str, ...],
+    NoDecode,
+    BeforeValidator(_split_vehicles),
+    AfterValidator(_checked_vehicles),
+    Field(max_length=MOST_VEHICLES),
+]
 
 
 def default_data_dir() -> Path:
@@ -73,6 +106,11 @@ class Settings(BaseSettings):
     link: Names = ()
     """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
     first vehicle heard on one of them is the one that is flown."""
+    vehicle: Vehicles = ()
+    """Several vehicles, each with its name and its connections, separated by semicolons: Bee=udpin:0.0.0.0:14550;
+    Wasp=udpin:0.0.0.0:14560. What link names is the first vehicle then, and these come after it."""
+    demo_vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 1
+    """How many simulated vehicles the demo has. Only the first one has sensors."""
     demo_world: bool = True
     """Whether the demo's simulated vehicle has radar and camera, in a world with things that its surface model does not
     know."""
@@ -83,6 +121,22 @@ class Settings(BaseSettings):
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)
     """Where the built console lies."""
+
+    @model_validator(mode="after")
+    def _check_vehicles(self) -> Self:
+        if len(wanted := self.vehicles) > MOST_VEHICLES:
+            raise ValueError(f"There are {len(wanted)} vehicles, and at most {MOST_VEHICLES} can be flown.")
+        if twice := set(self.link) & {link for text in self.vehicle for link in named_links(text)[1]}:
+            raise ValueError(f"{sorted(twice)[0]} is a connection of two vehicles.")
+        return self
+
+    @property
+    def vehicles(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Name and connections of each, the first one first."""
+        named = [named_links(text) for text in self.vehicle]
+        if self.link or not named:
+            named.insert(0, ("Vehicle 1", self.link))
+        return named
 
     @model_validator(mode="before")
     @classmethod
@@ -184,6 +238,7 @@ _DOCUMENTED = {
     "tls_certificate": "none",
     "tls_key": "none",
     "link": "none",
+    "vehicle": "none",
     "allowed_hosts": "none",
     "allowed_origins": "none",
     "console_dir": "`web/dist` of the project",

@@ -1,13 +1,14 @@
-"""Flying as a whole: the server's place on the bus, and everything that hangs on it."""
+"""One vehicle: the server's place on its bus, and everything that hangs on it."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import os
-import sys
 import time
 from collections.abc import Coroutine
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from server.door.hub import Hub
@@ -15,11 +16,11 @@ from server.door.lease import Lease
 from server.door.operators import Operators
 from server.errors import reported
 from server.flying.flight_desk import FlightDesk
+from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
-from server.flying.recordings import RecordingDesk, TrackSoFar
-from server.flying.reviewing import Reviewing
-from server.flying.scenery import Scenery
+from server.flying.recordings import Recording, TrackSoFar
 from server.flying.simulation import Simulation
+from server.flying.vehicle_logs import VehicleLogs
 from server.flying.work import FlightWork
 from server.heard.agents import Agents
 from server.heard.channel import Channel
@@ -31,73 +32,104 @@ from server.heard.relay import Relay
 from server.library import Library
 from server.library.recording_list import RecordingShelf
 from server.obstacles.obstacles import Obstacles
-from server.schemas import (
-    LinkMessage,
-    NoticeMessage,
-    ServerMessage,
-    TransferMessage,
-)
-from server.settings import Settings
+from server.obstacles.replayed import Replayed
+from server.schemas import LinkMessage, NoticeMessage, ServerMessage, TransferMessage, VehicleAlarm, VehicleDoc
+from server.schemas.station_docs import FIRST_VEHICLE
 from server.studies.scenario_desk import ScenarioDesk
-from server.traversability.live_uwb import LiveUwb
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import RadarKind, VehicleState
 
 log = logging.getLogger("hedgehop.flying")
 
 RUNTIME_FOLDER = "run"
 ALIVE_EVERY_S = 1.0
+APART_M = 15.0
+"""From one of the demo's vehicles to the next."""
+_CRITICAL, _CRITICAL_FOR_S = 2, 120.0
+"""MAV_SEVERITY: emergency, alert and critical; for so long after it was said it is told where others are shown."""
 _LINK_FAILS = 1, "The link has failed: no command reaches the vehicle. Take the pilot's transmitter."
 _LINK_IS_BACK = 5, "The link answers again."
 """Each with its MAV_SEVERITY."""
 
 
-class Flying:
-    """Everything about vehicles that the server does; all methods belong to the event loop."""
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """What the vehicles of a station have in common."""
 
-    def __init__(
-        self,
-        bus: Bus,
-        lease: Lease,
-        library: Library,
-        hub: Hub,
-        workspace: Workspace,
-        scenarios: ScenarioDesk,
-        settings: Settings,
-    ) -> None:
-        self._bus, self._hub, self._workspace, self._scenarios = bus, hub, workspace, scenarios
-        self.lease, self.operators = lease, Operators(lease, hub)
-        self._present = present = Present(hub)
-        self._lane = lane = Lane("flight")
-        runtime_dir, board = library.root / RUNTIME_FOLDER, workspace.board
-        link, aboard = LinkClient(bus, lease.issue_above), Aboard(library.root / "onboard.json")
-        self.shelf = RecordingShelf(library)
-        self.nodes = Nodes(bus, runtime_dir, self.shelf.folder, present, demo_radar=settings.demo_radar)
+    library: Library
+    hub: Hub
+    workspace: Workspace
+    scenarios: ScenarioDesk
+    shelf: RecordingShelf
+    lane: Lane
+    replayed: Replayed
+    channels: dict[int, Channel] = field(default_factory=dict)
+    """By the vehicle's number."""
+
+    def on_vehicle(self) -> None:
+        """Without a surface model the 3D view shows the ground around the first vehicle's home."""
+        armed = any(channel.armed for channel in self.channels.values())
+        self.workspace.picture.on_vehicle(armed, self.channels[FIRST_VEHICLE].home)
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleWanted:
+    """A vehicle that the station was started for."""
+
+    number: int
+    name: str
+    links: tuple[str, ...]
+    is_alone: bool = True
+    """Sentences about it need not name it."""
+    demo_radar: RadarKind = "model"
+    demo_world: bool = True
+
+
+class Flying:
+    """Everything about one vehicle that the server does; all methods belong to the event loop."""
+
+    def __init__(self, bus: Bus, lease: Lease, folder: Path, recordings: Path, wanted: VehicleWanted, shared: Shared):
+        library, workspace, lane, number = shared.library, shared.workspace, shared.lane, wanted.number
+        self.number, self.bus, self._shared, self._workspace = number, bus, shared, workspace
+        pages = shared.hub.of_vehicle(number)
+        self.name, called = wanted.name, "the vehicle" if wanted.is_alone else wanted.name
+        self.lease, self.operators = lease, Operators(lease, shared.hub, number, called)
+        self._present = present = Present(pages)
+        runtime_dir = folder / RUNTIME_FOLDER
+        link, aboard = LinkClient(bus, lease.issue_above), Aboard(folder / "onboard.json")
+        self.nodes = Nodes(bus, runtime_dir, recordings, present, demo_radar=wanted.demo_radar)
         self.agents = Agents(bus)
-        self.live, self.replay = Channel("live", present), Channel("replay", present)
-        self.connections = Connections(link, self.nodes, lease, configured=settings.link)
-        self._obstacles = Obstacles(bus, library, workspace, self.nodes, link, self.live, aboard, lane, lease, present)
+        self.live, self._aboard = Channel("live", present), aboard
+        shared.channels[number] = self.live
+        self._critical: VehicleText | None = None
+        self.connections = Connections(link, self.nodes, lease, configured=wanted.links)
+        self._obstacles = Obstacles(
+            folder,
+            bus,
+            library,
+            workspace,
+            self.nodes,
+            link,
+            self.live,
+            aboard,
+            lane,
+            lease,
+            present,
+            shared.replayed,
+            workspace.sights if number == FIRST_VEHICLE else None,
+        )
         self.obstacles, self.looking = self._obstacles.desk, self._obstacles.looking
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
         self.desk = FlightDesk(link, work, aboard, workspace, self.live, self._watch, bus, present)
-        self.reviewing = Reviewing(
-            library,
-            self.shelf,
-            workspace.on_show,
-            self.replay,
-            self.nodes,
-            board,
-            self._obstacles.watches["replay"],
-            self._obstacles.tracks["replay"],
-            present,
-        )
-        self.recording = RecordingDesk(self.shelf, self.nodes, board, self.reviewing, present)
+        self.parameters = ParameterDesk(link, self.live, aboard, library.root)
+        self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
+        self.logs = VehicleLogs(link, self.live, library)
         self.simulation = Simulation(
             library,
             workspace,
@@ -106,21 +138,20 @@ class Flying:
             self._obstacles,
             lane,
             runtime_dir,
-            demo_world=settings.demo_world,
+            demo_world=wanted.demo_world and number == FIRST_VEHICLE,
+            aside_m=APART_M * (number - FIRST_VEHICLE),
         )
-        self.uwb = LiveUwb(workspace.traversability, library, bus)
-        self._scenery = Scenery(workspace.stage, {"live": self.live, "replay": self.replay})
         self._followed = PlanFollowed(library, self.live, aboard, workspace)
-        self._track_so_far = TrackSoFar(self.shelf.folder, self.live, lane)
+        self._track_so_far = TrackSoFar(recordings, self.live, lane)
 
     @classmethod
-    async def open(
-        cls, settings: Settings, library: Library, hub: Hub, workspace: Workspace, scenarios: ScenarioDesk
-    ) -> Flying:
+    async def open(cls, wanted: VehicleWanted, shared: Shared) -> Flying:
         """Joins the bus; nodes that a server before this one has left running are taken over. Raises BusError."""
-        lease = await asyncio.to_thread(Lease, library.root / "lease.json")
-        bus = await Bus.open(library.root / RUNTIME_FOLDER, "server")
-        return cls(bus, lease, library, hub, workspace, scenarios, settings)
+        folder = shared.library.vehicle_dir(wanted.number)
+        recordings = await asyncio.to_thread(shared.shelf.folder_of, wanted.number)
+        lease = await asyncio.to_thread(Lease, folder / "lease.json")
+        bus = await Bus.open(folder / RUNTIME_FOLDER, "server")
+        return cls(bus, lease, folder, recordings, wanted, shared)
 
     # Life
 
@@ -131,30 +162,22 @@ class Flying:
             *self._relay().loops(),
             self.nodes.supervisor.run(),
             self._beat(),
-            self._hear_of_plan(),
             self._hear_of_nodes(),
-            self._scenery.run(),
             self._followed.run(),
-            *self.uwb.loops(),
+            self.logs.run(),
             *self._obstacles.loops(),
             *starts,
         ]
 
     async def close(self) -> None:
-        """Nodes go on while a vehicle is armed: the next server finds them again."""
-        if self.live.armed:
-            sys.stdout.write(_LEFT_FLYING)
-            sys.stdout.flush()
-        else:
+        """Nodes go on while the vehicle is armed: the next server finds them again."""
+        if not self.live.armed:
             await self.nodes.stop_all()
         self.live.close()
-        self.replay.close()
-        await self._lane.close()
-        await self._bus.close()
+        await self.bus.close()
 
     async def _start(self, *, demo: bool) -> None:
         await self._obstacles.start()
-        await self.recording.refresh()
         if self.connections.wanted or demo:
             await self.nodes.link()
             await self.connections.ask_for_configured()
@@ -167,24 +190,21 @@ class Flying:
             await self.simulation.start(self.lease.server_operator())
         except Exception as error:
             doc = reported(error, log, "Starting the simulated vehicle")
-            self._hub.publish(NoticeMessage(level="warning", error=doc))
+            self._shared.hub.publish(NoticeMessage(level="warning", error=doc))
 
     async def _beat(self) -> None:
         while True:
-            self._bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
+            self.bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), os.getpid()))
             self.live.tick()
             self._obstacles.tick()
             await self.operators.look()
             await asyncio.sleep(ALIVE_EVERY_S)
 
-    async def _hear_of_plan(self) -> None:
+    def on_plan(self) -> None:
         """Another document is open, or there is another answer to it."""
-        while True:
-            await self._workspace.changed.wait()
-            self._workspace.changed.clear()
-            self.desk.refresh()
-            self._followed.look()
-            self._obstacles.on_plan()
+        self.desk.refresh()
+        self._followed.look()
+        self._obstacles.on_plan()
 
     async def _hear_of_nodes(self) -> None:
         """The link that flies for the operator fails, or is back: said at once, with what to do."""
@@ -203,38 +223,36 @@ class Flying:
     # What is heard
 
     def _relay(self) -> Relay:
-        relay, present = Relay(self._bus), self._present
+        relay, present = Relay(self.bus), self._present
         relay.on(Topic.VEHICLE, self._on_state)
-        relay.on(Topic.TEXT, self.live.on_text, each=True)
+        relay.on(Topic.TEXT, self._on_text, each=True)
         relay.on(Topic.LINK, self._on_link)
-        # Its scans are placed between positions: each one counts.
-        relay.on(Topic.VEHICLE, self.uwb.on_state, each=True)
-        relay.on(Topic.UWB_SCAN, self.uwb.on_scan, each=True)
         relay.on(Topic.TRANSFER, lambda transfer: present.publish(TransferMessage(transfer=transfer)))
         relay.on(Topic.FLIGHT, self._on_flight)
         relay.on(Topic.AVOIDANCE, self._on_avoidance)
         relay.on(Topic.RECORDER, self._on_recorder)
-        relay.on(Topic.REPLAY, self.reviewing.on_status)
-        relay.on(Topic.VEHICLE, self.replay.on_state, replayed=True)
-        relay.on(Topic.TEXT, self.replay.on_text, replayed=True, each=True)
-        relay.on(Topic.FLIGHT, self.replay.on_flight, replayed=True)
         self._obstacles.hear(relay)
         return relay
 
     def _on_state(self, state: VehicleState) -> None:
         was_armed = self.live.armed
         self.live.on_state(state)
-        self._workspace.picture.on_vehicle(self.live.armed, self.live.home)
+        self._shared.on_vehicle()
         if was_armed and not state.armed:
             self.desk.on_disarmed()
         if state.armed and not was_armed:
-            self._scenarios.on_armed()
+            self._shared.scenarios.on_armed()
+
+    def _on_text(self, text: VehicleText) -> None:
+        if text.severity <= _CRITICAL:
+            self._critical = text
+        self.live.on_text(text)
 
     async def _on_link(self, status: LinkStatus) -> None:
         self._present.publish(LinkMessage(link=status))
         if status.adopted is None and self.live.state is not None:
             self.live.forget()
-            self._workspace.picture.on_vehicle(False, None)
+            self._shared.on_vehicle()
         self.desk.on_link(status)
         self._followed.look()
         await self.connections.on_status(status)
@@ -250,18 +268,60 @@ class Flying:
         self.desk.refresh()
 
     async def _on_recorder(self, status: RecorderStatus) -> None:
-        await self.recording.on_status(status)
+        self.recording.on_status(status)
         await self._track_so_far.on_status(status)
 
     # Pages and who is in charge
 
+    def doc(self, near: VehicleAlarm | None) -> VehicleDoc:
+        """For pages that show another vehicle. ``near``: the alarm, where another one comes near."""
+        state, status, holder = self.live.state, self.connections.status, self.lease.holder
+        record = self._aboard.record
+        known = VehicleDoc(
+            number=self.number,
+            name=self.name,
+            link="none" if status is None else status.state,
+            silent_s=None if status is None else status.silent_s,
+            phase=self.live.flight.phase,
+            holder=None if holder is None else holder.name,
+            plan_name="" if record is None else record.name,
+            alarm=self._loss() or near or self._alert(),
+        )
+        if state is None:
+            return known
+        seen = {
+            "lat_deg": state.lat_deg,
+            "lon_deg": state.lon_deg,
+            "alt_rel_home_m": state.alt_rel_home_m,
+            "ground_speed_m_s": state.ground_speed_m_s,
+            "mode": state.mode,
+            "armed": state.armed,
+            "battery_share": state.battery_share,
+        }
+        return known.model_copy(update=seen)
+
+    def _loss(self) -> VehicleAlarm | None:
+        """Comes first: what a sensor said before it is old."""
+        status = self.connections.status
+        if self.live.armed and not self.nodes.link_answers:
+            return VehicleAlarm(kind="loss", key="link", text=_LINK_FAILS[1])
+        if self.live.armed and status is not None and status.state == "lost":
+            text = "Nothing is heard of it any more. Take the pilot's transmitter."
+            return VehicleAlarm(kind="loss", key="lost", text=text)
+        return None
+
+    def _alert(self) -> VehicleAlarm | None:
+        critical = self._critical
+        for doc in self._watch.state.alerts:
+            if not doc.over and not doc.acknowledged:
+                return VehicleAlarm(kind="alert", key=doc.alert.id, text=doc.alert.text)
+        if self.live.state is not None and self.live.state.fence_breach not in (None, "none"):
+            text = "The vehicle says that it is beyond its fence."
+            return VehicleAlarm(kind="alert", key=f"fence {self.live.state.fence_breach}", text=text)
+        if critical is not None and time.time() - critical.t_utc_s < _CRITICAL_FOR_S:
+            return VehicleAlarm(kind="alert", key=f"{critical.t_utc_s} {critical.text}", text=critical.text)
+        return None
+
     def present_for(self, session_key: str) -> list[ServerMessage]:
         """What a page is told right after its snapshot."""
         return [*self._present.messages(), self.operators.message(session_key)]
-
-
-_LEFT_FLYING = (
-    "The vehicle is armed: its link and the recording go on without the server, for 10 seconds.\n"
-    "Start Hedgehop again within that time to stay in touch. After it, Hedgehop falls silent and the vehicle's own\n"
-    "failsafe decides; in GUIDED it is told to hold its position first.\n"
-)

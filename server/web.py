@@ -26,6 +26,7 @@ from server.api import (
     flight_routes,
     link_routes,
     obstacle_routes,
+    parameter_routes,
     plan_routes,
     proxy,
     radar_file_routes,
@@ -35,6 +36,7 @@ from server.api import (
     session_routes,
     terrain_routes,
     traversability_routes,
+    vehicle_log_routes,
     view_routes,
 )
 from server.api.access import Admitted, Parts, answer
@@ -55,6 +57,7 @@ from server.library.reserve import DiskWatch
 from server.library.scenario_runs import ScenarioShelf
 from server.scene.host import SceneHost
 from server.schemas import ErrorDoc, NoticeMessage
+from server.schemas.station_docs import FIRST_VEHICLE
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
 from server.studies.scenario_desk import ScenarioDesk
@@ -62,15 +65,15 @@ from server.work.loop_lag import LoopLag
 from server.work.task_group import Background
 
 if TYPE_CHECKING:
-    from server.stations import Flying
+    from server.fleet import Fleet
     from server.workspace import Workspace
 
 log = logging.getLogger("hedgehop.app")
 
 MakeWorkspace = Callable[[Library, Hub, SceneHost, Background], "Workspace"]
 """Joins the open plan to its files, its pages and its 3D view."""
-OpenFlying = Callable[[Settings, Library, Hub, "Workspace", ScenarioDesk], Awaitable["Flying"]]
-"""Joins the bus and all that hangs on it."""
+OpenFleet = Callable[[Settings, Library, Hub, "Workspace", ScenarioDesk, bool], Awaitable["Fleet"]]
+"""Joins the buses and all that hangs on them."""
 ROUTERS = (
     session_routes,
     account_routes,
@@ -81,7 +84,9 @@ ROUTERS = (
     view_routes,
     console_routes,
     link_routes,
+    vehicle_log_routes,
     flight_routes,
+    parameter_routes,
     obstacle_routes,
     sensor_routes,
     recording_routes,
@@ -95,7 +100,7 @@ def create_app(
     settings: Settings,
     library: Library,
     make_workspace: MakeWorkspace,
-    open_flying: OpenFlying,
+    open_fleet: OpenFleet,
     *,
     demo: bool = False,
     tls: Tls | None = None,
@@ -108,7 +113,7 @@ def create_app(
         redoc_url=None,
         openapi_url=None,
         dependencies=[Admitted],
-        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_flying, demo, tls),
+        lifespan=lambda app: _lifespan(app, settings, library, make_workspace, open_fleet, demo, tls),
     )
     for module in ROUTERS:
         app.include_router(module.router)
@@ -126,7 +131,7 @@ async def _lifespan(
     settings: Settings,
     library: Library,
     make_workspace: MakeWorkspace,
-    open_flying: OpenFlying,
+    open_fleet: OpenFleet,
     demo: bool,
     tls: Tls | None,
 ) -> AsyncIterator[None]:
@@ -135,7 +140,7 @@ async def _lifespan(
         stack.callback(background.stop)
         await asyncio.to_thread(_complete_routes, app)
         try:
-            parts = await _open(settings, library, make_workspace, open_flying, background, stack, demo, tls)
+            parts = await _open(settings, library, make_workspace, open_fleet, background, stack, demo, tls)
         except DescribedError as error:
             app.state.start_error = error
             raise
@@ -148,7 +153,7 @@ async def _lifespan(
             parts.audit.run(),
             *_tls_loops(tls, settings, parts.alarms),
         )
-        for loop in (*own, *parts.workspace.loops(), *parts.flying.loops(demo=demo)):
+        for loop in (*own, *parts.workspace.loops(), *parts.fleet.loops(demo=demo)):
             background.spawn(loop)
         try:
             yield
@@ -173,7 +178,7 @@ async def _open(
     settings: Settings,
     library: Library,
     make_workspace: MakeWorkspace,
-    open_flying: OpenFlying,
+    open_fleet: OpenFleet,
     background: Background,
     stack: AsyncExitStack,
     demo: bool,
@@ -197,19 +202,17 @@ async def _open(
     stack.push_async_callback(radar.close)
     stack.push_async_callback(scenarios.close)
     log.info("%s", what_holds())
-    flying = await open_flying(settings, library, hub, workspace, scenarios)
-    stack.push_async_callback(flying.close)
+    fleet = await open_fleet(settings, library, hub, workspace, scenarios, demo)
+    stack.push_async_callback(fleet.close)
     await workspace.start(with_demo=demo)
     for notice in library.notices:
         log.warning("%s (%s)", notice.what, notice.where)
     hub.greet_with([NoticeMessage(level="warning", error=notice) for notice in library.notices])
     alarms = Alarms(hub)
-    audit = AuditWatch(library.root, workspace.board, alarms)
+    audit = AuditWatch(lambda: {FIRST_VEHICLE: library.root, **library.vehicle_dirs()}, workspace.board, alarms)
     trust_port = settings.trust_port if tls is not None and tls.offer(settings) else None
     lag = LoopLag()
-    return Parts(
-        settings, auth, hub, library, host, workspace, flying, radar, scenarios, lag, alarms, audit, trust_port
-    )
+    return Parts(settings, auth, hub, library, host, workspace, fleet, radar, scenarios, lag, alarms, audit, trust_port)
 
 
 def _tell_of_disk(parts: Parts, full: ErrorDoc | None) -> None:

@@ -150,11 +150,11 @@ class Workspace:
     async def on_terrain_click(self, lat_deg: float, lon_deg: float, known: bool) -> None:
         await self.pointing.on_terrain(lat_deg, lon_deg, known=known)
 
-    async def on_poi_click(self, poi_id: str) -> None:
-        self.pointing.on_poi(poi_id)
+    async def on_mark_click(self, mark: str) -> None:
+        self.pointing.on_mark(mark)
 
-    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
-        await self.pointing.on_poi_moved(poi_id, lat_deg, lon_deg)
+    async def on_mark_moved(self, mark: str, lat_deg: float, lon_deg: float) -> None:
+        await self.pointing.on_mark_moved(mark, lat_deg, lon_deg)
 
     # What follows
 

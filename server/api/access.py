@@ -27,6 +27,7 @@ from server.work.loop_lag import LoopLag
 from telemetry.topics.requests import Operator
 
 if TYPE_CHECKING:
+    from server.fleet import Fleet
     from server.stations import Flying
     from server.studies.radar_desk import RadarDesk
     from server.studies.scenario_desk import ScenarioDesk
@@ -43,7 +44,7 @@ class Parts:
     library: Library
     scene_host: SceneHost
     workspace: Workspace
-    flying: Flying
+    fleet: Fleet
     radar: RadarDesk
     scenarios: ScenarioDesk
     loop_lag: LoopLag
@@ -128,7 +129,13 @@ def workspace_of(request: Request) -> Workspace:
 
 
 def flying_of(request: Request) -> Flying:
-    return parts_of(request).flying
+    """The vehicle that a page shows is the one that its requests name; raises NotFoundError, BadRequestError."""
+    named = request.headers.get("hedgehop-vehicle") or request.query_params.get("vehicle")
+    return parts_of(request).fleet.named(named)
+
+
+def fleet_of(request: Request) -> Fleet:
+    return parts_of(request).fleet
 
 
 def who_asks(request: Request) -> Identity:
@@ -138,7 +145,7 @@ def who_asks(request: Request) -> Identity:
 def in_charge(request: Request) -> Operator:
     """What a command of this session carries; raises ``NotInChargeError``, and ``LateError`` for one that is late."""
     _check_in_time(request.headers.get("hedgehop-good-until", ""))
-    return parts_of(request).flying.lease.operator(identity_of(request).session_key)
+    return flying_of(request).lease.operator(identity_of(request).session_key)
 
 
 def _check_in_time(good_until: str) -> None:
@@ -159,6 +166,8 @@ def _check_in_time(good_until: str) -> None:
 Admitted = Depends(admit)
 Work = Annotated["Workspace", Depends(workspace_of)]
 Fly = Annotated["Flying", Depends(flying_of)]
+"""The vehicle that the request is about."""
+All = Annotated["Fleet", Depends(fleet_of)]
 Who = Annotated[Identity, Depends(who_asks)]
 InCharge = Annotated[Operator, Depends(in_charge)]
 """Demanded by everything that reaches a vehicle."""

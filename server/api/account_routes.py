@@ -78,7 +78,7 @@ async def change_password(body: ChangePassword, who: Who, request: Request) -> N
 async def sessions(who: Who, request: Request) -> Response:
     """Who is in: newest first."""
     parts = parts_of(request)
-    holder = parts.flying.lease.holder
+    in_charge = parts.fleet.holders
     found = [
         SessionDoc(
             id=key[:_ID_LENGTH],
@@ -88,7 +88,7 @@ async def sessions(who: Who, request: Request) -> Response:
             seen_utc_s=session.seen_utc_s,
             address=session.address,
             mine=key == who.session_key,
-            in_charge=holder is not None and holder.session_key == key,
+            in_charge=key in in_charge,
         )
         for key, (session, role) in parts.auth.sessions.items()
     ]

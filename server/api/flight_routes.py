@@ -9,7 +9,7 @@ from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
 from server.schemas import FlyState, StartFlight, UploadPlan
-from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome
+from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome, StopMotors
 
 router = APIRouter(prefix="/api/flight", tags=["flight"], responses=ERROR_RESPONSES)
 
@@ -46,3 +46,4 @@ _add_command("pause", Pause, "The vehicle holds its position.")
 _add_command("resume", Resume, "Goes on with what was paused.")
 _add_command("return_home", ReturnHome)
 _add_command("land", Land, "Here and now.")
+_add_command("emergency_stop", StopMotors, "The motors stop at once, also in the air: the vehicle falls.")

@@ -14,6 +14,7 @@ from server.schemas import Imported, OpenPlan, PlanEdit, PlanState, SavePlanAs, 
 
 router = APIRouter(prefix="/api", tags=["plan"], responses=ERROR_RESPONSES)
 
+FenceFileName = Literal["fence.plan", "fence.waypoints", "rally.waypoints", "fence.kml", "fence.geojson"]
 ExportFile = Literal[FileName, "all.zip"]
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
@@ -81,12 +82,20 @@ async def delete(plan_id: str, workspace: Work) -> None:
     openapi_extra={"requestBody": {"content": {"application/octet-stream": {}}, "required": True}},
 )
 async def import_points(
-    request: Request, workspace: Work, filename: Annotated[str, Query(max_length=1000)]
+    request: Request, workspace: Work, filename: Annotated[str, Query(max_length=1000)], only_fence: bool = False
 ) -> Response:
-    """Points or a polygon from the raw bytes of a CSV, GeoJSON, KML, .waypoints or .plan file."""
+    """Points, a polygon or a fence from the raw bytes of a CSV, GeoJSON, KML, .waypoints or .plan file."""
     name = display_name(filename)
     upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(name)))
-    return answer(await workspace.plans.import_points(name, upload))
+    return answer(await workspace.plans.import_points(name, upload, only_fence=only_fence))
+
+
+@router.get("/plan/fence/{file}", response_class=Response)
+async def export_fence(file: FenceFileName, workspace: Work) -> Response:
+    """Fence and rally points of the open plan, certified or not."""
+    data = workspace.plans.exported_fence(file)
+    headers = {"content-disposition": f'attachment; filename="{file}"'}
+    return Response(data, media_type=MEDIA_TYPES[file.rpartition(".")[2]], headers=headers)
 
 
 @router.post("/plan/shortest_order", response_model=PlanState)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import RootModel
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk
 from server.library.recording_list import suffix_of_recording
@@ -35,43 +35,43 @@ async def stop(operator: InCharge, flying: Fly) -> None:
 
 
 @router.get("/recordings", response_model=Recordings)
-async def recordings(flying: Fly) -> Response:
-    return answer(Recordings(await flying.recording.docs()))
+async def recordings(fleet: All) -> Response:
+    return answer(Recordings(await fleet.recordings.docs()))
 
 
 @router.post("/recordings/import", response_model=RecordingDoc, openapi_extra=RAW_BODY)
-async def add(request: Request, flying: Fly, filename: Annotated[str, Query(max_length=1000)]) -> Response:
-    """A ``.tlog`` of any ground station, or an ``.mcap`` of Hedgehop's."""
+async def add(request: Request, fleet: All, filename: Annotated[str, Query(max_length=1000)]) -> Response:
+    """An ``.mcap`` of Hedgehop's, a ``.tlog`` of any ground station, a ``.bin`` or ``.ulg`` of the vehicle's own."""
     name = display_name(filename)
     suffix = suffix_of_recording(name)
     upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix))
-    return answer(await flying.recording.add(upload, name))
+    return answer(await fleet.recordings.add(upload, name))
 
 
 @router.get("/recordings/{recording_id}/file", response_class=FileResponse)
-async def download(recording_id: str, flying: Fly) -> Response:
-    path = flying.shelf.path(recording_id)
+async def download(recording_id: str, fleet: All) -> Response:
+    path = fleet.shelf.path(recording_id)
     return FileResponse(path, media_type="application/octet-stream", filename=path.name)
 
 
 @router.delete("/recordings/{recording_id}", **DONE)
-async def delete(recording_id: str, flying: Fly) -> None:
+async def delete(recording_id: str, fleet: All) -> None:
     """409 for the one that is being written."""
-    await flying.recording.delete(recording_id)
+    await fleet.recordings.delete(recording_id)
 
 
 @router.post("/review/open", **DONE)
-async def open_review(body: OpenReview, flying: Fly) -> None:
+async def open_review(body: OpenReview, fleet: All) -> None:
     """Reads a recording, judges it against its plan, and makes it ready to be played."""
-    await flying.reviewing.open(body)
+    await fleet.reviewing.open(body)
 
 
 @router.post("/review/close", **DONE)
-async def close_review(flying: Fly) -> None:
-    await flying.reviewing.close()
+async def close_review(fleet: All) -> None:
+    await fleet.reviewing.close()
 
 
 @router.post("/review/play", **DONE)
-async def play(body: PlayReview, flying: Fly) -> None:
+async def play(body: PlayReview, fleet: All) -> None:
     """Plays, pauses, seeks, changes speed. Nothing that is replayed can reach a vehicle."""
-    await flying.reviewing.play(body)
+    await fleet.reviewing.play(body)

@@ -39,7 +39,7 @@ async def runs(request: Request) -> Response:
 async def run(body: RunScenario, request: Request) -> Response:
     """Flies one with one seed; 409 while a vehicle is armed, 503 while another runs."""
     parts = parts_of(request)
-    return answer(parts.scenarios.run(body, armed=parts.flying.live.armed), 202)
+    return answer(parts.scenarios.run(body, armed=parts.fleet.any_armed), 202)
 
 
 @router.post("/runs/{run_id}/cancel", **DONE)

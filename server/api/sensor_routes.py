@@ -40,10 +40,10 @@ async def frames(websocket: WebSocket) -> None:
         return
     offered = websocket.scope.get("subprotocols", [])
     await websocket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
-    intake = Intake()
+    intake, agents = Intake(), parts.fleet.first.agents
     try:
-        with parts.flying.agents.connected(intake):
-            await until_first(_take(websocket, intake, parts.flying.agents), _report(websocket, intake))
+        with agents.connected(intake):
+            await until_first(_take(websocket, intake, agents), _report(websocket, intake))
     except BusyError as error:
         log.warning("An agent was sent away: %s", error)
         await websocket.close(CLOSE_TRY_LATER, error.what)

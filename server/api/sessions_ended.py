@@ -17,8 +17,7 @@ async def end_sessions(parts: Parts, keys: Collection[str]) -> None:
 
 async def close_ended(parts: Parts) -> None:
     """Of accounts that were removed or have another password, and of those whose time is over."""
-    holder = parts.flying.lease.holder
-    keys = parts.hub.session_keys() | (set() if holder is None else {holder.session_key})
+    keys = parts.hub.session_keys() | parts.fleet.holders
     await _close(parts, parts.auth.ended(keys))
 
 
@@ -34,4 +33,5 @@ async def watch_sessions(parts: Parts) -> None:
 async def _close(parts: Parts, keys: Collection[str]) -> None:
     for key in keys:
         parts.hub.close_session(key)
-        await parts.flying.operators.release(key)
+        for flying in parts.fleet.flights:
+            await flying.operators.release(key)

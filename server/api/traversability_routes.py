@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, Work, answer, parts_of
+from server.api.access import DONE, ERROR_RESPONSES, All, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
 from server.api.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
@@ -41,9 +41,9 @@ async def clear_foliage(request: Request, workspace: Work, asked: Annotated[UwbC
 
 
 @router.put("/uwb/live", response_model=TraversabilityState)
-async def fuse_live(workspace: Work, flying: Fly, asked: Annotated[UwbRule, Query()]) -> Response:
+async def fuse_live(workspace: Work, fleet: All, asked: Annotated[UwbRule, Query()]) -> Response:
     """How the scans of a radar that scans now are fused, those before as well."""
-    flying.uwb.set_params(asked.params())
+    fleet.uwb.set_params(asked.params())
     return answer(workspace.traversability.state)
 
 
@@ -62,7 +62,7 @@ async def export_layer(layer: LayerName, workspace: Work) -> Response:
 
 
 @router.delete("", **DONE)
-async def forget(workspace: Work, flying: Fly) -> None:
+async def forget(workspace: Work, fleet: All) -> None:
     """Forgets the maps, and live scans; what is being worked out is cancelled."""
     workspace.traversability.forget()
-    flying.uwb.clear()
+    fleet.uwb.clear()

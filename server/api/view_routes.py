@@ -8,6 +8,7 @@ from server.api.access import Need, identity_of, needs, parts_of
 from server.door.page import CLOSE_SIGNED_OUT, CLOSE_TRY_LATER
 from server.errors import BusyError, SignInError
 from server.schemas import MeDoc, MeMessage
+from server.schemas.station_docs import FIRST_VEHICLE
 
 router = APIRouter()
 
@@ -15,7 +16,8 @@ router = APIRouter()
 @router.websocket("/ws")
 @needs(Need.OBSERVER)
 async def stream(websocket: WebSocket) -> None:
-    """A snapshot, then what changes. ``?page=`` names the page of the stream before this one, which had broken off.
+    """A snapshot, then what changes. ``?page=`` names the page of the stream before this one, which had broken off;
+    ``?vehicle=`` the vehicle that it showed.
 
     The guard has refused foreign origins before this.
     """
@@ -38,8 +40,15 @@ async def stream(websocket: WebSocket) -> None:
             page_id=websocket.query_params.get("page"),
             may_change=identity.may_change,
             snapshot=parts.workspace.snapshot,
-            present=lambda: [me, parts.alarms.message, *parts.workspace.present(), *parts.flying.present_for(key)],
+            present=lambda: [me, parts.alarms.message, *parts.workspace.present(), *parts.fleet.present()],
+            vehicle=_number(websocket.query_params.get("vehicle", "")),
+            of_vehicle=lambda number: parts.fleet.of(number).present_for(key),
             on_message=parts.workspace.on_show.on_client_message,
         )
     except BusyError:
         await websocket.close(CLOSE_TRY_LATER)
+
+
+def _number(text: str) -> int:
+    """Of a vehicle that may have gone: then the first one is shown."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 4 else FIRST_VEHICLE

@@ -56,6 +56,7 @@ class _Lazy(TyperGroup):
 
 
 class _Commands(_Lazy):
+    with_negative: ClassVar = frozenset({"goto"})
     places: ClassVar = {
         "serve": (".serve_command.serve", examples.SERVE),
         "tls": (".tls_command.tls", examples.TLS),
@@ -65,16 +66,18 @@ class _Commands(_Lazy):
         "upload": (".upload_command.upload", examples.UPLOAD),
         "fence": (".places_command.fence", examples.FENCE),
         "rally": (".places_command.rally", examples.RALLY),
-        "fly": (".fly_command.fly", examples.FLY),
+        "fly": (".flights.fly_command.fly", examples.FLY),
+        "goto": (".flights.goto_command.goto", examples.GOTO),
         "sim": (".sim_command.sim", examples.SIM),
         "review": (".review_command.review", examples.REVIEW),
         "scenario": (".scenario_command.scenario", examples.SCENARIO),
         "map": (".map_command.build_map", examples.MAP),
         "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
-        "agent": (".agent_command.agent", examples.AGENT),
+        "agent": (".agent.command.agent", examples.AGENT),
         "audit": (".audit_command.audit", examples.AUDIT),
         "bench": ("bench", examples.BENCH),
         "params": ("", ""),
+        "logs": ("", ""),
         "radar": ("", ""),
         "account": ("", ""),
     }
@@ -82,8 +85,8 @@ class _Commands(_Lazy):
 
 class _RadarCommands(_Lazy):
     places: ClassVar = {
-        "process": (".radar_command.process", examples.RADAR_PROCESS),
-        "tracks": (".radar_tracks_command.tracks", examples.RADAR_TRACKS),
+        "process": (".radar.process_command.process", examples.RADAR_PROCESS),
+        "tracks": (".radar.tracks_command.tracks", examples.RADAR_TRACKS),
     }
 
 
@@ -96,6 +99,13 @@ class _ParamsCommands(_Lazy):
         "load": (".params.commands.load", examples.PARAMS_LOAD),
         "compare": (".params.commands.compare", examples.PARAMS_COMPARE),
         "review": (".params.review_command.review", examples.PARAMS_REVIEW),
+    }
+
+
+class _LogsCommands(_Lazy):
+    places: ClassVar = {
+        "list": (".logs.commands.list_", examples.LOGS_LIST),
+        "get": (".logs.commands.get", examples.LOGS_GET),
     }
 
 
@@ -118,7 +128,10 @@ account = typer.Typer(
 params = typer.Typer(
     name="params", help="The vehicle's parameters.", no_args_is_help=True, rich_markup_mode="rich", cls=_ParamsCommands
 )
-_GROUPS = {"radar": radar, "account": account, "params": params}
+logs = typer.Typer(
+    name="logs", help="Logs on the vehicle.", no_args_is_help=True, rich_markup_mode="rich", cls=_LogsCommands
+)
+_GROUPS = {"radar": radar, "account": account, "params": params, "logs": logs}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

@@ -42,7 +42,10 @@ FIRST_KEYS = (
 
 @command
 def review(
-    recording: Annotated[Path, Argument(metavar="RECORDING|TLOG", help="A recording, or any ground station's .tlog.")],
+    recording: Annotated[
+        Path,
+        Argument(metavar="RECORDING", help="A recording, a ground station's .tlog, or a vehicle's own .bin or .ulg."),
+    ],
     *,
     dsm: o.FlightDsm = None,
     mission: Annotated[

@@ -42,6 +42,11 @@ def serve(
             metavar="ADDRESS", help="Connection to a vehicle, such as udpin:0.0.0.0:14550; may be given several times."
         ),
     ] = None,
+    vehicle: Annotated[
+        list[str] | None,
+        Option(metavar="NAME=LINK[,LINK]", help="One of several vehicles and its connections; once for each of them."),
+    ] = None,
+    demo_vehicles: Annotated[int | None, Option(help="How many simulated vehicles the demo has; default 1.")] = None,
     data_dir: Annotated[
         Path | None, Option(help="Where models and plans are kept; default: the user's data home.")
     ] = None,
@@ -61,6 +66,8 @@ def serve(
         behind_proxy=behind_proxy,
         data_dir=data_dir,
         link=link or None,
+        vehicle=vehicle or None,
+        demo_vehicles=demo_vehicles,
         demo_world=demo_world,
         demo_radar=radar,
     )

@@ -6,7 +6,7 @@ import asyncio
 import io
 import logging
 import zipfile
-from collections.abc import Awaitable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from server.door.alarms import Alarms
@@ -14,7 +14,9 @@ from server.errors import reported
 from server.library import audit_log
 from server.library.audit_log import AuditVerdict
 from server.schemas import AuditDoc, AuditEntryDoc, ErrorDoc
+from server.schemas.station_docs import FIRST_VEHICLE
 from server.work.job_board import JobBoard
+from server.work.jobs import Lane
 from telemetry.link.audit import AUDIT_FILE
 
 log = logging.getLogger("hedgehop.audit")
@@ -26,8 +28,9 @@ NEWEST = 50
 class AuditWatch:
     """All methods belong to the event loop; the log is read beside it, and held against recordings in a worker."""
 
-    def __init__(self, folder: Path, board: JobBoard, alarms: Alarms) -> None:
-        self._file, self._board, self._alarms = folder / AUDIT_FILE, board, alarms
+    def __init__(self, folders: Callable[[], Mapping[int, Path]], board: JobBoard, alarms: Alarms) -> None:
+        """``folders``: of each vehicle by its number; each has a log of its own."""
+        self._folders, self._board, self._alarms = folders, board, alarms
         self._verdict: AuditVerdict | None = None
         self._looking = asyncio.Lock()
 
@@ -46,16 +49,21 @@ class AuditWatch:
             return await self._verify()
 
     async def _verify(self) -> AuditVerdict | None:
-        if not await asyncio.to_thread(self._file.is_file):
-            self._verdict = None
+        files = await asyncio.to_thread(self._files)
+        found: dict[int, AuditVerdict] = {}
+        for number, file in files.items():
+            key = await asyncio.to_thread(audit_log.read_key, file.parent)
+
+            async def look(lane: Lane, number: int = number, file: Path = file, key: bytes = key) -> None:
+                found[number] = await lane.call(audit_log.look_through, file, key)
+
+            await self._board.unseen(look)
+        self._verdict = verdict = audit_log.joined(found) if found else None
+        if verdict is None:
             return None
-        key = await asyncio.to_thread(audit_log.read_key, self._file.parent)
-        found: list[AuditVerdict] = []
-        await self._board.unseen(lambda lane: _kept(found, lane.call(audit_log.look_through, self._file, key)))
-        self._verdict = verdict = found[0]
         if verdict.faults:
             what = " ".join(verdict.faults)
-            error = ErrorDoc(code="audit_broken", what=what, where=self._file.name, advice=audit_log.ADVICE)
+            error = ErrorDoc(code="audit_broken", what=what, where=AUDIT_FILE, advice=audit_log.ADVICE)
             self._alarms.begin("audit", error)
         else:
             self._alarms.end("audit")
@@ -63,10 +71,10 @@ class AuditWatch:
 
     async def doc(self) -> AuditDoc:
         """As last looked through, with the entries of now. Raises StorageError."""
-        has_log = await asyncio.to_thread(self._file.is_file)
-        if has_log and self._verdict is None:
+        files = await asyncio.to_thread(self._files)
+        if files and self._verdict is None:
             await self.verify()
-        newest = await asyncio.to_thread(audit_log.newest_entries, self._file, NEWEST) if has_log else []
+        newest = await asyncio.to_thread(audit_log.newest_of, list(files.values()), NEWEST)
         entries = [
             AuditEntryDoc(
                 t_utc_s=t_utc_s if isinstance(t_utc_s := entry.get("t_utc_s"), int | float) else None,
@@ -90,13 +98,16 @@ class AuditWatch:
         """A zip with the table and with what is thought of it now."""
         verdict = await self.verify()
         said = ["No command was given yet."] if verdict is None else [*verdict.sentences]
-        table = "" if verdict is None else await asyncio.to_thread(audit_log.as_table, self._file)
+        files = await asyncio.to_thread(self._files)
+        tables = {number: await asyncio.to_thread(audit_log.as_table, file) for number, file in files.items()}
         archive = io.BytesIO()
         with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
             file.writestr("verdict.txt", "\n".join(said) + "\n")
-            file.writestr("commands.csv", table)
+            file.writestr("commands.csv", tables.pop(FIRST_VEHICLE, ""))
+            for number, table in tables.items():
+                file.writestr(f"commands-{number}.csv", table)
         return archive.getvalue()
 
-
-async def _kept(found: list[AuditVerdict], looking: Awaitable[AuditVerdict]) -> None:
-    found.append(await looking)
+    def _files(self) -> dict[int, Path]:
+        logs = {number: folder / AUDIT_FILE for number, folder in self._folders().items()}
+        return {number: log for number, log in logs.items() if log.is_file()}

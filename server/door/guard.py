@@ -26,6 +26,7 @@ log = logging.getLogger("hedgehop.http")
 JSON_LIMIT_BYTES = 2 * 1024**2
 """A plan of 5000 points is half of it; the loop that reads it passes on what vehicles say."""
 IMPORT_LIMIT_BYTES = 20 * 1024**2
+_SMALL_FILES = frozenset({"/api/plan/import", "/api/parameters/compare", "/api/parameters/descriptions"})
 CHUNK_TIMEOUT_S = 30.0
 SLOWEST_BYTES_PER_S = 4096
 """Of a body, once it has been waited for so long in all."""
@@ -172,7 +173,7 @@ class Guard:
     def _body_limit(self, path: str) -> int:
         if path in UPLOADS:
             return self._upload_limit
-        return IMPORT_LIMIT_BYTES if path == "/api/plan/import" else JSON_LIMIT_BYTES
+        return IMPORT_LIMIT_BYTES if path in _SMALL_FILES else JSON_LIMIT_BYTES
 
 
 def _check_body(headers: Headers, limit: int) -> None:

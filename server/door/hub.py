@@ -14,14 +14,15 @@ import contextlib
 import json
 import logging
 import time
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from pydantic import TypeAdapter, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server import schemas
 from server.door.page import CLOSE_GOING_AWAY, CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, Outgoing, Page
-from server.errors import ASK_OPERATOR, BusyError, ObserverError, error_doc
+from server.errors import ASK_OPERATOR, BusyError, NotFoundError, ObserverError, error_doc
+from server.schemas.station_docs import FIRST_VEHICLE
 from server.work.bucket import Bucket
 from server.work.task_group import until_first
 
@@ -36,10 +37,21 @@ MESSAGE_LIMIT_CHARS = 64 * 1024
 RATE_PER_S, BURST = 120.0, 600.0
 
 _CLIENT_MESSAGE: TypeAdapter[schemas.ClientMessage] = TypeAdapter(schemas.ClientMessage)
-OBSERVERS_MAY = (schemas.FrameView, schemas.HoldCamera, schemas.Ping)
-"""What moves nothing but this page's own camera."""
-_CLIENT_TYPES = ("hover_profile", "hover_view", "set_view", "set_selection", "frame_view", "hold_camera", "ping")
+OBSERVERS_MAY = (schemas.FrameView, schemas.HoldCamera, schemas.ChooseVehicle, schemas.Ping)
+"""What moves nothing but this page's own camera, or chooses what it shows."""
+_CLIENT_TYPES = (
+    "hover_profile",
+    "hover_view",
+    "set_view",
+    "set_selection",
+    "frame_view",
+    "hold_camera",
+    "choose_vehicle",
+    "ping",
+)
 
+OfVehicle = Callable[[int], Iterable[schemas.ServerMessage]]
+"""All that is known of the vehicle of this number; raises NotFoundError."""
 OnMessage = Callable[[str, schemas.ClientMessage], Awaitable[None]]
 
 
@@ -70,11 +82,8 @@ class Hub:
         for page in list(self._pages.values()):
             page.put(message, outgoing)
 
-    def publish_each(self, make: Callable[[str], schemas.ServerMessage]) -> None:
-        """To every page, what its session (by ``server.door.auth.session_key``) may know."""
-        for page in list(self._pages.values()):
-            message = make(page.session_key)
-            page.put(message, Outgoing(message))
+    def of_vehicle(self, number: int) -> VehiclePages:
+        return VehiclePages(self._pages, number)
 
     def publish_to(self, session_key: str, message: schemas.ServerMessage) -> None:
         """To every page of one session."""
@@ -151,10 +160,13 @@ class Hub:
         snapshot: Callable[[str], schemas.Snapshot],
         present: Callable[[], Iterable[schemas.ServerMessage]] = tuple,
         on_message: OnMessage,
+        vehicle: int = FIRST_VEHICLE,
+        of_vehicle: OfVehicle | None = None,
     ) -> None:
         """Runs one accepted socket until either side ends it; ``present`` is what follows the snapshot at once.
 
-        ``page_id``: of the page's stream before this one, whose 3D view it would go on with.
+        ``page_id``: of the page's stream before this one, whose 3D view it would go on with; ``vehicle``: the one that
+        it showed.
         """
         if len(self._pages) >= PAGES_MAX:
             raise BusyError(f"{PAGES_MAX} pages are open already.", advice="Close some of them.")
@@ -164,9 +176,14 @@ class Hub:
             self.send(page.page_id, snapshot(page.page_id))
             for message in (*self._greetings, *present()):
                 self.send(page.page_id, message)
+            if of_vehicle is not None:
+                try:
+                    _show(page, vehicle, of_vehicle)
+                except NotFoundError:
+                    _show(page, FIRST_VEHICLE, of_vehicle)
             await until_first(
                 self._sender(websocket, page),
-                self._receiver(websocket, page, on_message),
+                self._receiver(websocket, page, on_message, of_vehicle),
                 _wait(page.gone, session_remaining_s, page),
             )
         finally:
@@ -186,7 +203,9 @@ class Hub:
             except (WebSocketDisconnect, RuntimeError):
                 return
 
-    async def _receiver(self, websocket: WebSocket, page: Page, on_message: OnMessage) -> None:
+    async def _receiver(
+        self, websocket: WebSocket, page: Page, on_message: OnMessage, of_vehicle: OfVehicle | None
+    ) -> None:
         bucket = Bucket(RATE_PER_S, BURST, time.monotonic())
         while True:
             received = await websocket.receive()
@@ -199,9 +218,9 @@ class Hub:
                 log.warning("Page %s sent too many messages and was dropped.", page.page_id)
                 page.cut_off(CLOSE_POLICY)
                 return
-            await self._handle(received.get("text"), page, on_message)
+            await self._handle(received.get("text"), page, on_message, of_vehicle)
 
-    async def _handle(self, text: str | None, page: Page, on_message: OnMessage) -> None:
+    async def _handle(self, text: str | None, page: Page, on_message: OnMessage, of_vehicle: OfVehicle | None) -> None:
         try:
             message = parse(text)
         except ValueError as error:
@@ -212,7 +231,10 @@ class Hub:
             self.send(page.page_id, clock)
             return
         try:
-            if page.may_change or isinstance(message, OBSERVERS_MAY):
+            if isinstance(message, schemas.ChooseVehicle):
+                if of_vehicle is not None:
+                    _show(page, message.vehicle, of_vehicle)
+            elif page.may_change or isinstance(message, OBSERVERS_MAY):
                 await on_message(page.page_id, message)
             elif not isinstance(message, schemas.HoverProfile | schemas.HoverView):  # a pointer is no wish
                 raise ObserverError("Observers see everything and change nothing.", advice=ASK_OPERATOR)
@@ -223,6 +245,35 @@ class Hub:
             self.send(page.page_id, schemas.NoticeMessage(level="error", error=notice))
         if isinstance(message, schemas.SetView | schemas.SetSelection):
             self.send(page.page_id, schemas.AnsweredMessage(change=message.change))
+
+
+class VehiclePages:
+    """The pages that show one vehicle. Every method belongs to the event loop's thread."""
+
+    def __init__(self, pages: Mapping[str, Page], number: int) -> None:
+        self._pages, self._number = pages, number
+
+    def publish(self, message: schemas.ServerMessage) -> None:
+        outgoing = Outgoing(message)
+        for page in self._shown():
+            page.put(message, outgoing, of_vehicle=True)
+
+    def publish_each(self, make: Callable[[str], schemas.ServerMessage]) -> None:
+        """To each of them, what its session (by ``server.door.auth.session_key``) may know."""
+        for page in self._shown():
+            message = make(page.session_key)
+            page.put(message, Outgoing(message), of_vehicle=True)
+
+    def _shown(self) -> list[Page]:
+        return [page for page in self._pages.values() if page.vehicle == self._number]
+
+
+def _show(page: Page, number: int, of_vehicle: OfVehicle) -> None:
+    """In one step: no change of the vehicle can fall between what is known of it and what follows."""
+    known = list(of_vehicle(number))
+    page.turn_to(number)
+    for message in (schemas.ActiveMessage(vehicle=number), *known):
+        page.put(message, Outgoing(message), of_vehicle=True)
 
 
 def parse(text: str | None) -> schemas.ClientMessage:

@@ -9,6 +9,7 @@ from server.door.hub import Hub
 from server.door.lease import SILENT_S, Lease
 from server.errors import reported
 from server.schemas import ErrorDoc, LeaseDoc, LeaseMessage, NoticeMessage
+from server.schemas.station_docs import FIRST_VEHICLE
 
 log = logging.getLogger("hedgehop.flying")
 
@@ -19,8 +20,9 @@ HEARD_S = 2.0
 class Operators:
     """All methods belong to the event loop."""
 
-    def __init__(self, lease: Lease, hub: Hub) -> None:
-        self._lease, self._hub = lease, hub
+    def __init__(self, lease: Lease, hub: Hub, vehicle: int = FIRST_VEHICLE, name: str = "the vehicle") -> None:
+        """``name``: what the vehicle is called in sentences."""
+        self._lease, self._hub, self._pages, self._name = lease, hub, hub.of_vehicle(vehicle), name
         self._told_silent = False
 
     def message(self, session_key: str) -> LeaseMessage:
@@ -42,7 +44,7 @@ class Operators:
         await self.look()  # a holder whose page is just back is asked
         before = self._lease.press(session_key, name)
         if before is not None:
-            what = f"{name} has taken control of the vehicle: nothing was heard of this page for {SILENT_S:g} s."
+            what = f"{name} has taken control of {self._name}: nothing was heard of this page for {SILENT_S:g} s."
             self._tell(before.session_key, "warning", what, "Press Take control to ask for it.")
         return await self._changed(session_key)
 
@@ -50,14 +52,19 @@ class Operators:
         before = self._lease.holder
         asker = self._lease.hand_over(session_key)
         if before is not None:
-            self._tell(asker.session_key, "info", f"{before.name} has handed control over: you are in charge.", "")
+            self._tell(
+                asker.session_key,
+                "info",
+                f"{before.name} has handed control over: you are in charge of {self._name}.",
+                "",
+            )
         return await self._changed(session_key)
 
     async def keep(self, session_key: str) -> LeaseDoc:
         asker = self._lease.keep(session_key)
         holder = self._lease.holder
         if holder is not None:
-            self._tell(asker.session_key, "warning", f"{holder.name} keeps control.", "")
+            self._tell(asker.session_key, "warning", f"{holder.name} keeps control of {self._name}.", "")
         return await self._changed(session_key)
 
     async def release(self, session_key: str) -> LeaseDoc:
@@ -75,7 +82,7 @@ class Operators:
 
     def _publish(self) -> None:
         self._told_silent = self._lease.is_silent
-        self._hub.publish_each(self.message)
+        self._pages.publish_each(self.message)
 
     def _tell(self, session_key: str, level: str, what: str, advice: str) -> None:
         doc = ErrorDoc(code="lease", what=what, advice=advice)

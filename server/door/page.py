@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import count
 
 from server import schemas
+from server.schemas.station_docs import FIRST_VEHICLE
 
 WAITING_MAX = 256
 
@@ -35,6 +36,8 @@ def key_of(message: schemas.ServerMessage) -> object | None:
             return message.type, message.job.id
         case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage() | schemas.TracksMessage():
             return message.type, message.source
+        case schemas.HealthMessage():
+            return message.type, message.source
         case schemas.PerceptionMessage():
             return message.type, message.source, message.sensor
         case schemas.TrackMessage():
@@ -50,15 +53,29 @@ class Page:
         self.session_key, self.may_change = session_key, may_change
         self.view_over = asyncio.Event() if before is None else before.view_over
         """Its 3D view ends: later than its stream, which may come back."""
+        self.vehicle = FIRST_VEHICLE
+        """The number of the one that it shows and commands."""
         self.heard_mono_s = time.monotonic()
         self.gone = asyncio.Event()
         self.close_code = CLOSE_GOING_AWAY
         self._waiting: dict[object, Outgoing] = {}
+        self._of_vehicle: set[object] = set()
+        """Keys of what waits about that vehicle."""
         self._wake = asyncio.Event()
         self._numbers = count()
 
-    def put(self, message: schemas.ServerMessage, outgoing: Outgoing) -> None:
-        self._waiting[self._key(message)] = outgoing
+    def turn_to(self, vehicle: int) -> None:
+        """What still waits about the one before would be taken for words about this one."""
+        for key in self._of_vehicle:
+            self._waiting.pop(key, None)
+        self._of_vehicle.clear()
+        self.vehicle = vehicle
+
+    def put(self, message: schemas.ServerMessage, outgoing: Outgoing, *, of_vehicle: bool = False) -> None:
+        key = self._key(message)
+        self._waiting[key] = outgoing
+        if of_vehicle:
+            self._of_vehicle.add(key)
         self._wake.set()
         if len(self._waiting) > WAITING_MAX:
             self.cut_off(CLOSE_SLOW)
@@ -71,7 +88,9 @@ class Page:
         while not self._waiting:
             self._wake.clear()
             await self._wake.wait()
-        return self._waiting.pop(next(iter(self._waiting))).text
+        key = next(iter(self._waiting))
+        self._of_vehicle.discard(key)
+        return self._waiting.pop(key).text
 
     def cut_off(self, code: int) -> None:
         if not self.gone.is_set():

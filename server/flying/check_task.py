@@ -23,12 +23,12 @@ from planning.missions.vehicle_profile import parse_profile
 from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
-from server.library.documents import clearance_of, demands_from_doc, seen_in
+from server.library.documents import clearance_of, demands_from_doc, places_of, seen_in
 from server.library.seen_columns import check_home_stands_on_ground, load_planned_terrain
 from server.library.shelf import utc_now
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
 from server.work.jobs import Progress
-from telemetry.topics.messages import Item, OnboardMission, PlanRecord
+from telemetry.topics.messages import Item, OnboardMission, PlacesOnboard, PlanRecord
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
@@ -65,6 +65,8 @@ class Checked:
     """That the profile counts on."""
     not_guided: str = ""
     """Why waypoints cannot be handed over one at a time: the line is followed less closely then. Empty: they can."""
+    at_fence: str = ""
+    """What the vehicle does when it crosses its fence; empty: not read."""
 
 
 def check_start(
@@ -73,11 +75,13 @@ def check_start(
     onboard: OnboardMission,
     state: VehicleState,
     parameters: dict[str, float | None],
+    aboard: PlacesOnboard,
     rereferenced_m: float | None = None,
     *,
     report: Progress,
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
+    from telemetry.flight.preflight.fence_check import at_fence
     from telemetry.flight.preflight.parameters import flown_speeds
     from telemetry.flight.preflight.preflight import check
 
@@ -86,6 +90,7 @@ def check_start(
     if seen_in(record) is not None:
         check_home_stands_on_ground(directory, dsm, (state.home_lat_deg, state.home_lon_deg))
     profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
+    fence, rally = places_of(record)
     found = check(
         onboard,
         state,
@@ -96,6 +101,9 @@ def check_start(
         planned_home=planned.home,
         firmware=record.firmware,
         rereferenced_m=rereferenced_m,
+        fence=fence,
+        rally=rally,
+        aboard=aboard,
     )
     certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
@@ -110,6 +118,7 @@ def check_start(
         speeds,
         braking,
         not_guided="" if found.certificate is None else _not_guided(record, found.certificate),
+        at_fence=at_fence(parameters, record.firmware),
     )
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 from server.errors import CheckNeededError, ConflictError
 from server.flying.check_task import Checked
 from server.flying.starting import Ready, check_start, preflight_now
+from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard, onboard
@@ -23,8 +24,17 @@ from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
-from telemetry.topics.messages import FlightStatus, Item, LinkStatus, PlanRecord, Topic, UploadReport
-from telemetry.topics.requests import Download, LinkRequest, Operator, StartAuto, StartGuided, Upload
+from telemetry.topics.messages import FlightStatus, Item, LinkStatus, PlaceList, PlanRecord, Topic, UploadReport
+from telemetry.topics.requests import (
+    Download,
+    DownloadPlaces,
+    LinkRequest,
+    Operator,
+    StartAuto,
+    StartGuided,
+    Upload,
+    UploadPlaces,
+)
 from telemetry.topics.vehicle import VehicleState
 
 
@@ -45,7 +55,7 @@ class FlightDesk:
         self._utc_minus_mono_s = time.time() - time.monotonic()
         self._flight = FlightStatus()
         self._ready: Ready | None = None
-        self._busy = ""
+        self._busy = self._at_fence = ""
         self._told: FlyState | None = None
 
     @property
@@ -54,6 +64,7 @@ class FlightDesk:
             onboard=self._aboard.doc(self._workspace.document),
             preflight=None if self._ready is None else self._preflight(self._ready),
             resume_from_item=self._flight.broke_off_at,
+            at_fence=self._at_fence,
             busy=self._busy,
         )
 
@@ -91,8 +102,9 @@ class FlightDesk:
         """Raises NotReadyError, NotCertifiedError, StaleRevisionError, TransferError and what the vehicle said."""
         async with self._doing("Uploading"):
             self._ready = None
-            made = await self._work.made_upload(revision)
+            made = await self._work.made_upload(revision, self._aboard.uploaded)
             _check_firmware(made.record, self._state())
+            await self._send_places(operator, made)
             await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
         return self.state
 
@@ -108,6 +120,7 @@ class FlightDesk:
                 checked = await self._checked(operator, state, rereferenced_m=moved.shift_m)
             if vehicle != self._vehicle_id():
                 raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
+            self._at_fence = checked.at_fence
             self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
             if checked.certificate_json:
                 self._aboard.certified(checked.certificate_json)
@@ -154,6 +167,19 @@ class FlightDesk:
         self._aboard.read_back(onboard(record, len(report.onboard.items), report.rounded))
         await self._note()
 
+    async def _send_places(self, operator: Operator, made: MadeUpload) -> None:
+        """Before the mission, which counts as on board only with them. A list that the plan does not have is left as it
+        is, unless it is that of the plan before."""
+        for kind, items in made.places.items():
+            if not items and not await self._is_left_over(operator, kind, made.places_before[kind]):
+                continue
+            report = await self._link.call(UploadPlaces(operator, kind, items))
+            if not report.verified:
+                raise _not_verified(report, _LISTS[kind])
+
+    async def _is_left_over(self, operator: Operator, kind: PlaceList, before: tuple[Item, ...]) -> bool:
+        return bool(before) and _marks(await self._link.call(DownloadPlaces(operator, kind))) == _marks(before)
+
     async def _note(self) -> None:
         """What is on board now, for the recorder and for the next server."""
         self.tell_recorder()
@@ -165,7 +191,7 @@ class FlightDesk:
         mission = await self._link.call(Download(operator))
         record = self._aboard.known_record(mission.digest)
         _check_firmware(record, state)
-        return await self._work.checked(record, mission, state, rereferenced_m)
+        return await self._work.checked(operator, record, mission, state, rereferenced_m)
 
     async def _start_request(
         self, operator: Operator, body: StartFlight, record: PlanRecord, ready: Ready
@@ -231,10 +257,18 @@ def _check_firmware(record: PlanRecord, state: VehicleState) -> None:
 _FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
-def _not_verified(report: UploadReport) -> TransferError:
-    first = report.differences[0] if report.differences else "It answered, but holds another mission."
+def _marks(items: tuple[Item, ...]) -> list[tuple[int, int, int]]:
+    """Alike for what was sent and for what a vehicle made of it."""
+    return [(item.command, round(item.lat_deg * 1e7), round(item.lon_deg * 1e7)) for item in items]
+
+
+_LISTS: dict[PlaceList, str] = {"fence": "fence", "rally": "list of rally points"}
+
+
+def _not_verified(report: UploadReport, what: str = "mission") -> TransferError:
+    first = report.differences[0] if report.differences else f"It answered, but holds another {what}."
     more = f" ({len(report.differences) - 1} more such differences.)" if len(report.differences) > 1 else ""
     return TransferError(
-        f"The vehicle does not hold the mission that was sent: {first}{more}",
+        f"The vehicle does not hold the {what} that was sent: {first}{more}",
         advice="Upload again. Do not start what is on board.",
     )

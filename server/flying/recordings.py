@@ -26,32 +26,22 @@ log = logging.getLogger("hedgehop.flying")
 
 
 class RecordingDesk:
-    def __init__(
-        self, shelf: RecordingShelf, nodes: Nodes, board: JobBoard, reviewing: Reviewing, pages: Pages
-    ) -> None:
-        self._shelf, self._nodes, self._board, self._reviewing, self._pages = shelf, nodes, board, reviewing, pages
+    """Of all vehicles."""
+
+    def __init__(self, shelf: RecordingShelf, board: JobBoard, reviewing: Reviewing, pages: Pages) -> None:
+        self._shelf, self._board, self._reviewing, self._pages = shelf, board, reviewing, pages
         self._listing = asyncio.Lock()
-        self._look_again = False
-        self.status: RecorderStatus | None = None
 
-    async def on_status(self, status: RecorderStatus) -> None:
-        before, self.status = self.status, status
-        self._pages.publish(RecorderMessage(recorder=status))
-        changed = before is None or (before.recording, before.name) != (status.recording, status.name)
-        if changed or self._look_again:
-            # A file that has just been ended gets its last part a moment later.
-            self._look_again = changed
+    async def run(self) -> None:
+        """Lists anew whenever a recorder has begun or ended one; until cancelled."""
+        while True:
             await self.refresh()
-
-    async def start(self) -> None:
-        await self._nodes.ask_recorder(StartRecording())
-
-    async def stop(self) -> None:
-        await self._nodes.ask_recorder(StopRecording())
+            await self._shelf.changed.wait()
+            self._shelf.changed.clear()
 
     async def docs(self) -> list[RecordingDoc]:
         async with self._listing:
-            return await asyncio.to_thread(self._shelf.docs, being_written=self.being_written)
+            return await asyncio.to_thread(self._shelf.docs)
 
     async def refresh(self) -> None:
         self._pages.publish(RecordingsMessage(recordings=await self.docs()))
@@ -68,17 +58,41 @@ class RecordingDesk:
 
     async def delete(self, recording_id: str) -> None:
         """Raises NotFoundError, InUseError."""
-        name = (await asyncio.to_thread(self._shelf.path, recording_id)).name
-        if name == self.being_written:
-            raise InUseError("This recording is being written.", where=name, advice="Stop it first.")
-        if name == self._reviewing.file_name:
-            raise InUseError("This recording is open.", where=name, advice="Close the review first.")
+        path = await asyncio.to_thread(self._shelf.path, recording_id)
+        if path in self._shelf.being_written.values():
+            raise InUseError("This recording is being written.", where=path.name, advice="Stop it first.")
+        if path == self._reviewing.path:
+            raise InUseError("This recording is open.", where=path.name, advice="Close the review first.")
         await asyncio.to_thread(self._shelf.delete, recording_id)
         await self.refresh()
 
-    @property
-    def being_written(self) -> str | None:
-        return self.status.name if self.status is not None and self.status.recording else None
+
+class Recording:
+    """What one vehicle's recorder does."""
+
+    def __init__(self, vehicle: int, folder: Path, shelf: RecordingShelf, nodes: Nodes, pages: Pages) -> None:
+        self._vehicle, self._folder, self._shelf, self._nodes, self._pages = vehicle, folder, shelf, nodes, pages
+        self._look_again = False
+        self.status: RecorderStatus | None = None
+
+    def on_status(self, status: RecorderStatus) -> None:
+        before, self.status = self.status, status
+        self._pages.publish(RecorderMessage(recorder=status))
+        changed = before is None or (before.recording, before.name) != (status.recording, status.name)
+        if changed:
+            self._shelf.being_written.pop(self._vehicle, None)
+            if status.recording and status.name is not None:
+                self._shelf.being_written[self._vehicle] = self._folder / status.name
+        if changed or self._look_again:
+            # A file that has just been ended gets its last part a moment later.
+            self._look_again = changed
+            self._shelf.changed.set()
+
+    async def start(self) -> None:
+        await self._nodes.ask_recorder(StartRecording())
+
+    async def stop(self) -> None:
+        await self._nodes.ask_recorder(StopRecording())
 
 
 class TrackSoFar:

@@ -20,8 +20,7 @@ from server.heard.present import Present
 from server.library import Library
 from server.library.recording_list import RecordingShelf
 from server.library.terrain_of import FlownOver, terrain_of
-from server.obstacles.moving_objects import TracksWatch
-from server.obstacles.obstacle_watch import Watch
+from server.obstacles.replayed import Replayed
 from server.plan.on_show import OnShow
 from server.schemas import (
     OpenReview,
@@ -47,7 +46,7 @@ class _Open:
 
 
 class Reviewing:
-    """``channel``, ``watch`` and ``tracks`` are the replay's; ``screen`` shows a recording instead of the plan."""
+    """``channel`` and ``seen`` are the replay's; ``screen`` shows a recording instead of the plan."""
 
     def __init__(
         self,
@@ -57,20 +56,26 @@ class Reviewing:
         channel: Channel,
         nodes: Nodes,
         board: JobBoard,
-        watch: Watch,
-        tracks: TracksWatch,
+        seen: Replayed,
         present: Present,
     ) -> None:
         self._library, self._shelf, self._screen, self._channel = library, shelf, screen, channel
-        self._nodes, self._board, self._watch, self._tracks, self._present = nodes, board, watch, tracks, present
+        self._nodes, self._board, self._watch, self._tracks, self._present = (
+            nodes,
+            board,
+            seen.watch,
+            seen.tracks,
+            present,
+        )
         self._open: _Open | None = None
         self._opening = asyncio.Lock()
         self._last: ReplayStatus | None = None
         self._last_mono_s = self._asked_mono_s = 0.0
 
     @property
-    def file_name(self) -> str | None:
-        return None if self._open is None else self._open.path.name
+    def path(self) -> Path | None:
+        """Of the recording that is open."""
+        return None if self._open is None else self._open.path
 
     async def open(self, body: OpenReview) -> None:
         """Raises NotFoundError, RecordingError, NotReadyError."""

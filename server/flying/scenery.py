@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
 from server.heard.channel import Channel
 from server.heard.vehicle_place import Placer
 from server.scene.layers.vehicle_layers import VehiclePose
-from server.scene.layers.vehicles import Vehicles
-from server.schemas import Source
+from server.scene.layers.vehicles import REPLAY, Vehicles
 from telemetry.topics.vehicle import VehicleState
 
 PERIOD_S = 0.1
@@ -21,9 +22,12 @@ _TRACK_EVERY = 5
 class Scenery:
     """Draws only what has changed since the last time."""
 
-    def __init__(self, stage: Vehicles | None, channels: dict[Source, Channel]) -> None:
+    def __init__(
+        self, stage: Vehicles | None, channels: Mapping[str, Channel], labels: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """Both by the actor (``actor_of``); ``labels``: their names, where they have to be told apart."""
         self._stage = stage
-        self._actors = {source: _Actor(source, channel) for source, channel in channels.items()}
+        self._actors = {a: _Actor(a, channel, labels.get(a, "")) for a, channel in channels.items()}
         self._placer: Placer | None = None
 
     async def run(self) -> None:
@@ -43,19 +47,18 @@ class Scenery:
             self._placer = Placer(dsm)
             for actor in self._actors.values():
                 actor.forget()
-        for source, actor in self._actors.items():
+        for name, actor in self._actors.items():
             actor.move(self._stage, self._placer)
             # A replay leaves states out when it runs fast or jumps; its whole line is drawn from the recording.
-            if with_tracks and source == "live":
+            if with_tracks and name != REPLAY:
                 actor.draw_track(self._stage, self._placer)
 
 
 class _Actor:
     """One vehicle on the stage, and what of it is drawn already."""
 
-    def __init__(self, source: Source, channel: Channel) -> None:
-        self._source: Source = source
-        self._channel = channel
+    def __init__(self, name: str, channel: Channel, label: str) -> None:
+        self._name, self._channel, self._label = name, channel, label
         self.forget()
 
     def forget(self) -> None:
@@ -67,7 +70,7 @@ class _Actor:
         state = self._channel.state
         if state is not self._drawn:
             self._drawn = state
-            stage.move(self._source, None if state is None else _pose(state, placer))
+            stage.move(self._name, None if state is None else _pose(state, placer, self._label))
 
     def draw_track(self, stage: Vehicles, placer: Placer) -> None:
         states = self._channel.track.states
@@ -77,10 +80,10 @@ class _Actor:
             self._placed, self._points = 0, np.zeros((0, 3))
         self._points = np.concatenate([self._points, placer.places(states[self._placed :])])
         self._placed = len(states)
-        stage.follow(self._source, self._points)
+        stage.follow(self._name, self._points)
 
 
-def _pose(state: VehicleState, placer: Placer) -> VehiclePose | None:
+def _pose(state: VehicleState, placer: Placer, label: str) -> VehiclePose | None:
     place = placer.place(state)
     if place is None:
         return None
@@ -90,4 +93,5 @@ def _pose(state: VehicleState, placer: Placer) -> VehiclePose | None:
         pitch_rad=state.pitch_rad or 0.0,
         heading_rad=state.heading_rad or 0.0,
         home_m=placer.home(state),
+        label=label,
     )

@@ -6,6 +6,7 @@ import asyncio
 import socket
 from pathlib import Path
 
+from mapping.geometry.frames import moved_deg
 from server.errors import NotReadyError
 from server.heard.connections import Connections
 from server.heard.ground_task import Ground, export_ground, write_demo_world
@@ -35,12 +36,15 @@ class Simulation:
         runtime_dir: Path,
         *,
         demo_world: bool = True,
+        aside_m: float = 0.0,
     ) -> None:
+        """``aside_m``: east of the plan's home, where another one stands there."""
         self._library, self._workspace, self._nodes, self._connections = library, workspace, nodes, connections
         self._obstacles = obstacles
         self._lane, self._ground_file = lane, runtime_dir / "ground.tif"
         self._port_file = runtime_dir / "simulator-port.txt"
         self._world_file, self._demo_world = runtime_dir / "world.json", demo_world
+        self._aside_m = aside_m
         self._starting = asyncio.Lock()
         self._last_port = self._read_port()
 
@@ -98,7 +102,7 @@ class Simulation:
                 "A simulated vehicle needs a place to stand.", advice="Open a plan with a surface model and a point."
             )
         directory = self._library.terrain_dir(document.terrain_id)
-        return await self._lane.call(export_ground, directory, self._ground_file, home)
+        return await self._lane.call(export_ground, directory, self._ground_file, moved_deg(home, self._aside_m, 0.0))
 
 
 def _address(port: int) -> str:

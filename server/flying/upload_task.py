@@ -9,10 +9,11 @@ from pathlib import Path
 from planning.formats import trajectory_csv, wpl
 from planning.missions.vehicle_profile import dump_profile
 from planning.request import effective_profile
+from server.library.documents import places_of
 from server.plan.tasks import last_plan
 from server.schemas import PlanDoc
 from server.work.jobs import Progress
-from telemetry.topics.messages import Item, PlanRecord
+from telemetry.topics.messages import Item, PlaceList, PlanRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +25,17 @@ class MadeUpload:
     home_lon_deg: float
     home_alt_m: float
     """Above the surface model's datum; ArduPilot puts its own in its place."""
+    places: dict[PlaceList, tuple[Item, ...]]
+    """Fence and rally points."""
+    places_before: dict[PlaceList, tuple[Item, ...]]
+    """Those of the plan that was uploaded before."""
 
 
-def make_upload(directory: Path, document: PlanDoc, terrain_name: str, *, report: Progress) -> MadeUpload:
-    """The plan is the one that was computed last, or is computed again."""
+def make_upload(
+    directory: Path, document: PlanDoc, terrain_name: str, before: PlanRecord | None, *, report: Progress
+) -> MadeUpload:
+    """The plan is the one that was computed last, or is computed again; ``before``: what was uploaded before it."""
+    from telemetry.flight.preflight.fence_check import NOTHING, sent_places
     from telemetry.mavlink.items import items_from_mission
 
     plan, source, _ = last_plan.of(directory, document, report)
@@ -52,4 +60,13 @@ def make_upload(directory: Path, document: PlanDoc, terrain_name: str, *, report
         path_csv=trajectory_csv.write_trajectory(plan.path, plan.timing, plan.mission.home, plan.dsm),
     )
     home = mission.home
-    return MadeUpload(items_from_mission(mission), record, home.lat_deg, home.lon_deg, home.alt_dsm_m)
+    replaced = NOTHING if before is None else places_of(before)
+    return MadeUpload(
+        items_from_mission(mission),
+        record,
+        home.lat_deg,
+        home.lon_deg,
+        home.alt_dsm_m,
+        sent_places((plan.request.fence, plan.request.rally), mission.firmware),
+        sent_places(replaced, mission.firmware),
+    )

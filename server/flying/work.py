@@ -15,9 +15,10 @@ from server.schemas import PlanState, TerrainDoc
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
+from telemetry.errors import TelemetryError
 from telemetry.flight.preflight.parameters import NAMES
-from telemetry.topics.messages import OnboardMission, PlanRecord
-from telemetry.topics.requests import ReadParameters
+from telemetry.topics.messages import OnboardMission, PlacesOnboard, PlanRecord
+from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
@@ -30,21 +31,27 @@ class FlightWork:
     def __init__(self, library: Library, link: LinkClient, workspace: Workspace, lane: Lane) -> None:
         self._library, self._link, self._workspace, self._lane = library, link, workspace, lane
 
-    async def made_upload(self, revision: int) -> MadeUpload:
+    async def made_upload(self, revision: int, before: PlanRecord | None) -> MadeUpload:
         """Raises StaleRevisionError, NotReadyError, NotCertifiedError."""
         plan = self._workspace.state
         check_uploadable(plan, revision)
         terrain = self._terrain(FlownOver(terrain_id=plan.document.terrain_id or ""))
         directory = self._library.terrain_dir(terrain.id)
-        return await self._workspace.plan_lane.call(make_upload, directory, plan.document, terrain.name)
+        return await self._workspace.plan_lane.call(make_upload, directory, plan.document, terrain.name, before)
 
     async def checked(
-        self, record: PlanRecord, mission: OnboardMission, state: VehicleState, rereferenced_m: float | None
+        self,
+        operator: Operator,
+        record: PlanRecord,
+        mission: OnboardMission,
+        state: VehicleState,
+        rereferenced_m: float | None,
     ) -> Checked:
-        """Judges what was read back, with the vehicle's own return height."""
+        """Judges what was read back, with the vehicle's own return height, fence and rally points."""
+        aboard = await self._aboard(operator)
         parameters = await self._link.call(ReadParameters(NAMES[record.firmware]))
         return await self._lane.call(
-            check_start, self._directory(record), record, mission, state, parameters, rereferenced_m
+            check_start, self._directory(record), record, mission, state, parameters, aboard, rereferenced_m
         )
 
     async def guided(self, record: PlanRecord) -> GuidedPlan:
@@ -61,6 +68,13 @@ class FlightWork:
             from_item,
             seen_in(record),
         )
+
+    async def _aboard(self, operator: Operator) -> PlacesOnboard:
+        try:
+            fence = await self._link.call(DownloadPlaces(operator, "fence"))
+            return PlacesOnboard(fence, await self._link.call(DownloadPlaces(operator, "rally")))
+        except TelemetryError as error:
+            return PlacesOnboard(unread=error.what)
 
     def _directory(self, record: PlanRecord) -> Path:
         terrain = self._terrain(FlownOver(record.terrain_id, record.terrain_sha256))

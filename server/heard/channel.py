@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from server.heard.flown_track import Track
 from server.heard.plan_follower import Follower
 from server.schemas import (
     FlightMessage,
     FollowDoc,
+    HealthMessage,
     Pages,
     Source,
     TextMessage,
@@ -18,6 +20,7 @@ from server.schemas import (
     VehicleMessage,
 )
 from server.work.bucket import Bucket
+from telemetry.flight.health import Health, HealthRow
 from telemetry.topics.messages import FlightStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 
@@ -25,6 +28,14 @@ RATE_HZ, BURST = 20.0, 20.0
 """Of positions: the link sends no more on average, so that in flight none waits; a fast replay sends many more."""
 QUIET_S = 0.05
 """What is no new position waits for the next one, but no longer."""
+
+
+HEALTH_EVERY_S = 1.0
+
+
+class HealthTold(NamedTuple):
+    at_mono_s: float = float("-inf")
+    rows: tuple[HealthRow, ...] | None = None
 
 
 class Channel:
@@ -44,6 +55,7 @@ class Channel:
         self._told_mono_s = float("-inf")
         self.follower = Follower()
         self.track = Track()
+        self._health, self._health_told = Health(), HealthTold()
         self.state: VehicleState | None = None
         self.flight = FlightStatus()
         self.follow: FollowDoc | None = None
@@ -67,6 +79,7 @@ class Channel:
     def on_state(self, state: VehicleState) -> None:
         """A new flight begins where the vehicle arms: its path starts afresh."""
         before, self.state = self.state, state
+        self._health.on_state(state)
         begins = state.armed and (before is None or not before.armed)
         if begins and self._source == "live":
             self.restart_track()
@@ -88,6 +101,7 @@ class Channel:
     def forget(self) -> None:
         """The vehicle is another one, or gone."""
         self.state, self.follow = None, None
+        self._health, self._health_told = Health(), HealthTold()
         self.restart_track()
         self._publish()
 
@@ -128,3 +142,15 @@ class Channel:
         self._pages.publish(
             VehicleMessage(source=self._source, now_mono_s=self._told_mono_s, state=state, follow=self.follow)
         )
+        self._tell_health()
+
+    def _tell_health(self) -> None:
+        """Words that a pilot reads: once a second, and only when they change."""
+        if self._told_mono_s - self._health_told.at_mono_s < HEALTH_EVERY_S:
+            return
+        live_mono_s = self._told_mono_s if self._source == "live" else None
+        state = self.state
+        rows = () if state is None else self._health.rows(state, self.follower.profile, now_mono_s=live_mono_s)
+        if rows != self._health_told.rows:
+            self._pages.publish(HealthMessage(source=self._source, rows=list(rows)))
+        self._health_told = HealthTold(self._told_mono_s, rows)

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from server.library.whole_files import write_atomically
-from server.schemas import OnboardDoc, PlanDoc
+from server.schemas import FenceDoc, OnboardDoc, PlanDoc
 from telemetry.errors import MissionUnknownError
 from telemetry.topics.messages import LinkStatus, PlanRecord, Rounded
 
@@ -47,6 +47,11 @@ class Aboard:
         if kept is None or (status is not None and status.mission_digest not in (None, kept.record.digest)):
             return None
         return kept.record
+
+    @property
+    def uploaded(self) -> PlanRecord | None:
+        """Of the plan that was uploaded last, whatever is on board by now."""
+        return None if self._kept is None else self._kept.record
 
     @property
     def digest(self) -> str:
@@ -124,8 +129,8 @@ def is_plan(record: PlanRecord, document: PlanDoc) -> bool:
 
 
 def _flown_part(document: dict[str, object]) -> dict[str, object]:
-    # Plans from before obstacles could be taken into them do not say that none were.
-    flown = {"seen_id": None} | document
+    # Plans from before obstacles, or a fence, could be taken into them do not say that none were.
+    flown = {"seen_id": None, "fence": FenceDoc().model_dump(mode="json"), "rally": []} | document
     return {key: value for key, value in flown.items() if key not in ("name", "orthophoto_id")}
 
 

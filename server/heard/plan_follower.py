@@ -10,12 +10,13 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.following.below import Demanded
+from planning.following.lag import planned_s
 from planning.following.live import Following, follow_on
 from planning.following.reference import Reference, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
-from planning.model import finite_or_none
+from planning.model import VehicleProfile, finite_or_none
 from planning.terrain.dsm import Dsm
 from server.heard.vehicle_place import Placer, home_distance_bearing
 from server.library.documents import clearance_of
@@ -41,19 +42,33 @@ class Followed:
     reference: Reference
     demanded: Demanded | None = None
     """What the plan requires of the flight; None where nothing tells it."""
+    profile: VehicleProfile | None = None
 
     @staticmethod
     def of(record: PlanRecord, dsm: Dsm) -> Followed:
         """Takes a second or so: for a thread. Raises PlanningError."""
         mission = read_wpl(record.mission_wpl)
         profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
-        return replace(Followed.over(reference_line(mission, dsm, profile), dsm), demanded=_demanded(record))
+        over = Followed.over(reference_line(mission, dsm, profile), dsm)
+        return replace(over, demanded=_demanded(record), profile=profile)
 
     @staticmethod
     def over(reference: Reference, dsm: Dsm) -> Followed:
         with _KERNELS:
             surface = SurfaceDistance(_window(dsm, reference.points_m))
         return Followed(Placer(dsm), surface, reference)
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """What is left of a plan that is being flown, as predicted from the last position on."""
+
+    lat_lon_deg: F64
+    """(N, 2)"""
+    alt_rel_home_m: F64
+    """(N,)"""
+    t_s: F64
+    """(N,) seconds from now; never falling"""
 
 
 class Follower:
@@ -66,6 +81,11 @@ class Follower:
         self._following = Following()
         self._share: float | None = None
         self._least_m: float | None = None
+
+    @property
+    def profile(self) -> VehicleProfile | None:
+        """Of the vehicle that the plan was made for; None without a plan."""
+        return None if self._followed is None else self._followed.profile
 
     def begin_again(self) -> None:
         """The next position is the first of a flight, or lies elsewhere."""
@@ -95,6 +115,22 @@ class Follower:
             **{**_UNKNOWN, "alt_rel_home_m": state.alt_rel_home_m, **near},
             home_distance_m=distance_m,
             home_bearing_deg=bearing_deg,
+        )
+
+    def ahead(self, flight: FlightStatus) -> Ahead | None:
+        """None where no plan is flown, or where nothing tells its times."""
+        followed, at = self._followed, self._following.at
+        if followed is None or at is None or not self._following.begun or flight.phase != "flying":
+            return None
+        reference, first = followed.reference, at.leg + 1
+        t_s = np.column_stack([reference.arrive_s, reference.leave_s])[first:].ravel()
+        t_s = t_s - planned_s(reference, at.leg, at.share)
+        if not len(t_s) or not np.isfinite(t_s).all():
+            return None
+        points_m = np.repeat(reference.points_m[first:], 2, axis=0)
+        lat_lon_deg = followed.placer.dsm.lat_lon_from_xy(points_m[:, :2])
+        return Ahead(
+            lat_lon_deg, points_m[:, 2] - reference.home_alt_dsm_m, np.maximum.accumulate(np.maximum(t_s, 0.0))
         )
 
     def _keep_least(self, flight: FlightStatus, near: dict[str, float | None]) -> None:

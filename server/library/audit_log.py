@@ -7,13 +7,14 @@ import io
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from server.library.whole_files import storage_errors
+from server.schemas.station_docs import FIRST_VEHICLE
 from telemetry.errors import RecordingError
 from telemetry.link.audit import END_BYTES
 from telemetry.link.audit_chain import Checked, check_file, parsed
@@ -57,6 +58,28 @@ def look_through(log: Path, key: bytes, *, report: object = None) -> AuditVerdic
         faults = (*_broken(checked), *_missing(log.parent, checked))
     notes = tuple(_torn(line, is_last=line == checked.lines) for line in checked.torn)
     return AuditVerdict(checked.lines, faults, notes, time.time())
+
+
+def joined(verdicts: Mapping[int, AuditVerdict]) -> AuditVerdict:
+    """Of the logs of several vehicles, by their numbers; each sentence about another than the first one says so."""
+
+    def said(number: int, sentences: tuple[str, ...]) -> list[str]:
+        return [text if number == FIRST_VEHICLE else f"Vehicle {number}: {text}" for text in sentences]
+
+    return AuditVerdict(
+        sum(verdict.lines for verdict in verdicts.values()),
+        tuple(text for number, verdict in verdicts.items() for text in said(number, verdict.faults)),
+        tuple(text for number, verdict in verdicts.items() for text in said(number, verdict.notes)),
+        max(verdict.checked_utc_s for verdict in verdicts.values()),
+    )
+
+
+def newest_of(logs: Sequence[Path], count: int) -> list[dict[str, Any]]:
+    """Of several logs together, the newest first."""
+    entries = [entry for log in logs for entry in newest_entries(log, count)]
+    if len(logs) < 2:
+        return entries
+    return sorted(entries, key=lambda entry: float(entry.get("t_utc_s") or 0.0), reverse=True)[:count]
 
 
 def newest_entries(log: Path, count: int) -> list[dict[str, Any]]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 
 from planning.certificate.model import ClearanceParams
+from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words
 from planning.formats.poi_files import PoiFile
 from planning.missions.vehicle_profile import path_params
 from planning.model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
 from planning.request import PlanRequest, survey_request
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import Dsm
-from server.library.edits import new_poi_id
+from server.library.fences import fence_from_doc, with_fence
 from server.library.planned_on import planned_on
-from server.schemas import PlaceDoc, PlanDoc, PoiDoc, ProfileDoc, SurveyDoc
+from server.library.whole_files import new_id
+from server.schemas import FenceDoc, PlaceDoc, PlanDoc, PoiDoc, ProfileDoc, SurveyDoc
 from telemetry.topics.messages import PlanRecord
 
 
@@ -27,7 +29,8 @@ def doc_from_profile(profile: VehicleProfile) -> ProfileDoc:
 
 
 def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
-    """Raises PlanningError when the survey polygon or camera cannot be flown."""
+    """Raises PlanningError when the survey polygon or camera cannot be flown, or the fence is none."""
+    fence, rally = fence_from_doc(document)
     mission = document.mission
     place = mission.look_at
     request = replace(
@@ -46,6 +49,8 @@ def request_from_doc(document: PlanDoc, dsm: Dsm) -> PlanRequest:
             camera_trigger_m=mission.camera_trigger_m,
         ),
         home_lat_lon_deg=None if document.home is None else (document.home.lat_deg, document.home.lon_deg),
+        fence=fence,
+        rally=rally,
     )
     return request if document.source == "pois" else survey_request(request, _survey(document, dsm))
 
@@ -73,6 +78,11 @@ def clearance_of(record: PlanRecord) -> ClearanceParams:
     return demands_from_doc(PlanDoc.model_validate_json(record.plan_json)).clearance()
 
 
+def places_of(record: PlanRecord) -> tuple[Fence, tuple[RallyPoint, ...]]:
+    """The plan's fence and rally points."""
+    return fence_from_doc(PlanDoc.model_validate_json(record.plan_json)) if record.plan_json else (NO_FENCE, ())
+
+
 def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:
     survey = document.survey
     return survey_lines(
@@ -87,23 +97,35 @@ def _survey(document: PlanDoc, dsm: Dsm) -> SurveyPlan:
 
 
 def doc_of_points(points: PoiFile) -> PlanDoc:
-    """A document of nothing but a file's points, or its polygon."""
+    """A document of nothing but a file's points, or its polygon, and the fence that its mission carries."""
     if points.polygon is not None and not points.pois:
         corners = [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in points.polygon]
         return PlanDoc(survey=SurveyDoc(polygon=corners), source="survey")
     pois = [
-        PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
-        for p in points.pois
+        PoiDoc(id=new_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s) for p in points.pois
     ]
-    return PlanDoc(pois=pois, planned_on=planned_on(points.mission))
+    document, mission = PlanDoc(pois=pois, planned_on=planned_on(points.mission)), points.mission
+    return document if mission is None else with_fence(document, mission.fence, mission.rally)
 
 
 def with_points(document: PlanDoc, found: PlanDoc) -> PlanDoc:
-    """The document with the points of ``doc_of_points``, or their polygon, in place of its own."""
+    """The document with what was found in a file in place of its own: points or a polygon, fence and rally points."""
+    if found.fence != FenceDoc() or found.rally:
+        document = document.model_copy(update={"fence": found.fence, "rally": found.rally})
+    if not found.pois and not found.survey.polygon:
+        return document
     if found.source == "survey":
         survey = document.survey.model_copy(update={"polygon": found.survey.polygon})
         return document.model_copy(update={"survey": survey, "source": "survey"})
     return document.model_copy(update={"pois": found.pois, "source": "pois", "planned_on": found.planned_on})
+
+
+def taken_words(found: PlanDoc) -> str:
+    """What was found in a file."""
+    points = [f"{len(found.pois)} points"] if found.pois else []
+    corners = [f"{len(found.survey.polygon)} corners of a survey's area"] if found.survey.polygon else []
+    fence = fence_from_doc(found)
+    return "; ".join([*points, *corners, *([fence_words(*fence)] if any(fence) else [])])
 
 
 def missing(document: PlanDoc) -> str:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import secrets
-
+from server.library.fences import clicked_circle, clicked_polygon, clicked_rally, moved_mark
+from server.library.whole_files import new_id
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SelectionDoc
-
-
-def new_poi_id() -> str:
-    return secrets.token_urlsafe(6).replace("-", "a").replace("_", "b")
 
 
 def next_poi_name(document: PlanDoc) -> str:
@@ -28,9 +24,9 @@ def clicked(
     match selection.tool:
         case "add_poi":
             name = next_poi_name(document)
-            poi = PoiDoc(id=new_poi_id(), lat_deg=lat_deg, lon_deg=lon_deg, name=name)
+            poi = PoiDoc(id=new_id(), lat_deg=lat_deg, lon_deg=lon_deg, name=name)
             added = document.model_copy(update={"pois": [*document.pois, poi], "source": "pois"})
-            return f"Add {name}", added, selection.model_copy(update={"poi_id": poi.id})
+            return f"Add {name}", added, selection.model_copy(update={"poi_id": poi.id, "fence_mark": None})
         case "polygon":
             survey = document.survey.model_copy(update={"polygon": [*document.survey.polygon, place]})
             return "Add corner", document.model_copy(update={"survey": survey, "source": "survey"}), selection
@@ -39,17 +35,30 @@ def clicked(
         case "look_at":
             mission = document.mission.model_copy(update={"heading": "point", "look_at": place})
             return "Look at a point", document.model_copy(update={"mission": mission}), SelectionDoc(tool="select")
+        case "fence_polygon":
+            return clicked_polygon(document, selection, place)
+        case "fence_circle":
+            return clicked_circle(document, selection, place)
+        case "rally":
+            return clicked_rally(document, selection, place)
         case _:
             return None
 
 
-def moved(document: PlanDoc, poi_id: str, lat_deg: float, lon_deg: float) -> tuple[str, PlanDoc] | None:
-    """(undo label, new document) for a POI dragged to a place; None when the POI is gone."""
+def picked(document: PlanDoc, selection: SelectionDoc, mark: str) -> SelectionDoc:
+    """The selection after a click on a point of interest, or on a mark of the fence."""
+    is_poi = any(poi.id == mark for poi in document.pois)
+    chosen = {"poi_id": mark, "fence_mark": None} if is_poi else {"poi_id": None, "fence_mark": mark}
+    return selection.model_copy(update=chosen)
+
+
+def moved(document: PlanDoc, mark: str, lat_deg: float, lon_deg: float) -> tuple[str, PlanDoc] | None:
+    """(undo label, new document) for a mark dragged to a place; None when it is gone."""
     names = {poi.id: poi.name or "point" for poi in document.pois}
-    if poi_id not in names:
-        return None
+    if mark not in names:
+        return moved_mark(document, mark, PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg))
     pois = [
-        poi.model_copy(update={"lat_deg": lat_deg, "lon_deg": lon_deg}) if poi.id == poi_id else poi
+        poi.model_copy(update={"lat_deg": lat_deg, "lon_deg": lon_deg}) if poi.id == mark else poi
         for poi in document.pois
     ]
-    return f"Move {names[poi_id]}", document.model_copy(update={"pois": pois})
+    return f"Move {names[mark]}", document.model_copy(update={"pois": pois})

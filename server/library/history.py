@@ -91,4 +91,9 @@ class History:
 
 def _steps_that_fit(document: PlanDoc) -> int:
     """Every step is a whole document, and all are written at every edit: thousands of points keep fewer."""
-    return max(_KEPT_STEPS_LEAST, min(_KEPT_STEPS, _KEPT_POINTS // max(1, len(document.pois))))
+    return max(_KEPT_STEPS_LEAST, min(_KEPT_STEPS, _KEPT_POINTS // max(1, _places(document))))
+
+
+def _places(document: PlanDoc) -> int:
+    corners = sum(len(polygon.corners) for polygon in document.fence.polygons)
+    return len(document.pois) + len(document.survey.polygon) + corners

@@ -29,9 +29,12 @@ from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
 from server.library.whole_files import clean, new_id, storage_errors, write_atomically
 from server.schemas import ErrorDoc, LibraryMessage, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
+from server.schemas.station_docs import FIRST_VEHICLE
 
+VEHICLES = "vehicles"
+"""What is kept of each vehicle but the first one, whose things lie in the data directory itself."""
 _SEEN = "seen-"
-_KEPT_IN = (f"{plans.FOLDER}/**/*.json", "set-aside/**/*.json", "*.json", "run/*.json")
+_KEPT_IN = (f"{plans.FOLDER}/**/*.json", "set-aside/**/*.json", "*.json", "run/*.json", f"{VEHICLES}/**/*.json")
 """Plans with all their undo steps, damaged ones that were set aside, and what is on board of a vehicle."""
 _LAST_PLAN = "last-plan"
 _PROFILES = "profiles"
@@ -88,6 +91,15 @@ class Library:
     def new_upload(self, suffix: str = "") -> Path:
         """Where to stream an upload; whoever used it deletes it, and the next start clears what was left."""
         return self._uploads / f"{new_id()}{suffix}"
+
+    def vehicle_dir(self, number: int) -> Path:
+        """What is kept of a vehicle: its nodes' sockets, its recordings, its plan on board, its log of commands."""
+        return self.root if number == FIRST_VEHICLE else self.root / VEHICLES / str(number)
+
+    def vehicle_dirs(self) -> dict[int, Path]:
+        """Of each but the first that there ever was, by its number."""
+        found = (self.root / VEHICLES).glob("[1-9]*")
+        return {int(path.name): path for path in sorted(found) if path.name.isdecimal() and path.is_dir()}
 
     # Surface models and orthophotos
 

@@ -1,10 +1,11 @@
-"""The shelf of recordings: one file each under ``recordings/``, written there by the recorder node or brought in.
+"""The shelf of recordings: one file each, written by a vehicle's recorder into its own folder, or brought in.
 
-A recording's id is made from its file name, so that the folder is all there is to keep: no list can contradict it.
+A recording's id is made from its file name, so that the folders are all there is to keep: no list can contradict it.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import os
 from datetime import UTC, datetime
@@ -17,38 +18,55 @@ from server.library.shelf import iso_utc
 from server.library.terrain_of import FlownOver, terrain_of
 from server.library.whole_files import check_id, storage_errors, sync_directory
 from server.schemas import RecordingDoc
+from server.schemas.station_docs import FIRST_VEHICLE
 
 if TYPE_CHECKING:
     from telemetry.recording.describe import RecordingInfo
 
 FOLDER = "recordings"
-KINDS: dict[str, Literal["hedgehop", "tlog"]] = {".mcap": "hedgehop", ".tlog": "tlog"}
+KINDS: dict[str, Literal["hedgehop", "tlog", "dataflash", "ulog"]] = {
+    ".mcap": "hedgehop",
+    ".tlog": "tlog",
+    ".bin": "dataflash",
+    ".ulg": "ulog",
+}
 
 
 class RecordingShelf:
     """Blocking calls, for threads; what a file says about itself is kept until it changes."""
 
     def __init__(self, library: Library) -> None:
-        self.folder = library.root / FOLDER
         self._library = library
         self._known: dict[tuple[str, int, int], RecordingInfo] = {}
-        with storage_errors(self.folder):
-            self.folder.mkdir(mode=0o700, exist_ok=True)
+        self._folder = self.folder_of(FIRST_VEHICLE)
+        self.being_written: dict[int, Path] = {}
+        """By the vehicle's number. Whoever changes it sets ``changed``."""
+        self.changed = asyncio.Event()
 
-    def docs(self, *, being_written: str | None = None) -> list[RecordingDoc]:
-        """Newest first. The one that is being written is left out: it is on show elsewhere."""
-        with storage_errors(self.folder):
-            files = [path for path in self.folder.iterdir() if _is_recording(path) and path.name != being_written]
+    def folder_of(self, vehicle: int) -> Path:
+        """Where this vehicle's recorder writes; a folder of its own, because what it finds unfinished there is its own.
+
+        Raises StorageError.
+        """
+        folder = self._library.vehicle_dir(vehicle) / FOLDER
+        with storage_errors(folder):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder
+
+    def docs(self) -> list[RecordingDoc]:
+        """Newest first. Those that are being written are left out: they are on show elsewhere."""
+        written = set(self.being_written.values())
+        files = [path for path in self._files() if path not in written]
         docs = [self._doc(path) for path in files]
-        present = {path.name for path in files}
+        present = {str(path) for path in files}
         self._known = {key: info for key, info in self._known.items() if key[0] in present}
         return sorted(docs, key=lambda doc: (doc.started_utc, doc.name), reverse=True)
 
     def path(self, recording_id: str) -> Path:
         """Raises NotFoundError."""
         check_id(recording_id, kind="recording")
-        for path in self.folder.iterdir():
-            if _is_recording(path) and recording_id_of(path.name) == recording_id:
+        for path in self._files():
+            if self._id(path) == recording_id:
                 return path
         raise NotFoundError("There is no such recording.", advice="Reload the page for the present list.")
 
@@ -61,21 +79,32 @@ class RecordingShelf:
         target = self._free_place(name)
         with storage_errors(target):
             os.rename(upload, target)
-            sync_directory(self.folder)
+            sync_directory(target.parent)
         return self._doc(target)
 
     def delete(self, recording_id: str) -> None:
         path = self.path(recording_id)
         with storage_errors(path):
             path.unlink()
-            sync_directory(self.folder)
+            sync_directory(path.parent)
+
+    def _files(self) -> list[Path]:
+        with storage_errors(self._folder):
+            others = (folder / FOLDER for folder in self._library.vehicle_dirs().values())
+            folders = [self._folder, *(folder for folder in others if folder.is_dir())]
+            return [path for folder in folders for path in folder.iterdir() if _is_recording(path)]
+
+    def _id(self, path: Path) -> str:
+        """Two vehicles may begin a recording in the same second."""
+        own = path.parent == self._folder
+        return recording_id_of(path.name if own else path.relative_to(self._library.root).as_posix())
 
     def _doc(self, path: Path) -> RecordingDoc:
         info = self._info(path)
         flown = FlownOver(info.terrain_id, info.terrain_sha256)
         terrain = terrain_of(flown, self._library.terrains())
         return RecordingDoc(
-            id=recording_id_of(path.name),
+            id=self._id(path),
             name=path.name,
             kind=KINDS[path.suffix.lower()],
             started_utc=iso_utc(info.start_utc_s if info.start_utc_s is not None else _changed_utc_s(path)),
@@ -99,7 +128,7 @@ class RecordingShelf:
     def _free_place(self, name: str) -> Path:
         stem, suffix = _plain_stem(name), suffix_of_recording(name)
         number = 1
-        while (target := self.folder / f"{stem}{f'-{number}' if number > 1 else ''}{suffix}").exists():
+        while (target := self._folder / f"{stem}{f'-{number}' if number > 1 else ''}{suffix}").exists():
             number += 1
         return target
 
@@ -109,12 +138,12 @@ def recording_id_of(name: str) -> str:
 
 
 def suffix_of_recording(name: str) -> str:
-    """Raises BadRequestError for a file that is neither kind of recording."""
+    """Raises BadRequestError for a file that is no kind of recording."""
     suffix = PurePosixPath(name).suffix.lower()
     if suffix not in KINDS:
         raise BadRequestError(
-            f"{name!r} is no recording: its name ends neither in .mcap nor in .tlog.",
-            advice="Choose a telemetry log (.tlog) or one of Hedgehop's own recordings (.mcap).",
+            f"{name!r} is no recording: its name ends in none of {', '.join(KINDS)}.",
+            advice="Choose a recording (.mcap), a ground station's log (.tlog) or a vehicle's own (.bin, .ulg).",
         )
     return suffix
 
@@ -135,8 +164,8 @@ def _key(path: Path) -> tuple[str, int, int]:
     try:
         status = path.stat()
     except FileNotFoundError:
-        return path.name, -1, 0
-    return path.name, status.st_size, status.st_mtime_ns
+        return str(path), -1, 0
+    return str(path), status.st_size, status.st_mtime_ns
 
 
 def _changed_utc_s(path: Path) -> float:

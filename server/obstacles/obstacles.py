@@ -22,9 +22,11 @@ from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_desk import ObstacleDesk
 from server.obstacles.obstacle_watch import Watch
+from server.obstacles.replayed import MAPS, STATUSES, Replayed
 from server.obstacles.section import Looking
 from server.obstacles.sensor_nodes import KnownGround, SensorNodes
 from server.obstacles.surroundings import Surroundings
+from server.scene.layers.sights import Sights
 from server.schemas import Pages, Source
 from server.work.jobs import Lane
 from server.workspace import Workspace
@@ -36,8 +38,6 @@ from telemetry.topics.requests import WholeMap
 
 log = logging.getLogger("hedgehop.obstacles")
 
-_MAPS = (Topic.MAP_RADAR, Topic.MAP_VISION, Topic.MAP_VISION_FLIGHT, Topic.MAP_RANGES)
-_STATUSES = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
 _ASK_EVERY_S = 2.0
 
 
@@ -46,6 +46,7 @@ class Obstacles:
 
     def __init__(
         self,
+        folder: Path,
         bus: Bus,
         library: Library,
         workspace: Workspace,
@@ -56,21 +57,25 @@ class Obstacles:
         lane: Lane,
         lease: Lease,
         pages: Pages,
+        replayed: Replayed,
+        sights: Sights | None,
     ) -> None:
+        """``folder``: where its settings are kept; ``sights``: where what it sees is drawn, None: nowhere."""
         self._bus, self._workspace, self._nodes, self._aboard = bus, workspace, nodes, aboard
-        self.watches: dict[Source, Watch] = {"live": Watch("live", pages, live), "replay": Watch("replay", pages)}
+        self.watches: dict[Source, Watch] = {"live": Watch("live", pages, live), "replay": replayed.watch}
         self.tracks: dict[Source, TracksWatch] = {
-            source: TracksWatch(source, pages, watch) for source, watch in self.watches.items()
+            "live": TracksWatch("live", pages, self.watches["live"]),
+            "replay": replayed.tracks,
         }
         around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
         self._manoeuvres = Manoeuvres(around, lane)
         self._coming_down = ComingDown(around, link, lane, lease)
         self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)
-        self._drawing = MapDrawing(workspace.sights, self.watches, self._manoeuvres, self.tracks)
-        self.looking = Looking(self.watches, workspace.sights)
+        self._drawing = MapDrawing(sights, self.watches, self._manoeuvres, self.tracks)
+        self.looking = Looking(self.watches, sights)
         self.desk = ObstacleDesk(
-            library.root,
+            folder,
             self.watches,
             self._manoeuvres,
             around,
@@ -82,21 +87,15 @@ class Obstacles:
         )
 
     def hear(self, relay: Relay) -> None:
-        live, replay = self.watches["live"], self.watches["replay"]
-        for topic in _MAPS:
+        live = self.watches["live"]
+        for topic in MAPS:
             relay.on(topic, live.on_map, each=True)
-            relay.on(topic, replay.on_map, replayed=True, each=True)
-        for topic in _STATUSES:
+        for topic in STATUSES:
             relay.on(topic, live.on_status)
-            relay.on(topic, replay.on_status, replayed=True)
-        for watch, replayed in ((live, False), (replay, True)):
-            relay.on(Topic.RADAR_LOOK, watch.on_radar_look, replayed=replayed)
-            relay.on(Topic.CLOUD_LOOK, watch.on_cloud_look, replayed=replayed)
+        relay.on(Topic.RADAR_LOOK, live.on_radar_look)
+        relay.on(Topic.CLOUD_LOOK, live.on_cloud_look)
         relay.on(Topic.ALERT, self._manoeuvres.on_alert, each=True)
-        relay.on(Topic.ALERT, replay.on_alert, replayed=True, each=True)
-        relay.on(Topic.AVOIDANCE, replay.on_avoidance, replayed=True)
-        for source, tracks in self.tracks.items():
-            relay.on(Topic.TRACKS, tracks.on_status, replayed=source == "replay")
+        relay.on(Topic.TRACKS, self.tracks["live"].on_status)
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         whole = [self._ask_for_whole(sensor) for sensor in SENSORS]

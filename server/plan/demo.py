@@ -8,8 +8,8 @@ from planning.ground.demo_hillside import demo_pois, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile
 from server.library import Library
 from server.library.documents import doc_from_profile
-from server.library.edits import new_poi_id
 from server.library.history import History
+from server.library.whole_files import new_id
 from server.plan import file_tasks
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SurfaceDoc, SurveyDoc, TerrainDoc
 from server.work.jobs import Lane, Progress
@@ -49,7 +49,7 @@ def _document(terrain: TerrainDoc) -> PlanDoc:
         name=PLAN_NAME,
         terrain_id=terrain.id,
         pois=[
-            PoiDoc(id=new_poi_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
+            PoiDoc(id=new_id(), lat_deg=p.lat_deg, lon_deg=p.lon_deg, name=p.name, loiter_s=p.loiter_s)
             for p in demo_pois()
         ],
         survey=SurveyDoc(polygon=[PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in demo_survey_polygon().tolist()]),

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from planning.errors import DescribedError, FormatError, PlanningError
+from planning.formats.fence_files import is_fence, read_fence
 from planning.formats.poi_files import looks_swapped, read_pois
 from planning.ground.demo_hillside import demo_dsm, small_hill
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
@@ -16,6 +17,7 @@ from planning.terrain.spikes import Spike, find_spikes
 from planning.terrain.spikes import remove_spikes as without
 from server.errors import error_doc
 from server.library.documents import doc_of_points
+from server.library.fences import with_fence
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, store_terrain
@@ -71,29 +73,29 @@ def import_terrain(
     return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
 
 
-FENCE_LEFT = (
-    "The file's fence and rally points were not taken: flights are held against them by hedgehop plan and hedgehop"
-    " certify."
-)
-
-
 def read_points(
-    upload: Path, filename: str, terrain_dir: Path | None, *, report: Progress
+    upload: Path, filename: str, terrain_dir: Path | None, *, only_fence: bool = False, report: Progress
 ) -> tuple[PlanDoc, tuple[str, ...]]:
-    """A file's points as a document, and remarks. Raises FormatError, PoiError."""
-    report("Reading points", None)
-    points = read_pois(filename, upload.read_bytes())
+    """A file's points, or its fence and rally points, as a document, and remarks. Raises FormatError, PoiError."""
+    report("Reading the file", None)
+    data = upload.read_bytes()
+    if only_fence or is_fence(filename, data):
+        return _fence_of(filename, data)
+    points = read_pois(filename, data)
     try:
         document = doc_of_points(points)
     except ValidationError as error:
         fault = error_doc(error)
         raise FormatError(fault.what, where=f"{filename}, {fault.where}", advice="Split or correct the file.") from None
-    mission, remarks = points.mission, list(points.warnings)
-    if mission is not None and (mission.fence or mission.rally):
-        remarks.append(FENCE_LEFT)
+    remarks = list(points.warnings)
     if terrain_dir is not None and looks_swapped(points.pois, load_terrain(terrain_dir)):
         remarks.append("Latitude and longitude seem swapped: exchanged, these points lie on the surface model.")
     return document, tuple(remarks)
+
+
+def _fence_of(filename: str, data: bytes) -> tuple[PlanDoc, tuple[str, ...]]:
+    found = read_fence(filename, data)
+    return with_fence(PlanDoc(), found.fence, found.rally), found.warnings
 
 
 def import_orthophoto(

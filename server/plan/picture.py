@@ -15,6 +15,7 @@ from server.library import Library
 from server.plan import tasks
 from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
 from server.scene.geometry.plain import plain_around, plain_scene
+from server.scene.layers.vehicles import actor_of
 from server.scene.view import SceneView
 from server.schemas import CursorMessage, ErrorDoc, FrameView, NoticeMessage, Pages, PlanDoc, SelectionDoc, ViewDoc
 from server.work.jobs import Lane
@@ -210,7 +211,7 @@ class Picture:
         return await self.mark(plan, None if pointer is None else self._view.sample_under(page_id, *pointer))
 
     async def frame(self, message: FrameView, page_id: str) -> None:
-        await self._view.frame(page_id, message.target, message.source)
+        await self._view.frame(page_id, message.target, actor_of(message.source, message.vehicle))
 
     def hold_camera(self, page_id: str, *, held: bool) -> None:
         self._view.hold_camera(page_id, held=held)

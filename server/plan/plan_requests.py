@@ -16,7 +16,8 @@ from planning.report.exports import FILES
 from planning.terrain.dsm import Dsm
 from server.errors import ConflictError, NotReadyError
 from server.library import Library
-from server.library.documents import missing, with_points
+from server.library.documents import missing, taken_words, with_points
+from server.library.fences import written_fence
 from server.library.shelf import utc_now
 from server.plan import file_tasks, tasks
 from server.plan.computing import Computing
@@ -92,16 +93,18 @@ class PlanRequests:
         await self._desk.delete(plan_id)
         self._pages.publish(self._library.message())
 
-    async def import_points(self, filename: str, upload: Path) -> Imported:
-        """Replaces the points, or the polygon, by those of an uploaded file. Raises FormatError, PoiError."""
+    async def import_points(self, filename: str, upload: Path, *, only_fence: bool) -> Imported:
+        """Replaces points, polygon or fence by those of an uploaded file. Raises FormatError, PoiError."""
         terrain_id = self._desk.document.terrain_id
         terrain_dir = None if self._picture.dsm is None or not terrain_id else self._library.terrain_dir(terrain_id)
         try:
-            found, warnings = await self._lane.call(file_tasks.read_points, upload, filename, terrain_dir)
+            found, warnings = await self._lane.call(
+                file_tasks.read_points, upload, filename, terrain_dir, only_fence=only_fence
+            )
         finally:
             await asyncio.to_thread(upload.unlink, missing_ok=True)
         await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, found)))
-        return Imported(state=self.state, warnings=list(warnings))
+        return Imported(state=self.state, warnings=list(warnings), taken=taken_words(found))
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""
@@ -112,6 +115,10 @@ class PlanRequests:
     async def export(self, file: str) -> bytes:
         """One export file, or ``all.zip``, of the present document. Raises NotReadyError."""
         return await exported(self._lane, self._library, self._desk.document, file)
+
+    def exported_fence(self, file: str) -> bytes:
+        """Raises NotReadyError without a fence, FormatError for one that is none."""
+        return written_fence(self._desk.document, file)
 
     async def plan_with_seen(
         self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None

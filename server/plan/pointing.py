@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from server.errors import reported
-from server.library.edits import clicked, moved
+from server.library.edits import clicked, moved, picked
 from server.plan.on_show import OnShow
 from server.plan.plan_desk import PlanDesk, Proposal
 from server.schemas import ErrorDoc, NoticeMessage, Pages, PlaceDoc, PlanDoc, SelectionDoc
@@ -43,11 +43,11 @@ class Pointing:
         if await self._propose(click) and selections:
             self._on_show.select(selections[0])
 
-    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None:
-        await self._propose(lambda document: moved(document, poi_id, lat_deg, lon_deg))
+    async def on_mark_moved(self, mark: str, lat_deg: float, lon_deg: float) -> None:
+        await self._propose(lambda document: moved(document, mark, lat_deg, lon_deg))
 
-    def on_poi(self, poi_id: str) -> None:
-        self._on_show.select(self._on_show.selection.model_copy(update={"poi_id": poi_id}))
+    def on_mark(self, mark: str) -> None:
+        self._on_show.select(picked(self._desk.document, self._on_show.selection, mark))
 
     async def _propose(self, proposal: Proposal) -> bool:
         try:

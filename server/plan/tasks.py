@@ -42,7 +42,17 @@ from server.scene.geometry.payload import PlanScene, TerrainScene
 from server.scene.geometry.relief import kept_within, relief
 from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
 from server.scene.mirror import Voxels
-from server.schemas import BetterHomeDoc, HomeDoc, PlanDoc, ReasonDoc, ResultDoc, SurveyResult, TradeRow, WorstDoc
+from server.schemas import (
+    BetterHomeDoc,
+    FenceVerdictDoc,
+    HomeDoc,
+    PlanDoc,
+    ReasonDoc,
+    ResultDoc,
+    SurveyResult,
+    TradeRow,
+    WorstDoc,
+)
 from server.work.clocks import READ_STEP, StepTimer
 from server.work.jobs import Progress
 
@@ -179,6 +189,7 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns:
         worst=None if worst is None else WorstDoc(**worst, s_m=certificate.worst.s_m),
         max_height_above_ground_m=finite_or_none(certificate.max_height_above_ground_m),
         reasons=[ReasonDoc(code=r.code, text=r.text, mend=r.mend) for r in certificate.reasons],
+        fence=None if summary["fence"] is None else FenceVerdictDoc(**summary["fence"]),
         survey=None if summary["survey"] is None else SurveyResult(**summary["survey"]),
         gsd_min_cm=gsd_min,
         gsd_max_cm=gsd_max,

@@ -15,18 +15,17 @@ import viser
 from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
 from server.scene.cameras.cameras import CAMERAS_EVERY_S, Cameras, lens_of, move, planes
-from server.scene.cameras.picking import PlaceHit, PoiHit, pick
+from server.scene.cameras.picking import MarkHit, PlaceHit, pick
 from server.scene.cameras.projection import FOV_RAD, nearest_on_path
 from server.scene.cameras.shots import Target, shot
 from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.payload import SceneState
 from server.scene.geometry.stage import Drawing
 from server.scene.host import SceneHost
-from server.scene.layers.layers import POIS, Key, layers, unchanged
+from server.scene.layers.layers import MARKS, Key, layers, unchanged
 from server.scene.layers.mark_layers import cursor_nodes
 from server.scene.layers.sights import Sights
 from server.scene.layers.vehicles import Vehicles
-from server.schemas import Source
 
 _POINTER_REACH_PX = 24.0
 _SHOTS_DUE_MAX = 100
@@ -37,9 +36,9 @@ class Hands(Protocol):
 
     async def on_terrain_click(self, lat_deg: float, lon_deg: float, known: bool) -> None: ...
 
-    async def on_poi_click(self, poi_id: str) -> None: ...
+    async def on_mark_click(self, mark: str) -> None: ...
 
-    async def on_poi_moved(self, poi_id: str, lat_deg: float, lon_deg: float) -> None: ...
+    async def on_mark_moved(self, mark: str, lat_deg: float, lon_deg: float) -> None: ...
 
 
 class SceneView:
@@ -60,7 +59,7 @@ class SceneView:
         self._cursor_m: F64 | None = None
         self._one_at_a_time = asyncio.Lock()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._shots_due: dict[str, tuple[Target, Source]] = {}
+        self._shots_due: dict[str, tuple[Target, str]] = {}
         """Asked for by pages whose view had not connected yet."""
         server.on_client_connect(self._joined)
         server.scene.world_axes.visible = False
@@ -82,19 +81,19 @@ class SceneView:
         self._cursor_m = None if at_m is None or not np.isfinite(at_m).all() else np.asarray(at_m, dtype=np.float64)
         self._canvas.draw({"cursor": self._cursor_nodes()})
 
-    async def frame(self, page_id: str, target: Target, source: Source = "live") -> None:
+    async def frame(self, page_id: str, target: Target, actor: str = "live") -> None:
         """Moves the camera of one page: terrain, plan, from above, worst point, selected POI, behind a vehicle."""
         client = self._host.client(page_id)
         if client is None:
             self._shots_due.pop(page_id, None)
-            self._shots_due[page_id] = target, source
+            self._shots_due[page_id] = target, actor
             while len(self._shots_due) > _SHOTS_DUE_MAX:
                 del self._shots_due[next(iter(self._shots_due))]
             return
         self._cameras.free(page_id)
         if self._drawn is None:
             return
-        if target == "chase" and self._cameras.chase(page_id, source):
+        if target == "chase" and self._cameras.chase(page_id, actor):
             self._cameras.follow(self._drawn)
         else:
             move(client, shot(self._drawn, target, aspect=client.camera.aspect), self._drawn)
@@ -135,7 +134,8 @@ class SceneView:
         keys = {layer.name: layer.key(drawing) for layer in self._layers}
         if self._dragged is not None:
             # Drawn when the hand lets go: the browser that drags moves its mark itself.
-            keys.pop(POIS)
+            for name in MARKS:
+                keys.pop(name)
         todo = [
             layer
             for layer in self._layers
@@ -184,8 +184,8 @@ class SceneView:
         if drawn is None:
             return
         match await asyncio.to_thread(pick, drawn, origin, direction, fov_rad=fov_rad):
-            case PoiHit(poi_id):
-                await self._hands.on_poi_click(poi_id)
+            case MarkHit(mark):
+                await self._hands.on_mark_click(mark)
             case PlaceHit(lat_deg, lon_deg, known):
                 await self._hands.on_terrain_click(lat_deg, lon_deg, known)
 
@@ -212,19 +212,20 @@ class SceneView:
             return
         at_m = drawn.frame.model_from_scene(at)
         if phase == "start":
-            self._dragged = drawn.state.selection.poi_id
+            self._dragged = drawn.state.selection.fence_mark or drawn.state.selection.poi_id
         elif phase == "update":
             await self.cursor(at_m)
         elif self._dragged is not None:
-            poi_id, self._dragged = self._dragged, None
+            mark, self._dragged = self._dragged, None
             await self.cursor(None)
-            await self._dropped(drawn, poi_id, at_m)
+            await self._dropped(drawn, mark, at_m)
 
-    async def _dropped(self, drawn: Drawing, poi_id: str, at_m: F64) -> None:
+    async def _dropped(self, drawn: Drawing, mark: str, at_m: F64) -> None:
         lat_deg, lon_deg = drawn.dsm.lat_lon_from_xy(at_m[None, :2])[0]
         if np.isfinite([lat_deg, lon_deg]).all():
-            await self._hands.on_poi_moved(poi_id, float(lat_deg), float(lon_deg))
+            await self._hands.on_mark_moved(mark, float(lat_deg), float(lon_deg))
         # Puts the mark where the document says, also when the move was refused.
-        self._keys.pop(POIS, None)
+        for name in MARKS:
+            self._keys.pop(name, None)
         async with self._one_at_a_time:
             await self._draw(self._drawn)

@@ -21,6 +21,7 @@ from server.schemas.flight_docs import (
     DisconnectLink,
     FlyState,
     FollowDoc,
+    LogDownloadDoc,
     NodeDoc,
     OnboardDoc,
     OpenReview,
@@ -32,6 +33,8 @@ from server.schemas.flight_docs import (
     StartFlight,
     TrackDoc,
     UploadPlan,
+    VehicleLogDoc,
+    VehicleLogsDoc,
 )
 from server.schemas.library_docs import (
     JobDoc,
@@ -61,9 +64,13 @@ from server.schemas.obstacle_docs import (
     TrackerSettingsBody,
     VelocitySettingsBody,
 )
+from server.schemas.parameter_docs import ComparedDoc, ParametersDoc, WriteParametersBody, WrittenAnswer
 from server.schemas.plan_docs import (
     CameraDoc,
     ClearanceDoc,
+    FenceCircleDoc,
+    FenceDoc,
+    FencePolygonDoc,
     MissionDoc,
     PathDoc,
     PlaceDoc,
@@ -71,6 +78,7 @@ from server.schemas.plan_docs import (
     PlannedOnDoc,
     PoiDoc,
     ProfileDoc,
+    RallyDoc,
     SurfaceDoc,
     SurveyDoc,
 )
@@ -79,6 +87,7 @@ from server.schemas.result_docs import (
     Chart,
     Computation,
     ErrorDoc,
+    FenceVerdictDoc,
     HomeDoc,
     Imported,
     OpenPlan,
@@ -92,17 +101,21 @@ from server.schemas.result_docs import (
     WorstDoc,
 )
 from server.schemas.review_docs import Histogram, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries
-from server.schemas.station_docs import AlarmDoc, AuditDoc, AuditEntryDoc
+from server.schemas.station_docs import AlarmDoc, AuditDoc, AuditEntryDoc, VehicleAlarm, VehicleDoc
 from server.schemas.stream import (
+    ActiveMessage,
     AlarmsMessage,
     AlertMessage,
     AnsweredMessage,
+    ChooseVehicle,
     ClientMessage,
     ClockMessage,
     CursorMessage,
+    FleetMessage,
     FlightMessage,
     FlyMessage,
     FrameView,
+    HealthMessage,
     HoldCamera,
     HoverProfile,
     HoverView,

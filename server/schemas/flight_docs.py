@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
 from telemetry.topics.messages import Rounded
 
@@ -60,7 +61,7 @@ class TrackDoc(Strict):
 class CheckRow(Strict):
     """One line of the check before the start."""
 
-    code: Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance"]
+    code: Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance", "fence"]
     state: Literal["good", "accept", "bad", "unknown"]
     """accept: may be flown once the operator accepts it; bad and unknown: not at all."""
     text: str
@@ -108,6 +109,8 @@ class FlyState(Strict):
     preflight: PreflightDoc | None = None
     resume_from_item: int | None = None
     """After a flight that broke off: where it can go on."""
+    at_fence: str = ""
+    """What the vehicle does when it crosses its fence, as read at the last check; empty: not known."""
     busy: str = ""
     """What is being done right now: "Uploading", "Checking the start" ..."""
 
@@ -122,7 +125,7 @@ class NodeDoc(Strict):
 class RecordingDoc(Strict):
     id: str
     name: str
-    kind: Literal["hedgehop", "tlog"]
+    kind: Literal["hedgehop", "tlog", "dataflash", "ulog"]
     started_utc: str
     duration_s: float | None
     bytes: int
@@ -132,6 +135,32 @@ class RecordingDoc(Strict):
     """A surface model in the library that it was flown over."""
     fault: str = ""
     """Why it can only be opened in part, or not at all."""
+
+
+class VehicleLogDoc(Strict):
+    """A log that lies on the vehicle."""
+
+    number: int
+    bytes: int
+    begun_utc: str | None
+
+
+class LogDownloadDoc(Strict):
+    """A log that is being read, or was last."""
+
+    number: int
+    bytes: int
+    read_bytes: int
+    state: Literal["reading", "done", "failed", "cancelled"]
+    recording_id: str | None = None
+    """Once it is done: what it is in the library."""
+    error: ErrorDoc | None = None
+
+
+class VehicleLogsDoc(Strict):
+    logs: list[VehicleLogDoc] | None
+    """The newest first; null: this vehicle was not asked."""
+    download: LogDownloadDoc | None
 
 
 # Bodies of requests
@@ -163,7 +192,7 @@ class UploadPlan(Strict):
 class StartFlight(Strict):
     way: Literal["auto", "guided"] = "auto"
     digest: str
-    accept: list[Literal["gnss", "battery", "rtl_height", "avoidance"]] = Field(default_factory=list)
+    accept: list[Literal["gnss", "battery", "rtl_height", "avoidance", "fence"]] = Field(default_factory=list)
     from_item: Annotated[int, Field(ge=1)] = 1
 
 

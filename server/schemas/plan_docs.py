@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from planning.fence.model import LARGEST_M, MOST_CORNERS
 from planning.limits import FEWEST_ITEMS, LONGEST_LOITER_S
 from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.route.camera import LOOKS_DOWN_DEG
@@ -16,8 +17,11 @@ Overlap = Annotated[float, Field(ge=0, lt=0.95), Asked(0, 0.94)]
 _VEHICLE, _SURFACE, _PATH, _MISSION = VehicleProfile(""), SurfaceParams(), PathParams(), MissionParams()
 
 
+MarkId = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,32}$")]
+
+
 class PoiDoc(Strict):
-    id: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,32}$")]
+    id: MarkId
     lat_deg: Latitude
     lon_deg: Longitude
     name: Name = ""
@@ -27,6 +31,38 @@ class PoiDoc(Strict):
 class PlaceDoc(Strict):
     lat_deg: Latitude
     lon_deg: Longitude
+
+
+class FencePolygonDoc(Strict):
+    id: MarkId
+    inclusion: bool
+    """The vehicle stays inside; otherwise outside."""
+    corners: list[PlaceDoc] = Field(min_length=3, max_length=MOST_CORNERS)
+
+
+class FenceCircleDoc(Strict):
+    id: MarkId
+    inclusion: bool
+    centre: PlaceDoc
+    radius_m: Annotated[float, Field(gt=0, le=LARGEST_M), Asked(1, LARGEST_M, initial=20)]
+
+
+class RallyDoc(Strict):
+    """Where a vehicle may return to instead of home."""
+
+    id: MarkId
+    lat_deg: Latitude
+    lon_deg: Longitude
+    alt_rel_home_m: Annotated[Metres, Asked(-500, 2000)]
+
+
+class FenceDoc(Strict):
+    """Where the vehicle may be: inside every inclusion, outside every exclusion, between floor and ceiling."""
+
+    polygons: list[FencePolygonDoc] = Field(default=[], max_length=MOST_CORNERS)
+    circles: list[FenceCircleDoc] = Field(default=[], max_length=MOST_CORNERS)
+    floor_rel_home_m: Annotated[Metres, Asked(-500, 2000, initial=-10)] | None = None
+    ceiling_rel_home_m: Annotated[Metres, Asked(1, 5000, initial=120)] | None = None
 
 
 class SurveyDoc(Strict):
@@ -139,3 +175,5 @@ class PlanDoc(Strict):
     path: PathDoc = PathDoc()
     mission: MissionDoc = MissionDoc()
     clearance: ClearanceDoc = ClearanceDoc()
+    fence: FenceDoc = FenceDoc()
+    rally: list[RallyDoc] = Field(default=[], max_length=MOST_CORNERS)

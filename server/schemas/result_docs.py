@@ -146,6 +146,22 @@ class HomeDoc(Strict):
     better: BetterHomeDoc | None
 
 
+class FenceVerdictDoc(Strict):
+    """The nearest that the line and the ways back come to what the fence forbids."""
+
+    keeps: bool
+    margin_m: float
+    min_distance_m: float | None
+    """Null: the fence has no shapes, only heights."""
+    shape: str
+    part: Literal["line", "home", "rally"]
+    lat_deg: float
+    lon_deg: float
+    lowest_rel_home_m: float
+    highest_rel_home_m: float
+    faults: list[str]
+
+
 class ResultDoc(Strict):
     other_surface: str = ""
     """That the points were planned on another surface model, and how far home moves; empty: they were not."""
@@ -178,6 +194,8 @@ class ResultDoc(Strict):
     items: int
     max_items: int
     excess_height_m: float
+    fence: FenceVerdictDoc | None = None
+    """Null: the plan has no fence."""
     survey: SurveyResult | None = None
     gsd_min_cm: float | None
     gsd_max_cm: float | None
@@ -234,3 +252,5 @@ class SavePlanAs(Strict):
 class Imported(Strict):
     state: PlanState
     warnings: list[str]
+    taken: str
+    """What was read, in words."""

@@ -7,6 +7,42 @@ from typing import Literal
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
 
+FIRST_VEHICLE = 1
+"""The number of the vehicle that a station with only one has."""
+
+
+class VehicleAlarm(Strict):
+    """The worst of what is wrong with one vehicle, for pages that show another one."""
+
+    kind: Literal["loss", "near", "alert"]
+    """loss: nothing reaches it, or nothing is heard of it; near: another one is, which has the same alarm."""
+    key: str
+    """Another key is another alarm: who has seen the one has not seen the other."""
+    text: str
+
+
+class VehicleDoc(Strict):
+    """One of several vehicles, as every page is told of it; null where nothing is known."""
+
+    number: int
+    name: str
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    alt_rel_home_m: float | None = None
+    ground_speed_m_s: float | None = None
+    mode: str = ""
+    phase: str = "idle"
+    """As in the flight message."""
+    armed: bool = False
+    link: Literal["none", "live", "stale", "lost"] = "none"
+    silent_s: float | None = None
+    battery_share: float | None = None
+    holder: str | None = None
+    """Who is in charge of it."""
+    plan_name: str = ""
+    """Of the plan on board, where it came from here."""
+    alarm: VehicleAlarm | None = None
+
 
 class AlarmDoc(Strict):
     """Stands on every page until it is over, or until somebody has read it."""

@@ -12,11 +12,12 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.station_docs import AlarmDoc
+from server.schemas.station_docs import FIRST_VEHICLE, AlarmDoc, VehicleDoc
 from server.schemas.strict_model import Message, Strict
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
 from server.schemas.view_docs import SelectionDoc, ViewDoc
+from telemetry.flight.health import HealthRow
 from telemetry.topics.messages import (
     FlightStatus,
     LinkStatus,
@@ -69,6 +70,20 @@ class AnsweredMessage(Message):
     change: int
 
 
+class ActiveMessage(Message):
+    """The vehicle that this page shows and commands from now on; all that is known of it follows at once."""
+
+    type: Literal["active"] = "active"
+    vehicle: int
+
+
+class FleetMessage(Message):
+    """All vehicles of a station that has several, some times a second."""
+
+    type: Literal["fleet"] = "fleet"
+    vehicles: list[VehicleDoc]
+
+
 class ClockMessage(Message):
     """The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came."""
 
@@ -102,6 +117,14 @@ class VehicleMessage(Message):
     """The clock of the state's ``..._t_mono_s``: their difference is a value's age."""
     state: VehicleState | None
     follow: FollowDoc | None
+
+
+class HealthMessage(Message):
+    """How the vehicle is, by its own account, in the words of ``telemetry.flight.health``; empty: no vehicle."""
+
+    type: Literal["health"] = "health"
+    source: Source
+    rows: list[HealthRow]
 
 
 class TrackMessage(Message):
@@ -252,7 +275,9 @@ class AlarmsMessage(Message):
 
 ServerMessage = Annotated[
     Snapshot
+    | ActiveMessage
     | AlarmsMessage
+    | FleetMessage
     | PlanMessage
     | LibraryMessage
     | ViewMessage
@@ -270,6 +295,7 @@ ServerMessage = Annotated[
     | FlyMessage
     | LeaseMessage
     | MeMessage
+    | HealthMessage
     | NodesMessage
     | RecorderMessage
     | RecordingsMessage
@@ -333,6 +359,8 @@ class FrameView(Strict):
     type: Literal["frame_view"] = "frame_view"
     target: Literal["terrain", "plan", "top", "worst", "poi", "chase"]
     source: Source = "live"
+    vehicle: Annotated[int, Field(ge=1)] = FIRST_VEHICLE
+    """Of the source "live"."""
 
 
 class HoldCamera(Strict):
@@ -340,6 +368,13 @@ class HoldCamera(Strict):
 
     type: Literal["hold_camera"] = "hold_camera"
     held: bool
+
+
+class ChooseVehicle(Strict):
+    """This page shows and commands another vehicle; who is in charge of which one stays as it is."""
+
+    type: Literal["choose_vehicle"] = "choose_vehicle"
+    vehicle: int
 
 
 class Ping(Strict):
@@ -350,6 +385,6 @@ class Ping(Strict):
 
 
 ClientMessage = Annotated[
-    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera | Ping,
+    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera | ChooseVehicle | Ping,
     Field(discriminator="type"),
 ]

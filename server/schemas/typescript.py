@@ -18,6 +18,7 @@ from server.schemas import (
     flight_docs,
     library_docs,
     obstacle_docs,
+    parameter_docs,
     plan_docs,
     result_docs,
     review_docs,
@@ -41,6 +42,9 @@ ANSWERS = (
     schemas.SessionDoc,
     schemas.InvitationDoc,
     schemas.AuditDoc,
+    schemas.ParametersDoc,
+    schemas.WrittenAnswer,
+    schemas.ComparedDoc,
 )
 """Of requests, beside the stream."""
 CONSTANTS = {"CHECK_FRESH_S": flight_docs.CHECK_FRESH_S, "STALE_S": STALE_S, "LOST_S": LOST_S}
@@ -79,6 +83,7 @@ def _models() -> Iterator[type[BaseModel]]:
         flight_docs,
         review_docs,
         obstacle_docs,
+        parameter_docs,
         traversability_docs,
         study_docs,
         stream,

@@ -40,8 +40,14 @@ class ViewDoc(Strict):
 class SelectionDoc(Strict):
     """Which tool clicks in the 3D view act through, and what is selected."""
 
-    tool: Literal["select", "add_poi", "polygon", "home", "look_at", "landing"] = "select"
+    tool: Literal[
+        "select", "add_poi", "polygon", "home", "look_at", "landing", "fence_polygon", "fence_circle", "rally"
+    ] = "select"
     poi_id: str | None = None
+    fence_mark: str | None = None
+    """Id of the fence's shape or of the rally point that is selected; a corner's number after a dot, from 0."""
+    draft: list[PlaceDoc] = Field(default=[], max_length=2)
+    """Corners of a polygon of the fence that is none yet."""
     place: PlaceDoc | None = None
     """Clicked with the tool "landing": sites are looked for near it."""
     site_rank: int | None = None

@@ -11,7 +11,7 @@ from typing import Any, cast
 from server.door.hub import Hub
 from server.door.lease import Lease
 from server.door.operators import Operators
-from server.errors import NotReadyError, StaleRevisionError
+from server.errors import NotFoundError, NotReadyError, StaleRevisionError
 from server.heard.agents import Agents
 from server.library import Library
 from server.schemas import (
@@ -27,6 +27,7 @@ from server.schemas import (
     NoticeMessage,
     ObstaclesState,
     OnboardDoc,
+    ParametersDoc,
     PlanDoc,
     PlanEdit,
     PlanMessage,
@@ -41,6 +42,7 @@ from server.schemas import (
     TraversabilityBody,
     TraversabilityState,
     ViewDoc,
+    WrittenAnswer,
 )
 
 
@@ -134,11 +136,11 @@ class FakeWorkspace:
             raise NotReadyError("There is no finished plan.", advice="Wait.")
         return b"<!doctype html><script>alert(1)</script>"
 
-    async def import_points(self, filename: str, upload: Path) -> Imported:
+    async def import_points(self, filename: str, upload: Path, *, only_fence: bool) -> Imported:
         self.uploads[filename] = upload.read_bytes()
         upload.unlink()
         document = PlanDoc(pois=[PoiDoc(id="a", lat_deg=1, lon_deg=2)])
-        return Imported(state=plan_state(2, document), warnings=[])
+        return Imported(state=plan_state(2, document), warnings=[], taken="2 points")
 
     async def add_demo(self) -> None:
         self.calls.append("demo")
@@ -213,20 +215,50 @@ class FakeFlying:
         self.agents = Agents(cast(Any, self))
         self.live = SimpleNamespace(armed=False)
         self.uwb = SimpleNamespace(clear=lambda: self.asked.append(("clear",)), set_params=lambda params: None)
-        self.connections = self.desk = self.simulation = self.recording = self.reviewing = _Asked(self.asked)
+        self.connections = self.desk = self.simulation = self.recording = self.parameters = _Asked(self.asked)
 
     def publish(self, topic: str, message: Any) -> None:
         """As the bus does."""
         self.published.append((topic, message))
 
+    def present_for(self, session_key: str) -> list[ServerMessage]:
+        return []
+
+
+class FakeFleet:
+    """Of one vehicle."""
+
+    def __init__(self, library: Library, hub: Hub) -> None:
+        self.first = FakeFlying(library, hub)
+        self.flights = [self.first]
+        self.uwb = self.first.uwb
+        self.recordings = self.reviewing = self.first.recording
+
+    @property
+    def any_armed(self) -> bool:
+        return self.first.live.armed
+
+    @property
+    def holders(self) -> set[str]:
+        holder = self.first.lease.holder
+        return set() if holder is None else {holder.session_key}
+
     def loops(self, *, demo: bool = False) -> list:
         return []
 
     async def close(self) -> None:
-        self.asked.append(("close",))
+        self.first.asked.append(("close",))
 
-    def present_for(self, session_key: str) -> list[ServerMessage]:
+    def present(self) -> list[ServerMessage]:
         return []
+
+    def of(self, number: int) -> FakeFlying:
+        if number != 1:
+            raise NotFoundError(f"There is no vehicle {number}.")
+        return self.first
+
+    def named(self, number: str | None) -> FakeFlying:
+        return self.of(int(number or 1))
 
 
 _FLY_STATE, _OBSTACLES = FlyState(onboard=OnboardDoc(state="none")), ObstaclesState()
@@ -239,6 +271,12 @@ _ANSWERS: dict[str, Any] = {
     "exported": b"a map",
     "section": SectionDoc(across=True, thickness_m=2.0, reach_m=30.0, text="No sensor tells where the vehicle is."),
     "targets": RadarTargetsDoc(),
+    "write": WrittenAnswer(
+        written=[],
+        now=ParametersDoc(
+            vehicle="vehicle 1", read_utc_s=0.0, described=False, parameters=[], findings=[], plan_name=""
+        ),
+    ),
 }
 
 

@@ -19,7 +19,7 @@ from server.work.jobs import Lane
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
 from telemetry.topics.obstacles import AvoidanceStatus
-from telemetry.topics.requests import Download, Operator, ReadParameters, Upload
+from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
 
 ME = Operator("Anna", 7)
@@ -31,7 +31,9 @@ class Vehicle:
     def __init__(self) -> None:
         self.items: tuple[Any, ...] = ()
         self.told: list[Any] = []
-        self.swaps_two_items = False
+        self.swaps_two_items = self.drops_fences = False
+        self.places: dict[str, tuple[Any, ...]] = {"fence": (), "rally": ()}
+        self.parameters: dict[str, float] = {"RTL_ALT": 6000.0}
 
     async def call(self, request: Any) -> Any:
         if isinstance(request, Upload):
@@ -40,10 +42,18 @@ class Vehicle:
                 self.items = (self.items[0], self.items[2], self.items[1], *self.items[3:])
             rounded, differences = compare(request.items, self.items)
             return UploadReport(not differences, self._onboard(), rounded, differences, 0.1)
+        if isinstance(request, UploadPlaces):
+            self.places[request.kind] = kept = as_stored(request.items, "ardupilot")
+            if self.drops_fences:
+                self.places[request.kind] = kept = kept[:-1]
+            rounded, differences = compare(request.items, kept)
+            return UploadReport(not differences, self._onboard(), rounded, differences, 0.1)
+        if isinstance(request, DownloadPlaces):
+            return self.places[request.kind]
         if isinstance(request, Download):
             return self._onboard()
         if isinstance(request, ReadParameters):
-            return {name: 6000.0 if name == "RTL_ALT" else None for name in request.names}
+            return {name: self.parameters.get(name) for name in request.names}
         self.told.append(request)
         return None
 

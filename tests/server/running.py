@@ -20,8 +20,8 @@ from server.app import bound_socket, server_config
 from server.door.hub import Hub
 from server.library import Library
 from server.settings import Settings
-from server.web import MakeWorkspace, OpenFlying, create_app
-from tests.server.fakes import FakeFlying, FakeWorkspace
+from server.web import MakeWorkspace, OpenFleet, create_app
+from tests.server.fakes import FakeFleet, FakeFlying, FakeWorkspace
 
 T = TypeVar("T")
 PASSWORD = "correct horse battery"
@@ -46,7 +46,7 @@ class Running:
 
     @property
     def flying(self) -> FakeFlying:
-        return cast(FakeFlying, self.parts.flying)
+        return cast(FakeFlying, self.parts.fleet.first)
 
     def on_loop(self, work: Coroutine[Any, Any, T]) -> T:
         """Runs it where the server's own coroutines run."""
@@ -98,8 +98,8 @@ def _fake_workspace(library: Library, hub: Hub, *_: object) -> Any:
     return FakeWorkspace(library, hub)
 
 
-async def fake_flying(settings: Settings, library: Library, hub: Hub, *_: object) -> Any:
-    return FakeFlying(library, hub)
+async def fake_fleet(settings: Settings, library: Library, hub: Hub, *_: object) -> Any:
+    return FakeFleet(library, hub)
 
 
 @contextlib.contextmanager
@@ -107,7 +107,7 @@ def running(
     data_dir: Path,
     *,
     make: MakeWorkspace = _fake_workspace,
-    flying: OpenFlying = fake_flying,
+    fleet: OpenFleet = fake_fleet,
     demo: bool = False,
     **overrides: Any,
 ) -> Iterator[Running]:
@@ -115,7 +115,7 @@ def running(
     with bound_socket("127.0.0.1", 0) as listening, contextlib.closing(Library(data_dir)) as library:
         port = listening.getsockname()[1]
         settings = Settings(data_dir=data_dir, port=port, **{"console_dir": data_dir / "no-console", **overrides})
-        app = create_app(settings, library, make, flying, demo=demo)
+        app = create_app(settings, library, make, fleet, demo=demo)
         ready = threading.Event()
         server = _Signalling(server_config(app, settings), ready)
         thread = threading.Thread(target=server.run, args=([listening],))

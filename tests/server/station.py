@@ -12,6 +12,7 @@ import httpx
 from pydantic import TypeAdapter
 from websockets.sync.connection import Connection
 
+from server.fleet import Fleet
 from server.schemas import (
     Computation,
     ErrorDoc,
@@ -25,9 +26,8 @@ from server.schemas import (
     ServerMessage,
     Snapshot,
 )
-from server.stations import Flying
 from server.workspace import Workspace
-from tests.server.running import Running, fake_flying, running
+from tests.server.running import Running, fake_fleet, running
 
 PATIENCE_S = 90.0
 """A worker may have to start and to compile kernels, on a busy machine."""
@@ -117,11 +117,11 @@ def station(data_dir: Path, *, demo: bool = False, flies: bool = False, **overri
     The demo's vehicle meets no obstacles unless ``demo_world=True`` is given.
     """
     overrides.setdefault("demo_world", False)
-    flying = Flying.open if flies else fake_flying
-    with running(data_dir, make=Workspace, flying=flying, demo=demo, **overrides) as server:
+    fleet = Fleet.open if flies else fake_fleet
+    with running(data_dir, make=Workspace, fleet=fleet, demo=demo, **overrides) as server:
         server.http.timeout = httpx.Timeout(PATIENCE_S)
         with server.socket() as socket:
             made = Station(server, socket)
             if flies:
-                ok(made.http.post("/api/lease/take"))
+                ok(made.http.post("/api/lease/take", headers={"Hedgehop-Vehicle": "1"}))
             yield made

@@ -22,7 +22,7 @@ from telemetry.errors import (
     TelemetryError,
     TransferError,
 )
-from telemetry.topics.requests import Arm, Land, Operator, Pause, ReturnHome
+from telemetry.topics.requests import Arm, Land, Operator, Pause, ReturnHome, StopMotors
 from tests.server.running import PASSWORD, Running
 
 COMMANDS: list[tuple[str, dict[str, object]]] = [
@@ -41,6 +41,8 @@ COMMANDS: list[tuple[str, dict[str, object]]] = [
     ("/api/flight/resume", {}),
     ("/api/flight/return", {}),
     ("/api/flight/land", {}),
+    ("/api/parameters/write", {"changes": [{"name": "RTL_ALT", "value": 1500}]}),
+    ("/api/flight/emergency", {}),
     ("/api/recorder/start", {}),
     ("/api/recorder/stop", {}),
 ]
@@ -86,10 +88,10 @@ def test_a_foreign_page_cannot_command(served: Running, pilot: httpx.Client) -> 
 
 
 def test_commands_carry_name_and_token(served: Running, pilot: httpx.Client) -> None:
-    for path in ("arm", "pause", "return", "land"):
+    for path in ("arm", "pause", "return", "land", "emergency"):
         assert pilot.post(f"/api/flight/{path}").status_code == 204
     requests = [asked[1] for asked in served.flying.asked]
-    assert [type(request) for request in requests] == [Arm, Pause, ReturnHome, Land]
+    assert [type(request) for request in requests] == [Arm, Pause, ReturnHome, Land, StopMotors]
     operators: list[Operator] = [request.operator for request in requests]
     assert {operator.name for operator in operators} == {served.name}
     assert len({operator.token for operator in operators}) == 1

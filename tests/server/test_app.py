@@ -17,7 +17,7 @@ from server.library import Library
 from server.settings import Settings
 from server.web import create_app
 from tests.server.fakes import FakeWorkspace
-from tests.server.running import fake_flying, running
+from tests.server.running import fake_fleet, running
 
 
 def test_a_taken_port_is_a_clear_error() -> None:
@@ -45,7 +45,7 @@ def test_the_printed_link_signs_in(tmp_path: Path, host: str, start: str) -> Non
         return made[0]
 
     library = Library(tmp_path)
-    app = create_app(settings, library, make, fake_flying, demo=True)
+    app = create_app(settings, library, make, fake_fleet, demo=True)
 
     async def whole() -> None:
         async with app.router.lifespan_context(app):
@@ -81,7 +81,7 @@ def test_a_loop_that_fails_stops_the_server(tmp_path: Path, monkeypatch: pytest.
 
     library = Library(tmp_path)
     app = create_app(
-        Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Failing(lib, hub)), fake_flying
+        Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Failing(lib, hub)), fake_fleet
     )
 
     async def whole() -> None:
@@ -100,7 +100,7 @@ def test_an_expected_fault_at_start_is_kept_for_the_command_line(tmp_path: Path)
             raise StorageFullError("The disk is full.")
 
     library = Library(tmp_path)
-    app = create_app(Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Full(lib, hub)), fake_flying)
+    app = create_app(Settings(data_dir=tmp_path), library, lambda lib, hub, *_: cast(Any, Full(lib, hub)), fake_fleet)
 
     async def whole() -> None:
         async with app.router.lifespan_context(app):

@@ -20,7 +20,7 @@ from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PlannedFor
 from planning.terrain.geotiff import read_dsm, write_dsm
-from server.cli.fly_command import keep_recording
+from server.cli.flights.fly_command import keep_recording
 from server.cli.shared.upload_words import report_lines
 from server.errors import StorageError
 from server.flying.review import recording_of
@@ -243,6 +243,14 @@ def test_review_of_another_stations_log(shared_data: Path) -> None:
     assert true.json["height_error_max_m"] == pytest.approx(0.16, abs=0.05)
 
 
+def test_review_of_a_vehicles_own_log(shared_data: Path) -> None:
+    run = hedgehop("review", shared_data / "logs" / "real_flights" / "arducopter-4.7.BIN", "--json")
+    assert run.code == 0
+    assert run.json["completed"] is True
+    assert run.json["cross_track_max_m"] == pytest.approx(0.53, abs=0.01)
+    assert "The file ends in the middle of a message." in run.json["notes"]
+
+
 def test_a_flight_below_its_required_clearance_ends_with_1(shared_data: Path) -> None:
     """A real ArduCopter in GUIDED: certified at 1.29 m, 1.15 m required, 0.76 m by its own positions."""
     dsm = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"
@@ -275,7 +283,7 @@ def test_fly_ends_with_1_when_the_flight_was_too_low(
     async def flown(_: object) -> tuple[object, ReviewDoc]:
         return SimpleNamespace(completed=True, text="The mission was flown and the vehicle has landed."), done
 
-    monkeypatch.setattr(sys.modules["server.cli.fly_command"]._Conductor, "run", flown)
+    monkeypatch.setattr(sys.modules["server.cli.flights.fly_command"]._Conductor, "run", flown)
     run = hedgehop("fly", ground.mission, "--link", ground.link, "--json")
     assert run.code == 1
     assert run.json["completed"] is True

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
-from server.library.edits import clicked, moved, new_poi_id, next_poi_name
+from server.library.edits import clicked, moved, next_poi_name
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SelectionDoc
 
 
@@ -59,8 +57,3 @@ def test_a_drag_moves_one_point_and_keeps_the_rest_of_it() -> None:
     assert document.pois[0] == before.pois[0]
     assert document.pois[1] == before.pois[1].model_copy(update={"lat_deg": 10.0, "lon_deg": 20.0})
     assert moved(before, "gone", 10.0, 20.0) is None
-
-
-@pytest.mark.parametrize("number", range(20))
-def test_ids_fit_the_document(number: int) -> None:
-    assert poi(new_poi_id()).id, number

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from server.heard.channel import Channel
 from server.heard.present import Present
-from server.schemas import FlightMessage, TextMessage, TrackMessage, VehicleMessage
+from server.schemas import FlightMessage, HealthMessage, TextMessage, TrackMessage, VehicleMessage
 from telemetry.topics.messages import FlightStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
@@ -57,6 +57,29 @@ def test_a_fast_replay_does_not_flood_the_pages() -> None:
             bench.now_s += 0.001
             bench.channel.on_state(replace(STATE, position_t_mono_s=bench.now_s))
         assert len(bench.vehicles()) <= 2 * 20 + 20
+
+    run(scenario)
+
+
+def test_health_is_told_once_a_second_when_it_changes_and_ends_with_the_vehicle() -> None:
+    def scenario(bench: Bench) -> None:
+        def heard() -> list[HealthMessage]:
+            return [message for message in bench.told if isinstance(message, HealthMessage)]
+
+        for share in (0.9, 0.8, 0.8):
+            for _ in range(10):
+                bench.now_s += 0.1
+                changes = {"position_t_mono_s": bench.now_s, "battery_t_mono_s": bench.now_s, "battery_share": share}
+                bench.channel.on_state(replace(STATE, **changes))
+        batteries = [next(row.value for row in message.rows if row.code == "battery") for message in heard()]
+        assert batteries == ["90%", "80%"]
+        bench.now_s += 30.0
+        bench.channel.tick()
+        assert any("Not heard for 30 s" in row.value for row in heard()[-1].rows)
+        opened = [message for message in bench.present.messages() if isinstance(message, HealthMessage)]
+        assert opened == [heard()[-1]]
+        bench.channel.forget()
+        assert heard()[-1].rows == []
 
     run(scenario)
 

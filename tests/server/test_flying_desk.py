@@ -13,7 +13,7 @@ import pytest
 
 from planning.formats.wpl import read_wpl
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotReadyError, StaleRevisionError
-from server.schemas import CheckRow, StartFlight
+from server.schemas import CheckRow, FenceCircleDoc, FenceDoc, PlaceDoc, StartFlight
 from server.work.jobs import Lane
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
 from telemetry.topics.messages import FlightStatus, LinkStatus
@@ -306,5 +306,50 @@ def test_what_the_link_said_before_the_read_back_is_not_believed_after_it(
         assert bench.aboard.record is not None
         bench.desk.on_link(replace(waiting, t_mono_s=time.monotonic()))
         assert bench.desk.state.onboard.state == "unknown"
+
+    runner.run(scenario())
+
+
+def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    lat_deg, lon_deg = made.home
+    fence = FenceDoc(
+        circles=[
+            FenceCircleDoc(id="c", inclusion=True, centre=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg), radius_m=900.0)
+        ]
+    )
+    fenced = made.document.model_copy(update={"fence": fence})
+
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench.vehicle.parameters |= {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0}
+        bench.plan = bench.plan.model_copy(update={"document": fenced})
+        bench.vehicle.drops_fences = True
+        with pytest.raises(TransferError, match="does not hold the fence that was sent"):
+            await bench.desk.upload(ME, 3)
+        assert bench.vehicle.items == ()
+        bench.vehicle.drops_fences = False
+        await bench.desk.upload(ME, 3)
+        assert len(bench.vehicle.places["fence"]) == 1
+        state = await bench.desk.check(ME)
+        assert state.preflight is not None
+        assert {row.code: row.state for row in state.preflight.rows}["fence"] == "good"
+        assert "returns" in state.at_fence
+
+        held, bench.vehicle.places["fence"] = bench.vehicle.places["fence"], ()
+        state = await bench.desk.check(ME)
+        assert state.preflight is not None
+        assert {row.code: row.state for row in state.preflight.rows}["fence"] == "bad"
+        assert not state.preflight.ok
+
+        bench.vehicle.places["fence"] = held
+        bench.plan = bench.plan.model_copy(update={"document": made.document})
+        await bench.desk.upload(ME, 3)
+        assert bench.vehicle.places["fence"] == ()
+        foreign = replace(held[0], lat_deg=held[0].lat_deg + 0.001)
+        bench.vehicle.places["fence"] = (foreign,)
+        await bench.desk.upload(ME, 3)
+        assert bench.vehicle.places["fence"] == (foreign,)
 
     runner.run(scenario())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from planning.following.below import Demanded
 from planning.following.reference import reference_line
 from planning.missions.vehicle_profile import load_profile
@@ -56,3 +58,20 @@ def test_the_smallest_distance_of_a_flight_stays_until_the_next() -> None:
     assert told(live.follow(at(50.0, 0.0, t_s=99.0), FlightStatus(phase="landed"))) == (6.0, 5.0)
     live.begin_again()
     assert told(live.follow(at(50.0, 0.0, t_s=200.0), FlightStatus(phase="idle"))) == (6.0, None)
+
+
+def test_what_is_left_of_the_plan_is_told_in_time_and_only_while_it_is_flown() -> None:
+    live = follower()
+    assert live.ahead(FLYING) is None
+    left_s = []
+    for k, x_m in enumerate((50.0, 100.0, 200.0)):
+        live.follow(at(x_m, 20.0, t_s=10.0 * k), FLYING)
+        ahead = live.ahead(FLYING)
+        assert ahead is not None
+        assert len(ahead.lat_lon_deg) == len(ahead.alt_rel_home_m) == len(ahead.t_s)
+        assert ahead.t_s[0] >= 0.0
+        assert (np.diff(ahead.t_s) >= 0.0).all()
+        left_s.append(float(ahead.t_s[-1]))
+    assert left_s == sorted(left_s, reverse=True)
+    assert left_s[0] > left_s[-1]
+    assert live.ahead(FlightStatus(phase="returning")) is None

@@ -13,8 +13,7 @@ from server.flying.review_task import Reviewed
 from server.flying.reviewing import Reviewing
 from server.heard.channel import Channel
 from server.heard.present import Present
-from server.obstacles.moving_objects import TracksWatch
-from server.obstacles.obstacle_watch import Watch
+from server.obstacles.replayed import Replayed
 from server.schemas import OpenReview, PlanDoc
 from telemetry.topics.messages import ReplayStatus
 from telemetry.topics.requests import OpenRecording, ReplayRequest
@@ -49,10 +48,8 @@ class Surroundings:
 def test_it_is_opened_again_by_a_node_that_has_lost_it_and_not_for_a_status_from_before() -> None:
     around: Any = Surroundings()
     present = Present(Told())
-    watch = Watch("replay", present)
-    tracks = TracksWatch("replay", present, watch)
     channel = Channel("replay", present)
-    reviewing = Reviewing(cast(Any, None), around, around, channel, around, around, watch, tracks, present)
+    reviewing = Reviewing(cast(Any, None), around, around, channel, around, around, Replayed(present), present)
 
     async def act() -> None:
         before_s = time.monotonic()

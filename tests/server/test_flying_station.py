@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -174,6 +175,28 @@ def _opened(page: Station, recording_id: str) -> ReviewDoc:
     return page.until(lambda m: m.type == "review" and m.review is not None).review
 
 
+def test_the_vehicles_own_log_of_that_flight_is_read_and_reviewed(planned: Station, vehicle: str) -> None:
+    del vehicle
+    assert planned.http.post("/api/link/logs/1/download").status_code == 404  # not asked for the list yet
+    listed = ok(planned.http.post("/api/link/logs/list")).json()["logs"]
+    assert len(listed) >= 1
+    newest = listed[0]
+    began = ok(planned.http.post(f"/api/link/logs/{newest['number']}/download")).json()
+    assert began["download"]["state"] == "reading"
+    assert planned.http.post("/api/link/logs/list").status_code == 409
+    deadline_s = time.monotonic() + LONG_S
+    while (download := ok(planned.http.get("/api/link/logs")).json()["download"])["state"] == "reading":
+        assert time.monotonic() < deadline_s
+        time.sleep(0.1)
+    assert (download["state"], download["error"]) == ("done", None)
+    assert download["read_bytes"] == newest["bytes"]
+    (recording,) = [r for r in ok(planned.http.get("/api/recordings")).json() if r["id"] == download["recording_id"]]
+    assert (recording["kind"], recording["bytes"]) == ("dataflash", newest["bytes"])
+    review = _opened(planned, recording["id"])
+    assert review.series.t_s
+    ok(planned.http.post("/api/review/close"))
+
+
 def test_another_ground_stations_log_is_reviewed(planned: Station, shared_data: Path) -> None:
     log = (shared_data / "logs" / "arducopter" / "auto.tlog").read_bytes()
     added = ok(
@@ -193,10 +216,28 @@ def test_another_ground_stations_log_is_reviewed(planned: Station, shared_data: 
     ok(planned.http.post("/api/review/close"))
 
 
+def test_a_vehicles_own_log_is_reviewed(planned: Station, shared_data: Path) -> None:
+    log = (shared_data / "logs" / "real_flights" / "arducopter-4.7.BIN").read_bytes()
+    added = ok(
+        planned.http.post(
+            "/api/recordings/import",
+            params={"filename": "00000007.BIN"},
+            content=log,
+            headers={"Content-Type": "application/octet-stream"},
+        )
+    ).json()
+    assert (added["name"], added["kind"], added["vehicle"]) == ("00000007.bin", "dataflash", "ArduPilot 4.7.0-dev")
+    review = _opened(planned, added["id"])
+    assert review.figures is not None
+    assert review.figures.completed
+    ok(planned.http.post("/api/review/close"))
+
+
 @pytest.mark.parametrize(
     ("name", "data", "status"),
     [
         ("notes.txt", b"hello", 422),
+        ("samples.bin", bytes(range(256)) * 9, 422),
         ("empty.tlog", b"", 422),
         ("foreign.tlog", b"\x89PNG\r\n\x1a\n" + bytes(2000), 422),
         ("foreign.mcap", b"GIF89a" + bytes(2000), 422),

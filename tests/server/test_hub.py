@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket, WebSocketState
 
 from server.door import hub as hub_module
 from server.door.hub import Hub, parse
-from server.door.page import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, WAITING_MAX
+from server.door.page import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, WAITING_MAX, Outgoing, Page
 from server.schemas import (
     CursorMessage,
     ErrorDoc,
@@ -381,10 +381,39 @@ def test_live_and_replayed_vehicles_do_not_replace_each_other_and_words_all_arri
 def test_each_session_is_told_what_is_its_own() -> None:
     async def scenario(bench: Bench) -> None:
         anna, ben = await bench.join(session="anna"), await bench.join(session="ben")
-        bench.hub.publish_each(lambda session: LeaseMessage(lease=LeaseDoc(holder="Anna", mine=session == "anna")))
+        bench.hub.of_vehicle(1).publish_each(
+            lambda session: LeaseMessage(lease=LeaseDoc(holder="Anna", mine=session == "anna"))
+        )
         bench.hub.publish_to("ben", notice("for Ben"))
         await settled()
         assert [m["lease"]["mine"] for s in (anna, ben) for m in s.sent if m["type"] == "lease"] == [True, False]
         assert (anna.types().count("notice"), ben.types().count("notice")) == (0, 1)
+
+    run(scenario)
+
+
+def test_what_waits_about_a_vehicle_is_dropped_when_the_page_shows_another() -> None:
+    page = Page("s")
+    first, second = (LeaseMessage(lease=LeaseDoc(holder=name, mine=False)) for name in ("Anna", "Ben"))
+    page.put(first, Outgoing(first), of_vehicle=True)
+    page.put(notice("for all"), Outgoing(notice("for all")))
+    page.turn_to(2)
+    page.put(second, Outgoing(second), of_vehicle=True)
+    waiting = [asyncio.run(page.next_text()) for _ in range(2)]
+    assert ["for all" in waiting[0], "Ben" in waiting[1]] == [True, True]
+    assert not page._waiting
+
+
+def test_a_vehicle_s_words_go_only_to_pages_that_show_it() -> None:
+    async def scenario(bench: Bench) -> None:
+        told, other = await bench.join(), await bench.join()
+        page = bench.hub.page(other.sent[0]["page_id"])
+        assert page is not None
+        page.turn_to(2)
+        bench.hub.of_vehicle(1).publish(notice("of the first"))
+        bench.hub.of_vehicle(2).publish(notice("of the second"))
+        await settled()
+        assert [told.sent[1]["error"]["what"], other.sent[1]["error"]["what"]] == ["of the first", "of the second"]
+        assert (len(told.sent), len(other.sent)) == (2, 2)
 
     run(scenario)

@@ -18,8 +18,8 @@ from planning.terrain.dsm import Dsm
 from server.scene.geometry.payload import SceneState
 from server.scene.host import SceneHost
 from server.scene.view import SceneView
-from server.schemas import SelectionDoc
-from tests.server.scene_fixtures import exaggerated, hill, plan_over, state_over
+from server.schemas import FenceCircleDoc, FenceDoc, FencePolygonDoc, PlaceDoc, PlanDoc, RallyDoc, SelectionDoc
+from tests.server.scene_fixtures import exaggerated, hill, plan_over, pois, state_over
 
 
 def host_of(server: viser.ViserServer, page_of_client: Callable[[int], str | None]) -> SceneHost:
@@ -37,8 +37,8 @@ class Stage:
         self.events: list[tuple[Any, ...]] = []
         hands: Any = SimpleNamespace(
             on_terrain_click=self._report("terrain"),
-            on_poi_click=self._report("poi"),
-            on_poi_moved=self._report("moved"),
+            on_mark_click=self._report("poi"),
+            on_mark_moved=self._report("moved"),
         )
         self.view = SceneView(host_of(server, lambda client_id: f"page{client_id}"), hands)
         interface = server.scene._websock_interface
@@ -262,3 +262,40 @@ def test_a_shot_that_was_asked_for_too_early_is_taken_when_the_view_connects(
     asyncio.run(play())
     east, north, up = np.subtract(clients[7].camera.position, clients[7].camera.look_at)  # type: ignore[attr-defined]
     assert up > 10 * np.hypot(east, north) > 0 or (up > 0 and np.hypot(east, north) < 1e-3 * up)
+
+
+def test_the_fence_is_drawn_with_words_picked_and_dragged(stage: Stage) -> None:
+    dsm = hill(hole=False)
+    places = [PlaceDoc(lat_deg=p.lat_deg, lon_deg=p.lon_deg) for p in pois(dsm, (10, 10), (30, 10), (20, 25), (60, 20))]
+    fence = FenceDoc(
+        polygons=[FencePolygonDoc(id="poly", inclusion=True, corners=places[:3])],
+        circles=[FenceCircleDoc(id="round", inclusion=False, centre=places[3], radius_m=8.0)],
+    )
+    rally = [RallyDoc(id="rally", lat_deg=places[0].lat_deg, lon_deg=places[0].lon_deg, alt_rel_home_m=30.0)]
+    document = PlanDoc(terrain_id="hill", fence=fence, rally=rally)
+    state = replace(state_over(dsm), document=document, selection=SelectionDoc())
+
+    async def play() -> None:
+        names = await stage.show(dsm, state)
+        assert {"/fence/poly", "/fence/round", "/rally/rally", "/fence_corners"} <= set(names)
+        labels = {m.props.text for m in stage.sent if hasattr(getattr(m, "props", None), "text")}
+        assert {"Stay inside: polygon 1", "Keep out: circle 1", "Rally point 1"} <= labels
+        await stage.click_down(60.1, 20.1)
+        await stage.click_down(30.1, 10.1)
+        assert [event[:2] for event in stage.events] == [("poi", "round"), ("poi", "poly.1")]
+
+        stage.events.clear()
+        names = await stage.show(dsm, replace(state, selection=SelectionDoc(fence_mark="poly.1")))
+        assert "/gizmo" in names
+        gizmo = stage.view._canvas.handle("/gizmo")
+        assert gizmo is not None
+        start = np.array(gizmo.position)
+        gizmo._impl.position = start + np.array([3.0, 2.0, 0.0])  # as the browser's update does
+        for phase in ("start", "update", "end"):
+            await stage.view._drag(phase, np.array(gizmo.position))
+        ((kind, mark, lat, lon),) = stage.events
+        assert (kind, mark) == ("moved", "poly.1")
+        assert dsm.xy_from_lat_lon(np.array([[lat, lon]]))[0] == pytest.approx([500_033, 3_999_952], abs=1e-3)
+        assert np.allclose(gizmo.position, start)
+
+    asyncio.run(play())

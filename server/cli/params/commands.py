@@ -37,6 +37,7 @@ from telemetry.parameters.comparing import of_vehicle
 from telemetry.parameters.files import (
     FileParameter,
     ParameterFile,
+    is_kept_by_vehicles,
     read_parameter_file,
     value_text,
     write_mission_planner,
@@ -57,11 +58,6 @@ EvenArmed = Annotated[
 ]
 Only = Annotated[list[str] | None, Option(metavar="PATTERN", help="Only names like this: 'FENCE_*'; several times.")]
 LeaveOut = Annotated[list[str] | None, Option(metavar="PATTERN", help="No names like this; several times.")]
-KEPT_BY_VEHICLES = (
-    *("MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "FORMAT_VERSION", "SYSID_SW_MREV", "SYS_NUM_RESETS", "LOG_LASTFILE"),
-    *("STAT_*", "BARO*_GND_PRESS", "GND_ABS_PRESS", "GND_TEMP", "LND_FLIGHT_T_*", "COM_FLIGHT_UUID", "_HASH_CHECK"),
-)
-"""What vehicles count and measure by themselves; a file's value would be a lie."""
 
 
 @command
@@ -242,14 +238,12 @@ def _chosen(given: Sequence[FileParameter], only: list[str] | None, leave_out: l
     return [
         p
         for p in given
-        if not _like(p.name, KEPT_BY_VEHICLES)
-        and (not only or _like(p.name, only))
-        and not _like(p.name, leave_out or ())
+        if not is_kept_by_vehicles(p.name) and (not only or _like(p.name, only)) and not _like(p.name, leave_out or ())
     ]
 
 
 def _note_own(given: Sequence[FileParameter]) -> None:
-    own = [p.name for p in given if _like(p.name, KEPT_BY_VEHICLES)]
+    own = [p.name for p in given if is_kept_by_vehicles(p.name)]
     if own:
         say_notes(f"left out, for vehicles count or measure it by themselves: {', '.join(own)}.")
 

@@ -26,13 +26,11 @@ from server.work.clocks import StepTimer
 from telemetry.errors import NotAllowedError
 from telemetry.flight.low_flight.findings import Finding
 from telemetry.flight.low_flight.low_plan import LowPlan, low_plan
-from telemetry.flight.low_flight.review import review_settings
+from telemetry.flight.low_flight.review import MULTIROTORS, review_settings
 from telemetry.mavlink.address import parse_address
 from telemetry.parameters.files import value_text
 
 _WORDS = {"bad": "CHANGE", "look": "LOOK", "good": "good"}
-MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
-"""MAV_TYPE: quadrotor, coaxial, hexa-, octo-, tri-, dodeca- and decarotor."""
 
 
 @command

@@ -94,9 +94,29 @@ PARAMS_REVIEW = _examples(
      "--link udpin:0.0.0.0:14550"),
     ("For any low flight", "hedgehop params review --link udpin:0.0.0.0:14550"),
 )  # fmt: skip
+LOGS_LIST = _examples(
+    ("All of them", "hedgehop logs list --link udpin:0.0.0.0:14550"),
+    ("For a script", "hedgehop logs list --link /dev/ttyACM0:115200 --json"),
+)
+LOGS_GET = _examples(
+    ("That of the last flight", "hedgehop logs get newest --link udpin:0.0.0.0:14550 --out logs"),
+    ("One of the list", "hedgehop logs get 17 --link /dev/ttyACM0:115200"),
+)
 PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
+)
+GOTO = _examples(
+    ("Up to 8 m, and hold there", "hedgehop goto udpin:0.0.0.0:14550 take-off --dsm dsm.tif --height-m 8"),
+    (
+        "To a place, 6 m above what stands there",
+        "hedgehop goto udpin:0.0.0.0:14550 to -37.1245,175.6893 --dsm dsm.tif --height-m 6",
+    ),
+    (
+        "Would an orbit be clear",
+        "hedgehop goto udpin:0.0.0.0:14550 orbit -37.1245,175.6893 --dsm dsm.tif --radius-m 15 --check",
+    ),
+    ("Home over the surface, and down", "hedgehop goto udpin:0.0.0.0:14550 home --dsm dsm.tif"),
 )
 SIM = _examples(
     ("A vehicle for a ground station on this machine", "hedgehop sim --link udpout:127.0.0.1:14550 "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from planning.fence.model import Fence, RallyPoint
+from planning.fence.model import Fence, RallyPoint, fence_words
 from planning.formats.fence_files import read_fence
 from planning.model import Mission
 from server.cli.shared.files_in_out import read_small
@@ -32,19 +32,3 @@ def fence_stays(mission: Mission) -> str | None:
     return (
         "the file's fence and rally points are not sent with the mission: hedgehop fence and hedgehop rally send them."
     )
-
-
-def fence_words(fence: Fence, rally: tuple[RallyPoint, ...]) -> str:
-    """What there is, counted."""
-    counts = (
-        (len(fence.polygons), "polygon", "polygons"),
-        (len(fence.circles), "circle", "circles"),
-        (len(rally), "rally point", "rally points"),
-    )
-    words = [f"{count} {one if count == 1 else many}" for count, one, many in counts if count]
-    heights = [
-        f"{name} at {value_m:g} m above home"
-        for name, value_m in (("floor", fence.floor_rel_home_m), ("ceiling", fence.ceiling_rel_home_m))
-        if value_m is not None
-    ]
-    return f"Fence: {', '.join([*words, *heights])}"

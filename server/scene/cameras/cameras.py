@@ -16,7 +16,6 @@ from server.scene.geometry.canvas import Node
 from server.scene.geometry.stage import Drawing
 from server.scene.host import SceneHost
 from server.scene.layers.vehicles import Vehicles
-from server.schemas import Source
 
 CAMERAS_EVERY_S = 0.1
 _TIDY_EVERY = 3
@@ -31,7 +30,7 @@ class Cameras:
     ) -> None:
         self._host, self._vehicles = host, vehicles
         self._now_mono_s = now_mono_s
-        self._chases: dict[str, tuple[Source, Chase]] = {}
+        self._chases: dict[str, tuple[str, Chase]] = {}
         self._hidden: dict[int, dict[str, Node]] = {}
         """By client: the labels it was told to hide, as they were drawn then."""
         self._turn = 0
@@ -39,28 +38,28 @@ class Cameras:
     def free(self, page_id: str) -> None:
         self._chases.pop(page_id, None)
 
-    def chase(self, page_id: str, source: Source) -> bool:
+    def chase(self, page_id: str, actor: str) -> bool:
         """Whether there is a vehicle to follow."""
-        client, pose = self._host.client(page_id), self._vehicles.pose(source)
+        client, pose = self._host.client(page_id), self._vehicles.pose(actor)
         if client is None or pose is None:
             return False
         chase = Chase.behind(pose.heading_rad, self._now_mono_s(), aspect=client.camera.aspect)
-        self._chases[page_id] = source, chase
+        self._chases[page_id] = actor, chase
         return True
 
     def hold(self, page_id: str, *, held: bool) -> None:
         if page_id in self._chases:
-            source, chase = self._chases[page_id]
-            self._chases[page_id] = source, chase.hold(self._now_mono_s(), held=held)
+            actor, chase = self._chases[page_id]
+            self._chases[page_id] = actor, chase.hold(self._now_mono_s(), held=held)
 
     def follow(self, drawing: Drawing) -> None:
         """Moves the cameras that follow a vehicle; those of pages that have gone are forgotten."""
-        for page_id, (source, chase) in list(self._chases.items()):
-            client, pose = self._host.client(page_id), self._vehicles.pose(source)
+        for page_id, (actor, chase) in list(self._chases.items()):
+            client, pose = self._host.client(page_id), self._vehicles.pose(actor)
             if client is None:
                 del self._chases[page_id]
             elif pose is not None:
-                self._chases[page_id] = source, self._followed(client, chase, drawing, pose.place_m, pose.heading_rad)
+                self._chases[page_id] = actor, self._followed(client, chase, drawing, pose.place_m, pose.heading_rad)
 
     def _followed(
         self, client: viser.ClientHandle, chase: Chase, drawing: Drawing, place_m: np.ndarray, heading_rad: float

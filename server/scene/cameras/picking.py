@@ -1,4 +1,4 @@
-"""What a click in the 3D view hits: a point of interest, known terrain, unknown terrain or nothing."""
+"""What a click in the 3D view hits: a point of interest, a mark of the fence, known or unknown terrain, or nothing."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from mapping.geometry.arrays import F64
 from planning.terrain.raycast import TerrainHit, raycast
 from server.scene.cameras.projection import SCREEN_HEIGHT_PX
 from server.scene.geometry.stage import Drawing, as_model
+from server.scene.layers.fence_layer import mark_places
 from server.scene.layers.mark_layers import poi_places
 
 _POI_REACH_PX = 18.0
 
 
 @dataclass(frozen=True, slots=True)
-class PoiHit:
-    poi_id: str
+class MarkHit:
+    mark: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +29,18 @@ class PlaceHit:
     known: bool
 
 
-def pick(drawing: Drawing, origin: F64, direction: F64, *, fov_rad: float) -> PoiHit | PlaceHit | None:
+def pick(drawing: Drawing, origin: F64, direction: F64, *, fov_rad: float) -> MarkHit | PlaceHit | None:
     """``origin`` and ``direction`` are the ray of sight, scene coordinates.
 
-    Points of interest are hit only with the select tool: other tools place things, also beside a point.
+    Marks are hit only with the select tool: other tools place things, also beside a point.
     """
     ray = direction / np.linalg.norm(direction)
     frame = drawing.frame
     hit = _touched(drawing, frame.model_from_scene(origin), frame.model_direction(ray))
     if drawing.state.selection.tool == "select":
-        poi_id = _poi_under(drawing, origin, ray, math.inf if hit is None else hit.distance, fov_rad)
-        if poi_id is not None:
-            return PoiHit(poi_id)
+        mark = _mark_under(drawing, origin, ray, math.inf if hit is None else hit.distance, fov_rad)
+        if mark is not None:
+            return MarkHit(mark)
     if hit is None:
         return None
     lat_deg, lon_deg = drawing.dsm.lat_lon_from_xy(np.array([[hit.x_m, hit.y_m]]))[0]
@@ -58,9 +59,10 @@ def _touched(drawing: Drawing, origin_m: F64, direction: F64) -> TerrainHit | No
     return hit
 
 
-def _poi_under(drawing: Drawing, origin: F64, ray: F64, terrain_at: float, fov_rad: float) -> str | None:
-    """The point of interest nearest to the ray on the screen, unless terrain stands well before it."""
-    ids, places = poi_places(drawing)
+def _mark_under(drawing: Drawing, origin: F64, ray: F64, terrain_at: float, fov_rad: float) -> str | None:
+    """The mark nearest to the ray on the screen, unless terrain stands well before it."""
+    pois, fence = poi_places(drawing), mark_places(drawing)
+    ids, places = pois[0] + fence[0], np.vstack([pois[1], fence[1]])
     if not ids:
         return None
     depth = (places - origin) @ ray

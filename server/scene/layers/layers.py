@@ -9,12 +9,15 @@ from typing import Any
 from server.scene.geometry.canvas import Node, Ready
 from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, TerrainScene
 from server.scene.geometry.stage import Drawing
+from server.scene.layers.fence_layer import fence_nodes
 from server.scene.layers.flight_layers import flight_nodes, review_nodes
 from server.scene.layers.ground_layers import surface_nodes, terrain_nodes, unknown_nodes
 from server.scene.layers.mark_layers import is_first_home, place_nodes, poi_nodes
 from server.scene.layers.site_layer import site_nodes
 
-POIS = "pois"
+_POIS, _FENCE = "pois", "fence"
+MARKS = (_POIS, _FENCE)
+"""Layers of what hands drag."""
 Key = tuple[Any, ...]
 _PAYLOADS = (TerrainScene, PlanScene, ReviewScene, OverlayScene)
 
@@ -36,7 +39,8 @@ def layers(gizmo_ready: Ready) -> tuple[Layer, ...]:
         Layer("sites", site_nodes, _sites_key),
         Layer("review", review_nodes, lambda d: (d.terrain, d.frame, d.state.review)),
         Layer("places", place_nodes, _places_key),
-        Layer(POIS, lambda d: poi_nodes(d, gizmo_ready), _pois_key),
+        Layer(_FENCE, lambda d: fence_nodes(d, gizmo_ready), _fence_key),
+        Layer(_POIS, lambda d: poi_nodes(d, gizmo_ready), _pois_key),
     )
 
 
@@ -64,6 +68,11 @@ def _sites_key(drawing: Drawing) -> Key:
     document, sites = drawing.state.document, drawing.state.sites
     names = (document.pois, document.source, document.home) if sites else ()
     return drawing.terrain, drawing.frame, sites, drawing.state.selection.site_rank, *names
+
+
+def _fence_key(drawing: Drawing) -> Key:
+    document = drawing.state.document
+    return drawing.terrain, drawing.frame, document.fence, document.rally, drawing.state.selection
 
 
 def _pois_key(drawing: Drawing) -> Key:

@@ -35,16 +35,16 @@ def poi_nodes(drawing: Drawing, moved: Ready) -> list[Node]:
     ids, places = poi_places(drawing)
     chosen = drawing.state.selection.poi_id
     others = [index for index, poi_id in enumerate(ids) if poi_id != chosen]
-    nodes = _points("/pois", places[others], drawing, palette.POI) if others else []
+    nodes = points_nodes("/pois", places[others], drawing, palette.POI) if others else []
     for index, poi_id in enumerate(ids):
         if poi_id == chosen:
-            nodes += _selected(drawing, poi_id, places[index], moved)
+            nodes += selected_nodes(drawing, _label(drawing, poi_id), places[index], moved)
         elif len(ids) <= _MOST_LABELS:
-            nodes.append(label_node(f"/poi_label/{poi_id}", _label(drawing, poi_id), places[index] + _above(drawing)))
+            nodes.append(label_node(f"/poi_label/{poi_id}", _label(drawing, poi_id), places[index] + above(drawing)))
     return nodes
 
 
-def _points(name: str, places: F64, drawing: Drawing, color: Rgb) -> list[Node]:
+def points_nodes(name: str, places: F64, drawing: Drawing, color: Rgb) -> list[Node]:
     """Balls for who is near, dots for who is far."""
     return [
         many_node(name, BALL, places, drawing.body_m, color),
@@ -52,19 +52,20 @@ def _points(name: str, places: F64, drawing: Drawing, color: Rgb) -> list[Node]:
     ]
 
 
-def _selected(drawing: Drawing, poi_id: str, at: F64, moved: Ready) -> list[Node]:
-    origin, text = np.zeros(3), _label(drawing, poi_id)
+def selected_nodes(drawing: Drawing, text: str, at: F64, moved: Ready) -> list[Node]:
+    """In the accent colour, with handles while nothing else is in hand."""
+    origin = np.zeros(3)
     if drawing.state.selection.tool == "select":
         return [
             _gizmo(at, moved),
             shape_node(f"{GIZMO}/ball", BALL, origin, drawing.body_m, palette.ACCENT),
             dots_node(f"{GIZMO}/dot", origin[None], palette.ACCENT, size_px=_SELECTED_PX),
-            label_node(f"{GIZMO}/label", text, 2 * _above(drawing), size=1.15),
+            label_node(f"{GIZMO}/label", text, 2 * above(drawing), size=1.15),
         ]
     return [
         shape_node("/selected", BALL, at, drawing.body_m, palette.ACCENT),
         dots_node("/selected_dot", at[None], palette.ACCENT, size_px=_SELECTED_PX),
-        label_node("/selected_label", text, at + _above(drawing), size=1.15),
+        label_node("/selected_label", text, at + above(drawing), size=1.15),
     ]
 
 
@@ -102,7 +103,7 @@ def is_first_home(drawing: Drawing) -> bool:
     return bool(np.hypot(*(first - plan.home_m[:2])) < _SAME_PLACE_M)
 
 
-def _above(drawing: Drawing) -> F64:
+def above(drawing: Drawing) -> F64:
     return np.array([0.0, 0.0, 1.6 * drawing.mark_m])
 
 
@@ -124,7 +125,7 @@ def _home(drawing: Drawing) -> list[Node]:
     return [
         shape_node("/home", CONE, at, 1.2 * drawing.body_m, palette.HOME),
         dots_node("/home_dot", at[None], palette.HOME, size_px=_POINT_PX),
-        label_node("/home_label", "Home", at + 2.4 * _above(drawing)),
+        label_node("/home_label", "Home", at + 2.4 * above(drawing)),
     ]
 
 
@@ -133,11 +134,11 @@ def _look_at(drawing: Drawing) -> list[Node]:
     at = None if mission.look_at is None or mission.heading != "point" else drawing.ground_of(mission.look_at)
     if at is None:
         return []
-    post = np.stack([at, at + 4 * _above(drawing)])
+    post = np.stack([at, at + 4 * above(drawing)])
     return [
         line_node("/look_at", post, palette.LOOK_AT, width_px=3.0),
         shape_node("/look_at_ball", BALL, post[1], 0.8 * drawing.mark_m, palette.LOOK_AT),
-        label_node("/look_at_label", "Look at", post[1] + _above(drawing)),
+        label_node("/look_at_label", "Look at", post[1] + above(drawing)),
     ]
 
 
@@ -148,14 +149,14 @@ def _polygon(drawing: Drawing) -> list[Node]:
     corners = corners[np.isfinite(corners).all(axis=1)]
     if document.source != "survey" or not len(corners):
         return []
-    nodes = _points("/polygon_corners", drawing.on_ground(corners), drawing, palette.SURVEY)
+    nodes = points_nodes("/polygon_corners", drawing.on_ground(corners), drawing, palette.SURVEY)
     if len(corners) > 1:
-        outline = _smoothed(drawing.on_ground(_outline(corners)), 0.3 * drawing.mark_m)
-        nodes.append(line_node("/polygon", outline, palette.SURVEY, width_px=4.0))
+        line = smoothed(drawing.on_ground(outline(corners)), 0.3 * drawing.mark_m)
+        nodes.append(line_node("/polygon", line, palette.SURVEY, width_px=4.0))
     return nodes
 
 
-def _outline(corners: F64) -> F64:
+def outline(corners: F64) -> F64:
     """(N, 2) a ring through the corners, fine enough to follow the terrain."""
     ring = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
     share = np.linspace(0.0, 1.0, _EDGE_POINTS, endpoint=False)[None, :, None]
@@ -163,7 +164,7 @@ def _outline(corners: F64) -> F64:
     return np.vstack([pieces.reshape(-1, 2), ring[-1:]])
 
 
-def _smoothed(line: F64, lift: float) -> F64:
+def smoothed(line: F64, lift: float) -> F64:
     """A line over the terrain that jumps over its roughness instead of tracing it."""
     above = ndimage.maximum_filter1d(line[:, 2], 7, mode="nearest")
     return np.column_stack([line[:, :2], ndimage.uniform_filter1d(above, 5, mode="nearest") + lift])

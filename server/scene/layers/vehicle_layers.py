@@ -18,7 +18,6 @@ from server.scene.geometry import palette
 from server.scene.geometry.canvas import Node
 from server.scene.geometry.mark_shapes import CONE, Rgb, dots_node, label_node, line_node, shape_node
 from server.scene.geometry.stage import Drawing
-from server.schemas import Source
 
 VEHICLE_M = 1.6
 """Half the drawn quadrotor's width: larger than most, so that it is seen among voxels of a metre."""
@@ -39,26 +38,28 @@ class VehiclePose:
     heading_rad: float = 0.0
     home_m: F64 | None = None
     """(3,) where it took off"""
+    label: str = ""
+    """Its name, where several fly."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Style:
     body: Rgb
     nose: Rgb
-    label: str
+    label: str = ""
 
 
-_STYLES: dict[Source, _Style] = {
-    "live": _Style(palette.VEHICLE, palette.NOSE, ""),
-    "replay": _Style(palette.REPLAY, palette.REPLAY_NOSE, "REPLAY"),
-}
+_LIVE, _REPLAY = _Style(palette.VEHICLE, palette.NOSE), _Style(palette.REPLAY, palette.REPLAY_NOSE, "REPLAY")
+REPLAY = "replay"
+"""The actor of a recording; every other one lives."""
 
 
-def vehicle_nodes(drawing: Drawing, source: Source, pose: VehiclePose | None) -> list[Node]:
+def vehicle_nodes(drawing: Drawing, actor: str, pose: VehiclePose | None) -> list[Node]:
     """The marks of one vehicle; none when it is nowhere on this model."""
     if pose is None:
         return []
-    style, name = _STYLES[source], f"/vehicle_{source}"
+    style, name = _REPLAY if actor == REPLAY else _LIVE, f"/vehicle_{actor}"
+    label = pose.label or style.label
     at = drawing.frame.scene_from_model(pose.place_m)
     size, middle = VEHICLE_M, np.zeros(3)
     return [
@@ -66,7 +67,7 @@ def vehicle_nodes(drawing: Drawing, source: Source, pose: VehiclePose | None) ->
         shape_node(f"{name}/body", _BODY, middle, size, style.body),
         shape_node(f"{name}/nose", _NOSE, middle, size, style.nose),
         dots_node(f"{name}/dot", middle[None], style.body, size_px=_DOT_PX),
-        *([label_node(f"{name}/label", style.label, np.array([0.0, 0.0, 0.9 * size]))] if style.label else []),
+        *([label_node(f"{name}/label", label, np.array([0.0, 0.0, 0.9 * size]))] if label else []),
         _plumb(drawing, name, pose, at, style),
         *_home(drawing, name, pose, style),
     ]
@@ -80,21 +81,21 @@ def scene_wxyz(pose: VehiclePose) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
-def track_nodes(drawing: Drawing, source: Source, points_m: F64) -> list[Node]:
+def track_nodes(drawing: Drawing, actor: str, points_m: F64) -> list[Node]:
     """The flown path (N, 3) in pieces of equal size: a longer path changes the last piece only."""
     if len(points_m) < 2:
         return []
     points = drawing.frame.scene_from_model(points_m)
     starts = range(0, len(points) - 1, _CHUNK_SEGMENTS)
-    return [_piece(source, number, points[start:]) for number, start in enumerate(starts)]
+    return [_piece(actor, number, points[start:]) for number, start in enumerate(starts)]
 
 
-def _piece(source: Source, number: int, points: F64) -> Node:
+def _piece(actor: str, number: int, points: F64) -> Node:
     points = points[: _CHUNK_SEGMENTS + 1]
     # The rest of an unfinished piece stands on its last point, unseen.
     rest = np.repeat(points[-1:], _CHUNK_SEGMENTS + 1 - len(points), axis=0)
-    color, width_px = (palette.VEHICLE, 4.0) if source == "live" else (palette.REPLAY, 3.0)
-    return line_node(f"/track_{source}/{number}", np.concatenate([points, rest]), color, width_px=width_px)
+    color, width_px = (palette.REPLAY, 3.0) if actor == REPLAY else (palette.VEHICLE, 4.0)
+    return line_node(f"/track_{actor}/{number}", np.concatenate([points, rest]), color, width_px=width_px)
 
 
 def _plumb(drawing: Drawing, name: str, pose: VehiclePose, at: F64, style: _Style) -> Node:

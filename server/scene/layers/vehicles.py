@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.stage import Drawing
-from server.scene.layers.vehicle_layers import VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
+from server.scene.layers.vehicle_layers import REPLAY, VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
 from server.schemas import Source
+from server.schemas.station_docs import FIRST_VEHICLE
 
-_SOURCES: tuple[Source, ...] = get_args(Source)
+
+def actor_of(source: Source, vehicle: int) -> str:
+    """What a vehicle is called on the stage: there is one of a recording, and each that lives."""
+    if source == "replay":
+        return REPLAY
+    return source if vehicle == FIRST_VEHICLE else f"{source}_{vehicle}"
+
+
 _NO_POINTS = np.zeros((0, 3))
 
 
@@ -23,15 +29,15 @@ class Vehicles:
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
         self._drawing: Drawing | None = None
-        self._poses: dict[Source, VehiclePose | None] = dict.fromkeys(_SOURCES)
-        self._tracks: dict[Source, F64] = dict.fromkeys(_SOURCES, _NO_POINTS)
+        self._poses: dict[str, VehiclePose | None] = {}
+        self._tracks: dict[str, F64] = {}
 
     @property
     def dsm(self) -> Dsm | None:
         return None if self._drawing is None else self._drawing.dsm
 
-    def pose(self, source: Source) -> VehiclePose | None:
-        return self._poses[source]
+    def pose(self, actor: str) -> VehiclePose | None:
+        return self._poses.get(actor)
 
     def marks(self) -> list[tuple[F64, float]]:
         """(3,) in the scene, and radius, of every vehicle that is drawn."""
@@ -40,32 +46,33 @@ class Vehicles:
         places = (pose.place_m for pose in self._poses.values() if pose is not None)
         return [(self._drawing.frame.scene_from_model(place_m), VEHICLE_M) for place_m in places]
 
-    def move(self, source: Source, pose: VehiclePose | None) -> None:
+    def move(self, actor: str, pose: VehiclePose | None) -> None:
         """None: the vehicle is nowhere on this model."""
-        if pose is None and self._poses[source] is None:
+        if pose is None and self._poses.get(actor) is None:
             return
-        self._poses[source] = pose
-        self._canvas.draw(self._vehicle(source))
+        self._poses[actor] = pose
+        self._canvas.draw(self._vehicle(actor))
 
-    def follow(self, source: Source, points_m: F64) -> None:
+    def follow(self, actor: str, points_m: F64) -> None:
         """The flown path so far, (N, 3) x, y, alt_dsm."""
-        if not len(points_m) and not len(self._tracks[source]):
+        if not len(points_m) and not len(self._tracks.get(actor, _NO_POINTS)):
             return
-        self._tracks[source] = points_m
-        self._canvas.draw(self._track(source))
+        self._tracks[actor] = points_m
+        self._canvas.draw(self._track(actor))
 
     def redraw(self, drawing: Drawing | None) -> None:
         """The frame has changed, or the model: nothing of another model is shown on this one."""
         if drawing is None or self._drawing is None or drawing.dsm is not self._drawing.dsm:
-            self._poses, self._tracks = dict.fromkeys(_SOURCES), dict.fromkeys(_SOURCES, _NO_POINTS)
+            self._poses, self._tracks = dict.fromkeys(self._poses), dict.fromkeys(self._tracks, _NO_POINTS)
         self._drawing = drawing
-        for source in _SOURCES:
-            self._canvas.draw(self._vehicle(source) | self._track(source))
+        for actor in {**self._poses, **self._tracks}:
+            self._canvas.draw(self._vehicle(actor) | self._track(actor))
 
-    def _vehicle(self, source: Source) -> dict[str, list[Node]]:
-        drawn = [] if self._drawing is None else vehicle_nodes(self._drawing, source, self._poses[source])
-        return {f"vehicle_{source}": drawn}
+    def _vehicle(self, actor: str) -> dict[str, list[Node]]:
+        drawn = [] if self._drawing is None else vehicle_nodes(self._drawing, actor, self._poses.get(actor))
+        return {f"vehicle_{actor}": drawn}
 
-    def _track(self, source: Source) -> dict[str, list[Node]]:
-        drawn = [] if self._drawing is None else track_nodes(self._drawing, source, self._tracks[source])
-        return {f"track_{source}": drawn}
+    def _track(self, actor: str) -> dict[str, list[Node]]:
+        track_m = self._tracks.get(actor, _NO_POINTS)
+        drawn = [] if self._drawing is None else track_nodes(self._drawing, actor, track_m)
+        return {f"track_{actor}": drawn}

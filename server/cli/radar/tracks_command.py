@@ -12,7 +12,7 @@ from typer import Argument, Option
 from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
 from mapping.radar.detections import Detections
 from mapping.radar.params import POSITION2GO
-from server.cli.radar_command import RadarOptionsError
+from server.cli.radar.process_command import RadarOptionsError
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import answer, end_progress, progress, say

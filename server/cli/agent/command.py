@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Option
 
-from server.cli.agent_source import Source, SourceOptions, source_of
+from server.cli.agent.source import Source, SourceOptions, source_of
 from server.cli.shared.command import command
 from server.cli.shared.output import print_json, say
 from server.errors import BadRequestError

@@ -1,0 +1,1 @@
+"""``hedgehop agent``: a companion computer's sensors."""

@@ -1,0 +1,1 @@
+"""``hedgehop fly`` and ``hedgehop goto``: what has a vehicle fly."""

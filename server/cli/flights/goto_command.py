@@ -1,0 +1,274 @@
+"""``hedgehop goto``: one guided command, certified over the surface model from where the vehicle really is, then flown.
+
+Ctrl+C on the way makes the vehicle hold; a second one leaves it to itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import typer
+from typer import Argument, Option
+
+from mapping.geometry.frames import apart_m
+from planning.errors import ParameterError
+from planning.fence.model import RallyPoint
+from planning.formats.fence_items import fence_of, rally_of
+from planning.guided.model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
+from planning.missions.vehicle_profile import load_profile, path_params
+from planning.part import FLIGHT_MARGIN_M, needed_part, rally_places
+from planning.request import PlanRequest, check_demands
+from planning.terrain.dsm import Dsm
+from server.cli.shared import options as o
+from server.cli.shared.command import DONE, FAILED, Without, command
+from server.cli.shared.output import answer, end_progress, progress, say, say_notes
+from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
+from server.cli.shared.terrain_given import OpenedModel, open_model
+from server.work.clocks import StepTimer
+from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.flight.certified_way import Flown, judged_way, way_json, way_request, way_words
+from telemetry.flight.preflight.parameters import NAMES
+from telemetry.flight.preflight.prepare import connect
+from telemetry.flight.watch import Watch, watching
+from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.items import mission_items
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.requests import DownloadPlaces, Pause, ReadParameters
+from telemetry.topics.vehicle import VehicleState
+
+Action = Literal["take-off", "to", "height", "look", "orbit", "home", "rally"]
+AT_PLACE = ("to", "look", "orbit")
+POSITION_S, LOOK_S = 30.0, 1.0
+LEFT = "nobody watches the vehicle when this command ends: its own failsafes decide what it does without a link."
+
+
+@dataclass(frozen=True, slots=True)
+class GotoOptions:
+    """How the way is flown."""
+
+    PANEL: ClassVar = "Way"
+    height_m: Annotated[float, Option(help="Above the surface at the place; for take-off and home above home.")] = 10.0
+    radius_m: Annotated[float, Option(help="Of an orbit.")] = 20.0
+    laps: Annotated[int, Option(help="Of an orbit.")] = 1
+    counter_clockwise: Annotated[bool, Option("--counter-clockwise", help="As seen from above.")] = False
+    speed_m_s: Annotated[float | None, Option(help="Over ground; default: the profile's mean speed.")] = None
+
+
+@command
+def goto(
+    link: Annotated[
+        str, Argument(metavar="LINK", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760.")
+    ],
+    action: Annotated[
+        Action,
+        Argument(
+            metavar="take-off|to|height|look|orbit|home|rally",
+            help="What is wanted; home and rally end with a landing.",
+        ),
+    ],
+    place: Annotated[str | None, Argument(metavar="LAT,LON", help="For to, look and orbit.")] = None,
+    *,
+    dsm: Annotated[Path, Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid.")],
+    check: Annotated[bool, Option("--check", help="Judge the way and say it; do not fly it.")] = False,
+    accept_return: Annotated[
+        bool, Option("--accept-return", help="Fly although the vehicle's own return from the way would not be clear.")
+    ] = False,
+    data_dir: o.Keys = None,
+    as_json: o.AsJson = False,
+    wanted: GotoOptions,
+    given: Annotated[o.PlannedVehicle, Without("max_items")],
+    demands: Annotated[o.PlannedClearance, Without("flown_as")],
+    how: Annotated[o.ModelOptions, Without("max_hole_m2", "remove_spikes")],
+) -> None:
+    """Certify one way over the surface model from where the vehicle is, and fly it in GUIDED.
+
+    It is raised as far as it must be, or refused with where and by how much. What sensors see is not known here.
+    """
+    parse_address(link)
+    wish = _wish(action, _place(action, place), wanted)
+    vehicle = replace(load_profile(given.profile), **o.of_vehicle(given, demands))
+    request = PlanRequest(
+        pois=(),
+        profile=vehicle,
+        path=path_params(vehicle),
+        required_clearance_m=demands.required_clearance_m,
+        max_height_above_ground_m=demands.max_height_above_ground_m,
+        way="guided",
+    )
+    check_demands(request)
+    model = open_model(dsm, StepTimer(progress), how)
+    speed_m_s = vehicle.mean_speed_m_s if wanted.speed_m_s is None else wanted.speed_m_s
+    flier = _Flier(link, wish, request, model, speed_m_s, data_dir, may_fly=not check, accepts=accept_return)
+    way, flight = asyncio.run(flier.run())
+    flown = flight is not None and flight.phase in ("paused", "landed") and not flier.was_held
+    text = way_words(way) if flight is None else (flight.hint or way_words(way))
+    lines = [("CERTIFIED: " if way.problem is None else "NOT CERTIFIED: ") + way_words(way)]
+    lines += [f"  - {reason.text}" for reason in way.certificate.reasons]
+    answer({"action": action, "flown": flown, "text": text, **way_json(way)}, lines, as_json=as_json)
+    raise typer.Exit(DONE if flown or (check and way.problem is None) else FAILED)
+
+
+def _place(action: Action, text: str | None) -> tuple[float, float] | None:
+    if (text is not None) != (action in AT_PLACE):
+        what = f"{action} needs a place." if text is None else f"{action} takes no place."
+        raise ParameterError(what, where="LAT,LON", advice="Give one for to, look and orbit only.")
+    return o.parse_place(text, "LAT,LON")
+
+
+def _wish(action: Action, place: tuple[float, float] | None, wanted: GotoOptions) -> Wish:
+    """The rally point of ``rally`` is not known yet: any stands for it."""
+    if action == "take-off":
+        return TakeOff(wanted.height_m)
+    if action == "home":
+        return Home(wanted.height_m)
+    if action == "rally":
+        return Rally(RallyPoint(0.0, 0.0, 0.0), wanted.height_m)
+    if place is None:
+        return GoTo(wanted.height_m)
+    if action == "look":
+        return Look(place)
+    if action == "to":
+        return GoTo(wanted.height_m, place)
+    return Orbit(place, wanted.radius_m, wanted.height_m, wanted.laps, clockwise=not wanted.counter_clockwise)
+
+
+class _Flier:
+    """One way, with a link node of its own."""
+
+    def __init__(
+        self,
+        link: str,
+        wish: Wish,
+        request: PlanRequest,
+        model: OpenedModel,
+        speed_m_s: float,
+        data_dir: Path | None,
+        *,
+        may_fly: bool,
+        accepts: bool,
+    ) -> None:
+        self._link, self._wish, self._request, self._model = link, wish, request, model
+        self._speed_m_s, self._data_dir, self._may_fly, self._accepts = speed_m_s, data_dir, may_fly, accepts
+        self._pressed = asyncio.Event()
+        self.was_held = False
+        self._sets_out = False
+
+    async def run(self) -> tuple[GuidedWay, FlightStatus | None]:
+        """The way, and how it was flown; None: it was not."""
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        assert task is not None
+        loop.add_signal_handler(signal.SIGINT, lambda: self._on_interrupt(task))
+        try:
+            async with own_nodes(recorder=False, data_dir=self._data_dir) as station, watching(station.bus) as watch:
+                return await self._fly(station, watch)
+        except asyncio.CancelledError:
+            raise typer.Abort from None
+        finally:
+            loop.remove_signal_handler(signal.SIGINT)
+
+    def _on_interrupt(self, task: asyncio.Task[Any]) -> None:
+        if not self._sets_out or self._pressed.is_set():
+            task.cancel()
+        else:
+            end_progress()
+            say("The vehicle is told to hold. Ctrl+C again leaves it to itself.")
+            self._pressed.set()
+
+    async def _fly(self, station: Station, watch: Watch) -> tuple[GuidedWay, FlightStatus | None]:
+        state = await connect(station.link, watch, self._link, OPERATOR, say)
+        state = await watch.until(lambda seen: _placed(seen.vehicle), timeout_s=POSITION_S) or state
+        flown = await self._flown(station, state)
+        way = await asyncio.to_thread(self._judged, watch.vehicle or state, flown)
+        end_progress()
+        if not self._may_fly or way.problem == "way" or (way.problem == "return" and not self._accepts):
+            if way.problem == "return":
+                say_notes("The way itself is clear. --accept-return flies it all the same.")
+            return way, None
+        say(way_words(way))
+        say_notes(LEFT)
+        asked_utc_s = time.time()
+        most_m_s = self._request.profile.max_speed_m_s
+        self._sets_out = True
+        await station.link.call(way_request(OPERATOR, way, self._wish, speed_m_s=self._speed_m_s, most_m_s=most_m_s))
+        return way, await self._followed(station, watch, asked_utc_s)
+
+    async def _flown(self, station: Station, state: VehicleState) -> Flown:
+        """The vehicle's own settings, and its fence and rally points, which the way is held against."""
+        firmware = "px4" if state.autopilot == "px4" else "ardupilot"
+        parameters = await station.link.call(ReadParameters(NAMES[firmware]))
+        fence_items = mission_items(await station.link.call(DownloadPlaces(OPERATOR, "fence")))
+        points = rally_of(mission_items(await station.link.call(DownloadPlaces(OPERATOR, "rally"))), "rally points")
+        warnings: list[str] = []
+        fence = fence_of(fence_items, "the fence on board", warnings)
+        say_notes(*warnings)
+        if isinstance(self._wish, Rally):
+            if not points:
+                raise NotAllowedError("The vehicle has no rally point.", advice="Send some with: hedgehop rally")
+            self._wish = replace(self._wish, point=_nearest(points, state))
+        return Flown(self._request.profile, self._request.clearance(), parameters, fence, points)
+
+    def _judged(self, state: VehicleState, flown: Flown) -> GuidedWay:
+        part = self._part(state, flown)
+        return judged_way(part, None, state, self._wish, flown, speed_m_s=self._speed_m_s, now_s=time.monotonic())
+
+    def _part(self, state: VehicleState, flown: Flown) -> Dsm:
+        """Of the model, around vehicle, home, rally points and the place that is asked for."""
+        model = self._model.model
+        places = [(state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)]
+        places.append(getattr(self._wish, "lat_lon_deg", None) or (None, None))
+        known = [place for place in places if None not in place]
+        xy_m = model.xy_from_lat_lon(np.array(known, np.float64).reshape(-1, 2))
+        part = needed_part(model, np.vstack([xy_m, rally_places(model, flown.rally)]), FLIGHT_MARGIN_M)
+        end_progress()
+        self._model.say_spikes(part)
+        return part
+
+    async def _followed(self, station: Station, watch: Watch, asked_utc_s: float) -> FlightStatus:
+        """To its end. A lost link is waited out: the vehicle holds by itself meanwhile."""
+        is_return = isinstance(self._wish, Home | Rally)
+        while True:
+            ended = await watch.until(
+                lambda seen: _ended(seen.flight, asked_utc_s, lands=is_return or None), timeout_s=LOOK_S
+            )
+            if ended is not None:
+                return ended
+            _tell(watch)
+            if self._pressed.is_set() and not self.was_held:
+                try:
+                    await station.link.call(Pause(OPERATOR))
+                    self.was_held = True
+                except TelemetryError as error:
+                    say(f"It was not obeyed and is commanded again: {error}")
+
+
+def _ended(flight: FlightStatus, since_utc_s: float, *, lands: bool | None) -> FlightStatus | None:
+    if flight.since_utc_s is None or flight.since_utc_s < since_utc_s:
+        return None  # of what was flown before
+    return flight if flight.phase in ("landed", "interrupted") or (flight.phase == "paused" and not lands) else None
+
+
+def _placed(state: VehicleState | None) -> VehicleState | None:
+    """Once it tells where it is and where its home is."""
+    if state is None or None in (state.lat_deg, state.lon_deg, state.alt_rel_home_m):
+        return None
+    return state if not state.armed or state.home_lat_deg is not None else None
+
+
+def _nearest(points: tuple[RallyPoint, ...], state: VehicleState) -> RallyPoint:
+    at = (state.lat_deg or 0.0, state.lon_deg or 0.0)
+    return min(points, key=lambda point: apart_m(at, (point.lat_deg, point.lon_deg)))
+
+
+def _tell(watch: Watch) -> None:
+    state, flight = watch.vehicle, watch.flight
+    if state is None:
+        return
+    parts = [flight.phase.replace("_", " "), f"{state.alt_rel_home_m or 0.0:.1f} m above home"]
+    parts += [f"{state.ground_speed_m_s:.1f} m/s"] if state.ground_speed_m_s is not None else []
+    progress(", ".join(parts), None)

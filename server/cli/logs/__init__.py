@@ -1,0 +1,1 @@
+"""``hedgehop logs``: the logs that lie on the vehicle."""

@@ -1,0 +1,1 @@
+"""``hedgehop radar``: raw radar files."""

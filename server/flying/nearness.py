@@ -1,0 +1,141 @@
+"""Vehicles in the air held against each other, once a second: an alarm for both where they may come too near."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from mapping.geometry.frames import offset_m
+from planning.following.separation import Nearest, TimedLine, nearest
+from server.errors import reported
+from server.heard.channel import Channel
+from server.heard.plan_follower import Ahead
+from server.schemas import VehicleAlarm
+from telemetry.topics.vehicle import VehicleState
+
+log = logging.getLogger("hedgehop.flying")
+
+EVERY_S = 1.0
+NEAR_M, OVER_M = 5.0, 8.0
+"""Between the balls in which the vehicles are: an alarm begins below the first, and is over above the second."""
+RADIUS_M = 3.0
+"""Of the ball: half a vehicle, and the errors of position and height; more where the receiver claims more."""
+AHEAD_S, STRAIGHT_S = 60.0, 12.0
+"""So far a plan is looked ahead; and straight on, where none is flown."""
+STANDS_M_S = 0.3
+"""What is slower stays where it is for all of that time."""
+EARLY_LATE_S, EARLY_LATE_SHARE = 2.0, 0.1
+"""Of a plan's predicted times."""
+VEER_SHARE = 0.2
+"""Of its speed: so much a vehicle's ball grows in a second while nothing is heard, or where no plan is flown."""
+_ADVICE = "Hold one of them, or lead it away."
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A vehicle in the air, as its pages know it."""
+
+    name: str
+    state: VehicleState
+    ahead: Ahead | None
+
+
+class Nearness:
+    """``alarms`` by the vehicle's number. All methods belong to the event loop."""
+
+    def __init__(
+        self, channels: Mapping[int, tuple[str, Channel]], *, now_mono_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._channels, self._now_mono_s = channels, now_mono_s
+        self._near: dict[tuple[int, int], Nearest] = {}
+        self.alarms: dict[int, VehicleAlarm] = {}
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await asyncio.sleep(EVERY_S)
+            try:
+                await self.look()
+            except Exception as error:
+                log.warning("Whether vehicles come near: %s", reported(error, log, "Holding vehicles apart").what)
+
+    async def look(self) -> None:
+        """A second in the life of all pairs; the sums are done beside the event loop."""
+        flown = {
+            number: Flown(name, channel.state, channel.follower.ahead(channel.flight))
+            for number, (name, channel) in self._channels.items()
+            if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
+        }
+        now_s = self._now_mono_s()
+        found = await asyncio.to_thread(found_among, flown, now_s)
+        limits_m = {pair: OVER_M if pair in self._near else NEAR_M for pair in found}
+        self._near = {pair: at for pair, at in found.items() if at.distance_m < limits_m[pair]}
+        self.alarms = {}
+        for (one, other), at in sorted(self._near.items(), key=lambda item: -item[1].distance_m):
+            for number, of in ((one, other), (other, one)):
+                text = said(flown[number].name, flown[of].name, at, now_s)
+                self.alarms[number] = VehicleAlarm(kind="near", key=f"near {one} {other}", text=text)
+
+
+def found_among(flown: Mapping[int, Flown], now_s: float) -> dict[tuple[int, int], Nearest]:
+    """How near each pair comes to each other, by their numbers."""
+    found: dict[tuple[int, int], Nearest] = {}
+    for one, other in combinations(sorted(flown), 2):
+        if (at := near_each_other(flown[one], flown[other], now_s)) is not None:
+            found[one, other] = at
+    return found
+
+
+def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
+    """Where either one's height above the sea is unknown, both are taken to be at the same height."""
+    origin_deg = one.state.lat_deg or 0.0, one.state.lon_deg or 0.0
+    flat = one.state.alt_amsl_m is None or other.state.alt_amsl_m is None
+    return nearest(_line(one, origin_deg, now_s, flat=flat), _line(other, origin_deg, now_s, flat=flat))
+
+
+def said(name: str, other: str, at: Nearest, now_s: float) -> str:
+    within_s = at.t_s - now_s
+    when = "now" if within_s < 1.5 else f"in {within_s:.0f} s"
+    return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}. {_ADVICE}"
+
+
+def _line(of: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool) -> TimedLine:
+    """From the last position that was heard, however old it is."""
+    state, ahead = of.state, of.ahead
+    alt_m = 0.0 if flat else state.alt_amsl_m or 0.0
+    here_m = np.array([*offset_m(origin_deg, state.lat_deg or 0.0, state.lon_deg or 0.0), alt_m])
+    heard_s = now_s if state.position_t_mono_s is None else min(now_s, state.position_t_mono_s)
+    v_enu_m_s = np.array([state.v_east_m_s or 0.0, state.v_north_m_s or 0.0, -(state.v_down_m_s or 0.0)])
+    v_enu_m_s[2] *= not flat
+    radius_m = max(RADIUS_M, 2.0 * (state.horizontal_accuracy_m or 0.0))
+    home_m = None if flat else state.home_alt_amsl_m
+    if ahead is not None and (flat or home_m is not None):
+        east_m, north_m = offset_m(origin_deg, ahead.lat_lon_deg[:, 0], ahead.lat_lon_deg[:, 1])
+        up_m = np.zeros(len(ahead.t_s)) if flat else ahead.alt_rel_home_m + (home_m or 0.0)
+        points_m = np.vstack([here_m, np.column_stack([east_m, north_m, up_m])])
+        return TimedLine(
+            *_until(points_m, heard_s + np.concatenate([[0.0], ahead.t_s]), now_s + AHEAD_S),
+            radius_m,
+            early_late_s=EARLY_LATE_S,
+            early_late_share=EARLY_LATE_SHARE,
+        )
+    speed_m_s = math.hypot(*v_enu_m_s)
+    ends_s = now_s + (AHEAD_S if speed_m_s < STANDS_M_S else STRAIGHT_S) - heard_s
+    points_m = np.stack([here_m, here_m + ends_s * v_enu_m_s])
+    return TimedLine(points_m, np.array([heard_s, heard_s + ends_s]), radius_m, VEER_SHARE * speed_m_s)
+
+
+def _until(points_m: np.ndarray, t_s: np.ndarray, end_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """The line as far as that time; at its end the vehicle may stay for as long."""
+    if t_s[-1] < end_s:
+        return np.vstack([points_m, points_m[-1:]]), np.append(t_s, end_s)
+    keep = int(np.searchsorted(t_s, end_s))
+    last_m = [np.interp(end_s, t_s, points_m[:, axis]) for axis in range(3)]
+    return np.vstack([points_m[:keep], [last_m]]), np.append(t_s[:keep], end_s)
