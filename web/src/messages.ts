@@ -13,6 +13,18 @@ export const LIMITS = {
     lat_deg: { min: -90, max: 90 },
     lon_deg: { min: -180, max: 180 },
   },
+  FenceCircleDoc: {
+    radius_m: { min: 1, max: 100_000.0, initial: 20 },
+  },
+  RallyDoc: {
+    lat_deg: { min: -90, max: 90 },
+    lon_deg: { min: -180, max: 180 },
+    alt_rel_home_m: { min: -500, max: 2_000 },
+  },
+  FenceDoc: {
+    floor_rel_home_m: { min: -500, max: 2_000, initial: -10 },
+    ceiling_rel_home_m: { min: 1, max: 5_000, initial: 120 },
+  },
   SurveyDoc: {
     gsd_cm: { min: 0.05, max: 100, initial: 1.0 },
     side_overlap: { min: 0, max: 0.94, initial: 0.7 },
@@ -159,6 +171,9 @@ export const LIMITS = {
   SetSelection: {
     change: { min: 0, max: 9_007_199_254_740_991 },
   },
+  FrameView: {
+    vehicle: { min: 1, initial: 1 },
+  },
   Ping: {
     page_ms: { min: 0, max: 1_000_000_000_000_000.0 },
   },
@@ -255,6 +270,15 @@ export interface FlightStatus {
   since_utc_s: number | null;
   broke_off_at: number | null;
   hint: string;
+}
+
+/** ``value`` in few words, ``limit`` beside it; ``text`` a sentence where there is something to do or to know. */
+export interface HealthRow {
+  code: "ready" | "estimator" | "gnss" | "vibration" | "battery" | "wind";
+  level: "good" | "near" | "bad" | "unknown";
+  value: string;
+  limit: string;
+  text: string;
 }
 
 export interface LinkStatus {
@@ -560,7 +584,15 @@ export interface VehicleState {
   rc_rssi: number | null;
   wind_speed_m_s: number | null;
   wind_from_rad: number | null;
+  estimator_t_mono_s: number | null;
   estimator_ok: boolean | null;
+  fence_ok: boolean | null;
+  fence_breach: "none" | "floor" | "ceiling" | "boundary" | null;
+  estimator_ratio: number | null;
+  estimator_ratio_of: "velocity" | "place" | "height" | "compass" | "airspeed" | "terrain" | null;
+  vibration_t_mono_s: number | null;
+  vibration_m_s2: number | null;
+  clipped: number | null;
 }
 
 /** A STATUSTEXT, its parts put together. */
@@ -608,6 +640,36 @@ export interface PoiDoc {
 export interface PlaceDoc {
   lat_deg: number;
   lon_deg: number;
+}
+
+export interface FencePolygonDoc {
+  id: string;
+  /** The vehicle stays inside; otherwise outside. */
+  inclusion: boolean;
+  corners: PlaceDoc[];
+}
+
+export interface FenceCircleDoc {
+  id: string;
+  inclusion: boolean;
+  centre: PlaceDoc;
+  radius_m: number;
+}
+
+/** Where a vehicle may return to instead of home. */
+export interface RallyDoc {
+  id: string;
+  lat_deg: number;
+  lon_deg: number;
+  alt_rel_home_m: number;
+}
+
+/** Where the vehicle may be: inside every inclusion, outside every exclusion, between floor and ceiling. */
+export interface FenceDoc {
+  polygons: FencePolygonDoc[];
+  circles: FenceCircleDoc[];
+  floor_rel_home_m: number | null;
+  ceiling_rel_home_m: number | null;
 }
 
 export interface SurveyDoc {
@@ -712,6 +774,8 @@ export interface PlanDoc {
   path: PathDoc;
   mission: MissionDoc;
   clearance: ClearanceDoc;
+  fence: FenceDoc;
+  rally: RallyDoc[];
 }
 
 export interface ErrorDoc {
@@ -841,6 +905,21 @@ export interface HomeDoc {
   better: BetterHomeDoc | null;
 }
 
+/** The nearest that the line and the ways back come to what the fence forbids. */
+export interface FenceVerdictDoc {
+  keeps: boolean;
+  margin_m: number;
+  /** Null: the fence has no shapes, only heights. */
+  min_distance_m: number | null;
+  shape: string;
+  part: "line" | "home" | "rally";
+  lat_deg: number;
+  lon_deg: number;
+  lowest_rel_home_m: number;
+  highest_rel_home_m: number;
+  faults: string[];
+}
+
 export interface ResultDoc {
   /** That the points were planned on another surface model, and how far home moves; empty: they were not. */
   other_surface: string;
@@ -873,6 +952,8 @@ export interface ResultDoc {
   items: number;
   max_items: number;
   excess_height_m: number;
+  /** Null: the plan has no fence. */
+  fence: FenceVerdictDoc | null;
   survey: SurveyResult | null;
   gsd_min_cm: number | null;
   gsd_max_cm: number | null;
@@ -928,6 +1009,8 @@ export interface SavePlanAs {
 export interface Imported {
   state: PlanState;
   warnings: string[];
+  /** What was read, in words. */
+  taken: string;
 }
 
 export interface SpikeDoc {
@@ -1025,8 +1108,12 @@ export interface ViewDoc {
 
 /** Which tool clicks in the 3D view act through, and what is selected. */
 export interface SelectionDoc {
-  tool: "select" | "add_poi" | "polygon" | "home" | "look_at" | "landing";
+  tool: "select" | "add_poi" | "polygon" | "home" | "look_at" | "landing" | "fence_polygon" | "fence_circle" | "rally";
   poi_id: string | null;
+  /** Id of the fence's shape or of the rally point that is selected; a corner's number after a dot, from 0. */
+  fence_mark: string | null;
+  /** Corners of a polygon of the fence that is none yet. */
+  draft: PlaceDoc[];
   /** Clicked with the tool "landing": sites are looked for near it. */
   place: PlaceDoc | null;
   /** Of the landing site that is pointed out. */
@@ -1092,6 +1179,37 @@ export interface NewAccount {
 
 export interface ChangePassword {
   password: string;
+}
+
+/** The worst of what is wrong with one vehicle, for pages that show another one. */
+export interface VehicleAlarm {
+  /** loss: nothing reaches it, or nothing is heard of it; near: another one is, which has the same alarm. */
+  kind: "loss" | "near" | "alert";
+  /** Another key is another alarm: who has seen the one has not seen the other. */
+  key: string;
+  text: string;
+}
+
+/** One of several vehicles, as every page is told of it; null where nothing is known. */
+export interface VehicleDoc {
+  number: number;
+  name: string;
+  lat_deg: number | null;
+  lon_deg: number | null;
+  alt_rel_home_m: number | null;
+  ground_speed_m_s: number | null;
+  mode: string;
+  /** As in the flight message. */
+  phase: string;
+  armed: boolean;
+  link: "none" | "live" | "stale" | "lost";
+  silent_s: number | null;
+  battery_share: number | null;
+  /** Who is in charge of it. */
+  holder: string | null;
+  /** Of the plan on board, where it came from here. */
+  plan_name: string;
+  alarm: VehicleAlarm | null;
 }
 
 /** Stands on every page until it is over, or until somebody has read it. */
@@ -1163,7 +1281,7 @@ export interface TrackDoc {
 
 /** One line of the check before the start. */
 export interface CheckRow {
-  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready" | "avoidance";
+  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready" | "avoidance" | "fence";
   /** accept: may be flown once the operator accepts it; bad and unknown: not at all. */
   state: "good" | "accept" | "bad" | "unknown";
   text: string;
@@ -1204,6 +1322,8 @@ export interface FlyState {
   preflight: PreflightDoc | null;
   /** After a flight that broke off: where it can go on. */
   resume_from_item: number | null;
+  /** What the vehicle does when it crosses its fence, as read at the last check; empty: not known. */
+  at_fence: string;
   /** What is being done right now: "Uploading", "Checking the start" ... */
   busy: string;
 }
@@ -1218,7 +1338,7 @@ export interface NodeDoc {
 export interface RecordingDoc {
   id: string;
   name: string;
-  kind: "hedgehop" | "tlog";
+  kind: "hedgehop" | "tlog" | "dataflash" | "ulog";
   started_utc: string;
   duration_s: number | null;
   bytes: number;
@@ -1228,6 +1348,30 @@ export interface RecordingDoc {
   terrain_id: string | null;
   /** Why it can only be opened in part, or not at all. */
   fault: string;
+}
+
+/** A log that lies on the vehicle. */
+export interface VehicleLogDoc {
+  number: number;
+  bytes: number;
+  begun_utc: string | null;
+}
+
+/** A log that is being read, or was last. */
+export interface LogDownloadDoc {
+  number: number;
+  bytes: number;
+  read_bytes: number;
+  state: "reading" | "done" | "failed" | "cancelled";
+  /** Once it is done: what it is in the library. */
+  recording_id?: string | null;
+  error?: ErrorDoc | null;
+}
+
+export interface VehicleLogsDoc {
+  /** The newest first; null: this vehicle was not asked. */
+  logs: VehicleLogDoc[] | null;
+  download: LogDownloadDoc | null;
 }
 
 export interface ConnectLink {
@@ -1255,7 +1399,7 @@ export interface UploadPlan {
 export interface StartFlight {
   way?: "auto" | "guided";
   digest: string;
-  accept?: ("gnss" | "battery" | "rtl_height" | "avoidance")[];
+  accept?: ("gnss" | "battery" | "rtl_height" | "avoidance" | "fence")[];
   from_item?: number;
 }
 
@@ -1564,6 +1708,89 @@ export interface PlanWithSeen {
   sensors?: ("radar" | "vision" | "ranges")[];
   /** The open plan as it is; or of the one that is flown, from where the vehicle is: the mission ahead, the way home. */
   part?: "whole" | "ahead" | "home";
+}
+
+export interface ParameterDoc {
+  name: string;
+  /** Null: what the vehicle sent is no number. */
+  value: number | null;
+  /** The value as it is written. */
+  text: string;
+  whole: boolean;
+  title: string;
+  help: string;
+  unit: string;
+  low: number | null;
+  high: number | null;
+  default: number | null;
+  /** Of this value. */
+  meaning: string;
+  reboot: boolean;
+  /** It differs from the default, as far as that is known. */
+  changed: boolean;
+}
+
+/** What one setting will do on a low flight. */
+export interface FindingDoc {
+  state: "bad" | "look" | "good";
+  parameter: string;
+  text: string;
+  value: number | null;
+  better: number | null;
+  better_text: string;
+}
+
+export interface ParametersDoc {
+  vehicle: string;
+  read_utc_s: number;
+  /** The makers' descriptions are known. */
+  described: boolean;
+  parameters: ParameterDoc[];
+  /** Worst first. */
+  findings: FindingDoc[];
+  /** Of the mission on board that they are about; empty: they are about any low flight. */
+  plan_name: string;
+  /** Why there are no findings. */
+  not_judged: string;
+}
+
+export interface ParameterChangeDoc {
+  name: string;
+  value: number;
+}
+
+export interface WriteParametersBody {
+  changes: ParameterChangeDoc[];
+}
+
+export interface WrittenDoc {
+  name: string;
+  asked: number;
+  before: number | null;
+  after: number | null;
+  outcome: "set" | "same" | "adjusted" | "kept" | "refused" | "unknown" | "not sent";
+  took: boolean;
+  words: string;
+}
+
+export interface WrittenAnswer {
+  written: WrittenDoc[];
+  now: ParametersDoc;
+}
+
+export interface DifferenceDoc {
+  name: string;
+  /** On the vehicle; null: it lists no such parameter. */
+  here: number | null;
+  /** In the file; null: it is not in there. */
+  there: number | null;
+}
+
+export interface ComparedDoc {
+  file: string;
+  same: number;
+  differences: DifferenceDoc[];
+  notes: string[];
 }
 
 /** A place to land, best first. */
@@ -1881,6 +2108,20 @@ export interface AnsweredMessage {
   change: number;
 }
 
+/** The vehicle that this page shows and commands from now on; all that is known of it follows at once. */
+export interface ActiveMessage {
+  v: 1;
+  type: "active";
+  vehicle: number;
+}
+
+/** All vehicles of a station that has several, some times a second. */
+export interface FleetMessage {
+  v: 1;
+  type: "fleet";
+  vehicles: VehicleDoc[];
+}
+
 /** The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came. */
 export interface ClockMessage {
   v: 1;
@@ -1915,6 +2156,14 @@ export interface VehicleMessage {
   now_mono_s: number;
   state: VehicleState | null;
   follow: FollowDoc | null;
+}
+
+/** How the vehicle is, by its own account, in the words of ``telemetry.flight.health``; empty: no vehicle. */
+export interface HealthMessage {
+  v: 1;
+  type: "health";
+  source: "live" | "replay";
+  rows: HealthRow[];
 }
 
 /** Replaces the flown path: after a seek, or when another flight begins. */
@@ -2103,12 +2352,20 @@ export interface FrameView {
   type: "frame_view";
   target: "terrain" | "plan" | "top" | "worst" | "poi" | "chase";
   source?: "live" | "replay";
+  /** Of the source "live". */
+  vehicle?: number;
 }
 
 /** A hand is on this page's camera: what follows a vehicle waits. */
 export interface HoldCamera {
   type: "hold_camera";
   held: boolean;
+}
+
+/** This page shows and commands another vehicle; who is in charge of which one stays as it is. */
+export interface ChooseVehicle {
+  type: "choose_vehicle";
+  vehicle: number;
 }
 
 /** Every second: the answer tells the page that the server works, how far away it is, and what its clock says. */
@@ -2119,7 +2376,9 @@ export interface Ping {
 
 export type ServerMessage =
   | Snapshot
+  | ActiveMessage
   | AlarmsMessage
+  | FleetMessage
   | PlanMessage
   | LibraryMessage
   | ViewMessage
@@ -2137,6 +2396,7 @@ export type ServerMessage =
   | FlyMessage
   | LeaseMessage
   | MeMessage
+  | HealthMessage
   | NodesMessage
   | RecorderMessage
   | RecordingsMessage
@@ -2158,4 +2418,5 @@ export type ClientMessage =
   | SetSelection
   | FrameView
   | HoldCamera
+  | ChooseVehicle
   | Ping;

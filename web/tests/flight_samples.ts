@@ -69,6 +69,7 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
     },
     preflight: null,
     resume_from_item: null,
+    at_fence: "",
     busy: "",
     ...fields,
   };

@@ -8,7 +8,9 @@ import {
   isInAir,
   latched,
   lease,
+  health,
   linkState,
+  overdue_s,
   linkStatus,
   nodes,
   silence_s,
@@ -121,17 +123,32 @@ describe("the flown path", () => {
   });
 });
 
+describe("health", () => {
+  it("is kept apart for the vehicle and for a recording", () => {
+    const row = { code: "wind", level: "good", value: "2.0 m/s", limit: "", text: "" } as const;
+    takeFlying({ v: 1, type: "health", source: "live", rows: [row] }, 0);
+    expect([health.live.value, health.replay.value]).toEqual([[row], []]);
+    takeFlying({ v: 1, type: "health", source: "live", rows: [] }, 0);
+    expect(health.live.value).toEqual([]);
+  });
+});
+
 describe("a link process that fails", () => {
   beforeEach(() => {
     takeFlying({ v: 1, type: "link", link: link({ silent_s: 0.1 }) }, 0);
     nodes.value = [{ name: "link", state: "running", restarts: 0, text: "" }];
   });
 
-  it("is lost by this page's own clock, whatever was heard last", () => {
-    expect(linkState.value).toBe("live");
-    now_ms.value = 3000;
-    expect(linkState.value).toBe("stale");
+  it("says of the vehicle's connection what it last said: that nothing comes here is the page's own trouble", () => {
+    expect([linkState.value, overdue_s.value]).toEqual(["live", 0]);
     now_ms.value = 6000;
+    expect([linkState.value, overdue_s.value]).toEqual(["live", 5]);
+    expect(silence_s.value).toBeCloseTo(6.1);
+    takeFlying({ v: 1, type: "link", link: link({ silent_s: 1.8 }) }, 6000);
+    now_ms.value = 6900;
+    expect([linkState.value, overdue_s.value]).toEqual(["stale", 0]);
+    takeFlying({ v: 1, type: "link", link: link({ silent_s: 3.8 }) }, 6900);
+    now_ms.value = 7700;
     expect(linkState.value).toBe("lost");
   });
 

@@ -18,7 +18,15 @@ const { places } = await import("../src/traversability/places");
 
 const PLACE = { lat_deg: 37.73, lon_deg: 14.99 };
 const told = (fields: Partial<SelectionDoc>) =>
-  (selection.value = { tool: "select", poi_id: null, place: null, site_rank: null, ...fields });
+  (selection.value = {
+    tool: "select",
+    poi_id: null,
+    fence_mark: null,
+    draft: [],
+    place: null,
+    site_rank: null,
+    ...fields,
+  });
 
 beforeEach(() => {
   told({});

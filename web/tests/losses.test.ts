@@ -22,6 +22,8 @@ describe("a loss in flight", () => {
   it("is of the server, of the link, or of the vehicle", () => {
     expect(loss.value).toBeNull();
     now_ms.value = 10_000;
+    expect(loss.value).toBe("slow");
+    takeFlying({ v: 1, type: "link", link: status({ state: "lost", silent_s: 10 }) }, 10_000);
     expect(loss.value).toBe("vehicle");
     nodes.value = linkNode("silent");
     expect(loss.value).toBe("link");

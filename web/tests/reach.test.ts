@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import { now_ms } from "../src/store/clock";
-import { heard, lease, linkStatus, nodes, takeFlying } from "../src/store/flying";
+import { heard, lease, linkState, linkStatus, nodes, takeFlying } from "../src/store/flying";
+import { loss } from "../src/store/losses";
 import { failed, isOld, late_s, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
 import { forgetClock, takeClock } from "../src/store/server_clock";
 import { link } from "../src/store/state";
@@ -68,5 +69,16 @@ describe("how far this page's word reaches", () => {
     link.value = "silent";
     expect(late_s.value).toBeNull();
     forgetClock();
+  });
+
+  it("is late as well while a slow line brings nothing of the vehicle, and leaves the link alone", () => {
+    expect(late_s.value).toBeNull();
+    now_ms.value = 4500;
+    expect([late_s.value, linkState.value, loss.value]).toEqual([3, "live", "slow"]);
+    nodes.value = linkNode("silent");
+    expect([late_s.value, loss.value]).toEqual([null, "link"]);
+    nodes.value = linkNode("running");
+    linkStatus.value = null;
+    expect(late_s.value).toBeNull();
   });
 });

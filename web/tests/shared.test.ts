@@ -39,7 +39,14 @@ describe("what all pages show together", () => {
 
   it("loses nothing that others changed meanwhile", () => {
     const change = nextChange();
-    takeSelection({ tool: "polygon", poi_id: null, place: null, site_rank: null });
+    takeSelection({
+      tool: "polygon",
+      poi_id: null,
+      fence_mark: null,
+      draft: [],
+      place: null,
+      site_rank: null,
+    });
     takeView(shown({ show_path: false }));
     takeAnswer(change);
     expect([view.value.show_path, selection.value.tool]).toEqual([false, "polygon"]);

@@ -33,9 +33,9 @@ describe("keys", () => {
     expect(shortcutOf(press(" "), false, { view: "review", study: "radar", afterG: false })).toBeNull();
   });
 
-  it("1 to 7 are the sections", () => {
+  it("1 to 8 are the sections", () => {
     expect(shortcutOf(press("4"), false)).toEqual({ id: "section", section: 4 });
-    expect(shortcutOf(press("8"), false)).toBeNull();
+    expect(shortcutOf(press("9"), false)).toBeNull();
   });
 
   it("inside inputs belong to the input, but for saving and opening", () => {

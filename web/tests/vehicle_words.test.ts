@@ -1,5 +1,12 @@
 import { describe, expect, it } from "vitest";
-import { batteryLevel, batteryWord, fixLevel, linkWords, modeWord } from "../src/vehicle/vehicle_words";
+import {
+  batteryLevel,
+  batteryWord,
+  fixLevel,
+  fixWord,
+  linkWords,
+  modeWord,
+} from "../src/vehicle/vehicle_words";
 import { linkStatus, vehicleState } from "./flight_samples";
 
 describe("the status bar", () => {
@@ -24,6 +31,11 @@ describe("the status bar", () => {
       level: "bad",
     });
     expect(linkWords(linkStatus(), 1.2, "live", "server").text).toBe("No server");
+    expect(linkWords(linkStatus(), 5.2, "live", null, 4)).toEqual({
+      text: "Page late",
+      note: "4\u00a0s",
+      level: "bad",
+    });
     expect(linkWords(linkStatus({ quality: 0.4 }), 0.1).level).toBe("near");
     expect(linkWords(linkStatus({ adopted: null, state: "none" }), null).text).toBe("No vehicle");
     expect(linkWords(null, null).text).toBe("No vehicle");
@@ -39,5 +51,7 @@ describe("the status bar", () => {
     expect(
       (["rtk_fixed", "2d", "no_fix"] as const).map((gnss_fix) => fixLevel(vehicleState({ gnss_fix }))),
     ).toEqual(["neutral", "near", "bad"]);
+    const unheard = vehicleState({ gnss_fix: "none", gnss_t_mono_s: null });
+    expect([fixWord(unheard), fixLevel(unheard)]).toEqual(["–", "neutral"]);
   });
 });

@@ -3,7 +3,7 @@ import type { Candidate, ConnectionStatus, SigningStatus } from "../messages";
 import { count, number } from "../format";
 import { adopted, isInAir, lease, linkState, linkStatus, silence_s, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
-import { failed, whyNotAsk, whyNotCommand } from "../store/reach";
+import { failed, late_s, whyNotAsk, whyNotCommand } from "../store/reach";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { ErrorPanel } from "../ui/Outcome";
@@ -241,7 +241,7 @@ export function ConnectionSection() {
   const status = linkStatus.value?.status ?? null;
   const used = adopted.value;
   const summary = used
-    ? linkWords(status, silence_s.value, linkState.value, failed.value).text
+    ? linkWords(status, silence_s.value, linkState.value, failed.value, late_s.value).text
     : count(status?.candidates.length ?? 0, "vehicle") + " heard";
   return (
     <Section

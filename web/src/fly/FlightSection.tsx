@@ -6,6 +6,7 @@ import { Button } from "../ui/Button";
 import { Done, ErrorPanel, Outcome } from "../ui/Outcome";
 import { HoldButton } from "../ui/HoldButton";
 import { Section } from "../ui/Section";
+import { EmergencyStop } from "./EmergencyStop";
 import { arm, disarm, land, startRecording, stopRecording } from "../vehicle/orders";
 import { armedWord } from "../vehicle/vehicle_words";
 
@@ -95,6 +96,7 @@ export function FlightSection() {
       startsOpen
     >
       <Actions />
+      <EmergencyStop place={PLACE} />
       <Done place={PLACE} />
       <Recorder />
     </Section>

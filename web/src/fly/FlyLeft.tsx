@@ -9,7 +9,9 @@ import { ConnectionSection } from "./Connection";
 import { FlightSection } from "./FlightSection";
 import { NextAction } from "./NextAction";
 import { OnboardSection } from "./Onboard";
+import { ParametersSection } from "./ParametersSection";
 import { PreflightSection } from "./Preflight";
+import { LogsSection } from "./VehicleLogs";
 
 /** All pages share the 3D view: it shows the recording that any of them reviews. */
 function ReviewOpen() {
@@ -78,6 +80,8 @@ export function FlyLeft() {
         <PreflightSection />
         {!isInAir.value && <FlightSection />}
         <ObstaclesSection />
+        <ParametersSection />
+        <LogsSection />
       </div>
       {standLeft.value && adopted.value && (
         <div class="ways">

@@ -7,6 +7,7 @@ import { hasRoom } from "../tracks/Displays";
 import { ROWS, TrackList } from "../tracks/TrackList";
 import { adopted, heard, texts } from "../store/flying";
 import { hasSensors } from "../store/obstacles";
+import { Health } from "../vehicle/Health";
 import { Instruments } from "../vehicle/Instruments";
 import { VehicleMessages } from "./VehicleMessages";
 
@@ -46,6 +47,7 @@ export function FlyRight() {
         <MissionAhead source="live" />
         <Sensors source="live" />
         <Looking source="live" />
+        <Health source="live" />
         {(!isEmpty || texts.value.length > 0) && <VehicleMessages />}
       </div>
       <Evasion />

@@ -36,6 +36,7 @@ const TITLES: Record<CheckRow["code"], string> = {
   battery: "Battery",
   ready: "Ready to arm",
   avoidance: "Avoidance",
+  fence: "Fence",
 };
 
 function Row({ row }: { row: CheckRow }) {

@@ -68,6 +68,9 @@ export interface Asking {
   headers?: Readonly<Record<string, string>>;
 }
 
+/** Headers that every request carries. */
+export const standing: Record<string, string> = {};
+
 /** One request to our server; returns the answer if it is a good one. */
 export async function request(
   method: string,
@@ -76,10 +79,10 @@ export async function request(
   { signal, limit_ms = LIMIT_MS, headers = {} }: Asking = {},
 ): Promise<Response> {
   const limit = AbortSignal.timeout(limit_ms);
-  const init: RequestInit = { method, credentials: "same-origin", headers };
+  const init: RequestInit = { method, credentials: "same-origin", headers: { ...standing, ...headers } };
   init.signal = signal ? AbortSignal.any([signal, limit]) : limit;
   if (method !== "GET") {
-    init.headers = { "Content-Type": "application/json", ...headers };
+    init.headers = { "Content-Type": "application/json", ...standing, ...headers };
     init.body = JSON.stringify(body ?? {});
   }
   const response = await fetch(path, init).catch(() => {
@@ -125,6 +128,7 @@ export function upload(
   });
   xhr.open(method, path);
   xhr.setRequestHeader("Content-Type", "application/octet-stream");
+  for (const [name, value] of Object.entries(standing)) xhr.setRequestHeader(name, value);
   xhr.send(file);
   return { done, cancel: () => xhr.abort() };
 }

@@ -37,6 +37,7 @@ export class Stream {
   private pinged_ms = 0;
   private state: LinkState = "connecting";
   private page: string | null = null;
+  private vehicle: number | null = null;
 
   constructor(
     private readonly url: string,
@@ -44,7 +45,8 @@ export class Stream {
   ) {}
 
   connect(): void {
-    const again = this.page === null ? "" : `?page=${encodeURIComponent(this.page)}`;
+    const shown = this.vehicle === null ? "" : `&vehicle=${this.vehicle}`;
+    const again = this.page === null ? "" : `?page=${encodeURIComponent(this.page)}${shown}`;
     const socket = new WebSocket(`${this.url}${again}`);
     this.socket = socket;
     socket.onopen = () => this.ping(performance.now());
@@ -101,6 +103,7 @@ export class Stream {
       this.attempt = 0;
       this.page = message.page_id;
     }
+    if (message.type === "active") this.vehicle = message.vehicle;
     if (message.type === "snapshot" || this.state === "silent") this.becomes("open");
     this.events.message(message);
   }

@@ -1,4 +1,5 @@
 import { number } from "../format";
+import { active } from "../store/fleet";
 import type { Source } from "../store/flying";
 import { SENSORS, sensed, type MapName, type SensorName } from "../store/obstacles";
 import { Icon } from "../ui/Icon";
@@ -13,7 +14,7 @@ const FILES = [
 ] as const;
 
 const mapFile = (source: Source, name: MapName, format: string) =>
-  `/api/obstacles/map/${name}.${format}?source=${source}`;
+  `/api/obstacles/map/${name}.${format}?source=${source}&vehicle=${active.value}`;
 
 interface Known {
   name: MapName;

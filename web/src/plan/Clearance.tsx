@@ -65,6 +65,43 @@ function Worst({ result }: { result: ResultDoc }) {
   );
 }
 
+const PARTS = { line: "the line", home: "a way home", rally: "a way to a rally point" } as const;
+
+/** How near the flight comes to what the fence forbids. */
+function Fence({ verdict }: { verdict: ResultDoc["fence"] }) {
+  if (!verdict) return null;
+  const { min_distance_m, shape, part, margin_m } = verdict;
+  const level = verdict.keeps ? "good" : "bad";
+  return (
+    <>
+      <h2>Fence</h2>
+      <dl class="figures-list">
+        <Figure
+          label="The flight"
+          value={verdict.keeps ? "keeps inside" : "does not keep inside"}
+          level={level}
+          testid="fence-kept"
+        />
+        {min_distance_m !== null && (
+          <Figure
+            label={`Nearest: ${PARTS[part]}, ${shape}`}
+            value={clearance(min_distance_m)}
+            level={clearanceLevel(min_distance_m, margin_m)}
+            note={`of ${demanded(margin_m)}`}
+            testid="fence-distance"
+          />
+        )}
+      </dl>
+      {min_distance_m !== null && (
+        <p class="row place">
+          {latLon(verdict)}
+          <CopyPlace place={verdict} name="the place nearest to the fence" />
+        </p>
+      )}
+    </>
+  );
+}
+
 function Return({ result }: { result: ResultDoc }) {
   const needed = result.rtl_height_needed_m;
   const isHighEnough = needed !== null && result.rtl_height_m >= needed;
@@ -129,6 +166,7 @@ export function Clearance({ result }: { result: ResultDoc }) {
         </p>
       )}
       <Worst result={result} />
+      <Fence verdict={result.fence} />
       <h2>Return and home</h2>
       <Return result={result} />
     </section>

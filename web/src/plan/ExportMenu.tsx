@@ -2,7 +2,7 @@ import { Icon, type IconName } from "../ui/Icon";
 import { Menu } from "../ui/Menu";
 import { computation } from "../store/state";
 import { verdict, verdictWord } from "./Verdict";
-import { busy, download, openReport } from "./downloads";
+import { busy, download, openReport } from "../store/downloads";
 
 const FILES: readonly { file: string; label: string; note: string; icon: IconName }[] = [
   { file: "all.zip", label: "Everything", note: ".zip", icon: "folder" },

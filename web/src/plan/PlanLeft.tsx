@@ -3,6 +3,7 @@ import { SeenInPlan } from "../obstacles/SeenInPlan";
 import { document_ } from "../store/state";
 import { TraversabilitySection } from "../traversability/TraversabilitySection";
 import { PlanActions } from "./PlanActions";
+import { FenceSection } from "./sections/Fence";
 import { MissionSection } from "./sections/Mission";
 import { PointsSection } from "./sections/Points";
 import { RequiredSection } from "./sections/Required";
@@ -28,6 +29,7 @@ export function PlanLeft() {
             <SpeedsSection plan={plan} />
             <RequiredSection plan={plan} />
             <MissionSection plan={plan} />
+            <FenceSection plan={plan} />
             <TraversabilitySection plan={plan} />
           </>
         ) : (

@@ -46,12 +46,14 @@ export function takeRecordings(files: readonly File[]): void {
 function Import({ isFirst }: { isFirst: boolean }) {
   return (
     <div class={`drop-zone ${isFirst ? "first" : ""}`} data-testid="recording-drop">
-      {isFirst && <p>Drop a .tlog or .mcap anywhere on this page. Flights are recorded by themselves.</p>}
+      {isFirst && (
+        <p>Drop a .mcap, .tlog, .bin or .ulg anywhere on this page. Flights are recorded by themselves.</p>
+      )}
       <div class="row">
         <Button
           icon="import"
           testid="recording-import"
-          onClick={() => chooseFiles(".tlog,.mcap", takeRecordings)}
+          onClick={() => chooseFiles(".mcap,.tlog,.bin,.ulg", takeRecordings)}
         >
           Open a recording…
         </Button>

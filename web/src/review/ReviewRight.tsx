@@ -1,6 +1,7 @@
 import { signal } from "@preact/signals";
 import { day, duration } from "../format";
 import type { ReviewDoc } from "../messages";
+import { Health } from "../vehicle/Health";
 import { Instruments } from "../vehicle/Instruments";
 import { MissionAhead } from "../obstacles/MissionAhead";
 import { Looking } from "../obstacles/Looking";
@@ -60,7 +61,7 @@ function FlightsRight() {
             How far beside the plan, how near the surface model, how late: the figures of a flight appear
             here.
           </p>
-          <p>Recordings of other ground stations (.tlog) are opened just the same.</p>
+          <p>Other ground stations' logs (.tlog) and vehicles' own (.bin, .ulg) are opened just the same.</p>
         </div>
       </div>
     );
@@ -85,6 +86,7 @@ function FlightsRight() {
       <div class="panel-scroll truth" tabIndex={0}>
         <div class="part part-instruments">
           <Instruments source="replay" />
+          <Health source="replay" />
           <TrackList source="replay" rows={ROWS.narrow} />
           <MissionAhead source="replay" />
           <Sensors source="replay" />

@@ -7,6 +7,7 @@ import { Loading } from "./Loading";
 import { MapLegend } from "./MapLegend";
 import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
+import { markTitle } from "../store/fence";
 import { viewId } from "../store/view";
 import { review } from "../store/review";
 import { document_, pageId, selection, terrain, view } from "../store/state";
@@ -20,29 +21,43 @@ const HINTS = {
   home: "Click the surface to put home there",
   look_at: "Click the surface where the nose shall point",
   landing: "Click the surface near which to land",
+  fence_polygon: "Click the surface to add a corner of the fence",
+  fence_circle: "Click the surface to put a circle's centre",
+  rally: "Click the surface to put a rally point",
 } as const;
 
 /** viser's handle for moving in the plane is a blue square beside its point: nobody would guess. */
-function MoveHint({ id }: { id: string }) {
-  const index = document_.value?.pois.findIndex((poi) => poi.id === id) ?? -1;
-  if (index < 0) return null;
+function MoveHint({ title }: { title: string }) {
   return (
     <p class="tool-hint" data-testid="move-hint">
-      <span class="handle-swatch" aria-hidden="true" /> Drag the blue square to move point {index + 1}
+      <span class="handle-swatch" aria-hidden="true" /> Drag the blue square to move {title}
     </p>
   );
 }
 
+/** What of the plan has handles; null: nothing. */
+function chosenTitle(): string | null {
+  const { poi_id, fence_mark } = selection.value;
+  const plan = document_.value;
+  if (!plan) return null;
+  if (fence_mark !== null) return markTitle(plan, fence_mark);
+  const index = plan.source === "pois" ? plan.pois.findIndex((poi) => poi.id === poi_id) : -1;
+  return index < 0 ? null : `point ${index + 1}`;
+}
+
 function ToolHint() {
-  const { tool, poi_id } = selection.value;
+  const { tool, draft } = selection.value;
   const hint = HINTS[tool];
   if (!terrain.value) return null;
-  if (tool === "select" && poi_id !== null && document_.value?.source === "pois")
-    return <MoveHint id={poi_id} />;
+  const chosen = tool === "select" ? chosenTitle() : null;
+  if (chosen) return <MoveHint title={chosen} />;
   if (!hint) return null;
+  const missing =
+    tool === "fence_polygon" && draft.length > 0 ? `: ${3 - draft.length} more make it one` : "";
   return (
     <p class="tool-hint" data-testid="tool-hint">
-      {hint} <span>·</span> <kbd>Esc</kbd> to stop
+      {hint}
+      {missing} <span>·</span> <kbd>Esc</kbd> to stop
     </p>
   );
 }

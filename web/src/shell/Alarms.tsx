@@ -1,5 +1,6 @@
 import { clock } from "../format";
 import type { AlarmDoc } from "../messages";
+import { acknowledgeBreach, breach, isBreachCalling } from "../store/breach";
 import { markRead, unreadAlarms } from "../store/alarms";
 import { openDialog } from "../store/view";
 import { Button } from "../ui/Button";
@@ -35,10 +36,35 @@ export function Alarm({ alarm, onRead }: { alarm: AlarmDoc; onRead?: () => void 
   );
 }
 
+/** The vehicle has crossed its fence: what, and what it does about that. */
+function BreachAlarm() {
+  const error = breach.value;
+  if (!error) return null;
+  return (
+    <section class="alarm error" aria-label="Alarm" data-testid="alarm" data-kind="fence">
+      <Icon name="warning" size={24} />
+      <ErrorText error={error} />
+      {isBreachCalling.value && (
+        <div class="row end">
+          <Button
+            icon="check"
+            title="The sound stops; this stays"
+            testid="breach-seen"
+            onClick={acknowledgeBreach}
+          >
+            Seen
+          </Button>
+        </div>
+      )}
+    </section>
+  );
+}
+
 /** Those that nobody here has read, over the 3D view and in every view. */
 export function Alarms() {
   return (
     <div class="alarms" role="alert">
+      <BreachAlarm />
       {unreadAlarms.value.map((alarm) => (
         <Alarm key={alarm.kind} alarm={alarm} onRead={() => markRead(alarm)} />
       ))}

@@ -3,7 +3,7 @@ import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
 import { droppedFiles } from "../store/dropped";
 import { isObserver, whyObserver } from "../store/flying";
-import { isRadarLog, isRecording, takeFiles } from "../store/files";
+import { isRadarLog, recordingsAmong, takeFiles } from "../store/files";
 import { dragging, goTo, study, viewId } from "../store/view";
 import { bringIn, isRadarSamples } from "../studies/radar";
 import { takeRadarLogs } from "../traversability/ground_orders";
@@ -22,7 +22,7 @@ function Kinds() {
       <p class="drop-title">Drop to open</p>
       <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
       <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
-      <p>Recorded flight: .tlog, .mcap</p>
+      <p>Recorded flight: .mcap, .tlog, .bin, .ulg</p>
       <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
     </>
   );
@@ -61,13 +61,15 @@ export function FileDrop() {
     event.preventDefault();
     end();
     if (!event.dataTransfer || isObserver.value) return;
-    const files = await droppedFiles(event.dataTransfer);
-    takeRecordings(files.filter(isRecording));
+    const dropped = await droppedFiles(event.dataTransfer);
+    const recordings = await recordingsAmong(dropped);
+    takeRecordings([...recordings]);
+    const files = dropped.filter((file) => !recordings.has(file));
     takeRadarLogs(files.filter(isRadarLog));
     const samples = files.filter((file) => isSamples(file));
     if (samples.length > 0) goTo("review");
     void bringIn(samples);
-    takeFiles(files.filter((file) => !isRecording(file) && !isRadarLog(file) && !isSamples(file)));
+    takeFiles(files.filter((file) => !isRadarLog(file) && !isSamples(file)));
   };
   return (
     <div

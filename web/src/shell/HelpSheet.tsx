@@ -16,7 +16,7 @@ const STEPS = [
   "Fly: connect a vehicle or the simulator, upload, check, then hold Start for a second.",
   "Obstacles: an alert stays until it is over and acknowledged; the ways past it stand on the right of Fly.",
   "Hold and Return stay in the second line of the page, in every view.",
-  "Review: open the recording that every flight leaves, or a .tlog, and play it.",
+  "Review: open the recording that every flight leaves, or a log (.tlog, .bin, .ulg), and play it.",
 ];
 
 const TERMS = [

@@ -5,12 +5,16 @@ import { switchSound } from "./sound";
 import { openHelpPages } from "../help/HelpPages";
 import { chase } from "../scene/camera";
 import { isObserver } from "../store/flying";
+import { acknowledgeElsewhere, calling } from "../store/fleet";
+import { acknowledgeBreach, isBreachCalling } from "../store/breach";
 import { acknowledgeLoss, isLossCalling } from "../store/losses";
+import { isAlarming } from "../store/obstacles";
 import { seekBy, togglePlaying } from "../store/review";
 import { stepFrame } from "../studies/radar";
 import { sound } from "../store/prefs";
 import { document_, selection } from "../store/state";
-import { frame, setSelection } from "../store/stream";
+import { removeMark } from "../store/fence";
+import { chooseVehicle, frame, setSelection } from "../store/stream";
 import { drawer, goTo, openDialog, study, viewId } from "../store/view";
 import { chooseFiles } from "../ui/choose_files";
 import { afterG, pressedAt_ms, shortcutOf, type Hit } from "./shortcuts";
@@ -34,11 +38,19 @@ function toggleSection(number: number): void {
 
 function stop(): void {
   if (drawer.value) drawer.value = null;
-  else setSelection({ tool: "select" });
+  else setSelection({ tool: "select", draft: [] });
 }
 
 /** What would lead an observer to what they cannot do; all else that changes something does nothing for them. */
 const NOT_FOR_OBSERVERS: ReadonlySet<Hit["id"]> = new Set(["save", "open"]);
+
+/** What is lost before what is near, the vehicle on the page before the others. */
+function acknowledgeTop(): void {
+  if (isLossCalling.value) return acknowledgeLoss();
+  if (isBreachCalling.value) return acknowledgeBreach();
+  if (!isAlarming.value && calling.value.length > 0) return acknowledgeElsewhere();
+  if (!isObserver.value) acknowledgeFirst();
+}
 
 function act(hit: Hit): void {
   if (isObserver.value && NOT_FOR_OBSERVERS.has(hit.id)) return;
@@ -53,12 +65,14 @@ function act(hit: Hit): void {
     case "open":
       return chooseFiles();
     case "add":
-      if (document_.value?.terrain_id) setSelection({ tool: "add_poi" });
+      if (document_.value?.terrain_id) setSelection({ tool: "add_poi", draft: [] });
       return;
     case "select":
       return stop();
     case "delete":
-      return removeSelectedPoi(selection.value.poi_id);
+      return selection.value.fence_mark
+        ? removeMark(selection.value.fence_mark)
+        : removeSelectedPoi(selection.value.poi_id);
     case "fit":
       return void frame("plan");
     case "top":
@@ -69,8 +83,10 @@ function act(hit: Hit): void {
       return toggleSection(hit.section ?? 0);
     case "view":
       return goTo(hit.view ?? "plan");
+    case "vehicle":
+      return chooseVehicle(hit.vehicle ?? 1);
     case "acknowledge":
-      return isLossCalling.value ? acknowledgeLoss() : void (isObserver.value || acknowledgeFirst());
+      return acknowledgeTop();
     case "sound":
       return void switchSound(!sound.value);
     case "play":

@@ -8,16 +8,17 @@ export const SHORTCUTS = [
   { id: "open", keys: "Ctrl O", text: "Open a file from this computer" },
   { id: "add", keys: "A", text: "Add points on click" },
   { id: "select", keys: "Esc", text: "Stop the tool, close what is open" },
-  { id: "delete", keys: "Delete", text: "Delete the selected point" },
+  { id: "delete", keys: "Delete", text: "Delete the selected point, or corner of the fence" },
   { id: "fit", keys: "F", text: "Fit the plan into the view" },
   { id: "top", keys: "T", text: "Look from above, north up" },
   { id: "chase", keys: "V", text: "Follow the vehicle" },
   {
     id: "section",
-    keys: "1 to 7",
+    keys: "1 to 8",
     text: "Open or close that section on the left",
   },
   { id: "view", keys: "G then P or F or R", text: "Go to Plan, Fly or Review, from any view" },
+  { id: "vehicle", keys: "G then 1 to 8", text: "Show that vehicle, where there are several" },
   { id: "acknowledge", keys: "K", text: "Acknowledge the alarm on top" },
   { id: "sound", keys: "M", text: "Sound of alarms on or off" },
   { id: "play", keys: "Space", text: "Review: play and pause" },
@@ -39,6 +40,8 @@ export interface Hit {
   id: ShortcutId;
   /** For `section`: which, from 1. */
   section?: number;
+  /** For `vehicle`: which, from 1. */
+  vehicle?: number;
   /** For `view`: which. */
   view?: ViewId;
   /** For `seek`: by how much. */
@@ -78,8 +81,10 @@ export function shortcutOf(
   inInput: boolean,
   where: Where = { view: "plan", afterG: false },
 ): Hit | null {
+  const isSecond = where.afterG && !pressed.mod && !inInput;
+  if (isSecond && /^[1-8]$/.test(pressed.key)) return { id: "vehicle", vehicle: Number(pressed.key) };
   const view = VIEW_KEYS[pressed.key.toLowerCase()];
-  if (where.afterG && view && !pressed.mod && !inInput) return { id: "view", view };
+  if (isSecond && view) return { id: "view", view };
   const hit = where.view === "review" && !pressed.mod && !inInput ? reviewKey(pressed, where.study) : null;
   const found = hit ?? anywhere(pressed, inInput);
   return found && where.view !== "plan" && PLANNING.has(found.id) ? null : found;
@@ -124,7 +129,7 @@ function anywhere({ key, mod, shift }: Key, inInput: boolean): Hit | null {
     h: "pages",
     "?": "help",
   };
-  if (/^[1-7]$/.test(key)) return { id: "section", section: Number(key) };
+  if (/^[1-8]$/.test(key)) return { id: "section", section: Number(key) };
   const id = plain[lower];
   return id ? { id } : null;
 }

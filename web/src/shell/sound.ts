@@ -1,4 +1,6 @@
 import { effect, signal } from "@preact/signals";
+import { isBreachCalling } from "../store/breach";
+import { calling, isCallingLoss } from "../store/fleet";
 import { isLossCalling } from "../store/losses";
 import { isAlarming } from "../store/obstacles";
 import { sound } from "../store/prefs";
@@ -12,7 +14,7 @@ interface Alarm {
 
 /** Short and rising: something is ahead. */
 const OBSTACLE: Alarm = { tones_hz: [880, 1175, 880], tone_s: 0.13, period_ms: 1600 };
-/** Long and falling: server, link or vehicle is lost, or the line is too slow to fly by. */
+/** Long and falling: server, link or vehicle is lost, the line is too slow to fly by, or a fence is crossed. */
 const LOSS: Alarm = { tones_hz: [740, 494, 330], tone_s: 0.4, period_ms: 2400 };
 
 const GAP_S = 0.04;
@@ -67,7 +69,10 @@ export async function switchSound(on: boolean): Promise<void> {
 }
 
 /** Of two the worse one: what a sensor said before the loss is old. */
-const present = () => (isLossCalling.value ? LOSS : isAlarming.value ? OBSTACLE : null);
+function present(): Alarm | null {
+  if (isLossCalling.value || isBreachCalling.value || isCallingLoss.value) return LOSS;
+  return isAlarming.value || calling.value.length > 0 ? OBSTACLE : null;
+}
 
 export function startSound(): void {
   void wake();

@@ -34,7 +34,7 @@ export const views: readonly [View, ...View[]] = [
     Left: PlanLeft,
     Right: PlanRight,
     Below: ProfilePane,
-    sections: ["terrain", "points", "vehicle", "surface", "speeds", "mission", "traversability"],
+    sections: ["terrain", "points", "vehicle", "surface", "speeds", "mission", "fence", "traversability"],
   },
   {
     id: "fly",
@@ -42,7 +42,7 @@ export const views: readonly [View, ...View[]] = [
     Left: FlyLeft,
     Right: FlyRight,
     Below: FlyBelow,
-    sections: ["connection", "onboard", "preflight", "flight", "obstacles"],
+    sections: ["connection", "onboard", "preflight", "flight", "obstacles", "parameters"],
   },
   {
     id: "review",

@@ -2,7 +2,7 @@
 
 const folders = new WeakMap<File, string>();
 const DEEPEST = 4;
-const OPENED = /\.(tiff?|asc|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|npz|npy|bin)$/i;
+const OPENED = /\.(tiff?|asc|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin)$/i;
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 

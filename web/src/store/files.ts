@@ -4,7 +4,7 @@ import { asErrorDoc, isCancelled, upload, type Upload } from "../net/api";
 import { allSent, queue, showPlan } from "./plan";
 import { folderOf } from "./dropped";
 import { act } from "./outcomes";
-import { document_, jobs, notifyText, setError, terrain } from "./state";
+import { jobs, notifyText, setError, terrain } from "./state";
 
 /** A file on its way to the server, before there is a job for it. */
 export interface Sending {
@@ -89,26 +89,29 @@ export async function sendOrthophoto(file: File): Promise<void> {
   }
 }
 
-/** Points, or the polygon of a survey, from a file. */
-export async function sendPoints(file: File): Promise<void> {
-  setError("points", null);
+/** Points, the polygon of a survey, or a fence from a file. */
+export const sendPoints = (file: File) => importIntoPlan(file, "points", {});
+
+/** Of a file that may hold a mission as well, only its fence and rally points. */
+export const sendFence = (file: File) => importIntoPlan(file, "fence", { only_fence: "true" });
+
+async function importIntoPlan(file: File, place: string, asked: Record<string, string>): Promise<void> {
+  setError(place, null);
   if (file.size > MOST_POINT_BYTES) {
     const what = `"${file.name}" is larger than 20 MB.`;
-    setError("points", { code: "too_large", what, where: file.name, advice: "Split it or thin it out." });
+    setError(place, { code: "too_large", what, where: file.name, advice: "Split it or thin it out." });
     return;
   }
   try {
     await allSent();
-    const path = `/api/plan/import?${new URLSearchParams({ filename: file.name })}`;
+    const path = `/api/plan/import?${new URLSearchParams({ filename: file.name, ...asked })}`;
     const imported = JSON.parse(await sendFile(path, file)) as Imported;
     queue.takeAnswer(imported.state);
     showPlan();
     imported.warnings.forEach((warning) => notifyText("warning", warning, `Check ${file.name}.`));
-    const { source, pois, survey } = document_.value ?? imported.state.document;
-    const what = source === "pois" ? `${pois.length} points` : `${survey.polygon.length} corners`;
-    notifyText("info", `${what} read from ${file.name}.`);
+    notifyText("info", `Read from ${file.name}: ${imported.taken}.`);
   } catch (error) {
-    report("points", error);
+    report(place, error);
   }
 }
 
@@ -155,7 +158,20 @@ export function takeFiles(files: Iterable<File>): void {
   for (const file of files) void (POINT_FILES.test(file.name) ? sendPoints(file) : sendTerrain(file));
 }
 
-export const isRecording = (file: File) => /\.(tlog|mcap)$/i.test(file.name);
+/** How an ArduPilot log begins: raw radar samples have the same ending. */
+const DATAFLASH = [0xa3, 0x95];
+
+async function isRecording(file: File): Promise<boolean> {
+  if (!/\.bin$/i.test(file.name)) return /\.(tlog|mcap|ulg)$/i.test(file.name);
+  const head = new Uint8Array(await file.slice(0, DATAFLASH.length).arrayBuffer());
+  return DATAFLASH.every((byte, index) => head[index] === byte);
+}
+
+/** Which of the files are flights: recordings, and logs of ground stations and vehicles. */
+export async function recordingsAmong(files: readonly File[]): Promise<ReadonlySet<File>> {
+  const found = await Promise.all(files.map((file) => isRecording(file).catch(() => false)));
+  return new Set(files.filter((_, index) => found[index]));
+}
 
 /** The file that a terrain was read from, if this page sent it. */
 export function sentFileOf(name: string): SentFile | null {

@@ -2,6 +2,7 @@ import { computed, signal, type Signal } from "@preact/signals";
 import type {
   FlightStatus,
   FlyState,
+  HealthRow,
   LeaseDoc,
   LinkStatus,
   MeDoc,
@@ -30,6 +31,7 @@ export type FlyingMessage = Extract<
       | "fly"
       | "lease"
       | "me"
+      | "health"
       | "nodes"
       | "recorder";
   }
@@ -41,6 +43,7 @@ export type Source = VehicleMessage["source"];
 /** A second more than the link's own limits, for its status comes once a second. */
 const STALE_AFTER_S = 2.5;
 const LOST_AFTER_S = 4.5;
+const SAID_EVERY_S = 1;
 
 type BySource<T> = Record<Source, Signal<T>>;
 
@@ -49,6 +52,8 @@ export const tracks: Record<Source, Track> = { live: emptyTrack(), replay: empty
 /** Counts up whenever a track has changed. */
 export const trackVersion: BySource<number> = { live: signal(0), replay: signal(0) };
 export const flight: BySource<FlightStatus | null> = { live: signal(null), replay: signal(null) };
+/** How the vehicle is by its own account, row by row; empty: no vehicle. */
+export const health: BySource<readonly HealthRow[]> = { live: signal([]), replay: signal([]) };
 export const texts = signal<readonly TextEntry[]>([]);
 export const linkStatus = signal<{ status: LinkStatus; received_ms: number } | null>(null);
 export const transfer = signal<TransferStatus | null>(null);
@@ -95,11 +100,20 @@ export const silence_s = computed(() => {
   return known.status.silent_s + Math.max(0, now_ms.value - known.received_ms) / 1000;
 });
 
-/** Of the vehicle's connection, as the link says; what this page has not heard for that long, by its own clock. */
+/** Seconds by which the link's word is overdue here: it comes once a second while server and line carry it. */
+export const overdue_s = computed(() => {
+  const known = linkStatus.value;
+  return known === null ? 0 : Math.max(0, (now_ms.value - known.received_ms) / 1000 - SAID_EVERY_S);
+});
+
+/**
+ * Of the vehicle's connection, as the link says. What does not come to this page says nothing of it: that the page is
+ * late is another thing (`store/reach.ts`).
+ */
 export const linkState = computed<LinkStatus["state"]>(() => {
   const state = linkStatus.value?.status.state ?? "none";
-  const silent_s = silence_s.value;
-  if (state === "none" || silent_s === null) return state;
+  if (state === "none" || silence_s.value === null) return state;
+  const silent_s = silence_s.value - overdue_s.value;
   if (silent_s >= LOST_AFTER_S) return "lost";
   return state === "live" && silent_s >= STALE_AFTER_S ? "stale" : state;
 });
@@ -128,6 +142,22 @@ export const isInAir = computed(() => {
 
 export function acknowledgeText(id: number): void {
   texts.value = acknowledge(texts.value, id);
+}
+
+/** Words of the vehicles that are not shown, by their numbers: who has read them has not to read them again. */
+const kept = new Map<number, readonly TextEntry[]>();
+
+/** Another vehicle is shown: nothing of the one before is taken for its own. */
+export function forgetFlying(before: number, now: number): void {
+  kept.set(before, texts.value);
+  texts.value = kept.get(now) ?? [];
+  heard.live.value = flight.live.value = linkStatus.value = null;
+  transfer.value = fly.value = recorder.value = null;
+  health.live.value = [];
+  tracks.live = emptyTrack();
+  trackVersion.live.value += 1;
+  lease.value = { holder: null, mine: false, silent: false, asks: null, waits: false };
+  nodes.value = [];
 }
 
 /** Takes one message about the vehicle. */
@@ -162,6 +192,9 @@ export function takeFlying(message: FlyingMessage, received_ms: number): void {
       return;
     case "me":
       me.value = message.me;
+      return;
+    case "health":
+      health[message.source].value = message.rows;
       return;
     case "nodes":
       nodes.value = message.nodes;

@@ -40,7 +40,7 @@ const PATIENCE_MS = 3000;
 /** An order about the vehicle that comes to the server later than that is not done any more: by then somebody may have
  * taken the transmitter. What is asked of plans, maps and recordings is as good late. */
 const GOOD_FOR_S = 5;
-const ABOUT_THE_VEHICLE = /^\/api\/(flight|lease|link|obstacles\/(avoidance|manoeuvre))\b/;
+const ABOUT_THE_VEHICLE = /^\/api\/(flight|lease|link|parameters\/write|obstacles\/(avoidance|manoeuvre))\b/;
 
 const unknown = (what: string, moves: boolean): ErrorDoc => ({
   code: "no_answer",
@@ -61,6 +61,14 @@ export function giveUpOrders(): void {
 
 /** The last order of each place: a late answer to one before it is nobody's any more. */
 const last = new Map<string, object>();
+
+/** Another vehicle is shown: what comes of them is none of its business. */
+export function forgetOrders(): void {
+  for (const place of last.keys()) setError(place, null);
+  last.clear();
+  pending.value = new Set();
+  forgetSaid();
+}
 
 interface Order {
   /** Where its outcome appears. */

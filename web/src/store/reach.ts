@@ -1,7 +1,7 @@
 import { computed } from "@preact/signals";
 import { isStale, type Group } from "./ages";
 import { now_ms } from "./clock";
-import { hasLinkFailed, heard, notInCharge, type Source } from "./flying";
+import { adopted, hasLinkFailed, heard, notInCharge, overdue_s, type Source } from "./flying";
 import { serverNow_s } from "./server_clock";
 import { link } from "./state";
 
@@ -42,11 +42,15 @@ export const isOld = (source: Source, group: Group): boolean =>
 /** A line that is slower than what there is to say, from here on. */
 const LATE_S = 2;
 
-/** How late the newest word of the vehicle came from the server to this page, whole seconds; null: not noticeably. */
+/**
+ * How late words of the vehicle come from the server to this page, whole seconds; null: not noticeably. What the newest
+ * one took counts, and for how long the link's, which comes every second, has been due.
+ */
 export const late_s = computed<number | null>(() => {
+  if (failed.value !== null) return null;
   const known = heard.live.value;
   const came_s = known && serverNow_s(known.received_ms);
-  if (!known || came_s === null || link.value !== "open") return null;
-  const seconds = came_s - known.message.now_mono_s;
+  const took_s = known && came_s !== null ? came_s - known.message.now_mono_s : 0;
+  const seconds = Math.max(took_s, adopted.value === null ? 0 : overdue_s.value);
   return seconds < LATE_S ? null : Math.floor(seconds);
 });

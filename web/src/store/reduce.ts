@@ -1,6 +1,7 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage, Snapshot } from "../messages";
 import { alarms } from "./alarms";
+import { takeActive, takeFleet } from "./fleet";
 import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
 import { queue, showPlan } from "./plan";
@@ -51,6 +52,12 @@ export function receive(message: ServerMessage): void {
     case "notice":
       state.notify(message.level, message.error);
       return;
+    case "active":
+      takeActive(message);
+      return;
+    case "fleet":
+      takeFleet(message);
+      return;
     case "alarms":
       alarms.value = message.alarms;
       return;
@@ -63,6 +70,7 @@ export function receive(message: ServerMessage): void {
     case "fly":
     case "lease":
     case "me":
+    case "health":
     case "nodes":
     case "recorder":
       takeFlying(message, performance.now());

@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import type { ClientMessage, FrameView, SelectionDoc, ViewDoc } from "../messages";
 import { goToSignIn } from "../net/api";
 import { Stream, streamUrl } from "../net/socket";
+import { active, fleet } from "./fleet";
 import { isObserver } from "./flying";
 import { giveUpOrders } from "./outcomes";
 import { receive } from "./reduce";
@@ -36,6 +37,12 @@ export function setSelection(fields: Partial<SelectionDoc>): void {
   send({ type: "set_selection", selection: selection.value, change: nextChange() });
 }
 
+/** Shows another vehicle; who is in charge of which one stays as it is. */
+export function chooseVehicle(vehicle: number): void {
+  const isThere = fleet.value.some(({ number }) => number === vehicle);
+  if (isThere && vehicle !== active.value) send({ type: "choose_vehicle", vehicle });
+}
+
 export type FrameTarget = FrameView["target"];
 
 /** Whether this page's camera follows a vehicle. */
@@ -44,7 +51,7 @@ export const follows = signal(false);
 /** Where this page's camera goes; `source`: of the vehicle that it follows. */
 export function frame(target: FrameTarget, source: FrameView["source"] = "live"): boolean {
   follows.value = target === "chase";
-  return send({ type: "frame_view", target, source });
+  return send({ type: "frame_view", target, source, vehicle: active.peek() });
 }
 
 export const holdCamera = (held: boolean) => {

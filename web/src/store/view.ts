@@ -10,7 +10,9 @@ import { setSelection } from "./stream";
 export const viewId = signal<ViewId>(viewIn(location.hash) ?? viewIn(lastView.value) ?? "plan");
 export const study = signal<StudyId>(studyIn(location.hash) ?? "flights");
 
-export const openDialog = signal<"help" | "plans" | "save_as" | "accounts" | "audit" | "space" | null>(null);
+export const openDialog = signal<
+  "help" | "plans" | "save_as" | "accounts" | "audit" | "space" | "parameters" | null
+>(null);
 /** On narrow screens the side panels are drawers: at most one is open. */
 export const drawer = signal<"left" | "right" | null>(null);
 /** A file is being dragged over the page. */
@@ -21,8 +23,9 @@ export function goTo(id: ViewId): void {
   viewId.value = id;
   drawer.value = null;
   // What is selected in the plan can be dragged in 3D: not where nobody means to edit.
-  const { tool, poi_id } = selection.value;
-  if (id !== "plan" && (tool !== "select" || poi_id !== null)) setSelection({ tool: "select", poi_id: null });
+  const { tool, poi_id, fence_mark } = selection.value;
+  if (id !== "plan" && (tool !== "select" || poi_id !== null || fence_mark !== null))
+    setSelection({ tool: "select", poi_id: null, fence_mark: null, draft: [] });
 }
 
 effect(() => {

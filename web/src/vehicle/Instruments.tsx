@@ -2,7 +2,7 @@ import { withUnit } from "../format";
 import { age_s, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, linkState, silence_s, type Source } from "../store/flying";
-import { failed, isOld } from "../store/reach";
+import { failed, isOld, late_s } from "../store/reach";
 import { link } from "../store/state";
 import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
@@ -18,7 +18,7 @@ function ageOf(source: Source, group: Group): { isOld: boolean; age: string } {
   return { isOld: old, age: old && seconds !== null ? `${withUnit(Math.floor(seconds), "s")} old` : "" };
 }
 
-const isLost = () => failed.value !== null || linkState.value === "lost";
+const isLost = () => failed.value !== null || late_s.value !== null || linkState.value === "lost";
 
 function lostWords(): [what: string, then: string] {
   if (link.value === "silent")
@@ -27,13 +27,15 @@ function lostWords(): [what: string, then: string] {
     return ["This page has lost the server", "It keeps trying. Take the pilot's transmitter."];
   if (failed.value === "link")
     return ["The link has failed", "It is started again. Take the pilot's transmitter."];
+  if (late_s.value !== null)
+    return ["This page is late", "The line is slow: what it shows has passed. Take the pilot's transmitter."];
   return ["Communication lost", "Last values below. The vehicle follows its failsafe."];
 }
 
 /** Over the attitude, so that nothing moves: the values below stay, greyed. */
 function Lost() {
   const [what, then] = lostWords();
-  const seconds = silence_s.value;
+  const seconds = failed.value === null ? (late_s.value ?? silence_s.value) : silence_s.value;
   return (
     <div class="lost-notice" role="alert" data-testid="link-lost">
       <Icon name="warning" size={28} />

@@ -30,7 +30,7 @@ export const resumeFrom = computed(() => (resumes.value ? (fly.value?.resume_fro
 export const wayToFly = computed(() => (resumeFrom.value === null ? way.value : "auto"));
 
 export const isAcceptable = (code: CheckRow["code"]): code is Accepted =>
-  code === "gnss" || code === "battery" || code === "rtl_height" || code === "avoidance";
+  code === "gnss" || code === "battery" || code === "rtl_height" || code === "avoidance" || code === "fence";
 
 export function accept(code: Accepted, yes: boolean): void {
   const next = new Set(accepted.value);
@@ -54,6 +54,9 @@ export const disarm = () =>
   order({ place: FLIGHT, path: "/api/flight/disarm", moves: true, done: "Disarmed." });
 export const land = () =>
   order({ place: FLIGHT, path: "/api/flight/land", moves: true, done: "The vehicle lands here and now." });
+
+export const stopMotors = () =>
+  order({ place: FLIGHT, path: "/api/flight/emergency", moves: true, done: "The motors are stopped." });
 
 export const pauseFlight = () =>
   order({ place: NEXT, path: "/api/flight/pause", moves: true, done: "Paused: it holds its position." });

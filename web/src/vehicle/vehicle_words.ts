@@ -16,10 +16,14 @@ const FIXES: Record<VehicleState["gnss_fix"], string> = {
 
 export type Level = "neutral" | "near" | "bad";
 
-export const fixWord = (state: VehicleState | null) => (state ? FIXES[state.gnss_fix] : DASH);
+/** A receiver of which nothing was heard yet, as right after the link began, is not one that has no fix. */
+const isFixHeard = (state: VehicleState | null): state is VehicleState =>
+  state !== null && state.gnss_t_mono_s !== null;
+
+export const fixWord = (state: VehicleState | null) => (isFixHeard(state) ? FIXES[state.gnss_fix] : DASH);
 
 export function fixLevel(state: VehicleState | null): Level {
-  if (!state) return "neutral";
+  if (!isFixHeard(state)) return "neutral";
   if (state.gnss_fix === "none" || state.gnss_fix === "no_fix") return "bad";
   return state.gnss_fix === "2d" ? "near" : "neutral";
 }
@@ -69,11 +73,13 @@ export function linkWords(
   silence_s: number | null,
   state: LinkStatus["state"] = status?.state ?? "none",
   failed: Failed | null = null,
+  late_s: number | null = null,
 ): LinkWords {
   if (!status || state === "none" || !status.adopted)
     return { text: "No vehicle", note: "", level: "neutral" };
   const silent = silence_s === null ? "" : withUnit(Math.floor(silence_s), "s");
   if (failed) return { text: FAILED[failed], note: silent, level: "bad" };
+  if (late_s !== null) return { text: "Page late", note: withUnit(late_s, "s"), level: "bad" };
   if (state === "lost") return { text: "Link lost", note: silent, level: "bad" };
   if (state === "stale") return { text: "Silent", note: silent, level: "near" };
   const note = status.round_trip_s === null ? "" : withUnit(status.round_trip_s * 1000, "ms");

@@ -55,7 +55,8 @@ function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
 
 function Row({ poi, index, last }: { poi: PoiDoc; index: number; last: number }) {
   const isSelected = selection.value.poi_id === poi.id;
-  const select = () => selection.value.poi_id !== poi.id && setSelection({ poi_id: poi.id });
+  const select = () =>
+    selection.value.poi_id !== poi.id && setSelection({ poi_id: poi.id, fence_mark: null });
   return (
     <li
       class={`poi ${isSelected ? "selected" : ""} ${drag.value?.id === poi.id ? "dragged" : ""} ${dropClass(index)}`}

@@ -26,7 +26,7 @@ const TOOLS: Record<Tool, { icon: IconName; label: string; title: string }> = {
 
 /** On narrow screens the drawer would cover what is to be clicked. */
 function take(tool: Tool): void {
-  setSelection({ tool });
+  setSelection({ tool, draft: [] });
   if (tool !== "select") drawer.value = null;
 }
 

@@ -1,7 +1,7 @@
 import { signal } from "@preact/signals";
 import { asErrorDoc, request } from "../net/api";
-import { allSent } from "../store/plan";
-import { setError } from "../store/state";
+import { allSent } from "./plan";
+import { setError } from "./state";
 
 /** A file is being fetched. */
 export const busy = signal(false);
@@ -12,12 +12,16 @@ function fileName(response: Response, fallback: string): string {
   return /filename="?([^";]+)"?/.exec(header)?.[1] ?? fallback;
 }
 
-export async function download(file: string): Promise<void> {
+export async function download(
+  file: string,
+  path = `/api/plan/export/${file}`,
+  place = "export",
+): Promise<void> {
   busy.value = true;
-  setError("export", null);
+  setError(place, null);
   try {
     await allSent();
-    const response = await request("GET", `/api/plan/export/${file}`);
+    const response = await request("GET", path);
     const address = URL.createObjectURL(await response.blob());
     const anchor = document.createElement("a");
     anchor.href = address;
@@ -25,7 +29,7 @@ export async function download(file: string): Promise<void> {
     anchor.click();
     setTimeout(() => URL.revokeObjectURL(address), 10_000);
   } catch (error) {
-    setError("export", asErrorDoc(error));
+    setError(place, asErrorDoc(error));
   } finally {
     busy.value = false;
   }

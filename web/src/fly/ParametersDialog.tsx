@@ -1,0 +1,128 @@
+import { useEffect, useState } from "preact/hooks";
+import { clock } from "../format";
+import type { WrittenDoc } from "../messages";
+import { active } from "../store/fleet";
+import { adopted } from "../store/flying";
+import {
+  compareWith,
+  describeBy,
+  isReading,
+  lookAtParameters,
+  PARAMETERS,
+  parameters,
+  readParameters,
+  written,
+} from "../store/parameters";
+import { openDialog } from "../store/view";
+import { Button, Segmented } from "../ui/Button";
+import { Changes } from "../ui/Changes";
+import { chooseFiles } from "../ui/choose_files";
+import { Dialog } from "../ui/Dialog";
+import { Icon } from "../ui/Icon";
+import { Outcome } from "../ui/Outcome";
+import { LowFlight } from "./LowFlight";
+import { ParameterList } from "./ParameterList";
+
+const OUTCOMES: Record<WrittenDoc["outcome"], string> = {
+  set: "set, read back",
+  same: "was so already",
+  adjusted: "NOT AS ASKED",
+  kept: "NOT SET",
+  refused: "NOT SET",
+  unknown: "UNKNOWN",
+  "not sent": "NOT SENT",
+};
+
+function Written() {
+  if (written.value.length === 0) return null;
+  return (
+    <ul class="written" role="status" data-testid="parameters-written">
+      {written.value.slice(0, 5).map((one) => (
+        <li key={one.name} class={one.took ? "took" : "missed"} data-outcome={one.outcome}>
+          <Icon name={one.took ? "check" : "warning"} size={16} />
+          <span>
+            <strong>{one.name}</strong> {one.before ?? "?"} → {one.asked}: {OUTCOMES[one.outcome]}
+            {!one.took && one.after !== null && <>, the vehicle holds {one.after}</>}. {one.words}
+          </span>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+const fileOf = (ending: "param" | "params") =>
+  `/api/parameters/file/vehicle.${ending}?vehicle=${active.value}`;
+
+const choose = (endings: string, take: (file: File) => Promise<void>) =>
+  chooseFiles(endings, (files) => files.slice(0, 1).forEach((file) => void take(file)));
+
+function Files() {
+  return (
+    <div class="row wrap">
+      <a class="button" href={fileOf("param")} download data-testid="parameters-save">
+        <Icon name="export" /> Save .param
+      </a>
+      <a class="button" href={fileOf("params")} download>
+        <Icon name="export" /> Save .params
+      </a>
+      <Changes>
+        <Button
+          icon="import"
+          testid="parameters-compare"
+          onClick={() => choose(".param,.parm,.params,.txt", compareWith)}
+        >
+          Compare with a file…
+        </Button>
+        <Button
+          icon="help"
+          testid="parameters-describe"
+          title="The makers' units, ranges and help: apm.pdef.xml, parameters.json or parameters.json.xz"
+          onClick={() => choose(".xml,.json,.xz", describeBy)}
+        >
+          Units and help…
+        </Button>
+      </Changes>
+    </div>
+  );
+}
+
+/** The vehicle's settings: what they will do on a low flight, and all of them. */
+export function ParametersDialog() {
+  const [part, setPart] = useState<"low" | "all">("low");
+  useEffect(() => void lookAtParameters(), []);
+  const doc = adopted.value ? parameters.value : null;
+  return (
+    <Dialog title="Parameters" testid="parameters-dialog" onClose={() => (openDialog.value = null)}>
+      <Outcome place={PARAMETERS} />
+      <div class="row wrap">
+        <span>{doc ? `Of ${doc.vehicle}, read ${clock(doc.read_utc_s)}` : "Not read yet."}</span>
+        <Changes>
+          <Button
+            testid="parameters-read"
+            disabled={isReading.value || !adopted.value}
+            onClick={() => void readParameters()}
+          >
+            {isReading.value ? "Reading… up to a minute over a slow radio" : doc ? "Read again" : "Read"}
+          </Button>
+        </Changes>
+      </div>
+      {doc && (
+        <>
+          <Written />
+          <Segmented
+            label="Which parameters"
+            testid="parameters-part"
+            value={part}
+            options={[
+              { value: "low", label: "Before a low flight" },
+              { value: "all", label: `All ${doc.parameters.length}` },
+            ]}
+            onChange={setPart}
+          />
+          {part === "all" && <Files />}
+          {part === "low" ? <LowFlight doc={doc} /> : <ParameterList doc={doc} />}
+        </>
+      )}
+    </Dialog>
+  );
+}

@@ -1,0 +1,89 @@
+import { duration, number, withUnit } from "../format";
+import type { VehicleDoc } from "../messages";
+import { acknowledgeElsewhere, active, calling, fleet } from "../store/fleet";
+import { chooseVehicle } from "../store/stream";
+import { Button } from "../ui/Button";
+import { Icon } from "../ui/Icon";
+
+function linkWord({ link, silent_s }: VehicleDoc): string {
+  if (link === "none") return "not connected";
+  if (link === "live") return "";
+  return silent_s === null ? "not heard" : `silent for ${duration(silent_s)}`;
+}
+
+/** What is seen at a glance of a vehicle that is not shown. */
+function facts(vehicle: VehicleDoc): string {
+  const { mode, armed, alt_rel_home_m, battery_share } = vehicle;
+  const known = [
+    linkWord(vehicle),
+    mode,
+    armed ? "armed" : "disarmed",
+    alt_rel_home_m === null ? "" : withUnit(alt_rel_home_m, "m"),
+    battery_share === null ? "" : `${number(100 * battery_share)} %`,
+  ];
+  return (vehicle.link === "none" ? known.slice(0, 1) : known).filter(Boolean).join(" · ");
+}
+
+function Vehicle({ vehicle }: { vehicle: VehicleDoc }) {
+  const isActive = vehicle.number === active.value;
+  const level = vehicle.alarm ? "bad" : vehicle.link === "stale" || vehicle.link === "lost" ? "near" : "";
+  const holder = vehicle.holder ? `${vehicle.holder} is in charge` : "Nobody is in charge";
+  return (
+    <button
+      type="button"
+      class={`fleet-vehicle ${level}`}
+      aria-pressed={isActive}
+      title={`${holder}${vehicle.plan_name && `; on board: ${vehicle.plan_name}`}`}
+      data-testid={`vehicle-${vehicle.number}`}
+      onClick={() => chooseVehicle(vehicle.number)}
+    >
+      <Icon name={vehicle.alarm ? "warning" : "drone"} size={16} />
+      <kbd>{vehicle.number}</kbd>
+      <strong>{vehicle.name}</strong>
+      {!isActive && <span class="fleet-facts">{facts(vehicle)}</span>}
+    </button>
+  );
+}
+
+/** What is wrong with vehicles that this page does not show, in every view. */
+function Elsewhere() {
+  const [first, ...others] = calling.value;
+  if (!first) return null;
+  return (
+    <p class="fleet-alarm" role="alert" data-testid="fleet-alarm">
+      <Icon name="warning" size={20} />
+      <span>
+        <strong>{first.name}:</strong> {first.alarm?.text}
+        {others.length > 0 && ` See also: ${others.map(({ name }) => name).join(", ")}.`}
+      </span>
+      {first.number !== active.value && (
+        <Button testid="fleet-show" onClick={() => chooseVehicle(first.number)}>
+          Show {first.name}
+        </Button>
+      )}
+      <Button
+        icon="check"
+        title="The alarm stops (K)"
+        testid="fleet-acknowledge"
+        onClick={acknowledgeElsewhere}
+      >
+        Seen
+      </Button>
+    </p>
+  );
+}
+
+/** All vehicles, where there are several: which one is shown, and one press to show another. */
+export function FleetStrip() {
+  if (fleet.value.length < 2) return null;
+  return (
+    <nav class="fleet" aria-label="Vehicles" data-testid="fleet">
+      <div class="fleet-vehicles">
+        {fleet.value.map((vehicle) => (
+          <Vehicle key={vehicle.number} vehicle={vehicle} />
+        ))}
+      </div>
+      <Elsewhere />
+    </nav>
+  );
+}
