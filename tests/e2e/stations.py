@@ -53,6 +53,7 @@ class Station:
         self.origin = f"http://127.0.0.1:{port}"
         self.link = self._read_link()
         self.http = client(self.origin, timeout=PATIENCE_S)
+        self.http.headers["Hedgehop-Vehicle"] = "1"
 
     def _read_link(self) -> str:
         while True:
@@ -87,7 +88,7 @@ class Station:
         ok(self.http.delete("/api/traversability"))
         self._delete_recordings()
         plan_id = ok(self.http.post("/api/plan/new")).json()["plan_id"]
-        self._change(terrain_id=None, orthophoto_id=None)
+        self.change(terrain_id=None, orthophoto_id=None)
         library = self.state["library"]
         for plan in library["plans"]:
             if plan["id"] != plan_id:
@@ -110,9 +111,9 @@ class Station:
         ok(self.http.post("/api/terrains/demo"))
         document = self.state["plan"]["document"]
         pois = points({point["name"]: point for point in document["pois"]})
-        self._change(pois=pois, profile={**document["profile"], **profile})
+        self.change(pois=pois, profile={**document["profile"], **profile})
 
-    def _change(self, **fields: object) -> None:
+    def change(self, **fields: object) -> None:
         plan = self.state["plan"]
         document = {**plan["document"], **fields}
         ok(self.http.put("/api/plan", json={"base_revision": plan["revision"], "label": "x", "document": document}))

@@ -36,6 +36,8 @@ def test_plan_upload_fly_review(station: Station, page: Page, vehicle: Simulated
     expect(page.get_by_test_id("cross-track")).to_contain_text(re.compile(r"\d\.\d\d\sm"))
     expect(page.get_by_test_id("vehicle-marker")).to_be_visible()
     expect(page.get_by_test_id("chip-rec")).to_contain_text("REC")
+    expect(page.get_by_test_id("health-battery")).to_contain_text("to the reserve")
+    expect(page.get_by_test_id("health-vibration")).to_have_attribute("data-level", "good")
     expect(page.get_by_test_id("vehicle-text").first).to_be_visible()
 
     page.get_by_test_id("next-pause").click()
@@ -68,6 +70,35 @@ def test_return_is_held_by_key_and_can_be_let_go(station: Station, page: Page, v
     page.keyboard.up("Enter")
     expect(page.get_by_test_id("chip-mode")).to_contain_text("RTL")
     disarmed(page)
+
+
+def test_the_motors_are_stopped_behind_a_guard(station: Station, page: Page, vehicle: SimulatedVehicle) -> None:
+    open_demo(page, station)
+    connect(page, vehicle)
+    expect(page.get_by_test_id("emergency-open")).to_be_disabled()
+    upload(page)
+    start(page)
+    wait_until(page, lambda: percent(page) >= 1)
+
+    page.get_by_test_id("emergency-open").click()
+    expect(page.get_by_test_id("emergency-guard")).to_contain_text("the vehicle falls")
+    page.get_by_test_id("emergency-cancel").click()
+    expect(page.get_by_test_id("emergency-guard")).to_have_count(0)
+
+    page.get_by_test_id("emergency-open").click()
+    button = page.get_by_test_id("emergency-stop")
+    button.focus()
+    page.keyboard.down("Enter")
+    page.wait_for_timeout(200)
+    page.keyboard.up("Enter")
+    expect(page.get_by_text("Hold it for one second")).to_be_visible()
+    expect(page.get_by_test_id("next-pause")).to_be_visible()
+    button.focus()
+    page.keyboard.down("Enter")
+    expect(page.get_by_test_id("emergency-guard")).to_have_count(0)
+    page.keyboard.up("Enter")
+    expect(page.get_by_test_id("arm")).to_be_visible()
+    expect(page.get_by_test_id("emergency-open")).to_be_disabled()
 
 
 def test_a_vehicle_that_falls_silent_is_said_and_its_values_age(

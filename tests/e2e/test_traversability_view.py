@@ -24,7 +24,7 @@ def test_the_ground_is_worked_out_searched_for_landing_sites_and_kept(
     station: Station, page: Page, tmp_path: Path
 ) -> None:
     open_demo(page, station)
-    page.keyboard.press("7")
+    page.keyboard.press("8")
     page.get_by_test_id("work-out").click()
     expect(page.get_by_test_id("traversability-status")).to_have_attribute("data-state", "ready")
     expect(page.get_by_test_id("ground-cells")).to_contain_text(re.compile(r"\d.*cells"))
@@ -56,7 +56,7 @@ def test_landing_sites_are_looked_for_where_the_surface_was_clicked(station: Sta
     page = page_3d
     open_demo(page, station)
     drawn(page)
-    page.keyboard.press("7")
+    page.keyboard.press("8")
     page.get_by_test_id("work-out").click()
     expect(page.get_by_test_id("ground-cells")).to_be_visible()
     page.get_by_test_id("view-top").click()
@@ -75,7 +75,7 @@ def test_a_file_that_is_no_radar_log_is_refused_where_it_was_opened(
     station: Station, page: Page, tmp_path: Path
 ) -> None:
     open_demo(page, station)
-    page.keyboard.press("7")
+    page.keyboard.press("8")
     garbage = tmp_path / "wood.npz"
     garbage.write_bytes(b"PK\x03\x04 this is no radar log")
     choose(page, page.get_by_test_id("radar-log-open"), garbage)
@@ -87,7 +87,7 @@ def test_a_file_that_is_no_radar_log_is_refused_where_it_was_opened(
 def test_a_radar_that_scans_now_is_shown_and_its_silence_is_told(station: Station, page: Page, tmp_path: Path) -> None:
     """Without a vehicle no scan has a place: that is said as well, and none is fused."""
     open_demo(page, station)
-    page.keyboard.press("7")
+    page.keyboard.press("8")
     live = page.get_by_test_id("live-radar")
     expect(live).to_have_count(0)
     token = tmp_path / "token.txt"

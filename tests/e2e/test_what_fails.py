@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -70,12 +71,14 @@ class Line:
         self._free_s = 0.0
         self._lock = threading.Lock()
         self._listening = socket.create_server(("127.0.0.1", 0))
-        self._sockets = [self._listening]
+        self._accepting: threading.Thread | None = None
+        self._pairs: list[tuple[socket.socket, socket.socket]] = []
         self.host = f"127.0.0.1:{self._listening.getsockname()[1]}"
 
     def lead_to(self, port: int) -> None:
         self._to = port
-        threading.Thread(target=self._accept, daemon=True).start()
+        self._accepting = threading.Thread(target=self._accept, daemon=True)
+        self._accepting.start()
 
     def _accept(self) -> None:
         while True:
@@ -84,7 +87,6 @@ class Line:
             except OSError:
                 return
             server = socket.socket()
-            self._sockets += [page, server]
             server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             try:
                 server.connect(("127.0.0.1", self._to))
@@ -92,6 +94,8 @@ class Line:
                 page.close()
                 server.close()
                 continue
+            with self._lock:
+                self._pairs.append((page, server))
             for source, sink, is_limited in ((page, server, False), (server, page, True)):
                 threading.Thread(target=self._pass_on, args=(source, sink, is_limited), daemon=True).start()
 
@@ -110,16 +114,20 @@ class Line:
 
     def cut(self) -> None:
         """All that goes over it; what is asked after that passes again."""
-        for one in self._sockets[1:]:
+        with self._lock:
+            pairs, self._pairs = self._pairs, []
+        for one in itertools.chain.from_iterable(pairs):
             with contextlib.suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
             one.close()
-        del self._sockets[1:]
 
     def close(self) -> None:
-        self.cut()
+        """Nothing is taken any more, and then nothing is open any more."""
         self._listening.shutdown(socket.SHUT_RDWR)
+        if self._accepting is not None:
+            self._accepting.join()
         self._listening.close()
+        self.cut()
 
     def _wait(self, size: int) -> None:
         with self._lock:

@@ -1,0 +1,119 @@
+"""A fence in Plan: drawn in the 3D view, judged at once, undone, exported and read again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from planning.formats.fence_files import read_fence
+from tests.e2e.stations import SimulatedVehicle, Station
+from tests.e2e.steps import certified, choose, connect, drawn, open_demo, upload, wait_until
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
+
+
+def test_a_fence_drawn_over_the_way_is_judged_at_once_and_undone(
+    station: Station, page_3d: Page, tmp_path: Path
+) -> None:
+    page = page_3d
+    open_demo(page, station)
+    drawn(page)
+    page.get_by_test_id("view-top").click()
+    _open_section(page)
+    page.get_by_test_id("tool-fence_polygon").click()
+    _click_corners(page, station, [(0.35, 0.35), (0.65, 0.35), (0.5, 0.65)])
+    expect(page.get_by_test_id("fence-row")).to_have_count(1)
+    reason = page.get_by_test_id("reasons").locator("[data-code=fence]")
+    expect(reason).to_contain_text("enters exclusion polygon 1 of the fence")
+    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "not_certified")
+    expect(page.get_by_test_id("fence-kept")).to_contain_text("does not keep inside")
+
+    page.keyboard.press("Escape")
+    with page.expect_download() as download:
+        page.get_by_test_id("fence-export").click()
+        page.get_by_test_id("export-fence.geojson").click()
+    file = tmp_path / "fence.geojson"
+    file.write_bytes(Path(download.value.path()).read_bytes())
+    assert len(read_fence(file.name, file.read_bytes()).fence.polygons) == 1
+
+    page.get_by_test_id("undo").click()
+    expect(page.get_by_test_id("fence-row")).to_have_count(0)
+    certified(page)
+    choose(page, page.get_by_test_id("fence-import"), file)
+    expect(page.get_by_test_id("fence-row")).to_have_count(1)
+    expect(reason).to_be_visible()
+
+
+def test_a_ceiling_is_kept_or_not_and_a_fence_that_is_none_says_what_to_do(
+    station: Station, page: Page, tmp_path: Path
+) -> None:
+    open_demo(page, station)
+    _open_section(page)
+    page.get_by_test_id("fence-ceiling-own").check()
+    expect(page.get_by_test_id("fence-kept")).to_contain_text("keeps inside")
+    ceiling = page.get_by_test_id("fence-ceiling-input")
+    ceiling.fill("15")
+    ceiling.press("Enter")
+    expect(page.get_by_test_id("reasons").locator("[data-code=fence]")).to_contain_text(
+        "the fence's ceiling is at 15 m"
+    )
+    page.get_by_test_id("fence-floor-own").check()
+    floor = page.get_by_test_id("fence-floor-input")
+    floor.fill("40")
+    floor.press("Enter")
+    expect(page.get_by_test_id("section-fence")).to_contain_text("is not below its ceiling, 15 m")
+
+    area = tmp_path / "area.geojson"
+    ring = [[8.0, 47.0], [8.01, 47.0], [8.0, 47.01], [8.0, 47.0]]
+    area.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}), encoding="utf-8")
+    choose(page, page.get_by_test_id("fence-import"), area)
+    expect(page.get_by_test_id("section-fence")).to_contain_text("does not say whether it is an inclusion")
+    expect(page.get_by_test_id("section-fence")).to_contain_text("area.geojson, feature 1")
+
+
+def test_the_fence_goes_on_board_with_the_mission_and_the_check_has_a_row_for_it(
+    station: Station, page: Page, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, station)
+    home = station.state["plan"]["document"]["pois"][0]
+    centre = {"lat_deg": home["lat_deg"], "lon_deg": home["lon_deg"]}
+    station.change(fence={"circles": [{"id": "c", "inclusion": True, "centre": centre, "radius_m": 900}]})
+    expect(page.get_by_test_id("fence-kept")).to_contain_text("keeps inside")
+    certified(page)
+    connect(page, vehicle)
+    upload(page)
+    check = page.get_by_test_id("next-check")
+    check.click()
+    row = page.get_by_test_id("check-row").and_(page.locator("[data-code=fence]"))
+    expect(row).to_contain_text("Fence: 1 circle on board, the plan's")
+    expect(row).to_contain_text("FENCE_ENABLE is 0")
+    expect(row).to_have_attribute("data-state", "accept")
+    expect(page.get_by_test_id("accept-fence")).to_be_visible()
+
+
+def _open_section(page: Page) -> None:
+    section = page.get_by_test_id("section-fence")
+    if not section.get_by_test_id("fence-import").count():
+        section.get_by_role("button", name="Fence").click()
+    section.get_by_test_id("fence-import").scroll_into_view_if_needed()
+
+
+def _click_corners(page: Page, station: Station, shares: list[tuple[float, float]]) -> None:
+    """By clicks on the surface, at shares of the 3D view's width and height."""
+    box = page.get_by_test_id("scene").bounding_box()
+    assert box is not None
+    hint = page.get_by_test_id("tool-hint")
+    for left, (x, y) in zip((2, 1, 0), shares, strict=True):
+        told = f"{left} more make it one" if left else "Click the surface to add a corner of the fence"
+
+        def taken(x: float = x, y: float = y, told: str = told, left: int = left) -> bool:
+            is_drawn = told in hint.inner_text() and (left > 0 or page.get_by_test_id("fence-row").count() == 1)
+            if not is_drawn:
+                page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+                page.wait_for_timeout(1500)
+            return is_drawn
+
+        wait_until(page, taken)

@@ -1,0 +1,82 @@
+"""Several vehicles in the console: all in sight, one shown, and no command to one that is not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Page, WebSocketRoute, expect
+
+from server.schemas import FleetMessage
+from server.schemas.station_docs import VehicleAlarm, VehicleDoc
+from tests.e2e.stations import Station
+from tests.e2e.steps import LONG_MS, STREAM, enter, visit
+
+pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[Station]:
+    """The demo with two simulated vehicles."""
+    station = Station(tmp_path_factory.mktemp("data") / "data", "--demo", "--demo-vehicles", "2")
+    yield station
+    station.stop()
+
+
+def hold(page: Page, testid: str) -> None:
+    page.get_by_test_id(testid).hover()
+    page.mouse.down()
+    expect(page.get_by_test_id("chip-operator")).to_contain_text("In charge")
+    page.mouse.up()
+
+
+def test_one_press_shows_another_vehicle_and_moves_nobody_s_charge(pair: Station, page: Page) -> None:
+    visit(page, pair)
+    page.get_by_test_id("tab-fly").click()
+    operator, second = page.get_by_test_id("chip-operator"), page.get_by_test_id("vehicle-2")
+    expect(page.get_by_test_id("vehicle-1")).to_have_attribute("aria-pressed", "true", timeout=LONG_MS)
+    expect(second).to_contain_text("disarmed", timeout=LONG_MS)
+    expect(operator).to_contain_text("In charge")
+    second.click()
+    expect(second).to_have_attribute("aria-pressed", "true")
+    expect(operator).to_contain_text("Nobody in charge")
+    expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed")
+    hold(page, "take-control")
+    page.keyboard.press("g")
+    page.keyboard.press("1")
+    expect(page.get_by_test_id("vehicle-1")).to_have_attribute("aria-pressed", "true")
+    expect(operator).to_contain_text("In charge")
+    # A page that is loaded anew begins with the first one.
+    page.reload()
+    expect(page.get_by_test_id("vehicle-1")).to_have_attribute("aria-pressed", "true")
+
+
+@pytest.mark.parametrize("width", [390, 1366])
+def test_an_alarm_of_another_vehicle_is_read_and_answered_at_any_width(pair: Station, page: Page, width: int) -> None:
+    lost = VehicleAlarm(kind="loss", key="lost", text="Nothing is heard of it any more. Take the pilot's transmitter.")
+    vehicles = [VehicleDoc(number=1, name="Bee"), VehicleDoc(number=2, name="Wasp", armed=True, alarm=lost)]
+
+    def pass_on(route: WebSocketRoute) -> None:
+        server = route.connect_to_server()
+
+        def to_page(text: str | bytes) -> None:
+            told = json.loads(text)
+            route.send(FleetMessage(vehicles=vehicles).model_dump_json() if told["type"] == "fleet" else text)
+
+        server.on_message(to_page)
+
+    page.route_web_socket(STREAM, pass_on)
+    page.set_viewport_size({"width": width, "height": 800})
+    enter(page, pair)
+    alarm = page.get_by_test_id("fleet-alarm")
+    expect(alarm).to_contain_text("Wasp: Nothing is heard of it any more.", timeout=LONG_MS)
+    for each in (alarm, page.get_by_test_id("fleet-show"), page.get_by_test_id("fleet-acknowledge")):
+        box = each.bounding_box()
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
+    page.get_by_test_id("fleet-acknowledge").click()
+    expect(alarm).to_have_count(0)
+    page.get_by_test_id("vehicle-2").click()
+    expect(page.get_by_test_id("vehicle-2")).to_have_attribute("aria-pressed", "true")
