@@ -110,6 +110,7 @@ def test_an_observer_sees_everything_and_nothing_that_is_pressed_changes_anythin
         other_page.evaluate(PRESS_ALL, tab)
     other_page.get_by_test_id("tab-plan").click()
     other_page.get_by_test_id("plans-button").click()
+    expect(other_page.get_by_test_id("plans-dialog")).to_be_visible()
     expect(other_page.get_by_test_id("plan-new")).to_be_disabled()
     assert other_page.evaluate(SILENT_ABOUT_WHY) == []
     other_page.keyboard.press("Escape")

@@ -37,6 +37,28 @@ def test_only_modes_that_were_asked_for_lately_are_ours() -> None:
     assert after("AUTO", "BRAKE", "AUTO", "BRAKE", asked={"BRAKE": 99.0}).words
 
 
+def test_each_order_of_a_mode_is_expected_to_show_once() -> None:
+    """On a slow link the first of them shows when the last was given long ago."""
+    watch = after("AUTO")
+    for mode, t_s in (("GUIDED", 100.0), ("BRAKE", 101.0), ("GUIDED", 101.5)):
+        watch.asked(mode, t_s)
+    for mode, t_s in (("GUIDED", 102.0), ("BRAKE", 102.5), ("GUIDED", 103.0)):
+        watch.on_state(state(mode), t_s)
+    assert watch.words == ""
+    watch.on_state(state("BRAKE"), 103.5)
+    assert "BRAKE" in watch.words
+
+
+@pytest.mark.parametrize(("shown_again_s", "is_ours"), [(2.0, True), (4.0, False)])
+def test_a_repeated_order_does_not_excuse_a_pilot_for_long(shown_again_s: float, is_ours: bool) -> None:
+    watch = after("AUTO")
+    for mode in ("GUIDED", "GUIDED", "AUTO"):
+        watch.asked(mode, 100.0)
+    for mode, t_s in (("GUIDED", 100.5), ("AUTO", 101.0), ("GUIDED", 100.5 + shown_again_s)):
+        watch.on_state(state(mode), t_s)
+    assert (watch.words == "") == is_ours
+
+
 def test_a_failsafe_is_named() -> None:
     watch = after("AUTO")
     watch.on_state(state("RTL", critical=True), 101.0)

@@ -129,6 +129,11 @@ def test_a_pole_too_near_to_be_seen_stays_where_it_stood(seed, number, nearest_o
     assert one_of(seed, number, nearest_only=nearest_only).nearest_gap_m > 0.3
 
 
+def test_a_mode_that_is_ordered_twice_is_no_pilot_who_took_over():
+    """GUIDED, BRAKE and GUIDED again in quick succession: avoidance had given up, and the vehicle never arrived."""
+    assert one_of(29, 19, nearest_only=True).arrived
+
+
 def test_without_a_radar_that_sees_it_is_hit(monkeypatch):
     """What shows that the poles are really in the way, and that nothing but the radar's tracks avoids them."""
     monkeypatch.setattr(Position2GoModel, "frame", lambda self, true, random: np.empty((0, 3)))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
+from collections import defaultdict
 
 from telemetry.mavlink.actions import Message
 from telemetry.topics.vehicle import VehicleState
 
 ASKED_S = 15.0
 """A mode that was asked for longer ago than this and shows only now was chosen by somebody else."""
+LATE_S = 3.0
+"""Of several orders of one mode the others show within this time after the first, or were repetitions of it."""
 STICK_US = 100
 """Sticks tremble; a radio's trims move them a little."""
 LOWEST_US, HIGHEST_US = 950, 2100
@@ -24,7 +26,8 @@ class PilotWatch:
     def __init__(self) -> None:
         self.words = ""
         self._mode: str | None = None
-        self._asked_s: dict[str, float] = {}
+        self._expected_until_s: defaultdict[str, list[float]] = defaultdict(list)
+        """When each order of a mode that has not shown yet stops being expected."""
         self._sticks_us: tuple[int, ...] | None = None
 
     def begin(self) -> None:
@@ -34,19 +37,24 @@ class PilotWatch:
 
     def asked(self, mode: str, now_s: float) -> None:
         """This ground station has commanded this mode."""
-        self._asked_s[mode] = now_s
+        self._expected_until_s[mode].append(now_s + ASKED_S)
 
     def on_state(self, state: VehicleState, now_s: float) -> None:
         before, self._mode = self._mode, state.mode
         if before is None or state.mode == before:
             return
-        asked_s = self._asked_s.pop(state.mode, -math.inf)
-        if now_s - asked_s <= ASKED_S or self.words:
+        if self._was_expected(state.mode, now_s) or self.words:
             return
         if state.critical:
             self.words = f"The vehicle has changed to {state.mode} by itself: a failsafe is active."
         else:
             self.words = f"The flight mode was changed to {state.mode}: the pilot took over."
+
+    def _was_expected(self, mode: str, now_s: float) -> bool:
+        expected_until_s = [until_s for until_s in self._expected_until_s.pop(mode, ()) if now_s <= until_s]
+        if others := expected_until_s[1:]:
+            self._expected_until_s[mode] = [min(until_s, now_s + LATE_S) for until_s in others]
+        return bool(expected_until_s)
 
     def on_message(self, message: Message) -> None:
         kind = message.get_type()
