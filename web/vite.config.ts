@@ -12,6 +12,7 @@ export default defineConfig({
     // The page's content security policy forbids inline scripts, and data: addresses with them.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
+    license: { fileName: "licences.md" },
   },
   server: {
     proxy: {

@@ -1,4 +1,5 @@
 import { render } from "preact";
+import "@fontsource-variable/roboto/wght.css";
 import "uplot/dist/uPlot.min.css";
 import "./styles/tokens.css";
 import "./styles/base.css";
@@ -39,6 +40,7 @@ import "./styles/traversability.css";
 import "./styles/studies.css";
 import "./styles/parameters.css";
 import { App } from "./shell/App";
+import { fontReady } from "./shell/font";
 import { startKeyboard } from "./shell/keyboard";
 import { startFollowing } from "./scene/camera";
 import { startSound } from "./shell/sound";
@@ -47,7 +49,7 @@ import { connect } from "./store/stream";
 
 startKeyboard();
 const root = document.getElementById("app");
-if (root) render(<App />, root);
+void fontReady().then(() => root && render(<App />, root));
 startClock();
 startFollowing();
 startSound();

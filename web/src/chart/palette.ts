@@ -41,4 +41,5 @@ export function readPalette(): Palette {
   return Object.fromEntries(entries) as unknown as Palette;
 }
 
-export const CHART_FONT = '14px "Segoe UI", Roboto, "Helvetica Neue", "Liberation Sans", Arial, sans-serif';
+export const CHART_FONT =
+  '14px "Roboto Variable", "Segoe UI", Roboto, "Helvetica Neue", "Liberation Sans", Arial, sans-serif';
