@@ -18,7 +18,7 @@ from planning.ground.landing_sites import LandingSites, landing_sites
 from planning.safe_surface.surface import block_max
 from planning.terrain.dsm import Dsm
 
-FINEST_M = 0.3
+FINEST_M = UwbGeometry().bin_m
 """Resolution where nobody asks for another, or the model's own where that is coarser: the radar's range bins."""
 
 

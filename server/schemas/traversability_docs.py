@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mapping.uwb.params import Rule, UwbParams, of_rule
-from planning.ground.traversable import FINEST_M
+from mapping.uwb.params import Rule, UwbGeometry, UwbParams, of_rule
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict
 
@@ -92,7 +91,7 @@ class TraversabilityState(Strict):
 class TraversabilityBody(Strict):
     """Works out the traversability of the open surface model."""
 
-    resolution_m: Annotated[float, Field(ge=0.1, le=10), Asked(initial=FINEST_M)] | None = None
+    resolution_m: Annotated[float, Field(ge=0.1, le=10), Asked(initial=UwbGeometry().bin_m)] | None = None
     """Of the grid; null: 0.3 m, or the model's own where that is coarser."""
 
 
