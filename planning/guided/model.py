@@ -12,6 +12,8 @@ from planning.fence.model import NO_FENCE, Fence, RallyPoint
 LatLon = tuple[float, float]
 Problem = Literal["way", "return"]
 """The way itself is not clear; or it is, but the vehicle's own return from it would not be."""
+HEIGHTS_M, RADII_M, LAPS = (0.5, 500.0), (3.0, 500.0), (1, 50)
+"""What may be asked for."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,9 @@ from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
 from planning.errors import MissionError, ParameterError
 from planning.guided.model import (
+    HEIGHTS_M,
+    LAPS,
+    RADII_M,
     RETURNS,
     Back,
     Demand,
@@ -52,7 +55,6 @@ FARTHEST_M = 5_000.0
 ROUNDING_M = 0.01
 """Above the exact altitude, so that the proof, which rounds differently, finds it high enough."""
 DEEP_M = -1e9
-HEIGHTS_M, RADII_M, LAPS = (0.5, 500.0), (3.0, 500.0), (1, 50)
 
 
 @dataclass(frozen=True, slots=True)

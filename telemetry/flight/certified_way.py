@@ -7,13 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from mapping.geometry.frames import apart_m
 from planning.certificate.model import ClearanceParams
 from planning.fence.model import NO_FENCE, Fence, RallyPoint
-from planning.guided.model import RETURNS, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
+from planning.guided.model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
 from planning.model import VehicleProfile
-from planning.terrain.dsm import Dsm
+from planning.part import FLIGHT_MARGIN_M, needed_part, rally_places
+from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import is_fresh
@@ -56,6 +60,24 @@ def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
     if flies and (state.home_lat_deg is None or state.home_lon_deg is None):
         raise NotAllowedError("The vehicle does not tell its home: its height is not known.", advice="Wait for it.")
     return Here((lat_deg, lon_deg), 0.0 if isinstance(wish, TakeOff) else up_m, (home.lat_deg, home.lon_deg))
+
+
+def part_for(model: SurfaceModel, state: VehicleState, wish: Wish, rally: tuple[RallyPoint, ...]) -> Dsm:
+    """Of the model, around vehicle, home, rally points and the place that is asked for."""
+    places = [(state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)]
+    places.append(getattr(wish, "lat_lon_deg", None) or (None, None))
+    places += [place[:2] for place in wish.flown] if isinstance(wish, Back) else []
+    known = [place for place in places if None not in place]
+    xy_m = model.xy_from_lat_lon(np.array(known, np.float64).reshape(-1, 2))
+    return needed_part(model, np.vstack([xy_m, rally_places(model, rally)]), FLIGHT_MARGIN_M)
+
+
+def nearest_rally(points: tuple[RallyPoint, ...], state: VehicleState) -> RallyPoint:
+    """Raises NotAllowedError where there is none."""
+    if not points:
+        raise NotAllowedError("The vehicle has no rally point.", advice="Send some with the plan, or: hedgehop rally")
+    at = (state.lat_deg or 0.0, state.lon_deg or 0.0)
+    return min(points, key=lambda point: apart_m(at, (point.lat_deg, point.lon_deg)))
 
 
 def judged_way(

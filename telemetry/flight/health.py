@@ -123,8 +123,8 @@ class Health:
                 "battery", "unknown", value, "", "The vehicle does not tell how much is left. Look yourself."
             )
         share = state.battery_share
-        measured_s = self._endurance_s(state)
-        known_s = [profile.endurance_s] * is_known + [measured_s] * (measured_s is not None)
+        ends_s = (profile.endurance_s if is_known else None, self._endurance_s(state))
+        known_s = [end_s for end_s in ends_s if end_s is not None]
         if not known_s:
             return HealthRow("battery", _by_share(share, profile), f"{share:.0%}", f"over {profile.reserve_share:.0%}")
         left_s = max(0.0, share - profile.reserve_share) * min(known_s)

@@ -9,7 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
-from telemetry.flight.guided.guided import GuidedScript, why_not_from
+from telemetry.flight.guided.beginning import why_not_from
+from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance

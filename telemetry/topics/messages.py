@@ -275,6 +275,8 @@ class FlightStatus:
     broke_off_at: int | None = None
     """Item that was flown to when the flight ended before the mission's end: where a resumed one goes on."""
     hint: str = ""
+    is_flown: bool = False
+    """All places were reached, and the vehicle holds at the last: nothing is left to be resumed."""
 
 
 @dataclass(frozen=True, slots=True)

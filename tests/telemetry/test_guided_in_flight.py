@@ -10,8 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError
+from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.feed import Feed
-from telemetry.flight.guided.guided import THERE, GuidedScript, why_not_from
+from telemetry.flight.guided.guided import THERE, GuidedScript
 from telemetry.mavlink.actions import Action
 from telemetry.mavlink.modes import mode_numbers
 from telemetry.mavlink.orders import FORCE, Orders

@@ -12,17 +12,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 import typer
 from typer import Argument, Option
 
-from mapping.geometry.frames import apart_m
 from planning.errors import ParameterError
 from planning.fence.model import RallyPoint
 from planning.formats.fence_items import fence_of, rally_of
 from planning.guided.model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.request import PlanRequest, check_demands
 from planning.terrain.dsm import Dsm
 from server.cli.shared import options as o
@@ -31,8 +28,8 @@ from server.cli.shared.output import answer, end_progress, progress, say, say_no
 from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
 from server.cli.shared.terrain_given import OpenedModel, open_model
 from server.work.clocks import StepTimer
-from telemetry.errors import NotAllowedError, TelemetryError
-from telemetry.flight.certified_way import Flown, judged_way, way_json, way_request, way_words
+from telemetry.errors import TelemetryError
+from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for, way_json, way_request, way_words
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import Watch, watching
@@ -208,9 +205,7 @@ class _Flier:
         fence = fence_of(fence_items, "the fence on board", warnings)
         say_notes(*warnings)
         if isinstance(self._wish, Rally):
-            if not points:
-                raise NotAllowedError("The vehicle has no rally point.", advice="Send some with: hedgehop rally")
-            self._wish = replace(self._wish, point=_nearest(points, state))
+            self._wish = replace(self._wish, point=nearest_rally(points, state))
         return Flown(self._request.profile, self._request.clearance(), parameters, fence, points)
 
     def _judged(self, state: VehicleState, flown: Flown) -> GuidedWay:
@@ -218,13 +213,7 @@ class _Flier:
         return judged_way(part, None, state, self._wish, flown, speed_m_s=self._speed_m_s, now_s=time.monotonic())
 
     def _part(self, state: VehicleState, flown: Flown) -> Dsm:
-        """Of the model, around vehicle, home, rally points and the place that is asked for."""
-        model = self._model.model
-        places = [(state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)]
-        places.append(getattr(self._wish, "lat_lon_deg", None) or (None, None))
-        known = [place for place in places if None not in place]
-        xy_m = model.xy_from_lat_lon(np.array(known, np.float64).reshape(-1, 2))
-        part = needed_part(model, np.vstack([xy_m, rally_places(model, flown.rally)]), FLIGHT_MARGIN_M)
+        part = part_for(self._model.model, state, self._wish, flown.rally)
         end_progress()
         self._model.say_spikes(part)
         return part
@@ -258,11 +247,6 @@ def _placed(state: VehicleState | None) -> VehicleState | None:
     if state is None or None in (state.lat_deg, state.lon_deg, state.alt_rel_home_m):
         return None
     return state if not state.armed or state.home_lat_deg is not None else None
-
-
-def _nearest(points: tuple[RallyPoint, ...], state: VehicleState) -> RallyPoint:
-    at = (state.lat_deg or 0.0, state.lon_deg or 0.0)
-    return min(points, key=lambda point: apart_m(at, (point.lat_deg, point.lon_deg)))
 
 
 def _tell(watch: Watch) -> None:

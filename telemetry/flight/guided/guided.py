@@ -14,6 +14,7 @@ from typing import Literal
 
 from planning.model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
+from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.handover import Handover, away_m, is_fresh
 from telemetry.flight.guided.leading import Leading
@@ -22,7 +23,6 @@ from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.flight.guided.script_watches import ModeWatch, Punctuality, Standstill
 from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
 from telemetry.topics.requests import FlyWay, StartGuided
@@ -32,8 +32,6 @@ TAKEOFF_TOLERANCE_M = 0.3
 OFF_THE_GROUND_M = 0.5
 RETURN_AGAIN_S = 2.0
 SLOW_TARGET_SENDINGS = 4
-BEGINS_M, STANDS_M_S = 1.0, 1.0
-"""From where a way begins, and how fast, the vehicle may be: well within the following error of its certificate."""
 THERE = "The way is flown: it holds there."
 
 
@@ -121,6 +119,7 @@ class GuidedScript:
             targets=self._targets[-1].item or None,
             since_utc_s=since_utc_s,
             broke_off_at=self.broke_off_at,
+            is_flown=self.phase == "paused" and self.is_flown,
             hint=self.hint or self._stands or late or (self._note if self.phase in ("taking_off", "flying") else ""),
         )
 
@@ -396,27 +395,6 @@ class GuidedScript:
             target = self.target
             return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, self._home_alt_amsl_m)
         return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, self._home_alt_amsl_m)
-
-
-def why_not_from(request: StartGuided | FlyWay, state: VehicleState) -> NotAllowedError | None:
-    in_air = state.armed and state.landed == "in_air"
-    if isinstance(request, StartGuided):
-        return (
-            NotAllowedError("The vehicle is already flying.", advice="Land it, then start again.") if in_air else None
-        )
-    if not (state.armed and is_in_the_air(state)):
-        return NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
-    speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
-    if speed_m_s > STANDS_M_S:
-        what = f"The vehicle moves at {speed_m_s:.1f} m/s: the way was certified from where it hovers."
-        return NotAllowedError(what, advice="Hold, then ask for the way again.")
-    begins = Place(request.begins_lat_deg, request.begins_lon_deg, request.begins_alt_rel_home_m, math.nan)
-    off_m = away_m(state, begins)
-    if not off_m <= BEGINS_M:
-        where = f"{off_m:.1f} m from" if math.isfinite(off_m) else "not known to be"
-        what = f"The vehicle is {where} where the certified way begins."
-        return NotAllowedError(what, advice="Ask for the way again: it is certified anew from there.")
-    return None
 
 
 def _is_off_the_ground(state: VehicleState) -> bool:

@@ -1,0 +1,44 @@
+"""Where and how a script or a certified way may begin."""
+
+from __future__ import annotations
+
+import math
+
+from telemetry.errors import NotAllowedError
+from telemetry.flight.guided.handover import away_m
+from telemetry.flight.guided.orders import Place
+from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.requests import FlyWay, StartGuided
+from telemetry.topics.vehicle import VehicleState
+
+BEGINS_M, STANDS_M_S = 1.0, 1.0
+"""From where a way begins, and how fast, the vehicle may be: well within the following error of its certificate."""
+
+
+def why_moves(state: VehicleState) -> NotAllowedError | None:
+    """Why no way can begin now: the vehicle would be elsewhere before it is certified."""
+    speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
+    if speed_m_s <= STANDS_M_S:
+        return None
+    what = f"The vehicle moves at {speed_m_s:.1f} m/s: a way is certified from where it hovers."
+    return NotAllowedError(what, advice="Hold, then ask for the way again.")
+
+
+def why_not_from(request: StartGuided | FlyWay, state: VehicleState) -> NotAllowedError | None:
+    """A mission's script begins on the ground; a certified way in the air, at rest, where it was certified."""
+    in_air = state.armed and state.landed == "in_air"
+    if isinstance(request, StartGuided):
+        return (
+            NotAllowedError("The vehicle is already flying.", advice="Land it, then start again.") if in_air else None
+        )
+    if not (state.armed and is_in_the_air(state)):
+        return NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
+    if (refusal := why_moves(state)) is not None:
+        return refusal
+    begins = Place(request.begins_lat_deg, request.begins_lon_deg, request.begins_alt_rel_home_m, math.nan)
+    off_m = away_m(state, begins)
+    if not off_m <= BEGINS_M:
+        where = f"{off_m:.1f} m from" if math.isfinite(off_m) else "not known to be"
+        what = f"The vehicle is {where} where the certified way begins."
+        return NotAllowedError(what, advice="Ask for the way again: it is certified anew from there.")
+    return None
