@@ -21,6 +21,7 @@ from server.flying.plan_followed import PlanFollowed
 from server.flying.recordings import Recording, TrackSoFar
 from server.flying.simulation import Simulation
 from server.flying.vehicle_logs import VehicleLogs
+from server.flying.way_desk import WayDesk
 from server.flying.work import FlightWork
 from server.heard.agents import Agents
 from server.heard.channel import Channel
@@ -127,6 +128,7 @@ class Flying:
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
         self.desk = FlightDesk(link, work, aboard, workspace, self.live, self._watch, bus, present)
+        self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
         self.parameters = ParameterDesk(link, self.live, aboard, library.root)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
         self.logs = VehicleLogs(link, self.live, library)
@@ -252,6 +254,7 @@ class Flying:
         self._present.publish(LinkMessage(link=status))
         if status.adopted is None and self.live.state is not None:
             self.live.forget()
+            self.ways.forget()
             self._shared.on_vehicle()
         self.desk.on_link(status)
         self._followed.look()
@@ -262,6 +265,7 @@ class Flying:
     def _on_flight(self, flight: FlightStatus) -> None:
         self.live.on_flight(flight)
         self.desk.on_flight(flight)
+        self.ways.on_flight(flight)
 
     def _on_avoidance(self, status: AvoidanceStatus) -> None:
         self._watch.on_avoidance(status)

@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
-from server.schemas import FlyState, StartFlight, UploadPlan
+from server.schemas import FlyState, FlyWayBody, GuidedState, StartFlight, UploadPlan, WayBody, WaySpeedBody
 from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome, StopMotors
 
 router = APIRouter(prefix="/api/flight", tags=["flight"], responses=ERROR_RESPONSES)
@@ -30,6 +30,31 @@ async def check(operator: InCharge, flying: Fly) -> Response:
 async def start(body: StartFlight, operator: InCharge, flying: Fly) -> None:
     """Flies the mission that was checked; 409 when the check is missing, old, or did not go well."""
     await flying.desk.start(operator, body)
+
+
+@router.put("/way", response_model=GuidedState)
+async def judge_way(body: WayBody, operator: InCharge, flying: Fly) -> Response:
+    """Lays a guided way from where the vehicle is over the open surface model and judges it; nothing moves."""
+    return answer(await flying.ways.judge(operator, body))
+
+
+@router.post("/way/fly", **DONE)
+async def fly_way(body: FlyWayBody, operator: InCharge, flying: Fly) -> None:
+    """Flies the way that was judged last; 409 where it may not be flown, 404 for one that is out of date."""
+    await flying.ways.fly(operator, body)
+
+
+@router.put("/way/speed", **DONE)
+async def set_speed(body: WaySpeedBody, operator: InCharge, flying: Fly) -> None:
+    """On the rest of the way that is flown, up to the speed for which it is certified."""
+    await flying.ways.set_speed(operator, body)
+
+
+@router.delete("/way", response_model=GuidedState)
+async def drop_way(operator: InCharge, flying: Fly) -> Response:
+    """Puts away what was judged; what is flown goes on."""
+    del operator
+    return answer(flying.ways.drop())
 
 
 def _add_command(name: str, command: Callable[[Operator], LinkRequest], description: str = "") -> None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from server.heard.channel import Channel
+from server.heard.channel import Channel, ShownWay
 from server.heard.vehicle_place import Placer
 from server.scene.layers.vehicle_layers import VehiclePose
 from server.scene.layers.vehicles import REPLAY, Vehicles
@@ -49,6 +49,7 @@ class Scenery:
                 actor.forget()
         for name, actor in self._actors.items():
             actor.move(self._stage, self._placer)
+            actor.draw_way(self._stage, self._placer)
             # A replay leaves states out when it runs fast or jumps; its whole line is drawn from the recording.
             if with_tracks and name != REPLAY:
                 actor.draw_track(self._stage, self._placer)
@@ -64,6 +65,7 @@ class _Actor:
     def forget(self) -> None:
         self._drawn: VehicleState | None = None
         self._placed = 0
+        self._way: ShownWay | None = None
         self._points = np.zeros((0, 3))
 
     def move(self, stage: Vehicles, placer: Placer) -> None:
@@ -71,6 +73,16 @@ class _Actor:
         if state is not self._drawn:
             self._drawn = state
             stage.move(self._name, None if state is None else _pose(state, placer, self._label))
+
+    def draw_way(self, stage: Vehicles, placer: Placer) -> None:
+        way, state = self._channel.way, self._channel.state
+        if way is self._way:
+            return
+        if way is None or state is None:
+            stage.lead(self._name, np.zeros((0, 3)))
+        else:
+            stage.lead(self._name, placer.line(way.places, state), is_certified=way.is_certified)
+        self._way = way
 
     def draw_track(self, stage: Vehicles, placer: Placer) -> None:
         states = self._channel.track.states

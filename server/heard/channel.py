@@ -38,6 +38,14 @@ class HealthTold(NamedTuple):
     rows: tuple[HealthRow, ...] | None = None
 
 
+class ShownWay(NamedTuple):
+    """A guided way that is judged or flown."""
+
+    places: tuple[tuple[float, float, float], ...]
+    """(K,) lat_deg, lon_deg, alt_rel_home_m"""
+    is_certified: bool
+
+
 class Channel:
     """Publishes each new position as soon as it comes, but no faster than pages draw; lives on the event loop."""
 
@@ -59,6 +67,7 @@ class Channel:
         self.state: VehicleState | None = None
         self.flight = FlightStatus()
         self.follow: FollowDoc | None = None
+        self.way: ShownWay | None = None
 
     @property
     def armed(self) -> bool:

@@ -40,6 +40,15 @@ class Placer:
         points = np.column_stack([self.dsm.xy_from_lat_lon(lat_lon_deg), [alt_m for _, alt_m in known]])
         return points[np.isfinite(points).all(axis=1)]
 
+    def line(self, places: Sequence[tuple[float, float, float]], state: VehicleState) -> F64:
+        """(K, 3) of (lat_deg, lon_deg, alt_rel_home_m); nothing where the model does not know the ground at home."""
+        if state.home_lat_deg is None or state.home_lon_deg is None:
+            return np.zeros((0, 3))
+        given = np.array(places, np.float64).reshape(-1, 3)
+        alt_m = self._home_alt_dsm_m(state.home_lat_deg, state.home_lon_deg) + given[:, 2]
+        points = np.column_stack([self.dsm.xy_from_lat_lon(given[:, :2]), alt_m])
+        return points if np.isfinite(points).all() else points[:0]
+
     def home(self, state: VehicleState) -> F64 | None:
         """(3,) the vehicle's actual home on the model's ground."""
         if state.home_lat_deg is None or state.home_lon_deg is None:

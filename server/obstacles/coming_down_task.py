@@ -14,9 +14,11 @@ from planning.errors import PlanningError
 from server.errors import ServerError
 from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.rest_of_plan import Underway, rest_of_plan
+from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, PoiDoc
 from server.work.jobs import Progress
 from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from planning.evading.seen import Columns
@@ -63,7 +65,7 @@ def _planned(situation: Situation, report: Progress) -> RestPlanned:
     fields = rest_of_plan("ahead", underway, terrain_id=record.terrain_id)
     fields["pois"] = _apart(fields["pois"])
     document = PlanDoc.model_validate({**document.model_dump(), **fields})
-    dsm = burned(load_planned_terrain(situation.terrain, seen_in(record)), situation)
+    dsm = burned(load_planned_terrain(situation.terrain, seen_in(record)), situation.maps, state)
     plan = plan_mission(dsm, request_from_doc(document, dsm), report=report)
     here = dsm.xy_from_lat_lon(np.array([[state.lat_deg, state.lon_deg]]))[0]
     first = int(np.argmax(np.hypot(*(plan.line.points_m[:, :2] - here).T) <= HERE_M))
@@ -86,11 +88,11 @@ def _apart(pois: list[PoiDoc]) -> list[PoiDoc]:
     return out
 
 
-def burned(dsm: Dsm, situation: Situation) -> Dsm:
+def burned(dsm: Dsm, maps: tuple[Voxels, ...], state: VehicleState) -> Dsm:
     """The model with all that was seen, and its shadow, as columns."""
     from planning.evading.seen import burn, columns_from_voxels
 
-    for voxels in situation.maps:
+    for voxels in maps:
         origin = voxels.origin
         centres = voxels.centres_enu_m[~voxels.explained]
         if origin is None or not len(centres):
@@ -98,7 +100,7 @@ def burned(dsm: Dsm, situation: Situation) -> Dsm:
         frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
         home_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
         columns = columns_from_voxels(centres, voxels.resolution_m, frame=frame, dsm=dsm, home_alt_dsm_m=home_m)
-        dsm = burn(dsm, with_shadow(columns, _forward(dsm, situation)))
+        dsm = burn(dsm, with_shadow(columns, _forward(dsm, state)))
     return dsm
 
 
@@ -109,9 +111,8 @@ def with_shadow(columns: Columns, forward: F64) -> Columns:
     return replace(columns, xy_m=np.vstack(moved), top_alt_dsm_m=np.tile(columns.top_alt_dsm_m, len(steps)))
 
 
-def _forward(dsm: Dsm, situation: Situation) -> F64:
+def _forward(dsm: Dsm, state: VehicleState) -> F64:
     """The leg's direction that is flown, in the model's plane."""
-    state = situation.state
     heading = state.heading_rad or 0.0
     v = (state.v_north_m_s or 0.0, state.v_east_m_s or 0.0)
     north, east = v if math.hypot(*v) > 0.5 else (math.cos(heading), math.sin(heading))

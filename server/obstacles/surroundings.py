@@ -10,7 +10,14 @@ from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import Underway
+from server.scene.mirror import Voxels
 from telemetry.topics.obstacles import SENSORS, ObstacleAlert
+
+
+def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
+    """What each sensor has seen. They may be large: for a thread."""
+    mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
+    return tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None)
 
 
 class Surroundings:
@@ -36,7 +43,6 @@ class Surroundings:
         origin = next((status.origin for status in statuses if status.origin is not None), None)
         if origin is None:
             return None
-        mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
         return Situation(
             standing,
             state,
@@ -45,7 +51,7 @@ class Surroundings:
             record,
             self._library.terrain_dir(terrain.id),
             origin,
-            tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None),
+            seen_maps(watch),
             watch.settings.vehicle_radius_m,
             ceiling_m=watch.settings.climb_ceiling_m,
             radar_high_deg=watch.settings.radar_high_deg,

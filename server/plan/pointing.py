@@ -21,14 +21,14 @@ class Pointing:
         """A click on the surface model; on that of a recording it means nothing."""
         if self._on_show.is_review:
             return
-        is_landing = self._on_show.selection.tool == "landing"
-        if not is_landing and clicked(self._desk.document, self._on_show.selection, lat_deg, lon_deg) is None:
+        asks_where = self._on_show.selection.tool in ("landing", "there")
+        if not asks_where and clicked(self._desk.document, self._on_show.selection, lat_deg, lon_deg) is None:
             return
         if not known:
             self._pages.publish(NoticeMessage(level="warning", error=_unknown_ground(lat_deg, lon_deg)))
             return
-        if is_landing:
-            # Edits nothing: the page that took the tool asks for sites there.
+        if asks_where:
+            # Edits nothing: the page that took the tool asks for sites, or for a way there.
             self._on_show.select(SelectionDoc(place=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg)))
             return
         selections: list[SelectionDoc] = []

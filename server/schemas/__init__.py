@@ -36,6 +36,7 @@ from server.schemas.flight_docs import (
     VehicleLogDoc,
     VehicleLogsDoc,
 )
+from server.schemas.guided_docs import FlyWayBody, GuidedState, WayAction, WayBody, WayDoc, WaySpeedBody
 from server.schemas.library_docs import (
     JobDoc,
     LibraryState,
@@ -115,6 +116,7 @@ from server.schemas.stream import (
     FlightMessage,
     FlyMessage,
     FrameView,
+    GuidedMessage,
     HealthMessage,
     HoldCamera,
     HoverProfile,

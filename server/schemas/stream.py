@@ -8,6 +8,7 @@ from pydantic import Field
 
 from server.schemas.account_docs import LeaseDoc, MeDoc
 from server.schemas.flight_docs import FlyState, FollowDoc, NodeDoc, RecordingDoc, Source, TrackDoc
+from server.schemas.guided_docs import GuidedState
 from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
@@ -163,6 +164,13 @@ class FlyMessage(Message):
     fly: FlyState
 
 
+class GuidedMessage(Message):
+    """The guided way that is judged or flown."""
+
+    type: Literal["guided"] = "guided"
+    guided: GuidedState
+
+
 class LeaseMessage(Message):
     type: Literal["lease"] = "lease"
     lease: LeaseDoc
@@ -293,6 +301,7 @@ ServerMessage = Annotated[
     | TransferMessage
     | FlightMessage
     | FlyMessage
+    | GuidedMessage
     | LeaseMessage
     | MeMessage
     | HealthMessage

@@ -16,6 +16,7 @@ from server import schemas
 from server.schemas import (
     account_docs,
     flight_docs,
+    guided_docs,
     library_docs,
     obstacle_docs,
     parameter_docs,
@@ -81,6 +82,7 @@ def _models() -> Iterator[type[BaseModel]]:
         account_docs,
         station_docs,
         flight_docs,
+        guided_docs,
         review_docs,
         obstacle_docs,
         parameter_docs,

@@ -41,7 +41,7 @@ class SelectionDoc(Strict):
     """Which tool clicks in the 3D view act through, and what is selected."""
 
     tool: Literal[
-        "select", "add_poi", "polygon", "home", "look_at", "landing", "fence_polygon", "fence_circle", "rally"
+        "select", "add_poi", "polygon", "home", "look_at", "landing", "there", "fence_polygon", "fence_circle", "rally"
     ] = "select"
     poi_id: str | None = None
     fence_mark: str | None = None
@@ -49,6 +49,6 @@ class SelectionDoc(Strict):
     draft: list[PlaceDoc] = Field(default=[], max_length=2)
     """Corners of a polygon of the fence that is none yet."""
     place: PlaceDoc | None = None
-    """Clicked with the tool "landing": sites are looked for near it."""
+    """Clicked with the tool "landing" or "there": sites are looked for near it, or a guided way leads there."""
     site_rank: int | None = None
     """Of the landing site that is pointed out."""

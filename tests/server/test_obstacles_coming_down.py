@@ -51,7 +51,7 @@ def test_the_rest_is_planned_over_the_wall_and_its_shadow_and_down_to_its_proper
     there = underway(situation(planned, 6))
     rest = rest_of(there)
     assert rest.why == ""
-    model = burned(planned[0], there)
+    model = burned(planned[0], there.maps, there.state)
     mission = read_wpl(there.record.mission_wpl)
     places = model.xy_from_lat_lon(np.array([[t.lat_deg, t.lon_deg] for t in rest.targets]))
     ups = np.array([t.alt_rel_home_m for t in rest.targets])

@@ -1,9 +1,11 @@
-"""A click with the landing tool: it asks where, and edits nothing."""
+"""A click with a tool that asks where: it edits nothing."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import Any, cast
+from typing import Any, Literal, cast
+
+import pytest
 
 from server.plan.plan_desk import PlanDesk, Proposal
 from server.plan.pointing import Pointing
@@ -42,8 +44,9 @@ class _Hand:
         asyncio.run(self._pointing.on_terrain(37.73, 14.99, known=known))
 
 
-def test_the_place_is_told_with_the_tool_put_down_and_the_plan_stays() -> None:
-    hand = _Hand(SelectionDoc(tool="landing"))
+@pytest.mark.parametrize("tool", ["landing", "there"])
+def test_the_place_is_told_with_the_tool_put_down_and_the_plan_stays(tool: Literal["landing", "there"]) -> None:
+    hand = _Hand(SelectionDoc(tool=tool))
     hand.click()
     assert hand.selection == SelectionDoc(tool="select", place=PlaceDoc(lat_deg=37.73, lon_deg=14.99))
     assert hand.desk.proposals == []

@@ -125,6 +125,29 @@ def test_a_page_follows_its_own_vehicle_until_it_wants_something_else() -> None:
     assert clients["anna"].moves == 2
 
 
+def test_a_guided_way_is_drawn_until_it_is_over_or_the_model_is_another() -> None:
+    dsm = hill()
+    drawing = Drawing.of(dsm, state_over(dsm))
+    assert drawing is not None
+    drawn: dict[str, Any] = {}
+    vehicles = Vehicles(cast(Any, SimpleNamespace(draw=drawn.update)))
+    vehicles.redraw(drawing)
+    way_m = np.array([[500_040.0, 3_999_970.0, 140.0], [500_060.0, 3_999_970.0, 145.0]])
+    vehicles.lead("live", np.zeros((0, 3)))
+    assert "way_live" not in drawn, "nothing has to be taken away"
+    vehicles.lead("live", way_m, is_certified=False)
+    line, end = drawn["way_live"]
+    assert np.ptp(np.asarray(line.props["points"]).reshape(-1, 3)[:, 0]) == pytest.approx(20.0)
+    refused = line.props["colors"]
+    vehicles.lead("live", way_m)
+    assert not np.array_equal(refused, drawn["way_live"][0].props["colors"])
+    assert end.name.startswith(line.name)
+    vehicles.redraw(drawing)
+    assert len(drawn["way_live"]) == 2
+    vehicles.redraw(None)
+    assert drawn["way_live"] == []
+
+
 def test_no_mark_on_the_way_is_larger_than_the_vehicle() -> None:
     dsm = hill()
     made = Drawing.of(dsm, state_over(dsm))

@@ -90,6 +90,15 @@ export const LIMITS = {
   PlayReview: {
     speed: { min: 0.1, max: 50 },
   },
+  WayBody: {
+    height_m: { min: 0.5, max: 500.0, initial: 10.0 },
+    radius_m: { min: 3.0, max: 500.0, initial: 20.0 },
+    laps: { min: 1, max: 50, initial: 1 },
+    speed_m_s: { min: 0.5, max: 20.0 },
+  },
+  WaySpeedBody: {
+    speed_m_s: { min: 0.5, max: 20.0 },
+  },
   SectionAsked: {
     thickness_m: { min: 0.5, max: 50, initial: 4.0 },
     reach_m: { min: 10, max: 150, initial: 25 },
@@ -270,6 +279,7 @@ export interface FlightStatus {
   since_utc_s: number | null;
   broke_off_at: number | null;
   hint: string;
+  is_flown: boolean;
 }
 
 /** ``value`` in few words, ``limit`` beside it; ``text`` a sentence where there is something to do or to know. */
@@ -1108,13 +1118,13 @@ export interface ViewDoc {
 
 /** Which tool clicks in the 3D view act through, and what is selected. */
 export interface SelectionDoc {
-  tool: "select" | "add_poi" | "polygon" | "home" | "look_at" | "landing" | "fence_polygon" | "fence_circle" | "rally";
+  tool: "select" | "add_poi" | "polygon" | "home" | "look_at" | "landing" | "there" | "fence_polygon" | "fence_circle" | "rally";
   poi_id: string | null;
   /** Id of the fence's shape or of the rally point that is selected; a corner's number after a dot, from 0. */
   fence_mark: string | null;
   /** Corners of a polygon of the fence that is none yet. */
   draft: PlaceDoc[];
-  /** Clicked with the tool "landing": sites are looked for near it. */
+  /** Clicked with the tool "landing" or "there": sites are looked for near it, or a guided way leads there. */
   place: PlaceDoc | null;
   /** Of the landing site that is pointed out. */
   site_rank: number | null;
@@ -1416,6 +1426,67 @@ export interface PlayReview {
   /** Since the recording's start. */
   at_s?: number | null;
   speed?: number | null;
+}
+
+/** A way from where the vehicle is now; it is judged, not flown. */
+export interface WayBody {
+  action: "take_off" | "to" | "height" | "look" | "orbit" | "home" | "rally" | "back";
+  /** For "to", "look" and "orbit". */
+  place?: PlaceDoc | null;
+  /** Above the surface where it ends; for "take_off" and "home" above home. "look" and "back" have heights already. */
+  height_m?: number;
+  /** Of an orbit. */
+  radius_m?: number;
+  laps?: number;
+  /** Seen from above. */
+  clockwise?: boolean;
+  /** Over ground; null: the profile's mean speed. */
+  speed_m_s?: number | null;
+}
+
+/** The way that was judged last is flown. */
+export interface FlyWayBody {
+  id: string;
+  /** Also where only the vehicle's own return from it would not be clear. */
+  accept_return?: boolean;
+}
+
+/** On the rest of the way that is flown. */
+export interface WaySpeedBody {
+  speed_m_s: number;
+}
+
+/** A judged way, from where the vehicle was. */
+export interface WayDoc {
+  id: string;
+  action: "take_off" | "to" | "height" | "look" | "orbit" | "home" | "rally" | "back";
+  /** null: certified. "return": the way itself is clear, the vehicle's own return from it would not be. */
+  problem: "way" | "return" | null;
+  /** It is being flown. */
+  flies: boolean;
+  /** How long, how clear, how much raised, in a few short sentences. */
+  text: string;
+  reasons: ReasonDoc[];
+  /** Smallest distance to the surface; null: nothing is near. */
+  clearance_m: number | null;
+  required_m: number;
+  length_m: number;
+  seconds: number;
+  /** It ends with a landing; else with holding. */
+  lands: boolean;
+  speed_m_s: number;
+  /** For no higher speed is it certified. */
+  most_m_s: number;
+  /** The surface model that it was judged over. */
+  terrain_name: string;
+  /** With what sensors have seen, and its shadow, in it. */
+  has_seen: boolean;
+}
+
+/** What guided flight has in hand. */
+export interface GuidedState {
+  way: WayDoc | null;
+  is_judging: boolean;
 }
 
 /** From the first waypoint to the last. */
@@ -2206,6 +2277,13 @@ export interface FlyMessage {
   fly: FlyState;
 }
 
+/** The guided way that is judged or flown. */
+export interface GuidedMessage {
+  v: 1;
+  type: "guided";
+  guided: GuidedState;
+}
+
 export interface LeaseMessage {
   v: 1;
   type: "lease";
@@ -2394,6 +2472,7 @@ export type ServerMessage =
   | TransferMessage
   | FlightMessage
   | FlyMessage
+  | GuidedMessage
   | LeaseMessage
   | MeMessage
   | HealthMessage

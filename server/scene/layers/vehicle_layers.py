@@ -90,6 +90,19 @@ def track_nodes(drawing: Drawing, actor: str, points_m: F64) -> list[Node]:
     return [_piece(actor, number, points[start:]) for number, start in enumerate(starts)]
 
 
+def way_nodes(drawing: Drawing, actor: str, points_m: F64, *, is_certified: bool) -> list[Node]:
+    """A guided way (K, 3) and a dot where it ends; red where it may not be flown."""
+    if len(points_m) < 2:
+        return []
+    points = drawing.frame.scene_from_model(points_m)
+    color = palette.ACCENT if is_certified else palette.INSIDE
+    name = f"/way_{actor}"
+    return [
+        line_node(name, points, color, width_px=4.0),
+        dots_node(f"{name}/end", points[-1:], color, size_px=_DOT_PX),
+    ]
+
+
 def _piece(actor: str, number: int, points: F64) -> Node:
     points = points[: _CHUNK_SEGMENTS + 1]
     # The rest of an unfinished piece stands on its last point, unseen.

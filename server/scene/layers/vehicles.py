@@ -8,7 +8,7 @@ from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.stage import Drawing
-from server.scene.layers.vehicle_layers import REPLAY, VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes
+from server.scene.layers.vehicle_layers import REPLAY, VEHICLE_M, VehiclePose, track_nodes, vehicle_nodes, way_nodes
 from server.schemas import Source
 from server.schemas.station_docs import FIRST_VEHICLE
 
@@ -31,6 +31,7 @@ class Vehicles:
         self._drawing: Drawing | None = None
         self._poses: dict[str, VehiclePose | None] = {}
         self._tracks: dict[str, F64] = {}
+        self._ways: dict[str, tuple[F64, bool]] = {}
 
     @property
     def dsm(self) -> Dsm | None:
@@ -60,13 +61,21 @@ class Vehicles:
         self._tracks[actor] = points_m
         self._canvas.draw(self._track(actor))
 
+    def lead(self, actor: str, points_m: F64, *, is_certified: bool = True) -> None:
+        """The guided way that is judged or flown, (K, 3) x, y, alt_dsm; none where it is empty."""
+        if not len(points_m) and actor not in self._ways:
+            return
+        self._ways[actor] = points_m, is_certified
+        self._canvas.draw(self._way(actor))
+
     def redraw(self, drawing: Drawing | None) -> None:
         """The frame has changed, or the model: nothing of another model is shown on this one."""
         if drawing is None or self._drawing is None or drawing.dsm is not self._drawing.dsm:
             self._poses, self._tracks = dict.fromkeys(self._poses), dict.fromkeys(self._tracks, _NO_POINTS)
+            self._ways = dict.fromkeys(self._ways, (_NO_POINTS, True))
         self._drawing = drawing
-        for actor in {**self._poses, **self._tracks}:
-            self._canvas.draw(self._vehicle(actor) | self._track(actor))
+        for actor in {**self._poses, **self._tracks, **self._ways}:
+            self._canvas.draw(self._vehicle(actor) | self._track(actor) | self._way(actor))
 
     def _vehicle(self, actor: str) -> dict[str, list[Node]]:
         drawn = [] if self._drawing is None else vehicle_nodes(self._drawing, actor, self._poses.get(actor))
@@ -76,3 +85,8 @@ class Vehicles:
         track_m = self._tracks.get(actor, _NO_POINTS)
         drawn = [] if self._drawing is None else track_nodes(self._drawing, actor, track_m)
         return {f"track_{actor}": drawn}
+
+    def _way(self, actor: str) -> dict[str, list[Node]]:
+        points_m, is_certified = self._ways.get(actor, (_NO_POINTS, True))
+        drawn = [] if self._drawing is None else way_nodes(self._drawing, actor, points_m, is_certified=is_certified)
+        return {f"way_{actor}": drawn}

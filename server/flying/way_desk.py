@@ -1,0 +1,217 @@
+"""Guided flight: a way is asked for, judged from where the vehicle is, shown to all pages, and flown if it may be."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import secrets
+import time
+from dataclasses import dataclass
+
+from mapping.geometry.frames import apart_m
+from planning.guided.model import RETURNS
+from server.errors import ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.flying.way_task import WayAsked, WayJudged, judge_way
+from server.heard.channel import Channel, ShownWay
+from server.library import Library
+from server.obstacles.obstacle_watch import Watch
+from server.obstacles.surroundings import seen_maps
+from server.schemas import (
+    FlyWayBody,
+    GuidedMessage,
+    GuidedState,
+    Pages,
+    ReasonDoc,
+    TerrainDoc,
+    WayBody,
+    WayDoc,
+    WaySpeedBody,
+)
+from server.work.jobs import Lane
+from server.workspace import Workspace
+from telemetry.bus.link_client import LinkClient
+from telemetry.errors import NoVehicleError
+from telemetry.flight.certified_way import way_request, way_words
+from telemetry.flight.guided.beginning import why_moves
+from telemetry.flight.preflight.parameters import NAMES
+from telemetry.topics.messages import FlightStatus, PlacesOnboard
+from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters, SetSpeed
+from telemetry.topics.vehicle import VehicleState
+
+TAKE_OFF_M = 1.0
+"""A climb that strays no farther to the side is the take-off."""
+NOWHERE = "Nothing is judged any more, or another way was judged meanwhile."
+
+
+@dataclass(frozen=True, slots=True)
+class _InHand:
+    doc: WayDoc
+    judged: WayJudged
+    flies_since_utc_s: float | None = None
+
+
+class WayDesk:
+    """All methods belong to the event loop."""
+
+    def __init__(
+        self,
+        link: LinkClient,
+        live: Channel,
+        workspace: Workspace,
+        library: Library,
+        lane: Lane,
+        watch: Watch,
+        pages: Pages,
+    ) -> None:
+        self._link, self._live, self._workspace, self._library = link, live, workspace, library
+        self._lane, self._watch, self._pages = lane, watch, pages
+        self._in_hand: _InHand | None = None
+        self._is_judging = False
+
+    @property
+    def state(self) -> GuidedState:
+        return GuidedState(way=None if self._in_hand is None else self._in_hand.doc, is_judging=self._is_judging)
+
+    async def judge(self, operator: Operator, body: WayBody) -> GuidedState:
+        """Nothing moves. Raises what the vehicle said, NotAllowedError, NotReadyError, MissionError, ParameterError."""
+        if self._is_judging:
+            raise ConflictError("Another way is being judged.", advice="Wait until it is done.")
+        if self._in_hand is not None and self._in_hand.doc.flies:
+            raise ConflictError("A way is being flown.", advice="Hold first, then ask for the next way.")
+        self._check_stands(body)
+        terrain = self._terrain()
+        self._in_hand, self._is_judging = None, True
+        self._tell()
+        try:
+            judged = await self._judged(operator, body, terrain)
+            self._in_hand = _InHand(_doc(judged, body, terrain), judged)
+        finally:
+            self._is_judging = False
+            self._tell()
+        return self.state
+
+    async def fly(self, operator: Operator, body: FlyWayBody) -> None:
+        """Raises NotFoundError, NotCertifiedError, and NotAllowedError where the vehicle is elsewhere by now."""
+        in_hand = self._in_hand
+        if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
+            raise NotFoundError(NOWHERE, advice="Ask for the way again.")
+        doc, judged = in_hand.doc, in_hand.judged
+        if doc.problem == "way" or (doc.problem == "return" and not body.accept_return):
+            first = doc.reasons[0] if doc.reasons else None
+            what = "The way is not certified" + ("." if first is None else f": {first.text}")
+            raise NotCertifiedError(what, advice="" if first is None else first.mend)
+        since_utc_s = time.time()
+        request = way_request(operator, judged.way, judged.wish, speed_m_s=judged.speed_m_s, most_m_s=judged.most_m_s)
+        await self._link.call(request)
+        if self._in_hand is in_hand:
+            self._in_hand = _InHand(doc.model_copy(update={"flies": True}), judged, since_utc_s)
+            self._tell()
+
+    async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
+        """Raises NotAllowedError where no way is flown, or it is certified for less."""
+        await self._link.call(SetSpeed(operator, body.speed_m_s))
+        if (in_hand := self._in_hand) is not None:
+            doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
+            self._in_hand = _InHand(doc, in_hand.judged, in_hand.flies_since_utc_s)
+            self._tell()
+
+    def drop(self) -> GuidedState:
+        """What was judged is put away; what is flown goes on, and stays on show."""
+        if self._in_hand is not None and not self._in_hand.doc.flies:
+            self._in_hand = None
+            self._tell()
+        return self.state
+
+    def on_flight(self, flight: FlightStatus) -> None:
+        """What is over is put away."""
+        since_utc_s = None if self._in_hand is None else self._in_hand.flies_since_utc_s
+        if since_utc_s is None or flight.since_utc_s is None or flight.since_utc_s < since_utc_s:
+            return
+        if flight.is_flown or flight.way != "guided" or flight.phase in ("idle", "landed", "interrupted"):
+            self._in_hand = None
+            self._tell()
+
+    def forget(self) -> None:
+        """The vehicle is another one, or gone."""
+        if self._in_hand is not None:
+            self._in_hand = None
+            self._tell()
+
+    # How
+
+    async def _judged(self, operator: Operator, body: WayBody, terrain: TerrainDoc) -> WayJudged:
+        state = self._vehicle()
+        parameters = await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"]))
+        fence = await self._link.call(DownloadPlaces(operator, "fence"))
+        rally = await self._link.call(DownloadPlaces(operator, "rally"))
+        maps = await asyncio.to_thread(seen_maps, self._watch)
+        asked = WayAsked(
+            body,
+            self._library.terrain_dir(terrain.id),
+            self._workspace.document,
+            self._vehicle(),
+            time.monotonic(),
+            parameters,
+            PlacesOnboard(fence, rally),
+            maps,
+            flown_places(self._live.track.states),
+        )
+        return await self._lane.call(judge_way, asked)
+
+    def _check_stands(self, body: WayBody) -> None:
+        if body.action != "take_off" and (refusal := why_moves(self._vehicle())) is not None:
+            raise refusal
+
+    def _vehicle(self) -> VehicleState:
+        if self._live.state is None:
+            raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
+        return self._live.state
+
+    def _terrain(self) -> TerrainDoc:
+        """The open plan's."""
+        terrain_id = self._workspace.document.terrain_id
+        terrain = next((each for each in self._library.terrains() if each.id == terrain_id), None)
+        if terrain is None:
+            raise NotReadyError(
+                "No surface model is open: no way can be certified.", advice="Open one in Plan, then ask again."
+            )
+        return terrain
+
+    def _tell(self) -> None:
+        in_hand = self._in_hand
+        self._live.way = None if in_hand is None else ShownWay(in_hand.judged.way.places, in_hand.doc.problem is None)
+        self._pages.publish(GuidedMessage(guided=self.state))
+
+
+def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc) -> WayDoc:
+    way = judged.way
+    return WayDoc(
+        id=secrets.token_hex(8),
+        action=body.action,
+        problem=way.problem,
+        text=way_words(way),
+        reasons=[ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons],
+        clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
+        required_m=way.certificate.required_clearance_m,
+        length_m=way.length_m,
+        seconds=way.seconds,
+        lands=isinstance(judged.wish, RETURNS),
+        speed_m_s=judged.speed_m_s,
+        most_m_s=judged.most_m_s,
+        terrain_name=terrain.name,
+        has_seen=judged.has_seen,
+    )
+
+
+def flown_places(states: list[VehicleState]) -> tuple[tuple[float, float, float], ...]:
+    """(lat_deg, lon_deg, alt_rel_home_m) from the top of the take-off on: what lies below is its own column."""
+    places = [
+        (state.lat_deg, state.lon_deg, state.alt_rel_home_m)
+        for state in states
+        if state.landed != "on_ground"
+        and state.lat_deg is not None
+        and state.lon_deg is not None
+        and state.alt_rel_home_m is not None
+    ]
+    left = next((k for k, place in enumerate(places) if apart_m(place[:2], places[0][:2]) > TAKE_OFF_M), len(places))
+    return tuple(places[max(0, left - 1) :])

@@ -1,0 +1,240 @@
+"""Guided ways at the desk: judged over the open model with what is on board, flown only where that was certified."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planning.errors import ParameterError
+from planning.fence.model import Fence, circle
+from planning.formats.fence_items import fence_items
+from server.errors import ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.flying.way_desk import WayDesk, flown_places
+from server.flying.way_task import WayJudged, wish_of
+from server.heard.channel import Channel, ShownWay
+from server.scene.mirror import Voxels
+from server.schemas import FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
+from server.work.jobs import Lane
+from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.mavlink.items import wire_items
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.obstacles import SENSORS, MapOrigin
+from telemetry.topics.requests import FlyWay, SetSpeed, StartGuided
+from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
+from tests.server.flying_desk_bench import ME, Made, Vehicle
+
+pytestmark = pytest.mark.xdist_group("flying-desk")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
+    made = Made(tmp_path_factory.mktemp("data"))
+    yield made
+    made.library.close()
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def lane(runner: asyncio.Runner) -> Iterator[Lane]:
+    lane = Lane("flight")
+    yield lane
+    runner.run(lane.close())
+
+
+class Bench:
+    """A desk over the demo's model, and a vehicle that hovers over the plan's home."""
+
+    def __init__(self, made: Made, lane: Lane, *, up_m: float = 30.0) -> None:
+        self.made, self.vehicle, self.document = made, Vehicle(), made.document
+        self.told: list[GuidedState] = []
+        me: Any = self
+        self.live = Channel("live", Told())
+        self.hovers(made.standing(), up_m)
+        self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
+        self.desk = WayDesk(me.vehicle, self.live, me, made.library, lane, me, me)
+
+    def publish(self, message: Any) -> None:
+        self.told.append(message.guided)
+
+    def hovers(self, standing: VehicleState, up_m: float) -> None:
+        now_s = time.monotonic()
+        flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
+        self.live.state = replace(standing, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
+
+    def beside(self, east_m: float, north_m: float) -> PlaceDoc:
+        there = self.made.standing(east_m=east_m, north_m=north_m)
+        assert there.lat_deg is not None
+        assert there.lon_deg is not None
+        return PlaceDoc(lat_deg=there.lat_deg, lon_deg=there.lon_deg)
+
+    async def judged(self, **body: Any) -> WayDoc:
+        way = (await self.desk.judge(ME, WayBody.model_validate(body))).way
+        assert way is not None
+        return way
+
+
+def test_a_way_is_judged_shown_and_flown_from_where_the_vehicle_hovers(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        assert way.problem is None
+        assert way.clearance_m is not None
+        assert way.clearance_m >= way.required_m > 1.0
+        assert (way.flies, way.lands, way.has_seen) == (False, False, False)
+        assert [state.is_judging for state in bench.told] == [True, False]
+        shown = bench.live.way
+        assert isinstance(shown, ShownWay)
+        assert shown.is_certified
+
+        with pytest.raises(NotFoundError, match="Nothing is judged any more"):
+            await bench.desk.fly(ME, FlyWayBody(id="another"))
+        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        request = bench.vehicle.told[-1]
+        assert isinstance(request, FlyWay)
+        assert request.most_m_s == bench.document.profile.max_speed_m_s
+        last = request.targets[-1]
+        assert (last.lat_deg, last.lon_deg, last.alt_rel_home_m) == shown.places[-1]
+        assert bench.told[-1].way == way.model_copy(update={"flies": True})
+        with pytest.raises(ConflictError, match="being flown"):
+            await bench.judged(action="home")
+        assert bench.desk.drop().way is not None, "what is flown stays on show"
+
+        await bench.desk.set_speed(ME, WaySpeedBody(speed_m_s=1.5))
+        assert bench.vehicle.told[-1] == SetSpeed(ME, 1.5)
+        bench.desk.on_flight(FlightStatus("guided", "paused", since_utc_s=time.time() - 3600, is_flown=True))
+        assert bench.desk.state.way is not None, "of a flight before"
+        bench.desk.on_flight(FlightStatus("guided", "flying", since_utc_s=time.time() + 1))
+        assert bench.desk.state.way is not None
+        bench.desk.on_flight(FlightStatus("guided", "paused", since_utc_s=time.time() + 1, is_flown=True))
+        assert bench.desk.state == GuidedState()
+        assert bench.live.way is None
+
+    runner.run(scenario())
+
+
+def test_what_is_not_certified_is_shown_and_not_flown(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        centre = bench.beside(40.0, 0.0)
+        fence = Fence(circles=(circle(centre.lat_deg, centre.lon_deg, 10.0, inclusion=False, where="t"),))
+        bench.vehicle.places["fence"] = wire_items(fence_items(fence))
+        way = await bench.judged(action="to", place=centre, height_m=20.0)
+        assert way.problem == "way"
+        assert "fence" in way.reasons[0].text
+        assert bench.live.way is not None
+        assert not bench.live.way.is_certified
+        for accepts in (False, True):
+            with pytest.raises(NotCertifiedError, match="fence"):
+                await bench.desk.fly(ME, FlyWayBody(id=way.id, accept_return=accepts))
+
+    runner.run(scenario())
+
+
+def test_where_only_the_return_is_not_clear_it_is_flown_once_that_is_accepted(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def judged_so(*arguments: Any) -> WayJudged:
+        judged: WayJudged = await lane.call(*arguments)
+        return replace(judged, way=replace(judged.way, problem="return"))
+
+    async def scenario() -> None:
+        stand_in: Any = SimpleNamespace(call=judged_so)
+        bench = Bench(made, stand_in)
+        way = await bench.judged(action="height", height_m=20.0)
+        with pytest.raises(NotCertifiedError):
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert bench.vehicle.told == []
+        await bench.desk.fly(ME, FlyWayBody(id=way.id, accept_return=True))
+        assert isinstance(bench.vehicle.told[-1], FlyWay)
+
+    runner.run(scenario())
+
+
+def test_what_a_sensor_has_seen_is_in_the_model_that_is_judged(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        free = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        state = bench.live.state
+        assert state is not None
+        assert state.home_alt_amsl_m is not None
+        origin = MapOrigin(*made.home, state.home_alt_amsl_m)
+        wall = np.array([(15, north, 34) for north in range(-20, 20)], np.int32)
+        none, sure = np.zeros(len(wall), bool), np.full(len(wall), 250, np.uint8)
+        seen = Voxels(wall, sure, none, 1.0, origin, SENSORS[0])
+        bench.mirrors[SENSORS[0]] = SimpleNamespace(origin=origin, voxels=lambda: seen)
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        assert way.has_seen
+        assert way.problem != free.problem or way.length_m > free.length_m + 5.0, "over the wall, or not at all"
+        assert free.problem is None
+
+    runner.run(scenario())
+
+
+def test_what_cannot_be_judged_is_said_with_what_to_do(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        state = bench.live.state
+        assert state is not None
+        bench.live.state = replace(state, ground_speed_m_s=4.0)
+        with pytest.raises(NotAllowedError, match=r"moves at 4\.0 m/s") as moves:
+            await bench.judged(action="height")
+        assert "Hold" in moves.value.advice
+        bench.hovers(made.standing(), 0.0)
+        with pytest.raises(NotAllowedError, match="not in the air"):
+            await bench.judged(action="height")
+        up = await bench.judged(action="take_off", height_m=12.0)
+        assert up.problem is None
+        await bench.desk.fly(ME, FlyWayBody(id=up.id))
+        assert isinstance(bench.vehicle.told[-1], StartGuided)
+
+        without = Bench(made, lane)
+        without.document = made.document.model_copy(update={"terrain_id": None})
+        with pytest.raises(NotReadyError, match="No surface model"):
+            await without.judged(action="height")
+        with pytest.raises(NotAllowedError, match="no rally point"):
+            await Bench(made, lane).judged(action="rally")
+        assert without.told == [], "nothing has begun"
+        without.live.state = None
+        with pytest.raises(NoVehicleError):
+            await without.judged(action="height")
+
+    runner.run(scenario())
+
+
+@pytest.mark.parametrize("action", ["to", "look", "orbit"])
+def test_a_place_belongs_to_what_leads_to_one(action: str) -> None:
+    with pytest.raises(ParameterError, match="needs a place"):
+        wish_of(WayBody.model_validate({"action": action}), ())
+
+
+def test_a_place_is_refused_where_it_means_nothing() -> None:
+    with pytest.raises(ParameterError, match="takes no place"):
+        wish_of(WayBody(action="home", place=PlaceDoc(lat_deg=1.0, lon_deg=1.0)), ())
+
+
+def test_the_way_back_begins_at_the_top_of_the_take_off() -> None:
+    def at(up_m: float, north_m: float, landed: Any = "in_air") -> VehicleState:
+        lat_deg = math.degrees(north_m / 6_371_000.0)
+        return VehicleState(1, 1, lat_deg=lat_deg, lon_deg=0.0, alt_rel_home_m=up_m, landed=landed)
+
+    climb = [at(0.0, 0.0, "on_ground"), *(at(up, 0.1) for up in (1.0, 4.0, 8.0))]
+    places = flown_places([*climb, at(8.0, 5.0), at(9.0, 10.0)])
+    assert [place[2] for place in places] == [8.0, 8.0, 9.0]
+    assert [place[2] for place in flown_places(climb)] == [8.0]
+    assert flown_places([]) == ()
