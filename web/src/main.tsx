@@ -39,6 +39,7 @@ import "./styles/tracks.css";
 import "./styles/traversability.css";
 import "./styles/studies.css";
 import "./styles/parameters.css";
+import "./styles/guided.css";
 import { App } from "./shell/App";
 import { fontReady } from "./shell/font";
 import { startKeyboard } from "./shell/keyboard";

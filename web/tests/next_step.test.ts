@@ -104,6 +104,8 @@ describe("the next step", () => {
     const inAir = true;
     expect(nextStep(facts({ fly, inAir, flight: phase("flying") })).id).toBe("pause");
     expect(nextStep(facts({ fly, inAir, flight: phase("paused") })).id).toBe("resume");
+    const isFlown = { ...phase("paused"), is_flown: true };
+    expect(nextStep(facts({ fly, inAir, flight: isFlown })).id).toBe("wait");
     expect(nextStep(facts({ fly, inAir, flight: phase("returning") })).id).toBe("wait");
     expect(nextStep(facts({ fly, inAir, vehicle: vehicleState({ mode: "LOITER" }) }))).toMatchObject({
       id: "wait",

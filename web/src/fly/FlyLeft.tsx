@@ -7,6 +7,7 @@ import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { ConnectionSection } from "./Connection";
 import { FlightSection } from "./FlightSection";
+import { GuidedSection } from "./GuidedSection";
 import { NextAction } from "./NextAction";
 import { OnboardSection } from "./Onboard";
 import { ParametersSection } from "./ParametersSection";
@@ -76,9 +77,11 @@ export function FlyLeft() {
         <LinkWarnings />
         <ConnectionSection key={adopted.value && !hasTrouble ? "used" : "open"} />
         {isInAir.value && <FlightSection />}
+        {isInAir.value && <GuidedSection />}
         <OnboardSection />
         <PreflightSection />
         {!isInAir.value && <FlightSection />}
+        {!isInAir.value && <GuidedSection />}
         <ObstaclesSection />
         <ParametersSection />
         <LogsSection />

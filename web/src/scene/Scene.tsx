@@ -21,6 +21,7 @@ const HINTS = {
   home: "Click the surface to put home there",
   look_at: "Click the surface where the nose shall point",
   landing: "Click the surface near which to land",
+  there: "Click the surface: the way leads there",
   fence_polygon: "Click the surface to add a corner of the fence",
   fence_circle: "Click the surface to put a circle's centre",
   rally: "Click the surface to put a rally point",

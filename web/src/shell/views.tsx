@@ -42,7 +42,7 @@ export const views: readonly [View, ...View[]] = [
     Left: FlyLeft,
     Right: FlyRight,
     Below: FlyBelow,
-    sections: ["connection", "onboard", "preflight", "flight", "obstacles", "parameters"],
+    sections: ["connection", "onboard", "preflight", "flight", "obstacles", "parameters", "guided"],
   },
   {
     id: "review",

@@ -2,6 +2,7 @@ import { batch, computed, signal } from "@preact/signals";
 import type { ActiveMessage, FleetMessage, VehicleDoc } from "../messages";
 import { standing } from "../net/api";
 import { forgetFlying } from "./flying";
+import { forgetGuided } from "./guided";
 import { forgetMoving } from "./moving";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetOrders } from "./outcomes";
@@ -21,6 +22,7 @@ export function takeActive({ vehicle }: ActiveMessage): void {
     forgetSensing("live");
     forgetObstacles("live");
     forgetMoving("live");
+    forgetGuided();
     forgetOrders();
     active.value = vehicle;
   });

@@ -1,6 +1,7 @@
 import { batch } from "@preact/signals";
 import type { ServerMessage } from "../messages";
 import { fly, flight, heard, linkStatus, nodes, recorder, transfer } from "./flying";
+import { forgetGuided } from "./guided";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
@@ -16,6 +17,7 @@ const FORGET: Partial<Record<string, () => void>> = {
   link: () => (linkStatus.value = null),
   transfer: () => (transfer.value = null),
   fly: () => (fly.value = null),
+  guided: forgetGuided,
   nodes: () => (nodes.value = []),
   recorder: () => (recorder.value = null),
   review: () => (review.value = null),

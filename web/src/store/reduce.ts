@@ -4,6 +4,7 @@ import { alarms } from "./alarms";
 import { takeActive, takeFleet } from "./fleet";
 import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
+import { guided } from "./guided";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
@@ -74,6 +75,9 @@ export function receive(message: ServerMessage): void {
     case "nodes":
     case "recorder":
       takeFlying(message, performance.now());
+      return;
+    case "guided":
+      guided.value = message.guided;
       return;
     case "recordings":
     case "review":
