@@ -6,11 +6,11 @@ import asyncio
 import math
 import secrets
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapping.geometry.frames import apart_m
 from planning.guided.model import RETURNS
-from server.errors import ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.library import Library
@@ -27,6 +27,7 @@ from server.schemas import (
     WayDoc,
     WaySpeedBody,
 )
+from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
@@ -47,6 +48,7 @@ NOWHERE = "Nothing is judged any more, or another way was judged meanwhile."
 class _InHand:
     doc: WayDoc
     judged: WayJudged
+    judged_mono_s: float
     flies_since_utc_s: float | None = None
 
 
@@ -84,7 +86,7 @@ class WayDesk:
         self._tell()
         try:
             judged = await self._judged(operator, body, terrain)
-            self._in_hand = _InHand(_doc(judged, body, terrain), judged)
+            self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic())
         finally:
             self._is_judging = False
             self._tell()
@@ -96,6 +98,9 @@ class WayDesk:
         if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
         doc, judged = in_hand.doc, in_hand.judged
+        if time.monotonic() - in_hand.judged_mono_s > CHECK_FRESH_S:
+            what = f"The way was judged more than {CHECK_FRESH_S:.0f} s ago: more may have been seen since."
+            raise CheckNeededError(what, advice="Ask for the way again.")
         if doc.problem == "way" or (doc.problem == "return" and not body.accept_return):
             first = doc.reasons[0] if doc.reasons else None
             what = "The way is not certified" + ("." if first is None else f": {first.text}")
@@ -104,7 +109,8 @@ class WayDesk:
         request = way_request(operator, judged.way, judged.wish, speed_m_s=judged.speed_m_s, most_m_s=judged.most_m_s)
         await self._link.call(request)
         if self._in_hand is in_hand:
-            self._in_hand = _InHand(doc.model_copy(update={"flies": True}), judged, since_utc_s)
+            doc = doc.model_copy(update={"flies": True})
+            self._in_hand = replace(in_hand, doc=doc, flies_since_utc_s=since_utc_s)
             self._tell()
 
     async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
@@ -112,7 +118,7 @@ class WayDesk:
         await self._link.call(SetSpeed(operator, body.speed_m_s))
         if (in_hand := self._in_hand) is not None:
             doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
-            self._in_hand = _InHand(doc, in_hand.judged, in_hand.flies_since_utc_s)
+            self._in_hand = replace(in_hand, doc=doc)
             self._tell()
 
     def drop(self) -> GuidedState:

@@ -16,12 +16,13 @@ import pytest
 from planning.errors import ParameterError
 from planning.fence.model import Fence, circle
 from planning.formats.fence_items import fence_items
-from server.errors import ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.way_desk import WayDesk, flown_places
 from server.flying.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.scene.mirror import Voxels
 from server.schemas import FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
+from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.mavlink.items import wire_items
@@ -182,6 +183,22 @@ def test_what_a_sensor_has_seen_is_in_the_model_that_is_judged(made: Made, lane:
         assert way.has_seen
         assert way.problem != free.problem or way.length_m > free.length_m + 5.0, "over the wall, or not at all"
         assert free.problem is None
+
+    runner.run(scenario())
+
+
+def test_a_way_that_was_judged_long_ago_is_asked_for_again(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        way = await bench.judged(action="height", height_m=20.0)
+        late_s = time.monotonic() + CHECK_FRESH_S + 1.0
+        monkeypatch.setattr("server.flying.way_desk.time.monotonic", lambda: late_s)
+        with pytest.raises(CheckNeededError, match="120 s ago"):
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert bench.vehicle.told == []
+        monkeypatch.undo()
 
     runner.run(scenario())
 
