@@ -32,7 +32,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NoVehicleError
-from telemetry.flight.certified_way import way_request, way_words
+from telemetry.flight.certified_way import way_notes, way_request
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.topics.messages import FlightStatus, PlacesOnboard
@@ -78,11 +78,14 @@ class WayDesk:
         """Nothing moves. Raises what the vehicle said, NotAllowedError, NotReadyError, MissionError, ParameterError."""
         if self._is_judging:
             raise ConflictError("Another way is being judged.", advice="Wait until it is done.")
-        if self._in_hand is not None and self._in_hand.doc.flies:
+        before = self._in_hand
+        flown = before if before is not None and before.doc.flies else None
+        if flown is not None and self._live.flight.phase != "paused":
             raise ConflictError("A way is being flown.", advice="Hold first, then ask for the next way.")
         self._check_stands(body)
         terrain = self._terrain()
-        self._in_hand, self._is_judging = None, True
+        # What is paused can be gone on with, until another way is there.
+        self._in_hand, self._is_judging = flown, True
         self._tell()
         try:
             judged = await self._judged(operator, body, terrain)
@@ -195,7 +198,7 @@ def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc) -> WayDoc:
         id=secrets.token_hex(8),
         action=body.action,
         problem=way.problem,
-        text=way_words(way),
+        notes=way_notes(way),
         reasons=[ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons],
         clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
         required_m=way.certificate.required_clearance_m,

@@ -54,8 +54,8 @@ class WayDoc(Strict):
     """null: certified. "return": the way itself is clear, the vehicle's own return from it would not be."""
     flies: bool = False
     """It is being flown."""
-    text: str
-    """How long, how clear, how much raised, in a few short sentences."""
+    notes: list[str]
+    """Where it is not what was asked for: sentences."""
     reasons: list[ReasonDoc]
     clearance_m: float | None
     """Smallest distance to the surface; null: nothing is near."""

@@ -161,12 +161,18 @@ def _finite(value_m: float) -> float | None:
 def way_words(way: GuidedWay) -> str:
     """In a few short sentences."""
     kept_m, required_m = max(0.0, way.clearance_m), way.certificate.required_clearance_m
-    parts = [
+    figures = (
         f"{way.length_m:.0f} m, about {way.seconds:.0f} s; at least {rounded_down(kept_m)} m from the surface,"
         f" required {rounded_up(required_m)} m."
-    ]
-    if way.rises_m > 0.05:
-        parts.append(f"It first climbs {rounded_up(way.rises_m)} m straight up.")
+    )
+    return " ".join([figures, *way_notes(way)])
+
+
+def way_notes(way: GuidedWay) -> list[str]:
+    """Where it is not what was asked for."""
+    notes = []
+    if way.rises_m > 0.05 and np.ptp(way.points_m[:, :2], axis=0).any():
+        notes.append(f"It first climbs {rounded_up(way.rises_m)} m straight up.")
     if way.raised_m > 0.05:
-        parts.append(f"It ends {rounded_up(way.raised_m)} m higher than asked: lower is not certified.")
-    return " ".join(parts)
+        notes.append(f"It ends {rounded_up(way.raised_m)} m higher than asked: lower is not certified.")
+    return notes

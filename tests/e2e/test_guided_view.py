@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 def flown(page: Page) -> None:
     """It holds at the end of the way."""
     expect(page.get_by_test_id("way-card")).to_have_count(0, timeout=LONG_MS)
-    expect(page.get_by_test_id("next-action")).to_contain_text("It holds: choose the next way")
+    expect(page.get_by_test_id("next-action")).to_contain_text("Choose the next way")
 
 
 def test_one_way_after_the_other_is_judged_shown_and_flown(
@@ -60,7 +60,7 @@ def test_one_way_after_the_other_is_judged_shown_and_flown(
     expect(page.get_by_test_id("outcome-guided")).to_contain_text("speed is changed")
     flown(page)
 
-    page.get_by_test_id("way-back").click()
+    page.get_by_test_id("guided-back").click()
     page.get_by_test_id("way-ask").click()
     expect(card).to_contain_text("It then lands.")
     hold(page, "way-fly")

@@ -115,6 +115,11 @@ def test_a_way_is_judged_shown_and_flown_from_where_the_vehicle_hovers(
         with pytest.raises(ConflictError, match="being flown"):
             await bench.judged(action="home")
         assert bench.desk.drop().way is not None, "what is flown stays on show"
+        bench.live.flight = FlightStatus("guided", "paused")
+        with pytest.raises(ParameterError):
+            await bench.judged(action="to")
+        assert bench.desk.state.way is not None, "it can still be gone on with"
+        bench.live.flight = FlightStatus("guided", "flying")
 
         await bench.desk.set_speed(ME, WaySpeedBody(speed_m_s=1.5))
         assert bench.vehicle.told[-1] == SetSpeed(ME, 1.5)

@@ -1464,8 +1464,8 @@ export interface WayDoc {
   problem: "way" | "return" | null;
   /** It is being flown. */
   flies: boolean;
-  /** How long, how clear, how much raised, in a few short sentences. */
-  text: string;
+  /** Where it is not what was asked for: sentences. */
+  notes: string[];
   reasons: ReasonDoc[];
   /** Smallest distance to the surface; null: nothing is near. */
   clearance_m: number | null;

@@ -1,6 +1,6 @@
-import { clearance, metres, withUnit } from "../format";
+import { clearance, demanded, metres, withUnit } from "../format";
 import { LIMITS, type WayDoc } from "../messages";
-import { adopted, isInAir } from "../store/flying";
+import { adopted, flight, isInAir } from "../store/flying";
 import { guided } from "../store/guided";
 import { pending } from "../store/outcomes";
 import { whyNotCommand } from "../store/reach";
@@ -128,8 +128,8 @@ function Wish() {
     <>
       {isInAir.value && (
         <div class="way-actions">
-          <Segmented label="Fly" testid="way" value={asked} options={GOES} onChange={set} />
-          <Segmented label="Return" testid="way" value={asked} options={RETURNS} onChange={set} />
+          <Segmented label="Fly" testid="guided" value={asked} options={GOES} onChange={set} />
+          <Segmented label="Return" testid="guided" value={asked} options={RETURNS} onChange={set} />
         </div>
       )}
       <Fields asked={asked} />
@@ -181,7 +181,7 @@ function Facts({ way }: { way: WayDoc }) {
       <dt>Clear by</dt>
       <dd data-testid="way-clearance">{clearance(way.clearance_m)}</dd>
       <dt>Required</dt>
-      <dd>{clearance(way.required_m)}</dd>
+      <dd>{demanded(way.required_m)}</dd>
       <dt>Length</dt>
       <dd>{metres(way.length_m, 0)}</dd>
       <dt>Takes</dt>
@@ -207,7 +207,9 @@ function Way({ way }: { way: WayDoc }) {
         <span class="muted">{TITLES[way.action]}</span>
       </strong>
       <Facts way={way} />
-      <p data-testid="way-text">{way.text}</p>
+      {way.notes.map((note) => (
+        <p key={note}>{note}</p>
+      ))}
       {way.reasons.length > 0 && (
         <ul class="way-reasons" data-testid="way-reasons">
           {way.reasons.map(({ code, text, mend }) => (
@@ -241,7 +243,7 @@ function Way({ way }: { way: WayDoc }) {
               icon="play"
               place={GUIDED}
               disabled={why !== null}
-              title={why ?? way.text}
+              title={why ?? "From where it is now"}
               testid="way-fly"
               onHold={() => void flyWay(way.id, !isClear)}
             />
@@ -266,9 +268,10 @@ function summary(): string {
 export function GuidedSection() {
   if (!adopted.value) return null;
   const { way, is_judging } = guided.value;
+  const isPaused = way?.flies && flight.live.value?.phase === "paused";
   return (
     <Section id={GUIDED} title="Guided flight" icon="route" summary={summary()} isUrgent={way !== null}>
-      {!way?.flies && <Wish />}
+      {(!way || isPaused) && <Wish />}
       {is_judging && (
         <p class="working" role="status">
           <span class="spinner" aria-hidden="true" /> Judging the way…

@@ -49,8 +49,7 @@ function inFlight(facts: Facts): Step | null {
   if (phase === "arming") return { id: "wait", why: "Arming…" };
   if (phase === "taking_off") return { id: "pause" };
   if (phase === "flying") return { id: "pause" };
-  if (phase === "paused" && facts.flight?.is_flown)
-    return { id: "wait", why: "It holds: choose the next way, return or land" };
+  if (phase === "paused" && facts.flight?.is_flown) return { id: "wait", why: "Choose the next way" };
   if (phase === "paused") return { id: "resume" };
   if (phase === "returning") return { id: "wait", why: "On the way home" };
   if (!facts.inAir) return null;
