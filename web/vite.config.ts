@@ -1,5 +1,5 @@
 import { defineConfig } from "vitest/config";
-import { helpPages } from "./src/help/build";
+import { helpPages } from "./src/help/build.ts";
 
 // `npm run dev` serves the sources and passes everything else to a running Hedgehop server.
 const SERVER = "http://127.0.0.1:8000";

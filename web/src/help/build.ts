@@ -1,6 +1,6 @@
 import type { Plugin } from "vite";
-import { contentsOf } from "./contents";
-import { pageOf } from "./render";
+import { contentsOf } from "./contents.ts";
+import { pageOf } from "./render.ts";
 
 const PICTURE = /\.(webp|svg)$/;
 

@@ -1,5 +1,5 @@
 import { Marked, type Tokens } from "marked";
-import type { Group, Page } from "./contents";
+import type { Group, Page } from "./contents.ts";
 
 interface Heading {
   anchor: string;
