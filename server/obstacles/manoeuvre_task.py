@@ -18,7 +18,7 @@ from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cru
 from server.scene.mirror import Voxels
 from server.schemas import ManoeuvreDoc
 from server.work.jobs import Progress
-from telemetry.topics.messages import GuidedTarget, PlanRecord
+from telemetry.topics.messages import FlightStatus, GuidedTarget, PlanRecord
 from telemetry.topics.obstacles import GroundNotice, MapOrigin, ObstacleAlert
 
 if TYPE_CHECKING:
@@ -31,11 +31,13 @@ BESIDE_M = 3.0
 """A vehicle farther than this from where its leg begins is on its way to it."""
 NEAR_M = 250.0
 """Farther from the vehicle no way leads."""
+NO_MISSION = "A guided way is flown, not the mission. Hold, then ask for another way."
 
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
     from planning.evading.manoeuvres import AvoidanceParams, around, over
+    from planning.evading.model import NoWay
     from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
@@ -45,7 +47,8 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
         return ()
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
-    ahead = None if line is None else _ahead(line, position, situation)
+    flies_way = _flies_way(situation.flight)
+    ahead = None if line is None or flies_way else _ahead(line, position, situation)
     reach_up = math.tan(math.radians(situation.radar_high_deg))
     seen = [_seen(voxels, situation.origin, frame, position, reach_up) for voxels in situation.maps if len(voxels.keys)]
     surface = _surface(ground_notice(situation.terrain), situation.origin)
@@ -58,11 +61,18 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     if (alert := situation.alert) is not None and ahead is not None:
         ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
         prepared += [_prepared(way, alert, situation, ahead, frame) for way in ways]
+    if situation.alert is not None and flies_way:
+        prepared += [impossible(NoWay(kind, NO_MISSION), situation.alert) for kind in ("over", "around")]
     if situation.approach is not None:
         prepared.append(
             sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
         )
     return tuple(prepared)
+
+
+def _flies_way(flight: FlightStatus) -> bool:
+    """A guided way, whose places are no items of a mission: none can be gone on from after another way."""
+    return flight.way == "guided" and flight.phase in ("flying", "paused") and flight.target is None
 
 
 def required_m(record: PlanRecord) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -233,6 +233,19 @@ def test_on_the_way_home_it_holds_after_the_sidestep(planned: tuple[Dsm, PlanRec
     (way,) = prepare(home, report=lambda *_: None)
     assert (way.rejoin_item, len(way.targets)) == (None, 1)
     assert way.doc.text.endswith("then it holds there.")
+
+
+@pytest.mark.parametrize("phase", ["flying", "paused"])
+def test_on_a_guided_way_nothing_leads_back_to_the_mission(
+    planned: tuple[Dsm, PlanRecord, Path], phase: Literal["flying", "paused"]
+) -> None:
+    flight = FlightStatus(way="guided", phase=phase)
+    ways = prepare(replace(situation(planned, 4), flight=flight), report=lambda *_: None)
+    assert [(way.doc.kind, way.doc.possible) for way in ways] == [("over", False), ("around", False)]
+    assert all("ask for another way" in way.doc.text for way in ways)
+    (aside,) = prepare(coming(planned, flight=flight), report=lambda *_: None)
+    assert (aside.rejoin_item, len(aside.targets)) == (None, 1)
+    assert aside.doc.text.endswith("then it holds there.")
 
 
 def test_where_the_object_is_by_now_counts(planned: tuple[Dsm, PlanRecord, Path]) -> None:
