@@ -44,6 +44,8 @@ def test_one_way_after_the_other_is_judged_shown_and_flown(
     hold(page, "way-fly")
     flown(page)
 
+    page.get_by_test_id("way-speed").fill("5")
+    page.get_by_test_id("way-speed").press("Enter")
     page.get_by_test_id("view-top").click()
     page.get_by_test_id("way-click").click()
     expect(page.get_by_test_id("tool-hint")).to_contain_text("the way leads there")
@@ -55,7 +57,7 @@ def test_one_way_after_the_other_is_judged_shown_and_flown(
     expect(page.get_by_test_id("undo")).to_be_disabled()
     hold(page, "way-fly")
     speed = page.get_by_test_id("way-flown-speed")
-    speed.fill("4")
+    speed.fill("4.5")
     speed.press("Enter")
     expect(page.get_by_test_id("outcome-guided")).to_contain_text("speed is changed")
     flown(page)
