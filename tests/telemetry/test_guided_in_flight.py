@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -28,8 +28,8 @@ BRAKE = 17
 WAY = (target(0, 0, 14.0), target(0, 12, 14.0), target(0, 12, 8.0))
 
 
-def way(targets: tuple[GuidedTarget, ...] = WAY, **more: Any) -> FlyWay:
-    return FlyWay(Operator("Ada", 1), targets, HOME[0], HOME[1], 10.0, **({"most_m_s": 5.0} | more))
+def way(targets: tuple[GuidedTarget, ...] = WAY, end: Literal["land", "hold"] = "hold") -> FlyWay:
+    return FlyWay(Operator("Ada", 1), targets, HOME[0], HOME[1], 10.0, 5.0, end=end)
 
 
 def hovering(*, px4: bool = False, up_m: float = 10.0) -> Craft:
