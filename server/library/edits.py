@@ -19,15 +19,22 @@ def next_poi_name(document: PlanDoc) -> str:
 def clicked(
     document: PlanDoc, selection: SelectionDoc, lat_deg: float, lon_deg: float
 ) -> tuple[str, PlanDoc, SelectionDoc] | None:
-    """(undo label, new document, new selection) for a click on the terrain; None when it edits nothing."""
+    """(undo label, new document, new selection) for a click on the terrain; None when it edits nothing.
+
+    The second click of a double click is on the very place of the first, and adds nothing.
+    """
     place = PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg)
     match selection.tool:
         case "add_poi":
+            if document.pois and _place(document.pois[-1]) == place:
+                return None
             name = next_poi_name(document)
             poi = PoiDoc(id=new_id(), lat_deg=lat_deg, lon_deg=lon_deg, name=name)
             added = document.model_copy(update={"pois": [*document.pois, poi], "source": "pois"})
             return f"Add {name}", added, selection.model_copy(update={"poi_id": poi.id, "fence_mark": None})
         case "polygon":
+            if document.survey.polygon[-1:] == [place]:
+                return None
             survey = document.survey.model_copy(update={"polygon": [*document.survey.polygon, place]})
             return "Add corner", document.model_copy(update={"survey": survey, "source": "survey"}), selection
         case "home":
@@ -43,6 +50,10 @@ def clicked(
             return clicked_rally(document, selection, place)
         case _:
             return None
+
+
+def _place(poi: PoiDoc) -> PlaceDoc:
+    return PlaceDoc(lat_deg=poi.lat_deg, lon_deg=poi.lon_deg)
 
 
 def picked(document: PlanDoc, selection: SelectionDoc, mark: str) -> SelectionDoc:

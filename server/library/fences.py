@@ -75,16 +75,23 @@ def with_fence(document: PlanDoc, shapes: Fence, rally: Sequence[RallyPoint]) ->
     return document.model_copy(update={"fence": doc, "rally": points})
 
 
-def clicked_polygon(document: PlanDoc, selection: SelectionDoc, place: PlaceDoc) -> Made:
-    """One more corner, after the selected one of a selected polygon; three make a new one, which is kept out of."""
+def clicked_polygon(document: PlanDoc, selection: SelectionDoc, place: PlaceDoc) -> Made | None:
+    """One more corner, after the selected one of a selected polygon; three make a new one, which is kept out of.
+
+    None: the corner before stands there already.
+    """
     for number, shape in enumerate(document.fence.polygons, start=1):
         shape_id, _, corner = (selection.fence_mark or "").partition(".")
         if shape.id != shape_id:
             continue
         at = min(int(corner) + 1 if corner.isdecimal() else len(shape.corners), len(shape.corners))
+        if shape.corners[:at][-1:] == [place]:
+            return None
         corners = [*shape.corners[:at], place, *shape.corners[at:]]
         label, chosen = f"Add corner to polygon {number}", f"{shape_id}.{at}"
         return label, _with_corners(document, shape_id, corners), _chosen(selection, chosen)
+    if selection.draft[-1:] == [place]:
+        return None
     corners = [*selection.draft, place]
     if len(corners) < 3:
         return "", document, _chosen(selection, None).model_copy(update={"draft": corners})

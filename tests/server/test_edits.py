@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from server.library.edits import clicked, moved, next_poi_name
 from server.schemas import PlaceDoc, PlanDoc, PoiDoc, SelectionDoc
 
@@ -30,6 +32,16 @@ def test_polygon_appends_a_corner_and_stays_in_hand() -> None:
     label, document, selection = through("polygon", PlanDoc())
     assert (label, document.source, selection.tool) == ("Add corner", "survey", "polygon")
     assert document.survey.polygon == [PlaceDoc(lat_deg=10.0, lon_deg=20.0)]
+
+
+@pytest.mark.parametrize("tool", ["add_poi", "polygon", "fence_polygon"])
+def test_the_second_click_of_a_double_click_adds_nothing(tool: Any) -> None:
+    _, once, selection = through(tool, PlanDoc())
+    assert clicked(once, selection, 10.0, 20.0) is None
+    elsewhere = clicked(once, selection, 10.0, 20.00001)
+    assert elsewhere is not None
+    back = clicked(elsewhere[1], elsewhere[2], 10.0, 20.0)
+    assert back is not None, "a place may be passed twice, as long as it is left between"
 
 
 def test_home_and_look_at_are_set_once() -> None:

@@ -60,6 +60,13 @@ def test_a_corner_is_added_after_the_selected_one() -> None:
     assert selection.fence_mark == f"{shape.id}.1"
 
 
+def test_a_corner_that_stands_where_the_selected_one_does_is_not_added() -> None:
+    document = drawn()
+    shape = document.fence.polygons[0]
+    assert clicked(document, SelectionDoc(tool="fence_polygon", fence_mark=f"{shape.id}.1"), *SQUARE[1]) is None
+    assert clicked(document, SelectionDoc(tool="fence_polygon", fence_mark=shape.id), *SQUARE[3]) is None
+
+
 def test_a_mark_of_a_polygon_that_is_gone_begins_a_new_one() -> None:
     chosen = SelectionDoc(tool="fence_polygon", fence_mark="gone.1")
     _, document, selection = click(PlanDoc(), chosen, SQUARE[0])
