@@ -9,7 +9,8 @@ from typing import Any
 
 from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError
-from server.flying.nearness import Nearness
+from server.flying.apart.nearness import Nearness
+from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.recordings import RecordingDesk
 from server.flying.reviewing import Reviewing
 from server.flying.scenery import Scenery
@@ -55,6 +56,10 @@ class Fleet:
         self.recordings = RecordingDesk(shelf, workspace.board, self.reviewing, present)
         self.uwb = LiveUwb(workspace.traversability, library, self.first.bus)
         self._nearness = Nearness({flying.number: (flying.name, flying.live) for flying in flights})
+        self._others = OtherVehicles(
+            {flying.number: flying.as_other for flying in flights},
+            {flying.number: flying.desk.on_others for flying in flights},
+        )
         self._scenery = Scenery(
             workspace.stage,
             {**{actor_of("live", f.number): f.live for f in flights}, "replay": self._replay},
@@ -126,7 +131,7 @@ class Fleet:
             *(loop for flying in self.flights for loop in flying.loops(demo=demo)),
             *self._relay().loops(),
             self._hear_of_plan(),
-            *([self._tell(), self._nearness.run()] if len(self._flights) > 1 else []),
+            *([self._tell(), self._nearness.run(), self._others.run()] if len(self._flights) > 1 else []),
             self.recordings.run(),
             self._scenery.run(),
             *self.uwb.loops(),

@@ -15,6 +15,7 @@ from server.door.hub import Hub
 from server.door.lease import Lease
 from server.door.operators import Operators
 from server.errors import reported
+from server.flying.apart.other_vehicles import Other, known
 from server.flying.flight_desk import FlightDesk
 from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
@@ -127,7 +128,9 @@ class Flying:
         self.obstacles, self.looking = self._obstacles.desk, self._obstacles.looking
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
-        self.desk = FlightDesk(link, work, aboard, workspace, self.live, self._watch, bus, present)
+        self.desk = FlightDesk(
+            link, work, aboard, workspace, self.live, self._watch, bus, present, is_alone=wanted.is_alone
+        )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
         self.parameters = ParameterDesk(link, self.live, aboard, library.root)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
@@ -274,6 +277,12 @@ class Flying:
     async def _on_recorder(self, status: RecorderStatus) -> None:
         self.recording.on_status(status)
         await self._track_so_far.on_status(status)
+
+    def as_other(self) -> Other:
+        """As vehicles that wait for their start are held against it."""
+        status = self.connections.status
+        is_verified = status is not None and status.mission_state == "verified" and self._aboard.record is not None
+        return known(self.name, self.live, is_verified=is_verified)
 
     # Pages and who is in charge
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping.geometry.arrays import F64
+from mapping.geometry.arrays import F64, I64
 from planning.errors import ParameterError
 
 PIECE_S = 0.5
 """A piece takes no longer: by what the balls grow in it the answer may be too small."""
 _TINY_M2 = 1e-12
+_ROUNDING_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,14 @@ class Nearest:
     """Half way between both lines."""
 
 
+def ways_apart(a_enu_m: F64, b_enu_m: F64, *, radius_m: float) -> Nearest:
+    """The same whenever either is flown: of two ways through points (N, 3), each with a ball of ``radius_m``."""
+    first, second = (TimedLine(points_m, np.zeros(len(points_m)), radius_m) for points_m in (a_enu_m, b_enu_m))
+    found = nearest(first, second)
+    assert found is not None, "both are under way at their one moment"
+    return found
+
+
 def nearest(a: TimedLine, b: TimedLine) -> Nearest | None:
     """None when there is no time at which both are under way."""
     pieces_a, pieces_b = _pieces(a), _pieces(b)
@@ -65,6 +74,7 @@ def nearest(a: TimedLine, b: TimedLine) -> Nearest | None:
     i, j = np.nonzero(together)
     if not len(i):
         return None
+    i, j = _worth_a_look(pieces_a, pieces_b, i, j)
     apart_m, middle_m = _between(pieces_a.start_m[i], pieces_a.end_m[i], pieces_b.start_m[j], pieces_b.end_m[j])
     clear_m = apart_m - pieces_a.radius_m[i] - pieces_b.radius_m[j]
     clear_m = np.maximum(clear_m, 0.0)
@@ -101,6 +111,17 @@ def _pieces(line: TimedLine) -> _Pieces:
     gone_s = end_s - line.t_s[0]
     span_s = line.early_late_s + line.early_late_share * gone_s
     return _Pieces(start_m, end_m, start_s - span_s, end_s + span_s, line.radius_m + line.spread_m_s * gone_s)
+
+
+def _worth_a_look(a: _Pieces, b: _Pieces, i: I64, j: I64) -> tuple[I64, I64]:
+    """Without pairs whose boxes are farther apart than the beginnings of some other pair."""
+    radii_m = a.radius_m[i] + b.radius_m[j]
+    enough_m = max(0.0, float((np.linalg.norm(a.start_m[i] - b.start_m[j], axis=1) - radii_m).min()))
+    low_a, high_a = np.minimum(a.start_m, a.end_m), np.maximum(a.start_m, a.end_m)
+    low_b, high_b = np.minimum(b.start_m, b.end_m), np.maximum(b.start_m, b.end_m)
+    gap_m = np.maximum(np.maximum(low_a[i] - high_b[j], low_b[j] - high_a[i]), 0.0)
+    near = np.linalg.norm(gap_m, axis=1) - radii_m <= enough_m + _ROUNDING_M
+    return i[near], j[near]
 
 
 def _between(p: F64, q: F64, r: F64, s: F64) -> tuple[F64, F64]:

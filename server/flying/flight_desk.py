@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 
 from server.errors import CheckNeededError, ConflictError
+from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
@@ -19,7 +20,7 @@ from server.flying.work import FlightWork
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard, onboard
 from server.obstacles.obstacle_watch import Watch
-from server.schemas import FlyMessage, FlyState, Pages, PreflightDoc, StartFlight
+from server.schemas import CheckRow, FlyMessage, FlyState, Pages, PreflightDoc, StartFlight
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
@@ -49,12 +50,16 @@ class FlightDesk:
         watch: Watch,
         bus: Bus,
         pages: Pages,
+        *,
+        is_alone: bool,
     ) -> None:
+        """``is_alone``: the station has no other vehicle."""
         self._link, self._work, self._aboard, self._workspace = link, work, aboard, workspace
         self._live, self._watch, self._bus, self._pages = live, watch, bus, pages
         self._utc_minus_mono_s = time.time() - time.monotonic()
         self._flight = FlightStatus()
         self._ready: Ready | None = None
+        self._others = None if is_alone else PENDING
         self._busy = self._at_fence = ""
         self._told: FlyState | None = None
 
@@ -79,6 +84,12 @@ class FlightDesk:
     def on_flight(self, flight: FlightStatus) -> None:
         self._flight = flight
         self.refresh()
+
+    def on_others(self, row: CheckRow) -> None:
+        """What the station's other vehicles mean for a start now."""
+        if row != self._others:
+            self._others = row
+            self.refresh()
 
     def on_disarmed(self) -> None:
         """A flight changes what was checked before it, the battery above all."""
@@ -145,7 +156,7 @@ class FlightDesk:
     # How
 
     def _preflight(self, ready: Ready) -> PreflightDoc:
-        return preflight_now(ready, self._watch.avoidance, utc_minus_mono_s=self._utc_minus_mono_s)
+        return preflight_now(ready, self._watch.avoidance, self._others, utc_minus_mono_s=self._utc_minus_mono_s)
 
     def _check_start(self, body: StartFlight) -> Ready:
         return check_start(
@@ -153,6 +164,7 @@ class FlightDesk:
             body,
             self._state(),
             self._watch.avoidance,
+            self._others,
             now_mono_s=time.monotonic(),
             utc_minus_mono_s=self._utc_minus_mono_s,
         )

@@ -30,8 +30,10 @@ class Ready:
     checked_mono_s: float
 
 
-def preflight_now(ready: Ready, avoidance: AvoidanceStatus, *, utc_minus_mono_s: float) -> PreflightDoc:
-    """The check with what avoidance sees by now: a sensor may have come or gone since."""
+def preflight_now(
+    ready: Ready, avoidance: AvoidanceStatus, others: CheckRow | None, *, utc_minus_mono_s: float
+) -> PreflightDoc:
+    """The check with what avoidance sees by now, and where other vehicles are: both may have come or gone since."""
     from telemetry.flight.preflight.eyes_check import avoidance_row
     from telemetry.flight.preflight.parameters import Speeds
 
@@ -39,7 +41,7 @@ def preflight_now(ready: Ready, avoidance: AvoidanceStatus, *, utc_minus_mono_s:
     speeds = checked.speeds or Speeds()
     row = avoidance_row(avoidance, speeds, checked.braking, utc_minus_mono_s=utc_minus_mono_s)
     shown = CheckRow(code=row.code, state=row.state, text=row.text, mend=row.mend)
-    return checked.doc.model_copy(update={"rows": [*checked.doc.rows, shown]})
+    return checked.doc.model_copy(update={"rows": [*checked.doc.rows, shown, *([] if others is None else [others])]})
 
 
 def check_start(
@@ -47,6 +49,7 @@ def check_start(
     body: StartFlight,
     state: VehicleState,
     avoidance: AvoidanceStatus,
+    others: CheckRow | None,
     *,
     now_mono_s: float,
     utc_minus_mono_s: float,
@@ -58,7 +61,7 @@ def check_start(
         raise CheckNeededError(f"The check is {now_mono_s - ready.checked_mono_s:.0f} s old.", advice=_AGAIN)
     if _has_moved(ready.state, state):
         raise CheckNeededError("The vehicle was moved after the check.", advice=_AGAIN)
-    for row in preflight_now(ready, avoidance, utc_minus_mono_s=utc_minus_mono_s).rows:
+    for row in preflight_now(ready, avoidance, others, utc_minus_mono_s=utc_minus_mono_s).rows:
         if row.state in ("bad", "unknown"):
             raise CheckNeededError(row.text, advice=row.mend or _AGAIN)
         if row.state == "accept" and row.code not in body.accept:

@@ -71,6 +71,20 @@ class Ahead:
     """(N,) seconds from now; never falling"""
 
 
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """All of a plan's way: up from home, along the line, and straight home at the return height."""
+
+    lat_lon_deg: F64
+    """(N, 2)"""
+    alt_rel_home_m: F64
+    """(N,)"""
+    t_s: F64 | None
+    """(M,) predicted seconds since lift-off, of the first M of them, up to the line's end; None where unknown"""
+    takeoff_s: float
+    """Until it leaves the first waypoint; where between the ground and there it is before that, nothing tells."""
+
+
 class Follower:
     """Remembers where along the plan the vehicle was; quick enough for the event loop."""
 
@@ -131,6 +145,25 @@ class Follower:
         lat_lon_deg = followed.placer.dsm.lat_lon_from_xy(points_m[:, :2])
         return Ahead(
             lat_lon_deg, points_m[:, 2] - reference.home_alt_dsm_m, np.maximum.accumulate(np.maximum(t_s, 0.0))
+        )
+
+    def whole(self) -> Whole | None:
+        """None where no plan is known."""
+        followed = self._followed
+        if followed is None or followed.profile is None:
+            return None
+        reference, home_m = followed.reference, followed.reference.home_alt_dsm_m
+        x, y = reference.home_xy_m
+        line_m = np.repeat(reference.points_m, 2, axis=0)
+        back_m = max(home_m + followed.profile.rtl_height_m, float(line_m[-1, 2]))
+        home = np.array([[*line_m[-1, :2], back_m], [x, y, back_m], [x, y, home_m]])
+        points_m = np.vstack([[x, y, home_m], line_m, home])
+        t_s = np.concatenate([[0.0], np.column_stack([reference.arrive_s, reference.leave_s]).ravel()])
+        return Whole(
+            followed.placer.dsm.lat_lon_from_xy(points_m[:, :2]),
+            points_m[:, 2] - home_m,
+            np.maximum.accumulate(t_s) if np.isfinite(t_s).all() else None,
+            reference.takeoff_s,
         )
 
     def _keep_least(self, flight: FlightStatus, near: dict[str, float | None]) -> None:

@@ -61,7 +61,9 @@ class TrackDoc(Strict):
 class CheckRow(Strict):
     """One line of the check before the start."""
 
-    code: Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance", "fence"]
+    code: Literal[
+        "mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance", "fence", "others"
+    ]
     state: Literal["good", "accept", "bad", "unknown"]
     """accept: may be flown once the operator accepts it; bad and unknown: not at all."""
     text: str
@@ -192,7 +194,7 @@ class UploadPlan(Strict):
 class StartFlight(Strict):
     way: Literal["auto", "guided"] = "auto"
     digest: str
-    accept: list[Literal["gnss", "battery", "rtl_height", "avoidance", "fence"]] = Field(default_factory=list)
+    accept: list[Literal["gnss", "battery", "rtl_height", "avoidance", "fence", "others"]] = Field(default_factory=list)
     from_item: Annotated[int, Field(ge=1)] = 1
 
 

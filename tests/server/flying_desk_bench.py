@@ -121,7 +121,7 @@ class Made:
 class Bench:
     """Stands for all that hangs on the desk, but for the vehicle."""
 
-    def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane]) -> None:
+    def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane], *, is_alone: bool = True) -> None:
         self.vehicle, self.plan = Vehicle(), made.plan()
         self.plan_lane = lanes[0]
         self.live = SimpleNamespace(state=made.standing())
@@ -132,7 +132,7 @@ class Bench:
         work = FlightWork(made.library, me.vehicle, me, lanes[1])
         bus: Any = SimpleNamespace(publish=lambda topic, record: self.records.append(record))
         self.aboard = Aboard(file)
-        self.desk = FlightDesk(me.vehicle, work, self.aboard, me, me.live, me.watch, bus, self)
+        self.desk = FlightDesk(me.vehicle, work, self.aboard, me, me.live, me.watch, bus, self, is_alone=is_alone)
         self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
 
     @property

@@ -13,6 +13,7 @@ import pytest
 
 from planning.formats.wpl import read_wpl
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotReadyError, StaleRevisionError
+from server.flying.apart.other_vehicles import PENDING
 from server.schemas import CheckRow, FenceCircleDoc, FenceDoc, PlaceDoc, StartFlight
 from server.work.jobs import Lane
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
@@ -227,6 +228,35 @@ def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
         await bench.desk.start(ME, start)
         bench.watch.avoidance = replace(bench.watch.avoidance, state="blind", eyes=())
         await bench.desk.start(ME, start.model_copy(update={"accept": ["avoidance"]}))
+
+    runner.run(scenario())
+
+
+def test_beside_other_vehicles_nobody_starts_before_it_is_told_what_they_do(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    def row(state: str, text: str) -> CheckRow:
+        return CheckRow.model_validate({"code": "others", "state": state, "text": text})
+
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both, is_alone=False)
+        await bench.desk.upload(ME, 3)
+        state = await bench.desk.check(ME)
+        assert state.preflight is not None
+        assert [row for row in state.preflight.rows if row.state != "good"] == [PENDING]
+        start = StartFlight(digest=state.onboard.digest or "")
+        willing = start.model_copy(update={"accept": ["others"]})
+        with pytest.raises(CheckNeededError, match="not known yet"):
+            await bench.desk.start(ME, willing)
+        bench.desk.on_others(row("bad", "It may come within 1 m of Bee."))
+        assert bench.told[-1].preflight is not None
+        assert bench.told[-1].preflight.rows[-1].text == "It may come within 1 m of Bee."
+        with pytest.raises(CheckNeededError, match="within 1 m of Bee"):
+            await bench.desk.start(ME, willing)
+        bench.desk.on_others(row("accept", "Bee has such a mission, too."))
+        with pytest.raises(CheckNeededError, match="such a mission"):
+            await bench.desk.start(ME, start)
+        await bench.desk.start(ME, willing)
 
     runner.run(scenario())
 

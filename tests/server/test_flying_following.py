@@ -75,3 +75,24 @@ def test_what_is_left_of_the_plan_is_told_in_time_and_only_while_it_is_flown() -
     assert left_s == sorted(left_s, reverse=True)
     assert left_s[0] > left_s[-1]
     assert live.ahead(FlightStatus(phase="returning")) is None
+
+
+def test_the_whole_way_leads_up_along_the_line_and_home_at_the_return_height() -> None:
+    profile = load_profile("generic-quad")
+    reference = reference_line(FLOWN, PLAIN, profile)
+    followed = replace(Followed.over(reference, PLAIN), profile=profile)
+    whole = Follower(followed).whole()
+    assert whole is not None
+    up_m, count = whole.alt_rel_home_m, len(reference.points_m)
+    assert up_m[0] == up_m[-1] == 0.0
+    assert list(whole.lat_lon_deg[0]) == list(whole.lat_lon_deg[-1])
+    np.testing.assert_allclose(up_m[1 : 2 * count : 2], reference.points_m[:, 2] - reference.home_alt_dsm_m)
+    np.testing.assert_allclose(up_m[-3:-1], max(profile.rtl_height_m, up_m[-4]))
+    np.testing.assert_allclose(whole.lat_lon_deg[-3], whole.lat_lon_deg[-4])
+    assert whole.t_s is not None
+    assert len(whole.t_s) == len(up_m) - 3
+    assert whole.t_s[0] == 0.0
+    assert (np.diff(whole.t_s) >= 0.0).all()
+    assert whole.t_s[-1] == max(reference.leave_s)
+    assert Follower(replace(followed, profile=None)).whole() is None
+    assert Follower(over=PLAIN).whole() is None

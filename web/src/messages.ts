@@ -1291,7 +1291,7 @@ export interface TrackDoc {
 
 /** One line of the check before the start. */
 export interface CheckRow {
-  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready" | "avoidance" | "fence";
+  code: "mission" | "clearance" | "home" | "gnss" | "rtl_height" | "battery" | "ready" | "avoidance" | "fence" | "others";
   /** accept: may be flown once the operator accepts it; bad and unknown: not at all. */
   state: "good" | "accept" | "bad" | "unknown";
   text: string;
@@ -1409,7 +1409,7 @@ export interface UploadPlan {
 export interface StartFlight {
   way?: "auto" | "guided";
   digest: string;
-  accept?: ("gnss" | "battery" | "rtl_height" | "avoidance" | "fence")[];
+  accept?: ("gnss" | "battery" | "rtl_height" | "avoidance" | "fence" | "others")[];
   from_item?: number;
 }
 

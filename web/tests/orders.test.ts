@@ -1,11 +1,11 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import { accept, accepted } from "../src/vehicle/orders";
 import { fly } from "../src/store/flying";
-import type { PreflightDoc } from "../src/messages";
+import type { CheckRow, PreflightDoc } from "../src/messages";
 import { flyState } from "./flight_samples";
 
-const checkedAt = (checked_utc: string) =>
-  flyState({ preflight: { checked_utc, rows: [] } as unknown as PreflightDoc });
+const checkedAt = (checked_utc: string, rows: Partial<CheckRow>[] = []) =>
+  flyState({ preflight: { checked_utc, rows } as unknown as PreflightDoc });
 
 describe("what the operator accepts", () => {
   beforeEach(() => {
@@ -25,5 +25,17 @@ describe("what the operator accepts", () => {
     expect(accepted.value.size).toBe(0);
     accept("battery", true);
     expect([...accepted.value]).toEqual(["battery"]);
+  });
+
+  it("of other vehicles holds for what they did when it was ticked", () => {
+    const others = (text: string) => checkedAt("2026-01-01T00:00:00Z", [{ code: "others", text }]);
+    fly.value = others("Bee has such a mission on board.");
+    accept("gnss", true);
+    accept("others", true);
+    expect([...accepted.value]).toEqual(["gnss", "others"]);
+    fly.value = others("Bee is in the air.");
+    expect([...accepted.value]).toEqual(["gnss"]);
+    accept("others", true);
+    expect([...accepted.value]).toEqual(["gnss", "others"]);
   });
 });

@@ -37,6 +37,7 @@ const TITLES: Record<CheckRow["code"], string> = {
   ready: "Ready to arm",
   avoidance: "Avoidance",
   fence: "Fence",
+  others: "Other vehicles",
 };
 
 function Row({ row }: { row: CheckRow }) {

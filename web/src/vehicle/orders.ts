@@ -13,14 +13,19 @@ export type Accepted = NonNullable<StartFlight["accept"]>[number];
 /** What the operator chose for the next start. */
 export const way = signal<"auto" | "guided">("auto");
 const checkedAt = () => fly.value?.preflight?.checked_utc ?? "";
-const marks = signal<{ checked_utc: string; codes: ReadonlySet<Accepted> }>({
+/** Other vehicles come and go while a check stands: what was accepted of them is what was read then. */
+const saidOfOthers = () => fly.value?.preflight?.rows.find((row) => row.code === "others")?.text ?? "";
+const marks = signal<{ checked_utc: string; others: string; codes: ReadonlySet<Accepted> }>({
   checked_utc: "",
+  others: "",
   codes: new Set(),
 });
 /** What is accepted of the present check: another check must be accepted anew. */
-export const accepted = computed<ReadonlySet<Accepted>>(() =>
-  marks.value.checked_utc === checkedAt() ? marks.value.codes : new Set(),
-);
+export const accepted = computed<ReadonlySet<Accepted>>(() => {
+  const { checked_utc, others, codes } = marks.value;
+  if (checked_utc !== checkedAt()) return new Set();
+  return others === saidOfOthers() ? codes : new Set([...codes].filter((code) => code !== "others"));
+});
 /** Resume where the flight broke off, if it did. */
 export const resumes = signal(true);
 
@@ -30,13 +35,13 @@ export const resumeFrom = computed(() => (resumes.value ? (fly.value?.resume_fro
 export const wayToFly = computed(() => (resumeFrom.value === null ? way.value : "auto"));
 
 export const isAcceptable = (code: CheckRow["code"]): code is Accepted =>
-  code === "gnss" || code === "battery" || code === "rtl_height" || code === "avoidance" || code === "fence";
+  (["gnss", "battery", "rtl_height", "avoidance", "fence", "others"] as const).some((one) => one === code);
 
 export function accept(code: Accepted, yes: boolean): void {
   const next = new Set(accepted.value);
   if (yes) next.add(code);
   else next.delete(code);
-  marks.value = { checked_utc: checkedAt(), codes: next };
+  marks.value = { checked_utc: checkedAt(), others: saidOfOthers(), codes: next };
 }
 
 /** Pause and Return stand in the status bar, in every view. */

@@ -97,7 +97,7 @@ def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     """Where either one's height above the sea is unknown, both are taken to be at the same height."""
     origin_deg = one.state.lat_deg or 0.0, one.state.lon_deg or 0.0
     flat = one.state.alt_amsl_m is None or other.state.alt_amsl_m is None
-    return nearest(_line(one, origin_deg, now_s, flat=flat), _line(other, origin_deg, now_s, flat=flat))
+    return nearest(line_of(one, origin_deg, now_s, flat=flat), line_of(other, origin_deg, now_s, flat=flat))
 
 
 def said(name: str, other: str, at: Nearest, now_s: float) -> str:
@@ -106,8 +106,10 @@ def said(name: str, other: str, at: Nearest, now_s: float) -> str:
     return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}. {_ADVICE}"
 
 
-def _line(of: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool) -> TimedLine:
-    """From the last position that was heard, however old it is."""
+def line_of(
+    of: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool, ahead_s: float | None = AHEAD_S
+) -> TimedLine:
+    """From the last position that was heard, however old it is; ``ahead_s`` None: to the end of its plan."""
     state, ahead = of.state, of.ahead
     alt_m = 0.0 if flat else state.alt_amsl_m or 0.0
     here_m = np.array([*offset_m(origin_deg, state.lat_deg or 0.0, state.lon_deg or 0.0), alt_m])
@@ -120,14 +122,15 @@ def _line(of: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: boo
         east_m, north_m = offset_m(origin_deg, ahead.lat_lon_deg[:, 0], ahead.lat_lon_deg[:, 1])
         up_m = np.zeros(len(ahead.t_s)) if flat else ahead.alt_rel_home_m + (home_m or 0.0)
         points_m = np.vstack([here_m, np.column_stack([east_m, north_m, up_m])])
+        t_s = heard_s + np.concatenate([[0.0], ahead.t_s])
         return TimedLine(
-            *_until(points_m, heard_s + np.concatenate([[0.0], ahead.t_s]), now_s + AHEAD_S),
+            *((points_m, t_s) if ahead_s is None else _until(points_m, t_s, now_s + ahead_s)),
             radius_m,
             early_late_s=EARLY_LATE_S,
             early_late_share=EARLY_LATE_SHARE,
         )
     speed_m_s = math.hypot(*v_enu_m_s)
-    ends_s = now_s + (AHEAD_S if speed_m_s < STANDS_M_S else STRAIGHT_S) - heard_s
+    ends_s = now_s + ((ahead_s or AHEAD_S) if speed_m_s < STANDS_M_S else STRAIGHT_S) - heard_s
     points_m = np.stack([here_m, here_m + ends_s * v_enu_m_s])
     return TimedLine(points_m, np.array([heard_s, heard_s + ends_s]), radius_m, VEER_SHARE * speed_m_s)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mapping.geometry.frames import moved_deg
-from server.flying.nearness import NEAR_M, OVER_M, RADIUS_M, Flown, Nearness, near_each_other
+from server.flying.apart.nearness import NEAR_M, OVER_M, RADIUS_M, Flown, Nearness, near_each_other
 from server.heard.plan_follower import Ahead
 from telemetry.topics.vehicle import VehicleState
 

@@ -1,0 +1,1 @@
+"""Several vehicles held apart: in the air, and before a start."""
