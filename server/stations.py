@@ -257,9 +257,9 @@ class Flying:
         self._present.publish(LinkMessage(link=status))
         if status.adopted is None and self.live.state is not None:
             self.live.forget()
-            self.ways.forget()
             self._shared.on_vehicle()
         self.desk.on_link(status)
+        self.ways.on_link(self._aboard.vehicle)
         self._followed.look()
         await self.connections.on_status(status)
         await self.simulation.on_link(status)

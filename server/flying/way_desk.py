@@ -69,6 +69,7 @@ class WayDesk:
         self._lane, self._watch, self._pages = lane, watch, pages
         self._in_hand: _InHand | None = None
         self._is_judging = False
+        self._adopted: str | None = None
 
     @property
     def state(self) -> GuidedState:
@@ -85,10 +86,11 @@ class WayDesk:
         self._check_stands(body)
         terrain = self._terrain()
         # What is paused can be gone on with, until another way is there.
-        self._in_hand, self._is_judging = flown, True
+        self._in_hand, self._is_judging, vehicle = flown, True, self._adopted
         self._tell()
         try:
             judged = await self._judged(operator, body, terrain)
+            self._check_still(vehicle, flown)
             self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic())
         finally:
             self._is_judging = False
@@ -119,7 +121,7 @@ class WayDesk:
     async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
         """Raises NotAllowedError where no way is flown, or it is certified for less."""
         await self._link.call(SetSpeed(operator, body.speed_m_s))
-        if (in_hand := self._in_hand) is not None:
+        if (in_hand := self._in_hand) is not None and in_hand.doc.flies:
             doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
             self._in_hand = replace(in_hand, doc=doc)
             self._tell()
@@ -140,9 +142,13 @@ class WayDesk:
             self._in_hand = None
             self._tell()
 
-    def forget(self) -> None:
-        """The vehicle is another one, or gone."""
-        if self._in_hand is not None:
+    def on_link(self, vehicle: str | None) -> None:
+        """Id of the adopted one. What was judged for another is not this one's; what is flown goes on where the vehicle
+        is heard from elsewhere."""
+        if vehicle == self._adopted:
+            return
+        self._adopted = vehicle
+        if self._in_hand is not None and (vehicle is None or not self._in_hand.doc.flies):
             self._in_hand = None
             self._tell()
 
@@ -166,6 +172,13 @@ class WayDesk:
             flown_places(self._live.track.states),
         )
         return await self._lane.call(judge_way, asked)
+
+    def _check_still(self, vehicle: str | None, flown: _InHand | None) -> None:
+        """Raises ConflictError for a way that nobody can fly any more, once it is judged."""
+        if vehicle != self._adopted:
+            raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for the way again.")
+        if flown is not None and self._in_hand is flown and self._live.flight.phase != "paused":
+            raise ConflictError("The way before is flown again.", advice="Hold first, then ask for the next way.")
 
     def _check_stands(self, body: WayBody) -> None:
         if body.action != "take_off" and (refusal := why_moves(self._vehicle())) is not None:

@@ -208,6 +208,64 @@ def test_a_way_that_was_judged_long_ago_is_asked_for_again(
     runner.run(scenario())
 
 
+def test_a_way_that_was_judged_for_another_vehicle_is_not_this_one_s(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        bench.desk.on_link("udp/1/1")
+        up = await bench.judged(action="height", height_m=20.0)
+        bench.desk.on_link("udp/1/1")
+        assert bench.desk.state.way == up
+        bench.desk.on_link("udp/2/1")
+        assert bench.desk.state.way is None
+        with pytest.raises(NotFoundError):
+            await bench.desk.fly(ME, FlyWayBody(id=up.id))
+
+        async def judged_late(*arguments: Any) -> WayJudged:
+            judged: WayJudged = await lane.call(*arguments)
+            bench.desk.on_link("udp/1/1")
+            return judged
+
+        stand_in: Any = SimpleNamespace(call=judged_late)
+        bench = Bench(made, stand_in)
+        with pytest.raises(ConflictError, match="Another vehicle"):
+            await bench.judged(action="height", height_m=20.0)
+        assert bench.desk.state == GuidedState()
+        assert bench.live.way is None
+
+    runner.run(scenario())
+
+
+def test_a_paused_way_that_is_flown_again_while_the_next_is_judged_stays_on_show(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        way = await bench.judged(action="height", height_m=20.0)
+        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        bench.live.flight = FlightStatus("guided", "paused")
+        asked = asyncio.create_task(bench.judged(action="height", height_m=25.0))
+        while not bench.desk.state.is_judging:
+            await asyncio.sleep(0)
+        bench.live.flight = FlightStatus("guided", "flying")
+        with pytest.raises(ConflictError, match="flown again"):
+            await asked
+        assert bench.desk.state == GuidedState(way=way.model_copy(update={"flies": True}))
+
+    runner.run(scenario())
+
+
+def test_a_speed_is_that_of_the_way_that_is_flown(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        way = await bench.judged(action="height", height_m=20.0)
+        await bench.desk.set_speed(ME, WaySpeedBody(speed_m_s=1.5))
+        assert bench.desk.state.way == way, "it is certified, and would be flown, as it was asked for"
+
+    runner.run(scenario())
+
+
 def test_what_cannot_be_judged_is_said_with_what_to_do(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
     async def scenario() -> None:
         bench = Bench(made, lane)
