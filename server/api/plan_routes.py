@@ -93,7 +93,7 @@ async def import_points(
 @router.get("/plan/fence/{file}", response_class=Response)
 async def export_fence(file: FenceFileName, workspace: Work) -> Response:
     """Fence and rally points of the open plan, certified or not."""
-    data = workspace.plans.exported_fence(file)
+    data = await workspace.plans.exported_fence(file)
     headers = {"content-disposition": f'attachment; filename="{file}"'}
     return Response(data, media_type=MEDIA_TYPES[file.rpartition(".")[2]], headers=headers)
 

@@ -33,9 +33,12 @@ class RecordingDesk:
         self._listing = asyncio.Lock()
 
     async def run(self) -> None:
-        """Lists anew whenever a recorder has begun or ended one; until cancelled."""
+        """Lists anew whenever a recorder has begun or ended one; until cancelled. What cannot be read ends nothing."""
         while True:
-            await self.refresh()
+            try:
+                await self.refresh()
+            except Exception as error:
+                log.warning("Listing the recordings: %s", reported(error, log, "Listing the recordings").what)
             await self._shelf.changed.wait()
             self._shelf.changed.clear()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -79,7 +80,13 @@ def newest_of(logs: Sequence[Path], count: int) -> list[dict[str, Any]]:
     entries = [entry for log in logs for entry in newest_entries(log, count)]
     if len(logs) < 2:
         return entries
-    return sorted(entries, key=lambda entry: float(entry.get("t_utc_s") or 0.0), reverse=True)[:count]
+    return sorted(entries, key=_t_utc_s, reverse=True)[:count]
+
+
+def _t_utc_s(entry: dict[str, Any]) -> float:
+    """Also of an entry whose time somebody has made something else of: just then the log is looked at."""
+    t_utc_s = entry.get("t_utc_s")
+    return t_utc_s if isinstance(t_utc_s, int | float) and math.isfinite(t_utc_s) else 0.0
 
 
 def newest_entries(log: Path, count: int) -> list[dict[str, Any]]:

@@ -104,7 +104,8 @@ class PlanRequests:
         finally:
             await asyncio.to_thread(upload.unlink, missing_ok=True)
         await self._desk.propose(lambda document: (f"Import {filename[:40]}", with_points(document, found)))
-        return Imported(state=self.state, warnings=list(warnings), taken=taken_words(found))
+        taken = await asyncio.to_thread(taken_words, found)
+        return Imported(state=self.state, warnings=list(warnings), taken=taken)
 
     async def shortest_order(self) -> PlanState:
         """Reorders the points to the shortest route that keeps the first one."""
@@ -116,9 +117,9 @@ class PlanRequests:
         """One export file, or ``all.zip``, of the present document. Raises NotReadyError."""
         return await exported(self._lane, self._library, self._desk.document, file)
 
-    def exported_fence(self, file: str) -> bytes:
-        """Raises NotReadyError without a fence, FormatError for one that is none."""
-        return written_fence(self._desk.document, file)
+    async def exported_fence(self, file: str) -> bytes:
+        """Raises NotReadyError without a fence, FormatError for one that is none: to see that takes a while."""
+        return await asyncio.to_thread(written_fence, self._desk.document, file)
 
     async def plan_with_seen(
         self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+from server.library.audit_log import newest_of
 from telemetry.link.audit import open_audit
 from telemetry.link.keys import audit_key_file
 from telemetry.recording.mcap_files.writer import RecordingWriter
@@ -58,3 +59,11 @@ def test_nothing_to_look_at_is_said(tmp_path: Path) -> None:
     ran = hedgehop("audit", tmp_path)
     assert ran.code != 0
     assert "There is no audit.jsonl" in ran.out + ran.err
+
+
+def test_the_newest_of_several_logs_are_told_also_where_somebody_has_changed_a_time(tmp_path: Path) -> None:
+    (tmp_path / "1.jsonl").write_text('{"t_utc_s": 5.0, "words": "land"}\n', encoding="utf-8")
+    for number, t_utc_s in enumerate(('"x"', "null", "NaN"), start=2):
+        (tmp_path / f"{number}.jsonl").write_text(f'{{"t_utc_s": {t_utc_s}, "words": "arm"}}\n', encoding="utf-8")
+    newest = newest_of(sorted(tmp_path.glob("*.jsonl")), 3)
+    assert [entry["words"] for entry in newest] == ["land", "arm", "arm"]
