@@ -264,6 +264,10 @@ class VehiclePages:
             message = make(page.session_key)
             page.put(message, Outgoing(message), of_vehicle=True)
 
+    def are_of(self, session_key: str) -> bool:
+        """Whether this session has one of them."""
+        return any(page.session_key == session_key for page in self._shown())
+
     def _shown(self) -> list[Page]:
         return [page for page in self._pages.values() if page.vehicle == self._number]
 

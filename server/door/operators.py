@@ -46,6 +46,10 @@ class Operators:
         if before is not None:
             what = f"{name} has taken control of {self._name}: nothing was heard of this page for {SILENT_S:g} s."
             self._tell(before.session_key, "warning", what, "Press Take control to ask for it.")
+        holder = self._lease.holder
+        if holder is not None and holder.session_key != session_key and not self._pages.are_of(holder.session_key):
+            what = f"{name} asks for control of {self._name}, which this page does not show."
+            self._tell(holder.session_key, "warning", what, "Show it to hand over or keep it.")
         return await self._changed(session_key)
 
     async def hand_over(self, session_key: str) -> LeaseDoc:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
@@ -13,6 +14,8 @@ from starlette.websockets import WebSocket, WebSocketState
 
 from server.door import hub as hub_module
 from server.door.hub import Hub, parse
+from server.door.lease import Lease
+from server.door.operators import Operators
 from server.door.page import CLOSE_POLICY, CLOSE_SIGNED_OUT, CLOSE_SLOW, WAITING_MAX, Outgoing, Page
 from server.schemas import (
     CursorMessage,
@@ -415,5 +418,24 @@ def test_a_vehicle_s_words_go_only_to_pages_that_show_it() -> None:
         await settled()
         assert [told.sent[1]["error"]["what"], other.sent[1]["error"]["what"]] == ["of the first", "of the second"]
         assert (len(told.sent), len(other.sent)) == (2, 2)
+
+    run(scenario)
+
+
+def test_who_is_in_charge_of_a_vehicle_that_none_of_their_pages_shows_hears_that_it_is_asked_for(
+    tmp_path: Path,
+) -> None:
+    async def scenario(bench: Bench) -> None:
+        anna, ben = await bench.join(session="anna"), await bench.join(session="ben")
+        for number, told in ((1, 0), (2, 1)):
+            lease = Lease(tmp_path / f"{number}.json")
+            operators = Operators(lease, bench.hub, number, f"Vehicle {number}")
+            await operators.take("anna", "Anna")
+            await operators.take("ben", "Ben")
+            await settled()
+            notices = [message["error"]["what"] for message in anna.sent if message["type"] == "notice"]
+            assert len(notices) == told
+        assert "Ben asks for control of Vehicle 2" in notices[0]
+        assert "notice" not in ben.types()
 
     run(scenario)
