@@ -132,9 +132,10 @@ class Flying:
             link, work, aboard, workspace, self.live, self._watch, bus, present, is_alone=wanted.is_alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
-        self.parameters = ParameterDesk(link, self.live, aboard, library.root)
+        name = "" if wanted.is_alone else wanted.name
+        self.parameters = ParameterDesk(link, self.live, aboard, library.root, self.desk.on_parameters, name)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
-        self.logs = VehicleLogs(link, self.live, library)
+        self.logs = VehicleLogs(link, self.live, library, name)
         self.simulation = Simulation(
             library,
             workspace,

@@ -61,6 +61,8 @@ class FlightDesk:
         self._ready: Ready | None = None
         self._others = None if is_alone else PENDING
         self._busy = self._at_fence = ""
+        self._written = 0
+        """How often parameters were written."""
         self._told: FlyState | None = None
 
     @property
@@ -76,7 +78,10 @@ class FlightDesk:
     # What is heard
 
     def on_link(self, status: LinkStatus) -> None:
+        before = self._aboard.vehicle
         self._aboard.on_link(status)
+        if self._aboard.vehicle != before:
+            self._at_fence = ""
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
         self.refresh()
@@ -94,6 +99,12 @@ class FlightDesk:
     def on_disarmed(self) -> None:
         """A flight changes what was checked before it, the battery above all."""
         self._ready = None
+        self.refresh()
+
+    def on_parameters(self) -> None:
+        """Some were written, or may have been: what was checked before may not hold any more."""
+        self._ready, self._at_fence = None, ""
+        self._written += 1
         self.refresh()
 
     def refresh(self) -> None:
@@ -123,7 +134,7 @@ class FlightDesk:
         """Raises MissionUnknownError when what is on board did not come from here."""
         async with self._doing("Checking the start"):
             self._ready = None
-            vehicle, state = self._vehicle_id(), self._state()
+            vehicle, state, written = self._vehicle_id(), self._state(), self._written
             checked = await self._checked(operator, state)
             if (moved := checked.moved) is not None:
                 self._set_busy("Moving the heights to the vehicle's home")
@@ -131,6 +142,8 @@ class FlightDesk:
                 checked = await self._checked(operator, state, rereferenced_m=moved.shift_m)
             if vehicle != self._vehicle_id():
                 raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
+            if written != self._written:
+                raise CheckNeededError("Parameters were written during the check.", advice="Press Check again.")
             self._at_fence = checked.at_fence
             self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
             if checked.certificate_json:

@@ -6,7 +6,7 @@ import asyncio
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -29,7 +29,7 @@ from server.schemas.parameter_docs import (
     WrittenDoc,
 )
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import NoVehicleError
+from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.flight.low_flight.low_plan import LowPlan, low_plan
 from telemetry.flight.low_flight.review import MULTIROTORS, review_settings
 from telemetry.parameters.comparing import compare, of_vehicle
@@ -56,6 +56,8 @@ class _Read:
     """What a vehicle held when it was asked, and what was written since."""
 
     vehicle: str
+    title: str
+    """What people call it."""
     state: VehicleState
     parameters: dict[str, Parameter]
     described: dict[str, Description]
@@ -65,8 +67,18 @@ class _Read:
 class ParameterDesk:
     """All methods belong to the event loop; files are read beside it."""
 
-    def __init__(self, link: LinkClient, live: Channel, aboard: Aboard, root: Path) -> None:
+    def __init__(
+        self,
+        link: LinkClient,
+        live: Channel,
+        aboard: Aboard,
+        root: Path,
+        on_written: Callable[[], None],
+        name: str = "",
+    ) -> None:
+        """``on_written``: some may have been written; ``name``: of the vehicle, where there are several."""
         self._link, self._live, self._aboard, self._root = link, live, aboard, root
+        self._on_written, self._name = on_written, name
         self._kept: _Read | None = None
         self._busy = False
 
@@ -88,14 +100,20 @@ class ParameterDesk:
         if self._vehicle()[0] != vehicle:
             raise ConflictError("Another vehicle was adopted meanwhile.", advice="Read the parameters again.")
         described, _ = await asyncio.to_thread(kept_descriptions, self._root, state.autopilot)
-        self._kept = _Read(vehicle, state, listed.by_name(), described, time.time())
+        self._kept = _Read(vehicle, _title(state, self._name), state, listed.by_name(), described, time.time())
         return await self.doc()
 
     async def write(self, operator: Operator, changes: Sequence[ParameterChangeDoc]) -> WrittenAnswer:
         """One after the other, each read back; refused while the vehicle is armed. Raises what the link raises."""
         read = self._read_before()
         asked = tuple(ParameterChange(change.name, change.value) for change in changes)
-        written = await self._link.call(WriteParameters(operator, asked))
+        try:
+            written = await self._link.call(WriteParameters(operator, asked))
+        except Exception as error:
+            if not isinstance(error, NotAllowedError):
+                self._on_written()
+            raise
+        self._on_written()
         self._kept = replace(read, parameters=_after(read.parameters, written))
         docs = [
             WrittenDoc(
@@ -115,7 +133,7 @@ class ParameterDesk:
         """All that was read, as a file. Raises NotReadyError."""
         read = self._read_before()
         at = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(read.read_utc_s))
-        heading = f"Parameters of {_title(read.state)}\n{at}, saved by Hedgehop"
+        heading = f"Parameters of {read.title}\n{at}, saved by Hedgehop"
         parameters = tuple(read.parameters.values())
         if file == "vehicle.params":
             return write_qgc(parameters, system_id=read.state.system_id, heading=heading)
@@ -157,7 +175,7 @@ def _after(held: dict[str, Parameter], written: Sequence[ParameterWritten]) -> d
 def _doc(read: _Read, record: PlanRecord | None) -> ParametersDoc:
     findings, not_judged = _findings(read, record)
     return ParametersDoc(
-        vehicle=_title(read.state),
+        vehicle=read.title,
         read_utc_s=read.read_utc_s,
         described=bool(read.described),
         parameters=[_parameter(p, read.described.get(p.name, _NONE)) for p in _sorted(read)],
@@ -171,8 +189,9 @@ def _sorted(read: _Read) -> list[Parameter]:
     return sorted(read.parameters.values(), key=lambda parameter: parameter.name)
 
 
-def _title(state: VehicleState) -> str:
-    return f"vehicle {state.system_id}, {state.autopilot} {state.firmware_version or ''}".rstrip()
+def _title(state: VehicleState, name: str) -> str:
+    who = f"{name} (system {state.system_id})" if name else f"vehicle {state.system_id}"
+    return f"{who}, {state.autopilot} {state.firmware_version or ''}".rstrip()
 
 
 def _parameter(parameter: Parameter, about: Description) -> ParameterDoc:

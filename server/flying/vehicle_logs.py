@@ -36,8 +36,9 @@ class _Download:
 class VehicleLogs:
     """One is read at a time: a vehicle sends no two."""
 
-    def __init__(self, link: LinkClient, live: Channel, library: Library) -> None:
-        self._link, self._live, self._library = link, live, library
+    def __init__(self, link: LinkClient, live: Channel, library: Library, name: str = "") -> None:
+        """``name``: of the vehicle, where there are several."""
+        self._link, self._live, self._library, self._name = link, live, library, name
         self._logs: tuple[VehicleLog, ...] | None = None
         self._of: int | None = None
         """System id of the vehicle whose list it is."""
@@ -107,7 +108,7 @@ class VehicleLogs:
                 await asyncio.to_thread(_append, upload, stretch)
                 read = download.doc.read_bytes + len(stretch)
                 download.doc = download.doc.model_copy(update={"read_bytes": read})
-            name = f"vehicle-{self._of}-log-{download.log.number}{download.ending}"
+            name = f"{self._name or f'vehicle-{self._of}'}-log-{download.log.number}{download.ending}"
             recording = await download.into.add(upload, name)
         finally:
             await asyncio.to_thread(upload.unlink, missing_ok=True)

@@ -19,7 +19,7 @@ from server.work.jobs import Lane
 from telemetry.errors import MissionUnknownError, NotAllowedError, NoVehicleError, TransferError
 from telemetry.topics.messages import FlightStatus, LinkStatus
 from telemetry.topics.obstacles import AvoidanceStatus, Eye
-from telemetry.topics.requests import Arm, StartAuto, StartGuided
+from telemetry.topics.requests import Arm, ReadParameters, StartAuto, StartGuided
 from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
@@ -366,6 +366,14 @@ def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
         assert state.preflight is not None
         assert {row.code: row.state for row in state.preflight.rows}["fence"] == "good"
         assert "returns" in state.at_fence
+        bench.desk.on_parameters()
+        assert (bench.desk.state.preflight, bench.desk.state.at_fence) == (None, "")
+
+        assert "returns" in (await bench.desk.check(ME)).at_fence
+        other = replace(QUAD, id="udp/2/1", system_id=2)
+        for adopted in (other, QUAD):
+            bench.desk.on_link(LinkStatus(time.monotonic(), adopted=adopted, state="live"))
+            assert bench.desk.state.at_fence == ""
 
         held, bench.vehicle.places["fence"] = bench.vehicle.places["fence"], ()
         state = await bench.desk.check(ME)
@@ -381,5 +389,27 @@ def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
         bench.vehicle.places["fence"] = (foreign,)
         await bench.desk.upload(ME, 3)
         assert bench.vehicle.places["fence"] == (foreign,)
+
+    runner.run(scenario())
+
+
+def test_parameters_that_are_written_during_the_check_make_it_void(
+    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, tmp_path / "onboard.json", both)
+        await bench.desk.upload(ME, 3)
+        answered = bench.vehicle.call
+
+        async def call(request: Any) -> Any:
+            answer = await answered(request)
+            if isinstance(request, ReadParameters):
+                bench.desk.on_parameters()
+            return answer
+
+        monkeypatch.setattr(bench.vehicle, "call", call)
+        with pytest.raises(CheckNeededError, match="written during the check"):
+            await bench.desk.check(ME)
+        assert bench.desk.state.preflight is None
 
     runner.run(scenario())

@@ -53,12 +53,16 @@ class Link:
 
 
 class Bench:
-    def __init__(self, root: Path, state: VehicleState | None = QUAD) -> None:
+    def __init__(self, root: Path, state: VehicleState | None = QUAD, name: str = "") -> None:
         self.link = Link()
         self.aboard: Any = SimpleNamespace(vehicle="udp/1/1" if state else None, record=None)
         link: Any = self.link
         live: Any = SimpleNamespace(state=state)
-        self.desk = ParameterDesk(link, live, self.aboard, root)
+        self.told_written = 0
+        self.desk = ParameterDesk(link, live, self.aboard, root, self._on_written, name)
+
+    def _on_written(self) -> None:
+        self.told_written += 1
 
 
 def run(play: Any) -> Any:
@@ -83,6 +87,7 @@ def test_before_a_low_flight_each_setting_says_what_it_does_and_is_set_so(tmp_pa
         assert [(w.outcome, w.took) for w in answer.written] == [("set", True)]
         assert finding(answer.now, "FS_GCS_ENABLE").state == "good"
         assert (await bench.desk.doc()) == answer.now
+        assert bench.told_written == 1, "nothing was sent"
 
     run(play())
 
@@ -94,6 +99,7 @@ def test_what_the_vehicle_made_of_a_value_is_what_is_shown(tmp_path: Path) -> No
         changes = [ParameterChangeDoc(name="RTL_ALT", value=9000.0), ParameterChangeDoc(name="NO_SUCH", value=1.0)]
         answer = await bench.desk.write(ME, changes)
         assert [(w.outcome, w.after) for w in answer.written] == [("adjusted", 2000.0), ("refused", None)]
+        assert bench.told_written == 1
         assert {p.name: p.value for p in answer.now.parameters}["RTL_ALT"] == 2000.0
         bench.link.armed = True
         with pytest.raises(NotAllowedError):
@@ -116,6 +122,15 @@ def test_nothing_is_shown_of_another_vehicle_than_the_one_that_was_read(tmp_path
             await bench.desk.write(ME, [ParameterChangeDoc(name="RTL_ALT", value=1600.0)])
         with pytest.raises(NoVehicleError):
             await Bench(tmp_path, None).desk.read()
+
+    run(play())
+
+
+def test_one_of_several_is_called_by_its_name_because_their_systems_may_have_the_same_number(tmp_path: Path) -> None:
+    async def play() -> None:
+        bench = Bench(tmp_path, name="Wasp")
+        assert (await bench.desk.read()).vehicle == "Wasp (system 1), ardupilot 4.6.0"
+        assert "Wasp (system 1)" in bench.desk.saved("vehicle.param")
 
     run(play())
 

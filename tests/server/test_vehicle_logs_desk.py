@@ -55,12 +55,12 @@ class Recordings:
 
 
 def run(
-    folder: Path, stretch: Callable[[ReadVehicleLog], bytes], number: int = 2, *, cancel: bool = False
+    folder: Path, stretch: Callable[[ReadVehicleLog], bytes], number: int = 2, *, cancel: bool = False, name: str = ""
 ) -> tuple[LogDownloadDoc, Link, Recordings]:
     async def go() -> tuple[LogDownloadDoc, Link, Recordings]:
         link, recordings = Link(stretch), Recordings()
         live = SimpleNamespace(state=VehicleState(3, 1, autopilot="ardupilot"))
-        logs = VehicleLogs(cast(Any, link), cast(Any, live), cast(Any, Library(folder)))
+        logs = VehicleLogs(cast(Any, link), cast(Any, live), cast(Any, Library(folder)), name)
         running = asyncio.create_task(logs.run())
         await logs.ask(ANNA)
         doc = logs.download(ANNA, number, cast(Any, recordings)).download
@@ -88,6 +88,8 @@ def test_a_whole_log_comes_into_the_library(tmp_path: Path) -> None:
     assert (doc.state, doc.recording_id, doc.read_bytes) == ("done", "a" * 16, 3 * MOST_BYTES)
     assert recordings.added == [("vehicle-3-log-2.bin", 3 * MOST_BYTES)]
     assert [request.is_last for request in link.asked] == [False, False, True]
+    _, _, recordings = run(tmp_path, whole, name="Wasp")
+    assert recordings.added == [("Wasp-log-2.bin", 3 * MOST_BYTES)], "another vehicle may have the same number"
 
 
 def test_a_vehicle_that_is_armed_meanwhile_ends_it(tmp_path: Path) -> None:
