@@ -123,15 +123,16 @@ class Health:
                 "battery", "unknown", value, "", "The vehicle does not tell how much is left. Look yourself."
             )
         share = state.battery_share
+        told, over = f"{100 * share:.0f} %", f"over {100 * profile.reserve_share:.0f} %"
         ends_s = (profile.endurance_s if is_known else None, self._endurance_s(state))
         known_s = [end_s for end_s in ends_s if end_s is not None]
         if not known_s:
-            return HealthRow("battery", _by_share(share, profile), f"{share:.0%}", f"over {profile.reserve_share:.0%}")
+            return HealthRow("battery", _by_share(share, profile), told, over)
         left_s = max(0.0, share - profile.reserve_share) * min(known_s)
-        value = f"{share:.0%}, {_minutes(left_s + ROUNDED_S)} to the reserve"
+        value = f"{told}, {_minutes(left_s + ROUNDED_S)} to the reserve"
         home_s = way_home_s(state, profile)
         if home_s is None:
-            return HealthRow("battery", _by_share(share, profile), value, f"over {profile.reserve_share:.0%}")
+            return HealthRow("battery", _by_share(share, profile), value, over)
         limit = f"way home {_minutes(math.ceil(home_s - ROUNDED_S))}"
         if left_s <= home_s:
             return HealthRow("battery", "bad", value, limit, "The way home needs the reserve. Return now.")

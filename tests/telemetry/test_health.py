@@ -42,7 +42,7 @@ def test_all_is_well_in_words() -> None:
         ("good", "0.10 (velocity)", "under 0.8"),
         ("good", "RTK fixed, ±0.02 m, height ±0.03 m", "within 1 m"),
         ("good", "6.0 m/s²", "under 30 m/s²"),
-        ("good", "90%, 11 min 40 s to the reserve", "way home 1 min 10 s"),
+        ("good", "90 %, 11 min 40 s to the reserve", "way home 1 min 10 s"),
         ("good", "2.0 m/s from 090°", "under 5.0 m/s"),
     ]
 
@@ -109,15 +109,15 @@ def test_a_battery_that_goes_down_faster_than_set_counts_as_it_goes_down() -> No
     for second in range(0, 121, 10):
         health.on_state(state(t_utc_s=1000.0 + second, battery_share=0.9 - second / 400))
     found = row("battery", health, t_utc_s=1120.0, battery_share=0.6)
-    assert found.value == "60%, 2 min 40 s to the reserve"
+    assert found.value == "60 %, 2 min 40 s to the reserve"
     health.on_state(state(t_utc_s=1130.0, battery_share=1.0))  # swapped
-    assert row("battery", health, t_utc_s=1131.0, battery_share=1.0).value == "100%, 13 min 20 s to the reserve"
+    assert row("battery", health, t_utc_s=1131.0, battery_share=1.0).value == "100 %, 13 min 20 s to the reserve"
 
 
 def test_a_battery_of_an_unknown_vehicle_has_no_made_up_time() -> None:
     rows = Health().rows(state(battery_share=0.22), None, now_mono_s=100.5)
     battery = next(each for each in rows if each.code == "battery")
-    assert (battery.value, battery.level) == ("22%", "near")
+    assert (battery.value, battery.level) == ("22 %", "near")
 
 
 def test_clipped_samples_count_while_they_are_new() -> None:

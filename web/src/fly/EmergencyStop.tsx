@@ -3,13 +3,14 @@ import { isInAir, vehicle } from "../store/flying";
 import { whyNotCommand } from "../store/reach";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
-import { stopMotors } from "../vehicle/orders";
+import { Outcome } from "../ui/Outcome";
+import { EMERGENCY, stopMotors } from "../vehicle/orders";
 
 /** So long the guard stays open: nobody finds it open later. */
 const OPEN_MS = 15_000;
 
 /** Motors off in the air, behind a guard: it is opened first, then its button is held. */
-export function EmergencyStop({ place }: { place: string }) {
+export function EmergencyStop() {
   const [isOpen, setOpen] = useState(false);
   const why = whyNotCommand.value;
   const isOffered = vehicle.value?.armed === true && isInAir.value && why === null;
@@ -23,15 +24,18 @@ export function EmergencyStop({ place }: { place: string }) {
   }, [isOffered]);
   if (!isOpen)
     return (
-      <Button
-        icon="power"
-        disabled={!isOffered}
-        title={why ?? (isOffered ? "Opens the guard; nothing is stopped yet" : "Only in the air")}
-        testid="emergency-open"
-        onClick={() => setOpen(true)}
-      >
-        Emergency stop…
-      </Button>
+      <>
+        <Button
+          icon="power"
+          disabled={!isOffered}
+          title={why ?? (isOffered ? "Opens the guard; nothing is stopped yet" : "Only in the air")}
+          testid="emergency-open"
+          onClick={() => setOpen(true)}
+        >
+          Emergency stop…
+        </Button>
+        <Outcome place={EMERGENCY} />
+      </>
     );
   return (
     <div role="alertdialog" aria-label="Emergency stop" data-testid="emergency-guard">
@@ -41,7 +45,7 @@ export function EmergencyStop({ place }: { place: string }) {
       </p>
       <div class="row wrap minor-actions">
         <HoldButton
-          place={place}
+          place={EMERGENCY}
           label="Stop the motors"
           icon="power"
           disabled={!isOffered}

@@ -96,7 +96,7 @@ export function FlightSection() {
       startsOpen
     >
       <Actions />
-      <EmergencyStop place={PLACE} />
+      <EmergencyStop />
       <Done place={PLACE} />
       <Recorder />
     </Section>

@@ -62,6 +62,9 @@ const TITLES: Record<WayAction, string> = {
   back: "Back the way it came",
 };
 
+/** A take-off climbs as the vehicle climbs, and a look turns the nose only. */
+const hasSpeed = (asked: WayAction) => asked !== "look" && asked !== "take_off";
+
 function Fields({ asked }: { asked: WayAction }) {
   const over = OVER[asked];
   const speed = wantedSpeed_m_s();
@@ -101,7 +104,7 @@ function Fields({ asked }: { asked: WayAction }) {
           />
         </>
       )}
-      {asked !== "look" && asked !== "take_off" && speed !== null && (
+      {hasSpeed(asked) && speed !== null && (
         <NumberField
           label="Speed"
           unit="m/s"
@@ -224,17 +227,19 @@ function Way({ way }: { way: WayDoc }) {
         {way.has_seen ? ", with what was seen" : ""}. It then {way.lands ? "lands" : "holds"}.
       </p>
       {way.flies ? (
-        <NumberField
-          label="Speed"
-          unit="m/s"
-          {...LIMITS.WaySpeedBody.speed_m_s}
-          max={way.most_m_s}
-          step={0.5}
-          value={way.speed_m_s}
-          disabled={why !== null}
-          testid="way-flown-speed"
-          onChange={(value) => void setWaySpeed(value)}
-        />
+        hasSpeed(way.action) && (
+          <NumberField
+            label="Speed"
+            unit="m/s"
+            {...LIMITS.WaySpeedBody.speed_m_s}
+            max={way.most_m_s}
+            step={0.5}
+            value={way.speed_m_s}
+            disabled={why !== null}
+            testid="way-flown-speed"
+            onChange={(value) => void setWaySpeed(value)}
+          />
+        )
       ) : (
         <div class="row wrap">
           {way.problem !== "way" && (

@@ -1,6 +1,6 @@
 import { effect, signal } from "@preact/signals";
 import type { VehicleLogsDoc } from "../messages";
-import { isCancelled, requestJson } from "../net/api";
+import { requestJson } from "../net/api";
 import { active, stillOf } from "../store/fleet";
 import { order } from "../store/outcomes";
 
@@ -30,11 +30,7 @@ export const cancelLog = () => ordered("/cancel");
 
 /** What is known keeps standing while the server does not answer: the page says elsewhere that it does not. */
 export async function lookAtLogs(): Promise<void> {
-  try {
-    const isStill = stillOf();
-    const doc = await requestJson<VehicleLogsDoc>("GET", PATH);
-    if (isStill()) vehicleLogs.value = doc;
-  } catch (error) {
-    if (!isCancelled(error)) return;
-  }
+  const isStill = stillOf();
+  const doc = await requestJson<VehicleLogsDoc>("GET", PATH).catch(() => null);
+  if (doc && isStill()) vehicleLogs.value = doc;
 }

@@ -60,8 +60,11 @@ export const disarm = () =>
 export const land = () =>
   order({ place: FLIGHT, path: "/api/flight/land", moves: true, done: "The vehicle lands here and now." });
 
+/** Of its own: an order before it that is not answered holds up no emergency stop. */
+export const EMERGENCY = "emergency";
+
 export const stopMotors = () =>
-  order({ place: FLIGHT, path: "/api/flight/emergency", moves: true, done: "The motors are stopped." });
+  order({ place: EMERGENCY, path: "/api/flight/emergency", moves: true, done: "The motors are stopped." });
 
 export const pauseFlight = () =>
   order({ place: NEXT, path: "/api/flight/pause", moves: true, done: "Paused: it holds its position." });
