@@ -121,6 +121,18 @@ describe("several vehicles", () => {
     expect(calling.value).toEqual([]);
   });
 
+  it("a loss is read before what is near, and each is seen by itself", () => {
+    const alert = { kind: "alert", key: "a", text: "Ahead: 12 m." } as const;
+    tell(vehicle(1), vehicle(2, { alarm: alert }), vehicle(3, { alarm: lost }), vehicle(4, { alarm: lost }));
+    const first = () => calling.value[0]?.number;
+    const read = [first()];
+    while (calling.value.length > 0) {
+      acknowledgeElsewhere();
+      read.push(first());
+    }
+    expect(read).toEqual([3, 4, 2, undefined]);
+  });
+
   it("G and a digit show a vehicle; a digit alone is a section still", () => {
     const press = { key: "2", mod: false, shift: false };
     expect(shortcutOf(press, false, { view: "fly", afterG: true })).toEqual({ id: "vehicle", vehicle: 2 });

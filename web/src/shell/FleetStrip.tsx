@@ -1,6 +1,7 @@
 import { duration, number, withUnit } from "../format";
 import type { VehicleDoc } from "../messages";
 import { acknowledgeElsewhere, active, calling, fleet } from "../store/fleet";
+import { failed } from "../store/reach";
 import { chooseVehicle } from "../store/stream";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -11,11 +12,11 @@ function linkWord({ link, silent_s }: VehicleDoc): string {
   return silent_s === null ? "not heard" : `silent for ${duration(silent_s)}`;
 }
 
-/** What is seen at a glance of a vehicle that is not shown. */
-function facts(vehicle: VehicleDoc): string {
+/** What is seen at a glance of each, also of those that are not shown. */
+function facts(vehicle: VehicleDoc, isPast: boolean): string {
   const { mode, armed, alt_rel_home_m, battery_share } = vehicle;
   const known = [
-    linkWord(vehicle),
+    isPast ? "as last heard" : linkWord(vehicle),
     mode,
     armed ? "armed" : "disarmed",
     alt_rel_home_m === null ? "" : withUnit(alt_rel_home_m, "m"),
@@ -25,22 +26,23 @@ function facts(vehicle: VehicleDoc): string {
 }
 
 function Vehicle({ vehicle }: { vehicle: VehicleDoc }) {
-  const isActive = vehicle.number === active.value;
+  // Without the server nobody tells what has become of it.
+  const isPast = failed.value === "server";
   const level = vehicle.alarm ? "bad" : vehicle.link === "stale" || vehicle.link === "lost" ? "near" : "";
   const holder = vehicle.holder ? `${vehicle.holder} is in charge` : "Nobody is in charge";
   return (
     <button
       type="button"
-      class={`fleet-vehicle ${level}`}
-      aria-pressed={isActive}
-      title={`${holder}${vehicle.plan_name && `; on board: ${vehicle.plan_name}`}`}
+      class={`fleet-vehicle ${level} ${isPast ? "old" : ""}`}
+      aria-pressed={vehicle.number === active.value}
+      title={`${facts(vehicle, isPast)}. ${holder}${vehicle.plan_name && `; on board: ${vehicle.plan_name}`}`}
       data-testid={`vehicle-${vehicle.number}`}
       onClick={() => chooseVehicle(vehicle.number)}
     >
       <Icon name={vehicle.alarm ? "warning" : "drone"} size={16} />
       <kbd>{vehicle.number}</kbd>
       <strong>{vehicle.name}</strong>
-      {!isActive && <span class="fleet-facts">{facts(vehicle)}</span>}
+      <span class="fleet-facts">{facts(vehicle, isPast)}</span>
     </button>
   );
 }

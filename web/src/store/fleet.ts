@@ -48,13 +48,23 @@ const seen = signal<ReadonlySet<string>>(new Set());
 /** What is wrong with the vehicle that is shown stands elsewhere on the page, but for another one that comes near. */
 const isElsewhere = ({ number, alarm }: VehicleDoc) => number !== active.value || alarm?.kind === "near";
 
-/** Vehicles with which something is wrong that this page does not show and nobody here has seen. */
+const GRAVITY = { loss: 0, near: 1, alert: 2 } as const;
+const gravity = ({ alarm }: VehicleDoc) => (alarm ? GRAVITY[alarm.kind] : GRAVITY.alert);
+
+/** Vehicles with which something is wrong that this page does not show and nobody here has seen; the worst first. */
 export const calling = computed(() =>
-  fleet.value.filter((each) => each.alarm && isElsewhere(each) && !seen.value.has(keyOf(each))),
+  fleet.value
+    .filter((each) => each.alarm && isElsewhere(each) && !seen.value.has(keyOf(each)))
+    .sort((one, other) => gravity(one) - gravity(other)),
 );
 
 export const isCallingLoss = computed(() => calling.value.some(({ alarm }) => alarm?.kind === "loss"));
 
+/** The one whose words are read, and the other end of the same nearness: the next one is read after it. */
 export function acknowledgeElsewhere(): void {
-  seen.value = new Set([...seen.value, ...calling.value.map(keyOf)]);
+  const alarm = calling.value[0]?.alarm;
+  const read = calling.value.filter(
+    (each, index) => index === 0 || (alarm?.kind === "near" && each.alarm?.key === alarm.key),
+  );
+  seen.value = new Set([...seen.value, ...read.map(keyOf)]);
 }
