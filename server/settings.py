@@ -126,6 +126,8 @@ class Settings(BaseSettings):
     def _check_vehicles(self) -> Self:
         if len(wanted := self.vehicles) > MOST_VEHICLES:
             raise ValueError(f"There are {len(wanted)} vehicles, and at most {MOST_VEHICLES} can be flown.")
+        if wanted[0][0] in [name for name, _ in wanted[1:]]:
+            raise ValueError(f"{wanted[0][0]} is the name of the one that link names: give the other one another name.")
         if twice := set(self.link) & {link for text in self.vehicle for link in named_links(text)[1]}:
             raise ValueError(f"{sorted(twice)[0]} is a connection of two vehicles.")
         return self

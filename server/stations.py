@@ -290,12 +290,12 @@ class Flying:
     def doc(self, near: VehicleAlarm | None) -> VehicleDoc:
         """For pages that show another vehicle. ``near``: the alarm, where another one comes near."""
         state, status, holder = self.live.state, self.connections.status, self.lease.holder
-        record = self._aboard.record
+        record, answers = self._aboard.record, self.nodes.link_answers
         known = VehicleDoc(
             number=self.number,
             name=self.name,
-            link="none" if status is None else status.state,
-            silent_s=None if status is None else status.silent_s,
+            link="none" if status is None else status.state if answers or status.state == "none" else "lost",
+            silent_s=None if status is None or not answers else status.silent_s,
             phase=self.live.flight.phase,
             holder=None if holder is None else holder.name,
             plan_name="" if record is None else record.name,

@@ -99,6 +99,10 @@ class RecordingShelf:
         own = path.parent == self._folder
         return recording_id_of(path.name if own else path.relative_to(self._library.root).as_posix())
 
+    def _flown_by(self, path: Path) -> str:
+        """Systems of several vehicles may all have the same number. Those of the first lie with what was brought in."""
+        return "" if path.parent == self._folder else f"Vehicle {path.parent.parent.name}"
+
     def _doc(self, path: Path) -> RecordingDoc:
         info = self._info(path)
         flown = FlownOver(info.terrain_id, info.terrain_sha256)
@@ -110,7 +114,7 @@ class RecordingShelf:
             started_utc=iso_utc(info.start_utc_s if info.start_utc_s is not None else _changed_utc_s(path)),
             duration_s=info.duration_s,
             bytes=info.size_bytes,
-            vehicle=info.vehicle,
+            vehicle=", ".join(filter(None, (self._flown_by(path), info.vehicle))),
             plan_name=info.plan_name,
             terrain_id=None if terrain is None else terrain.id,
             fault=info.fault or "",

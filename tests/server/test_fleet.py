@@ -9,13 +9,18 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from server.errors import StartError
+from server.library import Library
+from server.library.recording_list import RecordingShelf
 from server.settings import MOST_VEHICLES, load_settings
+from server.stations import Flying
 from telemetry.bus.node_lock import running_nodes
+from telemetry.topics.messages import FlightStatus
 from tests.server.simulated import simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
 
@@ -59,6 +64,37 @@ def test_what_is_no_vehicle_stops_the_start_with_words(vehicles: list[str], says
 def test_a_connection_cannot_be_two_vehicles() -> None:
     with pytest.raises(StartError, match="connection of two vehicles"):
         load_settings(link=["tcp:a:1"], vehicle=["Bee=tcp:a:1"])
+
+
+def test_what_link_names_has_its_name_for_itself() -> None:
+    with pytest.raises(StartError, match="Vehicle 1 is the name of the one that link names"):
+        load_settings(link=["tcp:a:1"], vehicle=["Vehicle 1=tcp:a:2"])
+    assert [name for name, _ in load_settings(vehicle=["Vehicle 1=tcp:a:2"]).vehicles] == ["Vehicle 1"]
+
+
+def test_a_recording_says_which_vehicle_flew_it(tmp_path: Path) -> None:
+    with contextlib.closing(Library(tmp_path / "data")) as library:
+        shelf = RecordingShelf(library)
+        for number in (1, 2):
+            (shelf.folder_of(number) / f"{number}.tlog").write_bytes(b"")
+        assert {doc.name: doc.vehicle for doc in shelf.docs()} == {"1.tlog": "", "2.tlog": "Vehicle 2"}
+
+
+def test_the_strip_calls_no_vehicle_live_whose_link_process_has_failed() -> None:
+    said = SimpleNamespace(state="live", silent_s=0.2)
+    for answers, link in ((True, "live"), (False, "lost")):
+        stand_in: Any = SimpleNamespace(
+            number=2,
+            name="Wasp",
+            live=SimpleNamespace(state=None, flight=FlightStatus()),
+            connections=SimpleNamespace(status=said),
+            nodes=SimpleNamespace(link_answers=answers),
+            lease=SimpleNamespace(holder=None),
+            _aboard=SimpleNamespace(record=None),
+            _loss=lambda: None,
+            _alert=lambda: None,
+        )
+        assert Flying.doc(stand_in, None).link == link
 
 
 @pytest.fixture(scope="module")
