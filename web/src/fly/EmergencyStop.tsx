@@ -38,7 +38,7 @@ export function EmergencyStop() {
       </>
     );
   return (
-    <div role="alertdialog" aria-label="Emergency stop" data-testid="emergency-guard">
+    <div class="emergency" role="alertdialog" aria-label="Emergency stop" data-testid="emergency-guard">
       <p>
         <strong>The motors stop at once and the vehicle falls.</strong> Do it only where a fall does less harm
         than flying on.

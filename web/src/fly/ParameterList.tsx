@@ -16,9 +16,9 @@ function Edit({ one, onDone }: { one: ParameterDoc; onDone: () => void }) {
   return (
     <div class="parameter-edit">
       {one.help && <p>{one.help}</p>}
-      {one.default !== null && <p class="muted">Default {one.default}</p>}
+      {one.default !== null && <p class="muted">{`Default ${one.default} ${one.unit}`.trim()}</p>}
       <TextField
-        label={`New value of ${one.name}`}
+        label={`New value of ${one.name}${one.unit && `, ${one.unit}`}`}
         value={text}
         testid="parameter-value"
         onChange={setText}

@@ -42,7 +42,16 @@ export const views: readonly [View, ...View[]] = [
     Left: FlyLeft,
     Right: FlyRight,
     Below: FlyBelow,
-    sections: ["connection", "onboard", "preflight", "flight", "obstacles", "parameters", "guided"],
+    sections: [
+      "connection",
+      "onboard",
+      "preflight",
+      "flight",
+      "obstacles",
+      "parameters",
+      "guided",
+      "vehicle-logs",
+    ],
   },
   {
     id: "review",
