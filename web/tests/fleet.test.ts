@@ -12,7 +12,7 @@ import {
 } from "../src/store/fleet";
 import { fly, linkStatus, takeFlying, texts } from "../src/store/flying";
 import { order, outcomes, pending } from "../src/store/outcomes";
-import { lookAtParameters, parameters } from "../src/store/parameters";
+import { isReading, lookAtParameters, parameters, readParameters } from "../src/store/parameters";
 import { shortcutOf } from "../src/shell/shortcuts";
 import { flyState, linkStatus as link } from "./flight_samples";
 
@@ -82,6 +82,21 @@ describe("several vehicles", () => {
     answer(new Response(JSON.stringify(read(2))));
     await asked;
     expect(parameters.value).toBeNull();
+    vi.unstubAllGlobals();
+  });
+
+  it("one list that is waited for keeps nobody from reading another vehicle's", async () => {
+    let answer: (response: Response) => void = () => undefined;
+    vi.stubGlobal("fetch", () => new Promise<Response>((resolve) => (answer = resolve)));
+    const asked = readParameters();
+    expect(isReading.value).toBe(true);
+    show(2);
+    expect(isReading.value).toBe(false);
+    show(1);
+    expect(isReading.value).toBe(true);
+    answer(new Response("{}"));
+    await asked;
+    expect(isReading.value).toBe(false);
     vi.unstubAllGlobals();
   });
 

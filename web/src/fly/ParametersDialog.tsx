@@ -89,7 +89,8 @@ function Files() {
 /** The vehicle's settings: what they will do on a low flight, and all of them. */
 export function ParametersDialog() {
   const [part, setPart] = useState<"low" | "all">("low");
-  useEffect(() => void lookAtParameters(), []);
+  // Anew once the vehicle is known again after a break of the line.
+  useEffect(() => void (adopted.value && lookAtParameters()), [adopted.value?.id]);
   const doc = adopted.value ? parameters.value : null;
   return (
     <Dialog title="Parameters" testid="parameters-dialog" onClose={() => (openDialog.value = null)}>

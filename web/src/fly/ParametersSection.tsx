@@ -6,7 +6,7 @@ import { Section } from "../ui/Section";
 
 function summaryOf(): string {
   const findings = parameters.value?.findings;
-  if (!findings) return "not read";
+  if (!findings) return "not looked at";
   const bad = findings.filter(({ state }) => state === "bad").length;
   return bad > 0 ? `${bad} to be changed` : "nothing to be changed";
 }

@@ -15,7 +15,9 @@ const READ_LIMIT_MS = 600_000;
 export const parameters = signal<ParametersDoc | null>(null);
 export const compared = signal<ComparedDoc | null>(null);
 export const written = signal<readonly WrittenDoc[]>([]);
-export const isReading = signal(false);
+/** Numbers of the vehicles whose list this page waits for. */
+const reading = signal<ReadonlySet<number>>(new Set());
+export const isReading = computed(() => reading.value.has(active.value));
 
 const vehicleId = computed(() => adopted.value?.id ?? null);
 
@@ -48,12 +50,13 @@ async function take(ask: () => Promise<ParametersDoc>): Promise<void> {
 export const lookAtParameters = () => take(() => requestJson<ParametersDoc>("GET", "/api/parameters"));
 
 export async function readParameters(): Promise<void> {
-  isReading.value = true;
+  const asked = active.peek();
+  reading.value = new Set([...reading.value, asked]);
   compared.value = null;
   await take(() =>
     requestJson<ParametersDoc>("POST", "/api/parameters/read", {}, { limit_ms: READ_LIMIT_MS }),
   );
-  isReading.value = false;
+  reading.value = new Set([...reading.value].filter((number) => number !== asked));
 }
 
 export async function writeParameter(name: string, value: number): Promise<void> {
