@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -164,6 +165,22 @@ def test_a_list_that_changes_for_ever_is_given_up() -> None:
     run = listed(Changing([b"abc"]))
     assert isinstance(run.error, TransferError)
     assert run.now_s < LONGEST_S + 1
+
+
+def test_a_vehicle_that_says_it_has_as_many_logs_as_can_be_holds_nothing_up() -> None:
+    """The machine runs where the heartbeat is sent: what took minutes here would end the link."""
+
+    class Boasting(LogVehicle):
+        def on_tick(self, now_s: float) -> list[Any]:
+            return [mavlink.MAVLink_log_entry_message(65_000, 65_535, 65_535, 0, 1)] if now_s < 1.0 else []
+
+    begun_s = time.process_time()
+    run = listed(Boasting([b"abc"]))
+    assert isinstance(run.error, TransferError)
+    assert "65534 of 65535 entries" in run.error.what
+    questions = [(m.start, m.end) for _, way, m in run.log if way == "up" and m.get_type() == "LOG_REQUEST_LIST"]
+    assert questions[1:] == [(1, 64_999)] * (len(questions) - 1)
+    assert time.process_time() - begun_s < 20.0
 
 
 def test_data_of_another_log_or_from_between_blocks_is_not_taken() -> None:

@@ -27,6 +27,7 @@ class LogListRead:
         self._round_trip = RoundTrip(unknown_s=1.0, shortest_s=0.5, longest_s=2.0)
         self._numbers: range | None = None
         self._found: dict[int, VehicleLog] = {}
+        """Of ``_numbers`` only."""
         self._started_s = self._heard_s = self._asked_s = 0.0
         self._over = False
 
@@ -42,13 +43,13 @@ class LogListRead:
         if self._over or message.get_type() != "LOG_ENTRY" or not self._endpoints.is_from_vehicle(message):
             return []
         self._heard_s = now_s
-        self._numbers = range(max(0, message.last_log_num - message.num_logs + 1), message.last_log_num + 1)
+        self._count(range(max(0, message.last_log_num - message.num_logs + 1), message.last_log_num + 1))
         if not message.num_logs:
             return self._finish()
         if message.id in self._numbers:
             begun = message.time_utc if message.time_utc > _EARLIEST_UTC_S else None
             self._found[message.id] = VehicleLog(message.id, message.size, begun)
-        if self._missing():
+        if self._missing:
             return [Progress("reading", len(self._found), message.num_logs)]
         return self._finish()
 
@@ -66,16 +67,23 @@ class LogListRead:
         self._round_trip.repeats()
         if self._numbers is None:
             return self._ask(0, ALL, now_s)
-        missing = self._missing()
-        last = next((n for n in range(missing[0], self._numbers.stop) if n not in missing), self._numbers.stop) - 1
-        return self._ask(missing[0], last, now_s)
+        first = next(n for n in self._numbers if n not in self._found)
+        last = next((n for n in range(first, self._numbers.stop) if n in self._found), self._numbers.stop) - 1
+        return self._ask(first, last, now_s)
 
     def cancel(self) -> list[Action]:
         return [] if self._over else self._fail(TransferError("Reading the list of logs was cancelled.", advice=""))
 
-    def _missing(self) -> list[int]:
+    def _count(self, numbers: range) -> None:
         """Of a list that has changed meanwhile, too: its numbers are those of the newest entry."""
-        return [number for number in self._numbers or () if number not in self._found]
+        if numbers != self._numbers:
+            self._numbers = numbers
+            self._found = {number: log for number, log in self._found.items() if number in numbers}
+
+    @property
+    def _missing(self) -> int:
+        """How many; a vehicle may say that it has 65,535."""
+        return len(self._numbers or ()) - len(self._found)
 
     def _finish(self) -> list[Action]:
         self._over = True
@@ -86,8 +94,7 @@ class LogListRead:
         if self._numbers is None:
             advice = "Check the link. Some vehicles keep no logs, or have no card to keep them on."
             return SilentError("The vehicle does not say which logs it has.", advice=advice)
-        missing = len(self._missing())
-        what = f"{missing} of {len(self._numbers)} entries of the vehicle's list of logs did not come."
+        what = f"{self._missing} of {len(self._numbers)} entries of the vehicle's list of logs did not come."
         return TransferError(what, advice="Check the link, then ask again.")
 
     def _fail(self, error: TelemetryError) -> list[Action]:
