@@ -5,7 +5,19 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-_LETTERS = {"Q": "Q", "B": "B", "M": "B", "H": "H", "I": "I", "L": "i", "f": "f", "Z": "64s", "N": "16s", "c": "h"}
+_LETTERS = {
+    "Q": "Q",
+    "B": "B",
+    "M": "B",
+    "H": "H",
+    "I": "I",
+    "L": "i",
+    "f": "f",
+    "Z": "64s",
+    "N": "16s",
+    "c": "h",
+    "a": "64s",
+}
 GPS_WEEK, GPS_MS = 2400, 100_000_000
 STARTED_UTC_S = 315_964_800 + GPS_WEEK * 604_800 + GPS_MS / 1000 - 18
 """What 100 s of week 2400 are since 1970, less the leap seconds since 2017."""

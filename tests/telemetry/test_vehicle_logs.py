@@ -213,6 +213,107 @@ def test_descriptions_that_cannot_be_are_not_believed(tmp_path: Path, fields: st
         read_flight_log(written(tmp_path, data, "a.ulg"))
 
 
+@pytest.mark.parametrize("kind", ["ARM", "ATT", "CMD", "DSF", "ERR", "EV", "GPA", "GPS", "MISE", "MODE", "ORGN", "SIM"])
+def test_records_without_the_columns_that_are_looked_for_are_read_all_the_same(tmp_path: Path, kind: str) -> None:
+    log = DataFlashWriter()
+    log.describe("POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
+    log.describe(kind, "Q", "TimeUS")
+    for step in range(3):
+        log.write("POS", 100_000 * step, 480_000_000, 110_000_000, 510.0, 10.0, 10.0)
+        log.write(kind, 100_000 * step)
+    path = written(tmp_path, bytes(log.data))
+    assert describe_recording(path).fault is None
+    assert len(read_flight_log(path).track) == 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        *(("ATT", ["Roll"]), ("BAT", ["Inst", "RemPct"]), ("DSF", ["Dp"]), ("ERR", ["Subsys", "ECode"])),
+        *(("EV", ["Id"]), ("GPA", ["I"]), ("GPS", ["Status", "NSats", "GWk"]), ("MISE", ["CNum", "CTot"])),
+        *(("MODE", ["ModeNum"]), ("ORGN", ["Type", "Lat"]), ("SIM", ["Lat", "Lng"]), ("XKF1", ["C", "VN"])),
+    ],
+)
+@pytest.mark.parametrize("number", [math.nan, math.inf, -1.0])
+def test_numbers_that_count_nothing_and_arrays_are_not_believed(
+    tmp_path: Path, kind: str, names: list[str], number: float
+) -> None:
+    """A record's description comes from the log: it may call anything an array, or a number that is none."""
+    for letters in ("f", "a"):
+        log = DataFlashWriter()
+        log.describe("POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
+        log.describe(kind, "Q" + letters * len(names), "TimeUS," + ",".join(names))
+        for step in range(3):
+            log.write("POS", 100_000 * step, 480_000_000, 110_000_000, 510.0, 10.0, 10.0)
+            log.write(kind, 100_000 * step, *([number] * len(names) if letters == "f" else [bytes(64)] * len(names)))
+        path = written(tmp_path, bytes(log.data))
+        assert describe_recording(path).kind == "dataflash"
+        assert len(read_flight_log(path).track) == 3
+
+
+def test_one_name_for_two_kinds_mixes_neither(tmp_path: Path) -> None:
+    log = DataFlashWriter()
+    log.describe("POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
+    log.write("POS", 100_000, 480_000_000, 110_000_000, 510.0, 10.0, 10.0)
+    log.describe("POS", "H", "Lat")
+    log.write("POS", 7)
+    path = written(tmp_path, bytes(log.data))
+    assert describe_recording(path).kind == "dataflash"
+    assert len(read_flight_log(path).track) == 1
+
+
+@pytest.mark.parametrize(
+    ("topic", "fields"),
+    [
+        ("vehicle_global_position", "uint64_t timestamp;pair lat;double lon;"),
+        ("vehicle_global_position", "uint64_t[2] timestamp;double lat;double lon;"),
+        ("vehicle_global_position", "uint64_t timestamp;double[2] lat;double lon;"),
+        ("vehicle_status", "uint64_t timestamp;uint8_t[2] nav_state;pair arming_state;uint8_t[3] failsafe;"),
+        ("vehicle_status", "uint64_t timestamp;uint8_t[2] system_id;"),
+        ("vehicle_attitude", "uint64_t timestamp;pair[4] q;"),
+        ("battery_status", "uint64_t timestamp;float[3] remaining;"),
+        ("sensor_gps", "uint64_t timestamp;uint8_t[2] fix_type;double satellites_used;"),
+        ("home_position", "uint64_t timestamp;double[2] lat;double lon;"),
+        ("mission_result", "uint64_t timestamp;double seq_current;uint32_t[2] seq_total;"),
+        ("vehicle_land_detected", "uint64_t timestamp;uint8_t[2] landed;"),
+        ("vehicle_local_position", "uint64_t timestamp;float[2] vx;float vy;"),
+        ("vehicle_status", "uint64_t timestamp;step0 nav_state;"),
+    ],
+)
+@pytest.mark.parametrize("content", [bytes(60), b"\xff" * 60, bytes.fromhex("000000000000f07f") * 8])
+def test_topics_that_are_packed_as_nobody_packs_them_are_not_believed(
+    tmp_path: Path, topic: str, fields: str, content: bytes
+) -> None:
+    """Structures, arrays and thousands of structures in one another, where a number is looked for."""
+    words = ["pair:float a;uint8_t b;", *(f"step{k}:step{k + 1} x;" for k in range(1500)), "step1500:uint8_t x;"]
+    described = b"".join(ulog_record("F", text.encode()) for text in [*words, f"{topic}:{fields}"])
+    records = [ulog_record("D", b"\x09\0" + bytes((step, *bytes(7))) + content) for step in range(3)]
+    start = len(ulog_head())
+    data = ulog()[:start] + described + ulog_record("A", b"\0\x09\0" + topic.encode()) + b"".join(records)
+    path = written(tmp_path, data, "a.ulg")
+    assert describe_recording(path).kind == "ulog"
+    with contextlib.suppress(RecordingError):
+        read_flight_log(path)
+
+
+@pytest.mark.parametrize("kind", "FADLCIMPQSORB")
+@pytest.mark.parametrize("length", range(5))
+def test_records_that_are_too_short_are_no_records(tmp_path: Path, kind: str, length: int) -> None:
+    start, whole = len(ulog_head()), ulog()
+    for fill in (b"\0", b"\xff"):
+        path = written(tmp_path, whole[:start] + ulog_record(kind, fill * length) + whole[start:], "a.ulg")
+        assert describe_recording(path).kind == "ulog"
+        assert len(read_flight_log(path).track) == 50
+
+
+def test_one_time_that_cannot_be_does_not_stretch_what_the_list_says(tmp_path: Path) -> None:
+    data = bytearray(ulog())
+    at = data.rindex(ulog_record("D", b"\x04\0")[3:] + (59_800_000).to_bytes(8, "little")) + 2
+    data[at + 6] = 0x40
+    info = describe_recording(written(tmp_path, bytes(data), "a.ulg"))
+    assert info.duration_s == pytest.approx(9.8, abs=0.3)
+
+
 @given(st.integers(0, 10**9), st.sampled_from([dataflash(2), ulog(4)]))
 @settings(max_examples=150)
 def test_no_damage_brings_the_reader_down(tmp_path_factory: pytest.TempPathFactory, seed: int, data: bytes) -> None:

@@ -65,15 +65,16 @@ class DataFlash:
 
     data: Data
     kinds: dict[int, Kind] = field(default_factory=lambda: {_FORMAT_KIND: Kind("FMT", 89, None, {})})
-    found: dict[str, array[int]] = field(default_factory=dict)
+    found: dict[int, array[int]] = field(default_factory=dict)
+    """By the number of the kind: a name may stand for two that are packed in two ways."""
     damage: Damage = field(default_factory=Damage)
 
     def rows(self, name: str) -> Rows:
-        offsets = self.found.get(name)
-        kind = next((kind for kind in self.kinds.values() if kind.name == name and kind.layout is not None), None)
-        if not offsets or kind is None or kind.layout is None:
-            return NO_ROWS
-        return Rows(gathered(self.data, (at + _HEAD_BYTES for at in offsets), kind.layout), kind.scales)
+        for number, kind in self.kinds.items():
+            offsets = self.found.get(number)
+            if offsets and kind.name == name and kind.layout is not None:
+                return Rows(gathered(self.data, (at + _HEAD_BYTES for at in offsets), kind.layout), kind.scales)
+        return NO_ROWS
 
 
 def read_dataflash(
@@ -81,8 +82,6 @@ def read_dataflash(
 ) -> DataFlash:
     """All records of the ``wanted`` kinds; from byte ``start`` on with ``kinds`` that were read before."""
     log = DataFlash(data) if kinds is None else DataFlash(data, dict(kinds))
-    for name in wanted:
-        log.found[name] = array("Q")
     at, size, in_step = start, len(data), False
     while at < size:
         kind = _kind_at(log, at, in_step)
@@ -93,8 +92,8 @@ def read_dataflash(
             continue
         if kind.name == "FMT":
             _describe(log, at)
-        elif kind.name in log.found:
-            log.found[kind.name].append(at)
+        elif kind.name in wanted:
+            log.found.setdefault(data[at + len(MARKER)], array("Q")).append(at)
         at, in_step = at + kind.length, True
     return log
 

@@ -196,10 +196,9 @@ def _battery(flash: DataFlash) -> Told:
 
 def _gnss(flash: DataFlash, gps: Rows, t_s: F64) -> list[Told]:
     fixes = [GNSS_FIXES[int(status)] if 0 <= status < len(GNSS_FIXES) else "3d" for status in gps.column("Status")]
-    satellites = [int(count) if count >= 0 else None for count in gps.column("NSats")]
     fields: dict[str, Any] = {
         "gnss_fix": fixes,
-        "satellites": satellites,
+        "satellites": gps.wholes("NSats"),
         "hdop": gps.column("HDop"),
         "gnss_alt_amsl_m": gps.column("Alt"),
     }
@@ -268,8 +267,7 @@ def _landed(flash: DataFlash) -> Told:
 
 def _item_flown(flash: DataFlash) -> Told:
     rows, t_s = timed(flash, "MISE")
-    items = [int(number) for number in rows.column("CNum")]
-    return Told(t_s, {"mission_item": items, "mission_items": [int(n) for n in rows.column("CTot")]}, exact=True)
+    return Told(t_s, {"mission_item": rows.wholes("CNum"), "mission_items": rows.wholes("CTot")}, exact=True)
 
 
 def _missions(flash: DataFlash, facts: FrameFacts) -> None:
@@ -300,9 +298,11 @@ def _truth(flash: DataFlash, facts: FrameFacts) -> None:
 def _failures(flash: DataFlash) -> list[VehicleText]:
     rows, t_s = timed(flash, "ERR")
     told = []
-    for t, part, code in zip(t_s.tolist(), rows.column("Subsys"), rows.column("ECode"), strict=True):
-        name = _FAILURES.get(int(part), f"Part {int(part)}")
-        words = f"{name}: over" if code == 0 else f"{name}: error {int(code)}"
+    for t, part, code in zip(t_s.tolist(), rows.wholes("Subsys"), rows.wholes("ECode"), strict=True):
+        if part is None or code is None:
+            continue
+        name = _FAILURES.get(part, f"Part {part}")
+        words = f"{name}: over" if code == 0 else f"{name}: error {code}"
         told.append(VehicleText(t, _INFO if code == 0 else _ERROR, words))
     return told
 

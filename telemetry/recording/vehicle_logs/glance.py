@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from telemetry.recording.tlog import Data
+from telemetry.recording.vehicle_logs import ulog_flight
 from telemetry.recording.vehicle_logs.columns import EARLIEST_UTC_S, middle_utc_s
 from telemetry.recording.vehicle_logs.dataflash import MARKER, read_dataflash
 from telemetry.recording.vehicle_logs.dataflash_flight import gps_utc_s, timed, vehicle_words
@@ -50,12 +51,13 @@ def _dataflash(data: Data) -> Glance:
 
 def _ulog(data: Data) -> Glance:
     head = read_ulog(data[:_HEAD_BYTES], _ULOG)
-    start_us = int.from_bytes(data[8:FILE_HEAD_BYTES], "little")
+    start_s = int.from_bytes(data[8:FILE_HEAD_BYTES], "little") / 1e6
     mark = data.find(SYNC, max(FILE_HEAD_BYTES, len(data) - _TAIL_BYTES)) if len(data) > _HEAD_BYTES else -1
     tail = read_ulog(data, _ULOG, start=mark + len(SYNC), head=head) if mark >= 0 else head
     utc_minus_boot = utc_minus_boot_s(head)
-    if utc_minus_boot is None and start_us / 1e6 > EARLIEST_UTC_S:
+    if utc_minus_boot is None and start_s > EARLIEST_UTC_S:
         utc_minus_boot = 0.0  # simulated vehicles whose own clock is the time of day
-    starts = None if utc_minus_boot is None else start_us / 1e6 + utc_minus_boot
-    lasts_s = (tail.last_us - start_us) / 1e6 if tail.last_us >= start_us else None
+    starts = None if utc_minus_boot is None else start_s + utc_minus_boot
+    known_s = np.concatenate([ulog_flight.timed(tail, name)[1] for name in _ULOG])
+    lasts_s = float(known_s.max()) - start_s if len(known_s) and known_s.max() >= start_s else None
     return Glance(starts, lasts_s, version_of(head) or "", tail.damage.cut_short)

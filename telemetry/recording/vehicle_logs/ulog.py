@@ -23,7 +23,8 @@ SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 FILE_HEAD_BYTES, _RECORD_HEAD_BYTES, _TOPIC_BYTES = 16, 3, 2
 _KNOWN = frozenset(b"FADLCIMPQSORB")
 _LARGEST = 65535
-_MOST_FIELDS = 1024
+_MOST_FIELDS, _DEEPEST = 1024, 16
+"""Of a topic's description; what is described within it, in how many steps."""
 _TYPES = {
     "int8_t": "i1",
     "uint8_t": "u1",
@@ -62,7 +63,6 @@ class ULog:
     """Written in a way that this reader does not know."""
     appended: tuple[int, ...] = ()
     """Where the vehicle went on after it had crashed."""
-    last_us: int = 0
     damage: Damage = field(default_factory=Damage)
 
     def rows(self, name: str, instance: int = 0) -> Rows:
@@ -148,7 +148,6 @@ def _record(log: ULog, at: int, end: int) -> None:
     log.found.setdefault(topic, array("Q")).append(at + _TOPIC_BYTES)
     length = end - at - _TOPIC_BYTES
     log.lengths[topic] = min(length, log.lengths.get(topic, length))
-    log.last_us = max(log.last_us, int.from_bytes(head[_TOPIC_BYTES:], "little"))
 
 
 def _text(log: ULog, content: bytes, before_time: int) -> None:
@@ -159,7 +158,8 @@ def _text(log: ULog, content: bytes, before_time: int) -> None:
 
 
 def _tell(log: ULog, content: bytes) -> None:
-    key, value = content[1 : 1 + content[0]].decode("latin-1"), content[1 + content[0] :]
+    length = content[0] if content else 0
+    key, value = content[1 : 1 + length].decode("latin-1"), content[1 + length :]
     written_as, _, name = key.partition(" ")
     if written_as.startswith("char["):
         log.told.setdefault(name, value.decode(errors="replace"))
@@ -176,7 +176,7 @@ def _flags(log: ULog, content: bytes) -> None:
 
 def _layout(formats: dict[str, str], name: str, within: tuple[str, ...] = ()) -> np.dtype[Any] | None:
     """None for one that is not described, or not so that it could be a record."""
-    if name not in formats or name in within:
+    if name not in formats or name in within or len(within) > _DEEPEST:
         return None
     fields: list[tuple[str, Any, tuple[int, ...]]] = []
     size = 0

@@ -57,7 +57,7 @@ _ARMED = 2
 def read_ulog_flight(data: Data) -> OwnLog:
     ulog = read_ulog(data, _WANTED)
     gps, gps_t_s = _receiver(ulog)
-    status, status_t_s = _timed(ulog, "vehicle_status")
+    status, status_t_s = timed(ulog, "vehicle_status")
     vehicle = _vehicle(ulog, status)
     log = OwnLog(vehicle, utc_minus_boot_s(ulog))
     log.facts = FrameFacts(vehicle.system_id, vehicle.component_id)
@@ -80,7 +80,8 @@ def read_ulog_flight(data: Data) -> OwnLog:
     return log
 
 
-def _timed(ulog: ULog, name: str) -> tuple[Rows, F64]:
+def timed(ulog: ULog, name: str) -> tuple[Rows, F64]:
+    """The records of a topic, and when each was written, in seconds since the vehicle's start."""
     rows = ulog.rows(name)
     return ordered(rows, rows.column("timestamp") / 1e6)
 
@@ -100,7 +101,7 @@ def _vehicle(ulog: ULog, status: Rows) -> VehicleState:
 
 
 def _receiver(ulog: ULog) -> tuple[Rows, F64]:
-    return _timed(ulog, "vehicle_gps_position" if len(ulog.rows("vehicle_gps_position")) else "sensor_gps")
+    return timed(ulog, "vehicle_gps_position" if len(ulog.rows("vehicle_gps_position")) else "sensor_gps")
 
 
 def utc_minus_boot_s(ulog: ULog) -> float | None:
@@ -129,7 +130,7 @@ def _doubts(ulog: ULog) -> list[str]:
 
 
 def _home(ulog: ULog) -> tuple[Rows, F64]:
-    rows, t_s = _timed(ulog, "home_position")
+    rows, t_s = timed(ulog, "home_position")
     valid = placed(rows.column("lat"), rows.column("lon"))
     if rows.has("valid_hpos"):
         valid &= rows.column("valid_hpos") == 1
@@ -150,7 +151,7 @@ def _home_alt_amsl_m(home: Rows) -> F64:
 
 def _position(ulog: ULog, home: Rows, home_t_s: F64) -> Told:
     """Heights above home count from home as it was then: PX4 corrects it in flight."""
-    rows, t_s = _timed(ulog, _POSITION)
+    rows, t_s = timed(ulog, _POSITION)
     known = placed(rows.column("lat"), rows.column("lon"))
     for flag in ("lat_lon_valid", "alt_valid"):
         known &= ~(rows.column(flag) == 0)
@@ -168,7 +169,7 @@ def _position(ulog: ULog, home: Rows, home_t_s: F64) -> Told:
 
 
 def _velocity(ulog: ULog) -> Told:
-    rows, t_s = _timed(ulog, _LOCAL)
+    rows, t_s = timed(ulog, _LOCAL)
     level = ~(rows.column("v_xy_valid") == 0)
     north, east = (unless(rows.column(name), ~level) for name in ("vx", "vy"))
     down = unless(rows.column("vz"), rows.column("v_z_valid") == 0)
@@ -177,10 +178,8 @@ def _velocity(ulog: ULog) -> Told:
 
 def _attitude(ulog: ULog) -> Told:
     """From the Hamilton quaternion w, x, y, z that turns the body (forward, right, down) into north, east, down."""
-    rows, t_s = _timed(ulog, "vehicle_attitude")
-    q = rows.column("q")
-    q = q if q.ndim == 2 and q.shape[1] == 4 else np.full((len(rows), 4), np.nan)
-    w, x, y, z = q.T
+    rows, t_s = timed(ulog, "vehicle_attitude")
+    w, x, y, z = rows.columns("q", 4).T
     fields: dict[str, Any] = {
         "roll_rad": np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
         "pitch_rad": np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
@@ -190,7 +189,7 @@ def _attitude(ulog: ULog) -> Told:
 
 
 def _battery(ulog: ULog) -> Told:
-    rows, t_s = _timed(ulog, "battery_status")
+    rows, t_s = timed(ulog, "battery_status")
     share = rows.column("remaining")
     fields: dict[str, Any] = {
         "battery_v": rows.column("voltage_v"),
@@ -210,7 +209,7 @@ def _gnss(gps: Rows, t_s: F64) -> Told:
     metres_per_count = 1.0 if gps.has("altitude_msl_m") else 1e-3
     fields: dict[str, Any] = {
         "gnss_fix": [GNSS_FIXES[int(fix)] if 0 <= fix < len(GNSS_FIXES) else "3d" for fix in gps.column("fix_type")],
-        "satellites": [int(count) if count >= 0 else None for count in gps.column("satellites_used")],
+        "satellites": gps.wholes("satellites_used"),
         "hdop": unless(gps.column("hdop"), gps.column("hdop") == 0),
         "horizontal_accuracy_m": gps.column("eph"),
         "vertical_accuracy_m": gps.column("epv"),
@@ -221,7 +220,7 @@ def _gnss(gps: Rows, t_s: F64) -> Told:
 
 
 def _wind(ulog: ULog) -> Told:
-    rows, t_s = _timed(ulog, "wind" if len(ulog.rows("wind")) else "wind_estimate")
+    rows, t_s = timed(ulog, "wind" if len(ulog.rows("wind")) else "wind_estimate")
     return blowing(t_s, rows.column("windspeed_north"), rows.column("windspeed_east"))
 
 
@@ -236,28 +235,24 @@ def _status(rows: Rows, t_s: F64) -> Told:
 
 
 def _landed(ulog: ULog) -> Told:
-    rows, t_s = _timed(ulog, "vehicle_land_detected")
+    rows, t_s = timed(ulog, "vehicle_land_detected")
     words = ["on_ground" if landed == 1 else "in_air" for landed in rows.column("landed")]
     return Told(t_s, {"landed": words}, exact=True)
 
 
 def _mission(ulog: ULog) -> Told:
     """Which item it flew to; the items themselves are not in the log."""
-    rows, t_s = _timed(ulog, "mission_result")
+    rows, t_s = timed(ulog, "mission_result")
     fields: dict[str, Any] = {
-        "mission_item": [_number(n) for n in rows.column("seq_current")],
-        "mission_items": [_number(n) for n in rows.column("seq_total")],
-        "mission_reached": [_number(n) for n in rows.column("seq_reached")],
+        "mission_item": rows.wholes("seq_current"),
+        "mission_items": rows.wholes("seq_total"),
+        "mission_reached": rows.wholes("seq_reached"),
     }
     return Told(t_s, fields, exact=True)
 
 
-def _number(value: float) -> int | None:
-    return int(value) if value >= 0 else None
-
-
 def _truth(ulog: ULog, facts: FrameFacts) -> None:
-    rows, t_s = _timed(ulog, _TRUTH)
+    rows, t_s = timed(ulog, _TRUTH)
     known = placed(rows.column("lat"), rows.column("lon"))
     columns = np.column_stack((t_s, rows.column("lat"), rows.column("lon"), rows.column("alt")))
     facts.truth += [TruePosition(*row) for row in columns[known].tolist()]
