@@ -7,6 +7,7 @@ than the true one: each line is cut into short pieces, and a piece counts with t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,10 @@ import numpy as np
 from mapping.geometry.arrays import F64, I64
 from planning.errors import ParameterError
 
-PIECE_S = 0.5
-"""A piece takes no longer: by what the balls grow in it the answer may be too small."""
+PIECE_S, MOST_PIECES = 0.5, 400
+"""A piece takes no longer: by what the balls grow in it the answer may be too small. Of a line that takes longer than
+so many of them they are longer: each is held against each of the other's, and lines begin where a vehicle was last
+heard, maybe an hour ago."""
 _TINY_M2 = 1e-12
 _ROUNDING_M = 1e-6
 
@@ -67,9 +70,9 @@ def ways_apart(a_enu_m: F64, b_enu_m: F64, *, radius_m: float) -> Nearest:
     return found
 
 
-def nearest(a: TimedLine, b: TimedLine) -> Nearest | None:
-    """None when there is no time at which both are under way."""
-    pieces_a, pieces_b = _pieces(a), _pieces(b)
+def nearest(a: TimedLine, b: TimedLine, *, since_s: float = -math.inf) -> Nearest | None:
+    """None when there is no time from ``since_s`` on at which both are under way."""
+    pieces_a, pieces_b = _pieces(a, since_s), _pieces(b, since_s)
     together = (pieces_a.from_s[:, None] <= pieces_b.until_s) & (pieces_b.from_s <= pieces_a.until_s[:, None])
     i, j = np.nonzero(together)
     if not len(i):
@@ -97,8 +100,10 @@ class _Pieces:
     radius_m: F64
 
 
-def _pieces(line: TimedLine) -> _Pieces:
-    counts = np.maximum(1, np.ceil(np.diff(line.t_s) / PIECE_S).astype(int))
+def _pieces(line: TimedLine, since_s: float) -> _Pieces:
+    """Those on which the vehicle may be from ``since_s`` on."""
+    piece_s = max(PIECE_S, float(line.t_s[-1] - line.t_s[0]) / MOST_PIECES)
+    counts = np.maximum(1, np.ceil(np.diff(line.t_s) / piece_s).astype(int))
     whole = np.repeat(np.arange(len(counts)), counts)
     within = np.arange(len(whole)) - np.repeat(np.cumsum(counts) - counts, counts)
 
@@ -110,7 +115,9 @@ def _pieces(line: TimedLine) -> _Pieces:
     (start_m, start_s), (end_m, end_s) = at(within / counts[whole]), at((within + 1) / counts[whole])
     gone_s = end_s - line.t_s[0]
     span_s = line.early_late_s + line.early_late_share * gone_s
-    return _Pieces(start_m, end_m, start_s - span_s, end_s + span_s, line.radius_m + line.spread_m_s * gone_s)
+    from_s, until_s = np.maximum(start_s - span_s, since_s), end_s + span_s
+    radius_m, on = line.radius_m + line.spread_m_s * gone_s, until_s >= since_s
+    return _Pieces(start_m[on], end_m[on], from_s[on], until_s[on], radius_m[on])
 
 
 def _worth_a_look(a: _Pieces, b: _Pieces, i: I64, j: I64) -> tuple[I64, I64]:

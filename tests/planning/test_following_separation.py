@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.following.separation import PIECE_S, TimedLine, nearest
+from planning.following import separation
+from planning.following.separation import MOST_PIECES, PIECE_S, TimedLine, nearest
 
 METRES = st.floats(-60.0, 60.0)
 PLACES = st.lists(st.tuples(METRES, METRES, METRES), min_size=2, max_size=4)
@@ -53,11 +55,15 @@ def test_it_is_never_told_farther_than_it_is(
 ) -> None:
     a = line(one, steps_one_s, radius_m=1.0, early_late_s=early_late_s, spread_m_s=spread_m_s)
     b = line(other, steps_other_s, start_s=start_s, early_late_share=0.1)
-    slow_m, found = slowly(a, b, 0.25), nearest(a, b)
-    if found is None:
-        assert slow_m == math.inf
-    else:
-        assert found.distance_m <= slow_m + 1e-6
+    slow_m = slowly(a, b, 0.25)
+    for most_pieces in (MOST_PIECES, 3):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(separation, "MOST_PIECES", most_pieces)
+            found = nearest(a, b)
+        if found is None:
+            assert slow_m == math.inf
+        else:
+            assert found.distance_m <= slow_m + 1e-6
 
 
 def test_two_that_cross_at_the_same_time_meet_and_say_where_and_when() -> None:
@@ -78,6 +84,35 @@ def test_the_same_crossing_minutes_apart_is_none() -> None:
     found = nearest(line([(-50, 0, 10), (50, 0, 10)], [10.0], early_late_s=70.0), late)
     assert found is not None
     assert found.distance_m == pytest.approx(0.0, abs=1e-9)
+
+
+def test_lines_that_begin_long_ago_cost_no_more_than_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both vehicles were last heard an hour ago: a second's look at them must not take a minute and a gigabyte."""
+    held: list[int] = []
+
+    def counted(*segments: F64) -> tuple[F64, F64]:
+        held.append(len(segments[0]))
+        return between(*segments)
+
+    between = separation._between
+    monkeypatch.setattr(separation, "_between", counted)
+    old = {"radius_m": 3.0, "early_late_s": 2.0, "early_late_share": 0.1}
+    one = line([(0, 0, 0), (300, 0, 0), (300, 0, 0)], [60.0, 3600.0], **old)
+    other = line([(0, 500, 0), (300, 500, 0), (300, 500, 0)], [60.0, 3600.0], **old)
+    found = nearest(one, other, since_s=3600.0)
+    assert found is not None
+    assert found.distance_m == pytest.approx(494.0)
+    assert sum(held) < 200_000
+
+
+def test_what_was_near_before_is_not_near_now() -> None:
+    east = line([(-50, 0, 10), (50, 0, 10), (50, 0, 10)], [10.0, 50.0])
+    north = line([(0, -50, 13), (0, 50, 13), (0, 50, 13)], [10.0, 50.0])
+    found = nearest(east, north, since_s=20.0)
+    assert found is not None
+    assert found.distance_m == pytest.approx(math.dist((50, 0, 10), (0, 50, 13)))
+    assert found.t_s >= 20.0
+    assert nearest(east, north, since_s=60.5) is None
 
 
 def test_one_behind_the_other_on_the_same_line_keeps_its_distance() -> None:

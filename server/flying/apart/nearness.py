@@ -97,7 +97,8 @@ def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     """Where either one's height above the sea is unknown, both are taken to be at the same height."""
     origin_deg = one.state.lat_deg or 0.0, one.state.lon_deg or 0.0
     flat = one.state.alt_amsl_m is None or other.state.alt_amsl_m is None
-    return nearest(line_of(one, origin_deg, now_s, flat=flat), line_of(other, origin_deg, now_s, flat=flat))
+    one_line, other_line = (line_of(each, origin_deg, now_s, flat=flat) for each in (one, other))
+    return nearest(one_line, other_line, since_s=now_s)
 
 
 def said(name: str, other: str, at: Nearest, now_s: float) -> str:

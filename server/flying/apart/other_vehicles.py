@@ -131,7 +131,9 @@ def _against(state: VehicleState | None, mine: Whole, other: Other, now_s: float
     if min(ways_apart(way_m, line.points_enu_m, radius_m=line.radius_m).distance_m for line in theirs_ahead) >= NEAR_M:
         return None
     pairs = [(one, line) for one in _timed(mine, way_m, now_s) for line in theirs_ahead]
-    found = [met for one, line in pairs if (met := nearest(one, line)) is not None and met.distance_m < NEAR_M]
+    found = [
+        met for one, line in pairs if (met := nearest(one, line, since_s=now_s)) is not None and met.distance_m < NEAR_M
+    ]
     if not found:
         text = f"Its line comes near that of {name}, but by the predicted times not while {name} is there."
         return _row("accept", text, f"Start now or once {name} has landed, and watch both.")
