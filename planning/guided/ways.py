@@ -52,6 +52,9 @@ OWN_RETURNS = frozenset({"return_unknown", "return_height", "return_near_home", 
 LANDINGS = frozenset({"home_column", "home_on_top"})
 """What stands where it would land at home."""
 FARTHEST_M = 5_000.0
+STANDS_M, CAME_FROM_M = 1.0, 3.0
+"""From home, where a take-off begins and where the flown way does: heights count from there, and the one leads
+straight up, the other straight down to land."""
 ROUNDING_M = 0.01
 """Above the exact altitude, so that the proof, which rounds differently, finds it high enough."""
 DEEP_M = -1e9
@@ -99,11 +102,12 @@ def guided_way(dsm: Dsm, ground: SurfaceModel, here: Here, wish: Wish, demand: D
     home_m = _known(ground, home_xy_m, "home")
     at_m = np.array([*_xy(dsm, here.lat_lon_deg), home_m + here.alt_rel_home_m])
     shape = _shape(dsm, wish, at_m, home_xy_m, home_m)
+    _check_home(wish, shape, at_m, home_xy_m)
     away_m = float(np.linalg.norm(shape.tail_m[:, :2] - at_m[:2], axis=1).max())
     if away_m > FARTHEST_M:
         what = f"The way leads {away_m / 1000:.1f} km away; {FARTHEST_M / 1000:g} km are the most."
         raise MissionError(what, advice="Choose a place that is nearer.")
-    lands_xy_m = (float(shape.tail_m[-1, 0]), float(shape.tail_m[-1, 1])) if isinstance(wish, Rally) else None
+    lands_xy_m = (float(shape.tail_m[-1, 0]), float(shape.tail_m[-1, 1])) if isinstance(wish, Rally | Back) else None
     best: GuidedWay | None = None
     for points_m in _lines(dsm, shape, at_m, demand, takes_off=isinstance(wish, TakeOff)):
         line = _flown(points_m, home_xy_m, home_m, demand, lands_xy_m)
@@ -241,6 +245,19 @@ def _xy(dsm: SurfaceModel, lat_lon_deg: LatLon) -> LatLon:
 def _known(dsm: SurfaceModel, xy_m: LatLon, name: str) -> float:
     """The surface's height there."""
     return _finite(float(dsm.elevation_at(np.array([xy_m]))[0]), f"at {name}")
+
+
+def _check_home(wish: Wish, shape: _Shape, at_m: F64, home_xy_m: LatLon) -> None:
+    if isinstance(wish, TakeOff):
+        off_m = math.dist(at_m[:2], home_xy_m)
+        if off_m > STANDS_M:
+            what = f"The vehicle stands {off_m:.1f} m from its home: from there no take-off is certified."
+            raise MissionError(what, advice="Disarm it: when it arms again, its home is where it stands.")
+    if isinstance(wish, Back):
+        off_m = math.dist(shape.tail_m[-1, :2], home_xy_m)
+        if off_m > CAME_FROM_M:
+            what = f"The way that was flown is known from {off_m:.1f} m beside home on only: it does not lead home."
+            raise MissionError(what, advice="Return another way.")
 
 
 def _finite(alt_m: float, where: str) -> float:

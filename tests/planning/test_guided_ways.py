@@ -193,6 +193,15 @@ def test_a_take_off_ends_over_home_and_needs_a_free_column() -> None:
     assert asked(z, TakeOff(6.0), start=here(model(z), up_m=0.0)).problem is not None
 
 
+def test_a_take_off_from_anywhere_but_home_is_refused() -> None:
+    """Armed where it has landed, it would fly straight from there to over its home, through whatever stands between."""
+    dsm = model(walled())
+    for east_m in (61.5, 100.0):
+        with pytest.raises(MissionError, match="from its home") as error:
+            asked(walled(), TakeOff(6.0), start=here(dsm, east_m, up_m=0.0))
+        assert "Disarm" in error.value.advice
+
+
 def test_a_look_stays_where_it_is() -> None:
     dsm = model(flat())
     way = asked(flat(), Look(at(dsm, 90.0, 60.0)))
@@ -236,6 +245,21 @@ def test_back_along_the_flown_way_is_the_way_that_was_flown() -> None:
     raised = asked(z, Back(tuple(through)), start=here(dsm, 100.0, 60.0, 5.0))
     assert raised.raised_m > 0.0
     assert nearest_m(z, raised) >= REQUIRED_M
+
+
+def test_back_does_not_land_where_nobody_has_looked() -> None:
+    """The flown way is known from where the ground station began to listen on: that need not be home."""
+    dsm, start = model(flat()), here(model(flat()), 100.0, 60.0, 16.0)
+    cut = tuple((*at(dsm, 60.0 + k, 60.0), 16.0) for k in range(10, 41))
+    with pytest.raises(MissionError, match="10.0 m beside home") as error:
+        asked(flat(), Back(cut), start=start)
+    assert error.value.advice
+    z = flat()
+    z[60, 57] = 102.0
+    beside = tuple((*at(dsm, 57.5 + k, 60.5), 16.0) for k in range(41))
+    way = asked(z, Back(beside), start=start)
+    assert way.problem == "way"
+    assert "landing place is not clear" in " ".join(way.reasons)
 
 
 @pytest.mark.parametrize(
