@@ -12,8 +12,6 @@ from pydantic import TypeAdapter
 from server.api.access import DONE, ERROR_RESPONSES, Need, Who, answer, needs, parts_of
 from server.api.sessions_ended import close_ended, end_sessions
 from server.door.accounts import INVITED_S
-from server.door.auth import Identity
-from server.door.passwords import PasswordHash
 from server.errors import ConflictError, NotFoundError
 from server.schemas import AccountDoc, ChangePassword, InvitationDoc, NewAccount, SessionDoc
 
@@ -69,7 +67,8 @@ async def change_password(body: ChangePassword, who: Who, request: Request) -> N
             "The owner's password stands in the settings.", advice="Set HEDGEHOP_PASSWORD and start again."
         )
     parts = parts_of(request)
-    await asyncio.to_thread(_change_password, request, who, body.password)
+    made = await parts.auth.hashed(body.password)
+    await asyncio.to_thread(parts.auth.change_password, who.name, made, stays=who.session_key)
     await close_ended(parts)
 
 
@@ -118,7 +117,3 @@ async def _invited(request: Request, name: str, status_code: int) -> Response:
     token = await asyncio.to_thread(parts_of(request).auth.accounts.invite, name)
     made = InvitationDoc(link=f"{request.base_url}login?token={token}", expires_utc_s=expires_utc_s)
     return answer(made, status_code)
-
-
-def _change_password(request: Request, who: Identity, password: str) -> None:
-    parts_of(request).auth.change_password(who.name, PasswordHash.of(password), stays=who.session_key)

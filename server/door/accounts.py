@@ -118,6 +118,14 @@ class Accounts:
             )
         return changed
 
+    def keep_anew(self, account: Account, password: PasswordHash) -> None:
+        """The password that it has, hashed anew: nothing ends. Without effect where it has changed meanwhile."""
+        with self._changing() as kept:
+            anew = replace(account, password=password.text)
+            accounts = tuple(anew if other == account else other for other in kept.accounts)
+            if accounts != kept.accounts:
+                self._write(replace(kept, accounts=accounts))
+
     def invite(self, name: str, lasts_s: float = INVITED_S) -> str:
         """A token that signs in once, until it expires; ``OWNER`` as the printed link does. Raises NotFoundError."""
         token, now = secrets.token_urlsafe(32), self._clock_utc_s()
@@ -172,8 +180,7 @@ class Accounts:
         try:
             kept = msgspec.json.decode(self._file.read_bytes(), type=_Kept)
             for account in kept.accounts:
-                if account.password:
-                    PasswordHash.read(account.password)
+                _check_hash(account)
         except (OSError, ValueError, msgspec.MsgspecError) as error:
             self._is_damaged = True
             log.warning("The accounts cannot be read: %s. Mend or delete %s.", error, self._file)
@@ -192,6 +199,15 @@ def _check_name(name: str) -> str:
     if cleaned.casefold() in _NOT_NAMES:
         raise BadRequestError(f"{cleaned!r} would be taken for somebody else.", advice="Choose another name.")
     return cleaned
+
+
+def _check_hash(account: Account) -> None:
+    """Raises ValueError."""
+    try:
+        if account.password:
+            PasswordHash.read(account.password)
+    except ValueError as error:
+        raise ValueError(f"the password of {account.name!r} cannot be used: {error}") from error
 
 
 def _one(kept: _Kept, name: str) -> Account:

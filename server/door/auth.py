@@ -22,7 +22,7 @@ from pathlib import Path
 import msgspec
 
 from server.door.accounts import OWNER, Account, Accounts, Role
-from server.door.passwords import PasswordHash
+from server.door.passwords import OF_NOBODY, PasswordHash
 from server.door.tries import Tries, place_of
 from server.errors import SignInError, StorageError
 from server.library.whole_files import write_atomically
@@ -32,8 +32,6 @@ log = logging.getLogger("hedgehop.auth")
 SESSIONS_MAX = 1000
 BY_LINK = "link"
 """The stamp of the owner's sessions that no password stands behind."""
-_NOBODY = PasswordHash(bytes(16), bytes(64))
-"""What is compared where there is no such account: a guess takes as long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +132,7 @@ class Auth:
     async def sign_in(self, name: str, password: str, address: str) -> str:
         """Exchanges a password for a new session id. Raises SignInError, TooManyTriesError."""
         account = self._owner if name == OWNER else self.accounts.find(name)
-        kept = PasswordHash.read(account.password) if account is not None and account.password else _NOBODY
+        kept = PasswordHash.read(account.password) if account is not None and account.password else OF_NOBODY
         known = account is not None and any(
             session.name == account.name and place_of(session.address) == place_of(address)
             for session in self._sessions.values()
@@ -142,7 +140,14 @@ class Auth:
         right = await self._tries.check(address, name, known=known, matches=lambda: kept.matches(password))
         if not right or account is None:
             raise SignInError("Name or password is wrong.", advice="Try again, or use a sign-in link.")
+        if kept.is_outdated:
+            made = await self.hashed(password)
+            await asyncio.to_thread(self._keep_anew, account, made)
         return await asyncio.to_thread(self._enter, account, address)
+
+    async def hashed(self, password: str) -> PasswordHash:
+        """Never beside another one that is hashed or looked at."""
+        return await self._tries.alone(lambda: PasswordHash.of(password))
 
     # Sessions
 
@@ -202,6 +207,13 @@ class Auth:
                 sessions[stays] = replace(session, stamp=changed.stamp)
             self._write(sessions)
 
+    def _keep_anew(self, account: Account, password: PasswordHash) -> None:
+        """The same password, hashed as passwords are by now."""
+        try:
+            self.accounts.keep_anew(account, password)
+        except StorageError as error:
+            log.warning("The password of %r stays hashed as it was until its next sign-in: %s", account.name, error)
+
     def _enter(self, account: Account, address: str) -> str:
         return self._new_session(account.name, account.stamp, address)
 
@@ -242,7 +254,8 @@ class Auth:
         except ValueError:
             known = None
         if known is not None and known.matches(password):
-            return Account(OWNER, "operator", kept.owner_stamp, known.text)
+            text = PasswordHash.of(password).text if known.is_outdated else known.text
+            return Account(OWNER, "operator", kept.owner_stamp, text)
         return Account(OWNER, "operator", secrets.token_hex(8), PasswordHash.of(password).text)
 
     def _read(self) -> _Kept:

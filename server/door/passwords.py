@@ -1,48 +1,82 @@
-"""Passwords as they are kept: scrypt, whose cost in memory makes guessing dear, written with its own figures."""
+"""Passwords as they are kept: Argon2id, whose cost in memory makes guessing dear, written with its own figures.
+
+Older files hold scrypt: such a password still lets in, and is hashed anew when it does.
+"""
 
 from __future__ import annotations
 
+import base64
+import binascii
 import hashlib
 import hmac
-import secrets
+import re
 from dataclasses import dataclass
+
+from argon2 import PasswordHasher
+from argon2.exceptions import VerifyMismatchError
 
 from server.errors import BadRequestError
 
 SHORTEST, LONGEST = 8, 1024
-_N, _R, _P = 2**15, 8, 3
-"""32 MiB for about a quarter of a second."""
-_MEMORY_BYTES = 64 * 1024**2
+MEMORY_KIB, PASSES, LANES = 46 * 1024, 2, 1
+"""More than OWASP asks for at least (46 MiB, one pass), about a tenth of a second of one core of a laptop."""
+_HASHER = PasswordHasher(time_cost=PASSES, memory_cost=MEMORY_KIB, parallelism=LANES)
+_MEMORY_KIB_MAX, _PASSES_MAX, _LANES_MAX = 256 * 1024, 16, 8
+"""Figures in a file beyond these would hold up whoever signs in."""
+_ARGON2 = re.compile(
+    r"\$argon2id\$v=19\$m=(\d{1,12}),t=(\d{1,12}),p=(\d{1,12})\$([A-Za-z0-9+/]{22})\$([A-Za-z0-9+/]{43})"
+)
+_SCRYPT = re.compile(r"scrypt\$(\d{1,12})\$(\d{1,12})\$(\d{1,12})\$((?:[0-9a-f]{2})+)\$((?:[0-9a-f]{2})+)")
 
 
 @dataclass(frozen=True, slots=True)
 class PasswordHash:
-    salt: bytes
-    digest: bytes
-    n: int = _N
-    r: int = _R
-    p: int = _P
+    text: str
+    """As it is kept: ``$argon2id$v=19$m=…,t=…,p=…$salt$digest``, or of before ``scrypt$n$r$p$salt$digest``."""
 
     @classmethod
     def of(cls, password: str) -> PasswordHash:
-        salt = secrets.token_bytes(16)
-        return cls(salt, _scrypt(password, salt, _N, _R, _P))
+        """Takes its time and memory: call it in the thread of ``Tries``."""
+        return cls(_HASHER.hash(_raw(password)))
 
     @classmethod
     def read(cls, text: str) -> PasswordHash:
-        """What ``text`` has written. Raises ValueError."""
-        kind, n, r, p, salt, digest = text.split("$")
-        if kind != "scrypt" or not (2 <= int(n) <= 2**17 and 1 <= int(r) <= 8 and 1 <= int(p) <= 16):
-            raise ValueError(f"{kind} with these figures is not how passwords are kept here")
-        return cls(bytes.fromhex(salt), bytes.fromhex(digest), int(n), int(r), int(p))
+        """What ``text`` has written. Raises ValueError, which says what is wrong with it."""
+        if found := _ARGON2.fullmatch(text):
+            memory_kib, passes, lanes = (int(figure) for figure in found.groups()[:3])
+            if not _is_base64(found[4]) or not _is_base64(found[5]):
+                raise ValueError("its Argon2id hash is damaged")
+            usual = (
+                1 <= lanes <= _LANES_MAX and 1 <= passes <= _PASSES_MAX and 8 * lanes <= memory_kib <= _MEMORY_KIB_MAX
+            )
+        elif found := _SCRYPT.fullmatch(text):
+            n, r, p = (int(figure) for figure in found.groups()[:3])
+            usual = 2 <= n <= 2**17 and n & (n - 1) == 0 and 1 <= r <= 8 and 1 <= p <= 16
+        else:
+            raise ValueError("its hash is damaged: it is neither Argon2id nor scrypt as Hedgehop writes them")
+        if not usual:
+            raise ValueError(f"its hash has figures that Hedgehop never wrote: {text[: found.start(4)]}")
+        return cls(text)
 
     @property
-    def text(self) -> str:
-        return f"scrypt${self.n}${self.r}${self.p}${self.salt.hex()}${self.digest.hex()}"
+    def is_outdated(self) -> bool:
+        """It is not as ``of`` makes it."""
+        return not self.text.startswith("$argon2id$") or _HASHER.check_needs_rehash(self.text)
 
     def matches(self, password: str) -> bool:
-        """Takes as long for a wrong one as for the right one: call it in a thread."""
-        return hmac.compare_digest(self.digest, _scrypt(password, self.salt, self.n, self.r, self.p))
+        """Takes as long for a wrong one as for the right one: call it in the thread of ``Tries``."""
+        if found := _SCRYPT.fullmatch(self.text):
+            n, r, p = (int(figure) for figure in found.groups()[:3])
+            salt, digest = bytes.fromhex(found[4]), bytes.fromhex(found[5])
+            return hmac.compare_digest(digest, _scrypt(password, salt, n, r, p))
+        try:
+            return _HASHER.verify(self.text, _raw(password))
+        except VerifyMismatchError:
+            return False
+
+
+OF_NOBODY = PasswordHash(f"$argon2id$v=19$m={MEMORY_KIB},t={PASSES},p={LANES}${'A' * 22}${'A' * 43}")
+"""What is compared where there is no such account: a guess takes as long."""
 
 
 def check_password(password: str) -> str:
@@ -52,6 +86,17 @@ def check_password(password: str) -> str:
     return password
 
 
+def _raw(password: str) -> bytes:
+    return password.encode(errors="surrogatepass")
+
+
 def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
-    raw = password.encode(errors="surrogatepass")
-    return hashlib.scrypt(raw, salt=salt, n=n, r=r, p=p, maxmem=max(_MEMORY_BYTES, 256 * n * r))
+    return hashlib.scrypt(_raw(password), salt=salt, n=n, r=r, p=p, maxmem=256 * n * r + 1024**2)
+
+
+def _is_base64(text: str) -> bool:
+    """As Argon2 writes it: no padding, nothing in the bits that are left over."""
+    try:
+        return base64.b64encode(base64.b64decode(text + "=" * (-len(text) % 4))).decode().rstrip("=") == text
+    except binascii.Error:
+        return False

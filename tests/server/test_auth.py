@@ -5,16 +5,19 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import argon2
 import pytest
+from argon2 import PasswordHasher
 
 from server.door import passwords
 from server.door.accounts import OWNER, Accounts
 from server.door.auth import Auth, session_key
-from server.door.passwords import PasswordHash
+from server.door.passwords import OF_NOBODY, PasswordHash
 from server.door.tries import FROM_ONE_PLACE_MAX, IN_LINE_MAX, REMEMBERED_MAX, WRONG_MAX, Tries, place_of
 from server.errors import BadRequestError, ConflictError, NotFoundError, SignInError, StorageError, TooManyTriesError
 
@@ -33,14 +36,10 @@ def clock() -> Clock:
     return Clock()
 
 
-def _quick(password: str, salt: bytes, _n: int, r: int, p: int) -> bytes:
-    return hashlib.scrypt(password.encode(errors="surrogatepass"), salt=salt, n=2, r=r, p=p)
-
-
 @pytest.fixture
 def make(tmp_path: Path, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Auth]:
-    """Its passwords are hashed by the real function, without the quarter of a second that makes guessing dear."""
-    monkeypatch.setattr(passwords, "_scrypt", _quick)
+    """Its passwords are hashed by the real function, without the tenth of a second that makes guessing dear."""
+    monkeypatch.setattr(passwords, "_HASHER", PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
 
     def auth(password: str | None = GOOD) -> Auth:
         accounts = Accounts(tmp_path, clock_utc_s=clock)
@@ -286,6 +285,39 @@ def test_a_flood_is_looked_at_one_at_a_time_and_bounded(waits: Waits) -> None:
     assert sum(isinstance(each, TooManyTriesError) for each in ended) >= 300 - IN_LINE_MAX
 
 
+def test_guesses_of_clients_that_go_away_are_not_looked_at_beside_each_other(waits: Waits) -> None:
+    """Each takes its memory until it is done, whoever has gone meanwhile."""
+    go_on, began = threading.Event(), threading.Semaphore(0)
+    at_once = most = 0
+
+    def held() -> bool:
+        nonlocal at_once, most
+        at_once += 1
+        most = max(most, at_once)
+        began.release()
+        assert go_on.wait(60)
+        at_once -= 1
+        return False
+
+    async def whole() -> bool:
+        gone = []
+        for k in range(4):
+            gone.append(asyncio.ensure_future(waits.tries.check(f"203.0.113.{k}", "anna", known=False, matches=held)))
+            if k == 0:
+                await asyncio.to_thread(began.acquire)
+            await asyncio.sleep(0)
+            gone[-1].cancel()
+        await asyncio.gather(*gone, return_exceptions=True)
+        right = asyncio.ensure_future(waits.guess(HERE, right=True))
+        done, _ = await asyncio.wait([right], timeout=0.2)
+        assert not done, "looked at beside the one that is still under way"
+        go_on.set()
+        return await right
+
+    assert asyncio.run(whole())
+    assert most == 1
+
+
 def test_one_address_cannot_stand_in_line_for_all(waits: Waits) -> None:
     async def whole() -> list[Any]:
         return await asyncio.gather(*(waits.guess(HERE) for _ in range(10)), return_exceptions=True)
@@ -315,6 +347,96 @@ def test_a_hash_is_read_back_as_it_was_written() -> None:
     assert made != PasswordHash.of("same words")
     assert made.matches("same words")
     assert not made.matches("same words ")
-    for text in ("", "scrypt$1$2", "md5$2$1$1$aa$bb", "scrypt$1073741824$8$1$aa$bb"):
-        with pytest.raises(ValueError, match=r".+"):
-            PasswordHash.read(text)
+
+
+def test_passwords_are_hashed_with_argon2id_within_64_mib() -> None:
+    """As the library reads it: the figures stand in the hash."""
+    figures = argon2.extract_parameters(PasswordHash.of("same words").text)
+    assert figures.type is argon2.Type.ID
+    assert 46 * 1024 <= figures.memory_cost <= 64 * 1024
+    assert figures.time_cost >= 2
+    assert argon2.extract_parameters(OF_NOBODY.text) == figures
+    assert not OF_NOBODY.matches("")
+
+
+GOOD_ARGON2 = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1).hash("same words")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "neither Argon2id nor scrypt"),
+        ("scrypt$1$2", "neither"),
+        ("md5$2$1$1$aa$bb", "neither"),
+        ("scrypt$1073741824$8$1$aa$bb", "figures that Hedgehop never wrote"),
+        ("scrypt$3$8$1$aa$bb", "never wrote"),
+        (GOOD_ARGON2[:-1], "neither"),
+        (GOOD_ARGON2.replace("argon2id", "argon2i"), "neither"),
+        (GOOD_ARGON2.replace("m=8", "m=4194304"), "never wrote: .argon2id.v=19.m=4194304,t=1,p=1"),
+        (GOOD_ARGON2.replace("p=1", "p=0"), "never wrote"),
+        (GOOD_ARGON2[:-1] + "/", "its Argon2id hash is damaged"),
+    ],
+)
+def test_a_damaged_hash_is_refused_with_what_is_wrong(text: str, told: str) -> None:
+    assert PasswordHash.read(GOOD_ARGON2).matches("same words")
+    with pytest.raises(ValueError, match=told):
+        PasswordHash.read(text)
+
+
+def test_a_damaged_hash_is_told_with_the_name_of_its_account(
+    auth: Auth, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    auth.accounts.add("Anna", "operator")
+    file = tmp_path / "accounts.json"
+    file.write_text(file.read_text().replace('"password": ""', '"password": "$argon2id$v=19$"'))
+    with pytest.raises(SignInError):
+        enter(auth, "Anna", "hers alone")
+    assert "the password of 'Anna' cannot be used: its hash is damaged" in caplog.text
+
+
+# Hashes of before
+
+
+def old_hash(password: str) -> PasswordHash:
+    salt = bytes(range(16))
+    digest = hashlib.scrypt(password.encode(), salt=salt, n=2, r=8, p=1)
+    return PasswordHash.read(f"scrypt$2$8$1${salt.hex()}${digest.hex()}")
+
+
+def test_a_password_of_before_lets_in_and_is_hashed_anew_without_ending_anything(auth: Auth) -> None:
+    auth.accounts.add("Anna", "operator")
+    auth.accounts.set_password("Anna", old_hash("hers alone"))
+    earlier, invitation = auth.redeem(auth.accounts.invite("Anna")), auth.accounts.invite("Anna")
+    with pytest.raises(SignInError):
+        enter(auth, "Anna", "hers alone ")
+    kept = auth.accounts.find("Anna")
+    assert kept is not None
+    assert kept.password == old_hash("hers alone").text
+    session = enter(auth, "Anna", "hers alone")
+    anew = auth.accounts.find("Anna")
+    assert anew is not None
+    assert anew.password.startswith("$argon2id$")
+    assert lasts(auth, earlier)
+    assert lasts(auth, session)
+    assert lasts(auth, auth.redeem(invitation))
+    assert lasts(auth, enter(auth, "Anna", "hers alone"))
+    assert auth.accounts.find("Anna") == anew
+
+
+def test_a_password_that_has_changed_meanwhile_is_not_hashed_back(auth: Auth) -> None:
+    auth.accounts.add("Anna", "operator")
+    before = auth.accounts.set_password("Anna", old_hash("hers alone"))
+    changed = auth.accounts.set_password("Anna", PasswordHash.of("another one"))
+    auth.accounts.keep_anew(before, PasswordHash.of("hers alone"))
+    assert auth.accounts.find("Anna") == changed
+
+
+def test_the_owners_sessions_outlive_the_hash_of_before(auth: Auth, make: Callable[..., Auth], tmp_path: Path) -> None:
+    session, file = enter(auth), tmp_path / "sessions.json"
+    kept = json.loads(file.read_text())
+    kept["owner_password"] = old_hash(GOOD).text
+    file.write_text(json.dumps(kept))
+    again = make()
+    assert lasts(again, session)
+    assert lasts(again, enter(again))
+    assert json.loads(file.read_text())["owner_password"].startswith("$argon2id$")
