@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -19,7 +21,7 @@ from server.library import Library
 from server.library.recording_list import RecordingShelf
 from server.settings import MOST_VEHICLES, load_settings
 from server.stations import Flying
-from telemetry.bus.node_lock import running_nodes
+from telemetry.bus.node_lock import running_node, running_nodes
 from telemetry.topics.messages import FlightStatus
 from tests.server.simulated import simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
@@ -220,3 +222,20 @@ def test_each_has_nodes_recordings_and_a_log_of_commands_of_its_own(pair: Statio
     for recording in listed:
         ok(pair.http.delete(f"/api/recordings/{recording.id}"))
     assert ok(pair.http.get("/api/recordings")).json() == []
+
+
+@pytest.mark.xdist_group("real-time")
+@pytest.mark.slow
+def test_a_link_that_hangs_is_not_live_on_pages_that_show_another_vehicle(pair: Station) -> None:
+    """Disarmed, too: then no alarm says it."""
+
+    def wasp(message: Any) -> Any:
+        return next(each for each in message.vehicles if each.name == "Wasp")
+
+    node = running_node(pair.server.settings.data_dir / "vehicles" / "2" / "run", "link")
+    assert node is not None
+    pair.until(lambda m: m.type == "fleet" and wasp(m).link == "live", LONG_S)
+    os.kill(node.pid, signal.SIGSTOP)
+    told = wasp(pair.until(lambda m: m.type == "fleet" and wasp(m).link != "live", LONG_S))
+    assert (told.link, told.silent_s, told.alarm) == ("lost", None, None)
+    pair.until(lambda m: m.type == "fleet" and wasp(m).link == "live", LONG_S)

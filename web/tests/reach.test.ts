@@ -1,6 +1,6 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import { now_ms } from "../src/store/clock";
-import { heard, lease, linkState, linkStatus, nodes, takeFlying } from "../src/store/flying";
+import { forgetFlying, heard, lease, linkState, linkStatus, nodes, takeFlying } from "../src/store/flying";
 import { loss } from "../src/store/losses";
 import { failed, isOld, late_s, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
 import { forgetClock, takeClock } from "../src/store/server_clock";
@@ -10,6 +10,7 @@ import { linkStatus as status, vehicleMessage } from "./flight_samples";
 const linkNode = (state: string) => [{ name: "link", state, restarts: 0, text: "" }] as never;
 
 beforeEach(() => {
+  forgetFlying(1, 1);
   now_ms.value = 0;
   link.value = "open";
   lease.value = { ...lease.value, holder: "Anna", mine: true };
@@ -43,6 +44,24 @@ describe("how far this page's word reaches", () => {
       expect(whyNotAsk.value).toBeNull();
     },
   );
+
+  it("ends at a link that runs again until it has said how things are by now", () => {
+    takeFlying({ v: 1, type: "nodes", nodes: linkNode("silent") }, 100);
+    takeFlying({ v: 1, type: "nodes", nodes: linkNode("running") }, 200);
+    expect(failed.value).toBe("link");
+    expect(isOld("live", "position")).toBe(true);
+    takeFlying({ v: 1, type: "link", link: status() }, 300);
+    expect(failed.value).toBeNull();
+  });
+
+  it("ends at a link that is down though no vehicle is adopted: nothing connects, and no transmitter is named", () => {
+    takeFlying({ v: 1, type: "link", link: status({ adopted: null }) }, 0);
+    takeFlying({ v: 1, type: "nodes", nodes: linkNode("restarting") }, 100);
+    expect(failed.value).toBeNull();
+    expect(whyNotCommand.value).toContain("started again");
+    expect(whyNotCommand.value).not.toContain("transmitter");
+    expect(whyNotAsk.value).toBeNull();
+  });
 
   it.each(["silent", "lost", "connecting"] as const)("ends at a server to which the page is %s", (state) => {
     link.value = state;

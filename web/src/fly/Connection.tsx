@@ -3,7 +3,7 @@ import type { Candidate, ConnectionStatus, SigningStatus } from "../messages";
 import { count, number } from "../format";
 import { adopted, isInAir, lease, linkState, linkStatus, silence_s, vehicle } from "../store/flying";
 import { pending } from "../store/outcomes";
-import { failed, late_s, whyNotAsk, whyNotCommand } from "../store/reach";
+import { failed, late_s, whyNotAsk, whyNotCommand, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { ErrorPanel } from "../ui/Outcome";
@@ -87,18 +87,24 @@ function AddressForm() {
   );
 }
 
+const NOT_KNOWN = "not known now";
 const STATES = { open: "open", waiting: "nothing heard yet", failed: "failed, tried again" } as const;
 
 function ConnectionRow({ connection }: { connection: ConnectionStatus }) {
   const { address, state, error, received_messages, bad_bytes } = connection;
+  const isKnown = whyUnheard.value === null;
   return (
     <li data-testid="connection-row">
       <div class="row">
         <span class="connection-name">
           <strong>{address}</strong>
-          <span class={state === "failed" ? "says-bad" : "muted"}>
-            {state === "open" ? `${number(received_messages)} messages` : STATES[state]}
-            {bad_bytes > 0 && ` · ${number(bad_bytes)} bytes unreadable`}
+          <span class={isKnown && state === "failed" ? "says-bad" : "muted"}>
+            {!isKnown
+              ? NOT_KNOWN
+              : state === "open"
+                ? `${number(received_messages)} messages`
+                : STATES[state]}
+            {isKnown && bad_bytes > 0 && ` · ${number(bad_bytes)} bytes unreadable`}
           </span>
         </span>
         <Button
@@ -177,15 +183,16 @@ const SIGNED: Readonly<Record<SigningStatus["mode"], string>> = {
 function Signing({ signing }: { signing: SigningStatus }) {
   const refused = signing.unsigned + signing.wrong + signing.replayed + signing.ahead;
   const isOn = signing.mode === "on";
+  const isKnown = whyUnheard.value === null;
   return (
     <div class="row" data-testid="signing">
       <span class="connection-name">
         <strong>Signing</strong>
-        <span class={isOn ? "muted" : "says-near"} data-testid="signing-state">
-          {SIGNED[signing.mode]}
-          {refused > 0 && ` · ${number(refused)} refused`}
+        <span class={isOn || !isKnown ? "muted" : "says-near"} data-testid="signing-state">
+          {isKnown ? SIGNED[signing.mode] : NOT_KNOWN}
+          {isKnown && refused > 0 && ` · ${number(refused)} refused`}
         </span>
-        {refused > 0 && (
+        {isKnown && refused > 0 && (
           <span class="muted">
             {number(signing.unsigned)} unsigned, {number(signing.wrong)} with another key,{" "}
             {number(signing.replayed)} heard before, {number(signing.ahead)} of years ahead
@@ -242,7 +249,9 @@ export function ConnectionSection() {
   const used = adopted.value;
   const summary = used
     ? linkWords(status, silence_s.value, linkState.value, failed.value, late_s.value).text
-    : count(status?.candidates.length ?? 0, "vehicle") + " heard";
+    : whyUnheard.value === null
+      ? count(status?.candidates.length ?? 0, "vehicle") + " heard"
+      : NOT_KNOWN;
   return (
     <Section
       id={PLACE}

@@ -12,6 +12,7 @@ import {
 import {
   adopted,
   hasLinkFailed,
+  isRecorderDown,
   latched,
   isObserver,
   lease,
@@ -137,7 +138,7 @@ function Recording() {
   if (error)
     return <Chip icon="warning" text="Not recording" level="bad" title={error.what} testid="chip-rec" />;
   if (seconds === null) return null;
-  if (failed.value === "server")
+  if (failed.value === "server" || isRecorderDown.value)
     return (
       <Chip
         icon="question"

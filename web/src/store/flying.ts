@@ -118,14 +118,23 @@ export const linkState = computed<LinkStatus["state"]>(() => {
   return state === "live" && silent_s >= STALE_AFTER_S ? "stale" : state;
 });
 
-/** The process that commands the vehicle does not answer, or is being started again. */
-export const hasLinkFailed = computed(
-  () =>
-    adopted.value !== null &&
-    nodes.value.some(
-      (node) => node.name === "link" && (node.state === "silent" || node.state === "restarting"),
-    ),
-);
+const isDown = (known: readonly NodeDoc[], name: string) =>
+  known.some((node) => node.name === name && (node.state === "silent" || node.state === "restarting"));
+
+/** When the link was last said to be down: what it had told before is not so any more because it runs again. */
+const linkDown_ms = signal(-Infinity);
+
+/** The process that commands the vehicle does not answer, is being started again, or has not told anything since. */
+export const isLinkDown = computed(() => {
+  const told_ms = linkStatus.value?.received_ms;
+  return isDown(nodes.value, "link") || (told_ms !== undefined && told_ms <= linkDown_ms.value);
+});
+
+/** It is down, and a vehicle was commanded over it. */
+export const hasLinkFailed = computed(() => adopted.value !== null && isLinkDown.value);
+
+/** Whether what is happening is still being recorded cannot be told. */
+export const isRecorderDown = computed(() => isDown(nodes.value, "recorder"));
 
 /** Length of the running recording; null when nothing is being recorded. */
 export const recorded_s = computed(() => {
@@ -158,6 +167,7 @@ export function forgetFlying(before: number, now: number): void {
   trackVersion.live.value += 1;
   lease.value = { holder: null, mine: false, silent: false, asks: null, waits: false };
   nodes.value = [];
+  linkDown_ms.value = -Infinity;
 }
 
 /** Takes one message about the vehicle. */
@@ -198,6 +208,7 @@ export function takeFlying(message: FlyingMessage, received_ms: number): void {
       return;
     case "nodes":
       nodes.value = message.nodes;
+      if (isDown(message.nodes, "link")) linkDown_ms.value = received_ms;
       return;
     case "recorder":
       recorder.value = { status: message.recorder, received_ms };

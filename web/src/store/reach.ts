@@ -1,7 +1,7 @@
 import { computed } from "@preact/signals";
 import { isStale, type Group } from "./ages";
 import { now_ms } from "./clock";
-import { adopted, hasLinkFailed, heard, notInCharge, overdue_s, type Source } from "./flying";
+import { adopted, hasLinkFailed, heard, isLinkDown, notInCharge, overdue_s, type Source } from "./flying";
 import { serverNow_s } from "./server_clock";
 import { link } from "./state";
 
@@ -23,7 +23,8 @@ const FAILURES = {
 
 /** Why nothing that is asked here comes to the vehicle, whoever asks it. */
 export const whyUnheard = computed(() => {
-  if (failed.value === null) return null;
+  if (failed.value === null)
+    return isLinkDown.value ? "The vehicle link does not answer and is started again" : null;
   return FAILURES[link.value === "silent" ? "silent" : failed.value];
 });
 

@@ -1,5 +1,6 @@
 import { count } from "../format";
 import { transfer } from "../store/flying";
+import { whyUnheard } from "../store/reach";
 import { Bar } from "../ui/Bar";
 
 const PHASES = { sending: "Sending", reading_back: "Reading back", done: "Done", failed: "Failed" } as const;
@@ -7,7 +8,7 @@ const PHASES = { sending: "Sending", reading_back: "Reading back", done: "Done",
 /** A mission on its way, in items. */
 export function TransferBar() {
   const now = transfer.value;
-  if (!now || now.phase === "done" || now.phase === "failed") return null;
+  if (!now || now.phase === "done" || now.phase === "failed" || whyUnheard.value !== null) return null;
   return (
     <div class="transfer" data-testid="transfer" role="status">
       <span>
