@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -55,6 +56,10 @@ class Scenery:
                 actor.draw_track(self._stage, self._placer)
 
 
+_NOWHERE = np.full((1, 3), np.nan)
+"""Between two points of a path: no line there."""
+
+
 class _Actor:
     """One vehicle on the stage, and what of it is drawn already."""
 
@@ -85,12 +90,16 @@ class _Actor:
         self._way = way
 
     def draw_track(self, stage: Vehicles, placer: Placer) -> None:
-        states = self._channel.track.states
+        track = self._channel.track
+        states = track.states
         if len(states) == self._placed:
             return
         if len(states) < self._placed:
             self._placed, self._points = 0, np.zeros((0, 3))
-        self._points = np.concatenate([self._points, placer.places(states[self._placed :])])
+        starts = [k for k in range(self._placed, len(states)) if track.is_anew[k]]
+        for start, end in pairwise(sorted({self._placed, *starts, len(states)})):
+            parted = [_NOWHERE] if track.is_anew[start] else []
+            self._points = np.concatenate([self._points, *parted, placer.places(states[start:end])])
         self._placed = len(states)
         stage.follow(self._name, self._points)
 

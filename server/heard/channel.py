@@ -92,6 +92,7 @@ class Channel:
         begins = state.armed and (before is None or not before.armed)
         if begins and self._source == "live":
             self.restart_track()
+        self.track.see(state)
         moved = before is None or before.position_t_mono_s != state.position_t_mono_s
         wait_s = max(0.0, 1.0 - self._pace.left(self._now_mono_s())) / RATE_HZ if moved else QUIET_S
         if wait_s == 0.0:

@@ -48,7 +48,10 @@ class FollowDoc(Strict):
 
 
 class TrackDoc(Strict):
-    """The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring."""
+    """The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring.
+
+    Where no position came for ``LOST_S``, a row without place or height parts it.
+    """
 
     source: Source
     s_m: list[float | None]

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapping.geometry.arrays import F64
+from planning.ground.demo_hillside import small_hill
+from planning.terrain.dsm import Dsm
+from server.flying.scenery import Scenery
+from server.heard.channel import Channel
 from server.heard.flown_track import POINTS_MAX, Track
 from server.heard.onboard import rounded_note
 from server.library.terrain_of import FlownOver, covers, terrain_of
+from server.scene.layers.vehicles import Vehicles
 from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
 from server.work.bucket import Bucket
-from telemetry.topics.messages import Rounded
+from telemetry.topics.messages import LOST_S, Rounded
 from telemetry.topics.vehicle import VehicleState
 
 STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0)
@@ -50,6 +58,84 @@ def test_a_long_path_is_thinned_and_keeps_its_ends() -> None:
     assert doc.t_s[0] == 0.0
     assert doc.t_s[-1] > 3 * POINTS_MAX - 20
     assert doc.t_s == sorted(doc.t_s)
+
+
+def heard(t_s: float, **more: float) -> VehicleState:
+    return replace(STATE, t_utc_s=1000.0 + t_s, **{"position_t_mono_s": 50.0 + t_s, **more})
+
+
+def test_a_path_is_parted_where_no_position_came_until_the_vehicle_was_lost() -> None:
+    track = Track()
+    for t_s in (0.0, 1.0, LOST_S + 1.0):
+        track.add(heard(t_s), None)
+    assert None not in track.doc("live").alt_rel_home_m
+    # Other messages came meanwhile, and the first new position comes too soon after one of them to be kept.
+    track.add(heard(2 * LOST_S, position_t_mono_s=51.0 + LOST_S), None)
+    track.see(heard(2 * LOST_S + 1.2))
+    track.add(heard(2 * LOST_S + 1.3), None)
+    doc = track.doc("live")
+    assert doc.alt_rel_home_m == [10.0, 10.0, 10.0, 10.0, None, 10.0]
+    assert doc.s_m == doc.cross_track_m == [None] * 6
+    assert doc.t_s == sorted(doc.t_s)
+
+
+def test_a_thinned_path_is_parted_where_it_was_and_nowhere_else() -> None:
+    track = Track()
+    gaps_s = (10.0, 11.0, 2000.0, 2500.0)
+    away_s = 0.0
+    for k in range(3 * POINTS_MAX):
+        away_s += 60.0 if k in gaps_s else 0.0
+        track.add(heard(k + away_s), None)
+    doc = track.doc("live")
+    assert len(track.states) <= POINTS_MAX
+    parted = [k for k, alt_m in enumerate(doc.alt_rel_home_m) if alt_m is None]
+    # Two that lie nearer to each other than what is left of the points are one.
+    assert len(parted) == len(gaps_s) - 1
+    assert all(doc.t_s[k + 1] - doc.t_s[k - 1] > 60.0 for k in parted)
+
+
+def test_the_3d_view_draws_no_line_to_where_a_lost_vehicle_was_found_again() -> None:
+    dsm, stage = small_hill(), Stage()
+    west, south, _, _ = dsm.bounds_m
+    channel = Channel("live", Pages())
+    scenery = Scenery(cast(Vehicles, stage), {"1": channel})
+    stage.dsm = dsm
+
+    def fly(t_s: float, x_m: float) -> None:
+        lat_deg, lon_deg = dsm.lat_lon_from_xy(np.array([[west + x_m, south + 50.0]]))[0].tolist()
+        home = {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg}
+        channel.track.add(replace(heard(t_s), lat_deg=lat_deg, lon_deg=lon_deg, **home), None)
+
+    fly(0.0, 50.0)
+    fly(1.0, 51.0)
+    scenery.draw()
+    fly(20.0, 90.0)
+    fly(21.0, 91.0)
+    scenery.draw()
+    x_m = stage.path_m[:, 0] - west
+    np.testing.assert_allclose(x_m, [50.0, 51.0, np.nan, 90.0, 91.0], atol=0.01)
+    fly(40.0, 20.0)
+    fly(41.0, 21.0)
+    scenery.draw()
+    np.testing.assert_allclose(stage.path_m[5:, 0] - west, [np.nan, 20.0, 21.0], atol=0.01)
+
+
+class Stage:
+    """What was drawn last."""
+
+    dsm: Dsm | None = None
+
+    def __init__(self) -> None:
+        self.path_m = np.zeros((0, 3))
+
+    def move(self, actor: str, pose: object) -> None: ...
+
+    def follow(self, actor: str, points_m: F64) -> None:
+        self.path_m = points_m
+
+
+class Pages:
+    def publish(self, message: object) -> None: ...
 
 
 def test_a_replays_path_ends_where_it_was_wound_to() -> None:

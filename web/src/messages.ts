@@ -1279,7 +1279,7 @@ export interface FollowDoc {
   least_distance_m: number | null;
 }
 
-/** The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring. */
+/** The flown path so far, thinned; the page goes on with what ``vehicle`` messages bring. Where no position came for ``LOST_S``, a row without place or height parts it. */
 export interface TrackDoc {
   source: "live" | "replay";
   s_m: (number | null)[];

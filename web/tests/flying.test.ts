@@ -21,7 +21,7 @@ import {
   vehicle,
 } from "../src/store/flying";
 import { emptyTrack, extend, trackFrom } from "../src/store/track";
-import type { TrackDoc } from "../src/messages";
+import { LOST_S, type TrackDoc } from "../src/messages";
 import { follow, linkStatus as link, vehicleMessage, vehicleState } from "./flight_samples";
 
 beforeEach(() => {
@@ -104,6 +104,27 @@ describe("the flown path", () => {
     expect(extend(track, vehicleMessage({ now_mono_s: 10 }))).toBe(true);
     expect(extend(track, vehicleMessage({ now_mono_s: 10.05 }))).toBe(false);
     expect(track.s_m).toHaveLength(1);
+  });
+
+  it("has no line over a time in which the vehicle was lost, also once it is thinned", () => {
+    const track = emptyTrack();
+    const at = (now_mono_s: number, position_t_mono_s: number, s_m: number) =>
+      extend(
+        track,
+        vehicleMessage({ now_mono_s, state: vehicleState({ position_t_mono_s }), follow: follow({ s_m }) }),
+      );
+    at(0, 0, 1);
+    at(LOST_S, LOST_S, 2);
+    // The state is told again while nothing new is known of it.
+    for (let now_s = LOST_S + 1; now_s < 20; now_s++) at(now_s, LOST_S, 2);
+    expect(at(20, 20, 30)).toBe(true);
+    at(21, 21, 31);
+    expect(new Set(track.s_m)).toEqual(new Set([1, 2, null, 30, 31]));
+    expect(track.s_m.indexOf(null)).toBe(track.s_m.indexOf(30) - 1);
+    expect(track.alt_rel_home_m[track.s_m.indexOf(null)]).toBeNull();
+    for (let index = 22; index < 12_022; index++) at(index, index, index);
+    expect(track.s_m.length).toBeLessThan(7000);
+    expect(track.s_m.filter((s_m) => s_m === null)).toHaveLength(1);
   });
 
   it("is replaced by a new one, which the charts notice", () => {

@@ -82,7 +82,8 @@ def scene_wxyz(pose: VehiclePose) -> tuple[float, float, float, float]:
 
 
 def track_nodes(drawing: Drawing, actor: str, points_m: F64) -> list[Node]:
-    """The flown path (N, 3) in pieces of equal size: a longer path changes the last piece only."""
+    """The flown path (N, 3), parted where a row is NaN, in pieces of equal size: a longer path changes the last piece
+    only."""
     if len(points_m) < 2:
         return []
     points = drawing.frame.scene_from_model(points_m)

@@ -55,7 +55,7 @@ class Vehicles:
         self._canvas.draw(self._vehicle(actor))
 
     def follow(self, actor: str, points_m: F64) -> None:
-        """The flown path so far, (N, 3) x, y, alt_dsm."""
+        """The flown path so far, (N, 3) x, y, alt_dsm, parted where a row is NaN."""
         if not len(points_m) and not len(self._tracks.get(actor, _NO_POINTS)):
             return
         self._tracks[actor] = points_m
