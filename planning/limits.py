@@ -10,6 +10,8 @@ from planning.errors import ParameterError
 LARGEST = 1e6
 """Metres, seconds or m/s beyond any flight: past it a number is a slip, and rounding would eat centimetres."""
 LONGEST_LOITER_S = 3600.0
+LARGEST_SEED = 10_000
+"""Of whatever is simulated."""
 FEWEST_ITEMS = 4
 """Take-off, two waypoints and the return."""
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.errors import PoiError
+from planning.limits import LONGEST_LOITER_S
 from planning.model import Poi
 from planning.terrain.dsm import Dsm, SurfaceModel
 
@@ -59,8 +60,8 @@ def _range_problem(poi: Poi) -> str | None:
     if not (abs(poi.lat_deg) <= 90 and abs(poi.lon_deg) <= 180):
         hint = "they look swapped" if abs(poi.lat_deg) <= 180 and abs(poi.lon_deg) <= 90 else "give degrees"
         return f"latitude {poi.lat_deg} or longitude {poi.lon_deg} is out of range: {hint}."
-    if not (math.isfinite(poi.loiter_s) and poi.loiter_s >= 0):
-        return f"the loiter time is {poi.loiter_s} s: give zero or a positive number of seconds."
+    if not 0 <= poi.loiter_s <= LONGEST_LOITER_S:
+        return f"the loiter time is {poi.loiter_s:g} s: give zero or more seconds, at most {LONGEST_LOITER_S:,.0f}."
     return None
 
 

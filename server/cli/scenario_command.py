@@ -9,6 +9,7 @@ import typer
 from typer import Argument, Option
 
 from planning.errors import ParameterError
+from planning.limits import LARGEST_SEED
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, check_new
@@ -24,8 +25,8 @@ def scenario(
     world: Annotated[
         Path | None, Option(metavar="FILE", help="Objects of your own (JSON) instead of the scenario's.")
     ] = None,
-    seed: Annotated[int, Option(min=0, max=10_000, help="Of the scene, the sensors' noise and the wind.")] = 0,
-    seeds: Annotated[int, Option(min=1, max=10_000, help="So many seeds, from --seed on.")] = 1,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Of the scene, the sensors' noise and the wind.")] = 0,
+    seeds: Annotated[int, Option(min=1, max=LARGEST_SEED, help="So many seeds, from --seed on.")] = 1,
     radar: Annotated[RadarKind | None, Option(help="arena: by what it would report, or from its samples on.")] = None,
     figures: Annotated[
         list[str] | None,
@@ -52,7 +53,7 @@ def scenario(
 
     Virtual time: the same seed gives the same flight. The exit code is 1 when a figure is not reached.
     """
-    _check(name, record, seeds)
+    _check(name, record, seed, seeds)
     own = _own(name, radar, figures or [])
     _check_plots(name, plots, seeds)
     results: list[ScenarioResult] = []
@@ -95,10 +96,14 @@ def _check_plots(name: str, plots: Path | None, seeds: int) -> None:
     check_directory(plots)
 
 
-def _check(name: str, record: Path | None, seeds: int) -> None:
+def _check(name: str, record: Path | None, seed: int, seeds: int) -> None:
     if name not in NAMES:
         raise ParameterError(
             f'There is no scenario "{name}".', where="NAME", advice=f"Choose one of {', '.join(NAMES)}."
+        )
+    if (last := seed + seeds - 1) > LARGEST_SEED:
+        raise ParameterError(
+            f"The last seed would be {last:,}.", where="--seeds", advice=f"It may be {LARGEST_SEED:,} at most."
         )
     if record is None:
         return

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from typer import Option
 
+from planning.limits import LARGEST_SEED
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import say
@@ -26,7 +27,7 @@ def sim(
     ],
     home: Annotated[str, Option(metavar="LAT,LON,ALT", help="Where it stands; metres above sea level.")],
     speedup: Annotated[float, Option(help="Simulated seconds per second.")] = 1.0,
-    seed: Annotated[int, Option(help="Of wind gusts and GNSS errors.")] = 0,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Of wind gusts and GNSS errors.")] = 0,
     gnss: Annotated[Literal["standalone", "rtk", "perfect"], Option(help="Its receiver.")] = "rtk",
     wind_m_s: Annotated[float, Option(help="Mean wind speed.")] = 0.0,
     dsm: Annotated[

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from planning.limits import LARGEST_SEED
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict
 
@@ -191,4 +192,4 @@ class ScenarioResultDoc(Strict):
 
 class RunScenario(Strict):
     name: Annotated[str, Field(max_length=40)]
-    seed: Annotated[int, Field(ge=0, le=10_000)] = 0
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0

@@ -6,6 +6,7 @@ from affine import Affine
 from pyproj import CRS
 
 from planning.errors import PoiError
+from planning.limits import LONGEST_LOITER_S
 from planning.model import Poi
 from planning.route.poi import check_pois
 from planning.terrain.dsm import Dsm
@@ -38,6 +39,8 @@ def test_good_points_come_back_in_metres() -> None:
         (Poi(45.0, 200.0), "out of range"),
         (Poi(15.0, 195.0), "out of range"),
         (at(20, 20, loiter_s=-1), "loiter"),
+        (at(20, 20, loiter_s=float("nan")), "loiter"),
+        (at(20, 20, loiter_s=LONGEST_LOITER_S + 1), "at most 3,600"),
         (at(10.02, 10), "0.02 m apart"),
         (Poi(at(20, 20).lon_deg, at(20, 20).lat_deg), "but swapped it lies on it"),
     ],

@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import pytest
 
 from planning.formats.wpl import write_wpl
+from planning.limits import LARGEST_SEED
 from planning.missions.vehicle_profile import load_profile
 from planning.model import Mission, PlannedFor
 from planning.terrain.geotiff import read_dsm, write_dsm
@@ -219,6 +220,8 @@ def test_wrong_simulators(tmp_path: Path) -> None:
         (*link, "--home", "here"),
         (*link, "--home", "1,2"),
         (*link, "--home", HOME, "--speedup", 0),
+        (*link, "--home", HOME, "--seed", -1),
+        (*link, "--home", HOME, "--seed", LARGEST_SEED + 1),
         (*link, "--home", HOME, "--parameter", "NOSUCH=1"),
         (*link, "--home", HOME, "--dsm", tmp_path / "none.tif"),
         (*link, "--home", HOME, "--world", tmp_path / "none.json"),

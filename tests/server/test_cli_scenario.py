@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from planning.limits import LARGEST_SEED
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.simulation.scenarios.catalogue import NAMES
 from telemetry.simulation.scenarios.stage.curves import Chart, series
@@ -88,6 +89,8 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
         ("wood", "--record", there): "There is such a file already",
         ("wood", "--record", tmp_path / "new.mcap", "--seeds", 2): "A recording holds one seed",
         ("wood", "--seeds", 0): "--seeds",
+        ("wood", "--seed", LARGEST_SEED + 1): "--seed",
+        ("wood", "--seed", LARGEST_SEED - 1, "--seeds", 3): "The last seed would be 10,001",
         ("wood", "--plots", tmp_path): "There is nothing to draw of wood",
         ("foliage", "--plots", tmp_path, "--seeds", 2): "Figures show one seed, not 2",
     }
