@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -82,10 +82,11 @@ SAME = {"SYSID_THISMAV": "MAV_SYSID", "MAV_SYSID": "SYSID_THISMAV"}
 
 
 class Parameters:
-    """A table that keeps to its ranges; whole numbers stay whole."""
+    """A table that keeps to its ranges; whole numbers stay whole. ``specs``: of another autopilot."""
 
-    def __init__(self, **changed: float) -> None:
-        self._values = {name: spec.default for name, spec in SPECS.items()}
+    def __init__(self, specs: Mapping[str, Spec] = SPECS, /, **changed: float) -> None:
+        self.specs = specs
+        self._values = {name: spec.default for name, spec in specs.items()}
         for name, value in changed.items():
             self.set(name, value)
 
@@ -103,11 +104,11 @@ class Parameters:
 
     def set(self, name: str, value: float) -> float:
         """The value that is kept: cut to the parameter's range; NaN changes nothing."""
-        spec = SPECS[name]
+        spec = self.specs[name]
         if math.isfinite(value):
             kept = min(max(value, spec.low), spec.high)
             self._values[name] = kept if spec.kind == "float" else float(round(kept))
-            if name in SAME:
+            if name in SAME and SAME[name] in self.specs:
                 self._values[SAME[name]] = self._values[name]
         return self._values[name]
 

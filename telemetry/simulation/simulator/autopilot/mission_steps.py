@@ -38,11 +38,14 @@ class Step:
 
 @dataclass(slots=True)
 class MissionSteps:
-    """Row 0 is home. ``current`` is the step that is flown to, or would be."""
+    """``first``: number of the first step that is flown; before it stands home, for ArduCopter. ``current`` is the step
+    that is flown to, or would be.
+    """
 
     steps: list[Step] = field(default_factory=list)
     current: int = 0
     jumps_done: dict[int, int] = field(default_factory=dict)
+    first: int = 1
 
     def next_move(self, start: int) -> tuple[int | None, list[Step]]:
         """Index of the first step from ``start`` on that moves the vehicle, and what is to be set before it."""
@@ -75,7 +78,7 @@ class MissionSteps:
     def _jump(self, at: int, step: Step) -> int:
         target, repeats = int(step.values[0]), int(step.values[1])
         done = self.jumps_done.get(at, 0)
-        if not 0 < target < len(self.steps) or (repeats >= 0 and done >= repeats):
+        if not self.first <= target < len(self.steps) or (repeats >= 0 and done >= repeats):
             return at + 1
         self.jumps_done[at] = done + 1
         return target

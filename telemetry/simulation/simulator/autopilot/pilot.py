@@ -94,10 +94,11 @@ class Sensed:
     """The feet are on something."""
     voltage_v: float
     used_mah: float
+    above_ground_m: float = math.inf
 
 
-class SimulatedPilot:
-    """State that modes read and change. Positions are in the frame, as estimated."""
+class Pilot:
+    """What every simulated autopilot knows and tells, whoever made it. Positions are in the frame, as estimated."""
 
     def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:
         self.frame = frame
@@ -108,18 +109,11 @@ class SimulatedPilot:
         self.armed = self.flying = self.crashed = False
         self.home_neu: Vec3 = (0.0, 0.0, 0.0)
         self.home_known = False
-        self.speed_m_s: float | None = None
-        """Replaces WPNAV_SPEED until the mode changes."""
-        self._vertical_m_s: dict[str, float] = {}
-        """Of Axes; replace WPNAV_SPEED_UP and _DN as long."""
         self.heading_goal_rad = 0.0
-        self.facing_fixed = False
-        """A heading was commanded: the next waypoint does not turn the vehicle."""
         self.p_neu: Vec3 = (0.0, 0.0, 0.0)
         self.v_neu: Vec3 = (0.0, 0.0, 0.0)
         self.target: Motion = (self.p_neu, self.v_neu, (0.0, 0.0, 0.0))
         """Where the vehicle should be now, and how it should be moving."""
-        self.control = PositionControl()
         self._events: list[Event] = []
 
     @property
@@ -145,17 +139,6 @@ class SimulatedPilot:
     def say(self, severity: int, text: str) -> None:
         self.tell(Text(severity, text))
 
-    def axes(self, speed_m_s: float | None = None) -> Axes:
-        return replace(self.parameters.axes(speed_m_s), **self._vertical_m_s)
-
-    def forget_speeds(self) -> None:
-        """Those that were ordered: the vehicle's own count again."""
-        self.speed_m_s = None
-        self._vertical_m_s.clear()
-
-    def near(self, goal_neu: Vec3) -> bool:
-        return math.dist(self.p_neu, goal_neu) <= self.parameters["WPNAV_RADIUS"] / 100
-
     def place(self, step: Step) -> Vec3:
         """Where a step is in the frame."""
         lat, lon = step.lat_deg, step.lon_deg
@@ -167,6 +150,31 @@ class SimulatedPilot:
         north, east = goal_neu[0] - self.p_neu[0], goal_neu[1] - self.p_neu[1]
         if math.hypot(north, east) > at_least_m:
             self.heading_goal_rad = math.atan2(east, north) % (2 * math.pi)
+
+
+class SimulatedPilot(Pilot):
+    """ArduCopter's state that its modes read and change."""
+
+    def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:
+        super().__init__(frame, parameters, boot_s)
+        self.speed_m_s: float | None = None
+        """Replaces WPNAV_SPEED until the mode changes."""
+        self._vertical_m_s: dict[str, float] = {}
+        """Of Axes; replace WPNAV_SPEED_UP and _DN as long."""
+        self.facing_fixed = False
+        """A heading was commanded: the next waypoint does not turn the vehicle."""
+        self.control = PositionControl()
+
+    def axes(self, speed_m_s: float | None = None) -> Axes:
+        return replace(self.parameters.axes(speed_m_s), **self._vertical_m_s)
+
+    def forget_speeds(self) -> None:
+        """Those that were ordered: the vehicle's own count again."""
+        self.speed_m_s = None
+        self._vertical_m_s.clear()
+
+    def near(self, goal_neu: Vec3) -> bool:
+        return math.dist(self.p_neu, goal_neu) <= self.parameters["WPNAV_RADIUS"] / 100
 
     def turn_to(self, heading_rad: float) -> None:
         self.heading_goal_rad = heading_rad
