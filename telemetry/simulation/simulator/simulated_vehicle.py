@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from telemetry.simulation.simulator.airframe.battery import Battery, Pack
-from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, Airframe, AttitudeError, Multirotor, Wind
+from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, AttitudeError, Multirotor, Wind
 from telemetry.simulation.simulator.airframe.gnss import Gnss, GnssKind
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent, has_fix, offset_neu
-from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES, Beginning, Make
 from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S, Sensed
 from telemetry.simulation.simulator.ground_below import FlatGround, Ground, Obstacles
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
@@ -39,6 +39,7 @@ class SimulatedVehicle:
         self,
         frame: NeuFrame,
         *,
+        make: Make = "ardupilot",
         ground: Ground | None = None,
         obstacles: Obstacles | None = None,
         seed: int = 0,
@@ -50,7 +51,8 @@ class SimulatedVehicle:
     ) -> None:
         wind_seed, gnss_seed, attitude_seed = np.random.SeedSequence(seed).spawn(3)
         self.frame = frame
-        self.parameters = parameters or Parameters()
+        self.personality = PERSONALITIES[make]
+        self.parameters = parameters or self.personality.parameters()
         self.ground = ground or FlatGround()
         self.obstacles = obstacles
         self.gnss_script = gnss_script
@@ -61,9 +63,10 @@ class SimulatedVehicle:
         self.attitude_error = (
             AttitudeError() if gnss == "perfect" else AttitudeError.drawn(np.random.default_rng(attitude_seed))
         )
-        self.battery = Battery(Pack(capacity_mah=self.parameters["BATT_CAPACITY"]))
-        self.truth = Multirotor(Airframe())
-        self.autopilot = Autopilot(frame, self.parameters, boot_s=boot_s, speedup=speedup)
+        self.battery = Battery(Pack(capacity_mah=self.parameters[self.personality.capacity]))
+        self.truth = Multirotor(self.personality.airframe)
+        beginning = Beginning(boot_s, speedup, seed, receiver_is_coarse=gnss == "standalone")
+        self.autopilot = self.personality.pilot(frame, self.parameters, beginning)
         self.wind_neu: Vec3 = (0.0, 0.0, 0.0)
         self._steps = 0
         self._ground_m = 0.0
@@ -137,6 +140,7 @@ class SimulatedVehicle:
             touching=self._resting,
             voltage_v=self.battery.voltage_v,
             used_mah=self.battery.used_mah,
+            above_ground_m=max(0.0, u - self._ground_m),
         )
 
     def _thrust(self, motors: bool) -> float | None:
