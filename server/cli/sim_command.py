@@ -13,6 +13,7 @@ from server.cli.shared.command import command
 from server.cli.shared.output import say
 from telemetry.nodes.simulator import read_home, read_parameter
 from telemetry.simulation.simulator.airframe.gnss_script import read_event
+from telemetry.simulation.simulator.autopilot.personality import Make
 from telemetry.simulation.simulator.run import SimOptions, run
 
 
@@ -26,6 +27,9 @@ def sim(
         ),
     ],
     home: Annotated[str, Option(metavar="LAT,LON,ALT", help="Where it stands; metres above sea level.")],
+    autopilot: Annotated[
+        Make, Option(help="Whose behaviour it has: ArduCopter's (4.7) or PX4's (1.17).")
+    ] = "ardupilot",
     speedup: Annotated[float, Option(help="Simulated seconds per second.")] = 1.0,
     seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Of wind gusts and GNSS errors.")] = 0,
     gnss: Annotated[Literal["standalone", "rtk", "perfect"], Option(help="Its receiver.")] = "rtk",
@@ -53,6 +57,7 @@ def sim(
         home_lat_deg=lat_deg,
         home_lon_deg=lon_deg,
         home_alt_amsl_m=alt_m,
+        autopilot=autopilot,
         link=link,
         speedup=speedup,
         seed=seed,

@@ -19,6 +19,7 @@ from telemetry.bus import Bus
 from telemetry.bus.node import EXIT_ENDED, EXIT_REFUSED, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.simulation.simulator.airframe.gnss import RECEIVERS
 from telemetry.simulation.simulator.airframe.gnss_script import read_event
+from telemetry.simulation.simulator.autopilot.personality import MAKES
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying, run
 from telemetry.topics.messages import Topic
 
@@ -70,6 +71,7 @@ def read_options(arguments: Sequence[str] | None = None) -> tuple[SimOptions, Pa
         home_lat_deg=lat_deg,
         home_lon_deg=lon_deg,
         home_alt_amsl_m=alt_m,
+        autopilot=given.autopilot,
         link=given.link,
         speedup=given.speedup,
         seed=given.seed,
@@ -123,6 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=f"{__package__}.simulator", description="A simulated vehicle on MAVLink.")
     default = SimOptions(0.0, 0.0, 0.0)
     parser.add_argument("--link", default=default.link, help="udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT")
+    parser.add_argument("--autopilot", choices=MAKES, default=default.autopilot, help="whose behaviour it has")
     parser.add_argument("--runtime", type=Path, help="directory of the bus; without it no bus is used")
     parser.add_argument("--home", required=True, help="LAT,LON,ALT: degrees, degrees, metres above sea level")
     parser.add_argument("--speedup", type=float, default=default.speedup, help="simulated seconds per second")

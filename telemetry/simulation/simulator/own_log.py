@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +37,10 @@ class OwnLog:
 
 
 class OwnLogs:
-    def __init__(self, vehicle: SimulatedVehicle, mode_numbers: dict[str, int], version: str) -> None:
+    def __init__(
+        self, vehicle: SimulatedVehicle, mode_numbers: Mapping[str, int], version: str, *, are_kept: bool = True
+    ) -> None:
+        self._are_kept = are_kept
         self._vehicle, self._mode_numbers, self._version = vehicle, mode_numbers, version
         self._started_utc_s = time.time()
         self._is_open = False
@@ -45,7 +49,7 @@ class OwnLogs:
 
     def look(self) -> None:
         """After everything that may have armed or disarmed the vehicle."""
-        if self._vehicle.autopilot.armed == self._is_open:
+        if not self._are_kept or self._vehicle.autopilot.armed == self._is_open:
             return
         self._is_open = not self._is_open
         if self._is_open:

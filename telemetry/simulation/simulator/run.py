@@ -17,7 +17,7 @@ from planning.errors import ParameterError
 from telemetry.simulation.simulator.airframe.battery import Pack
 from telemetry.simulation.simulator.airframe.gnss import GnssKind
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
-from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Parameters
+from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES, Make
 from telemetry.simulation.simulator.ground_below import Ground, Obstacles, SurfaceGround
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
@@ -39,6 +39,8 @@ class SimOptions:
     home_lat_deg: float
     home_lon_deg: float
     home_alt_amsl_m: float
+    autopilot: Make = "ardupilot"
+    """Whose behaviour it has: ArduCopter's or PX4's."""
     link: str = "tcpin:127.0.0.1:5760"
     """Where ground stations find it: udpout:HOST:PORT, udpin:HOST:PORT or tcpin:HOST:PORT."""
     speedup: float = 1.0
@@ -58,7 +60,7 @@ class SimOptions:
     endurance_s: float = 1200.0
     """Of hovering."""
     parameters: tuple[tuple[str, float], ...] = field(default=())
-    """Autopilot parameters that differ from ArduCopter's defaults."""
+    """Autopilot parameters that differ from its defaults."""
 
 
 class Simulator:
@@ -223,14 +225,15 @@ def _vehicle(options: SimOptions) -> SimulatedVehicle:
     _check(options)
     frame = NeuFrame(options.home_lat_deg, options.home_lon_deg, options.home_alt_amsl_m)
     capacity_mah = Pack().hover_a * options.endurance_s / 3.6
-    parameters = Parameters(
-        BATT_CAPACITY=capacity_mah, SIM_WIND_SPD=options.wind_m_s, SIM_WIND_DIR=options.wind_from_deg
-    )
+    personality = PERSONALITIES[options.autopilot]
+    parameters = personality.parameters(SIM_WIND_SPD=options.wind_m_s, SIM_WIND_DIR=options.wind_from_deg)
+    parameters.set(personality.capacity, capacity_mah)
     for name, value in options.parameters:
         parameters.set(name, value)
     ground, obstacles = _surroundings(options, frame)
     return SimulatedVehicle(
         frame,
+        make=options.autopilot,
         ground=ground,
         obstacles=obstacles,
         seed=options.seed,
@@ -275,10 +278,11 @@ def _check(options: SimOptions) -> None:
                 where="simulated vehicle",
                 advice=f"Give a value from {low:g} to {high:g}.",
             )
-    unknown = [name for name, _ in options.parameters if name not in SPECS]
+    specs = PERSONALITIES[options.autopilot].specs
+    unknown = [name for name, _ in options.parameters if name not in specs]
     if unknown:
         raise ParameterError(
             f"The simulated autopilot has no parameter {unknown[0]}.",
             where="simulated vehicle",
-            advice=f"It has {', '.join(SPECS)}.",
+            advice=f"It has {', '.join(specs)}.",
         )

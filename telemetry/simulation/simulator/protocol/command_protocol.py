@@ -95,6 +95,10 @@ class Commands:
             return "failed"
         return self._pilot.set_mode(name)
 
+    def set_mode_message(self, message: Any) -> None:
+        """SET_MODE, the old way."""
+        self.set_mode(message.base_mode, message.custom_mode)
+
     def position_target(self, message: Any) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED: a place is flown to, a velocity flown, or both followed."""
         heading_rad = None if message.type_mask & NO_YAW else _heading(message.yaw)

@@ -111,7 +111,7 @@ class ItemProtocol:
         upload.heard_s = now_s
         if message.seq != upload.next_seq:
             return [self._ack(target, wire.MAV_MISSION_INVALID_SEQUENCE)]
-        if refusal := self._store.put(upload.next_seq, _as_int(message)):
+        if refusal := self._store.put(upload.next_seq, as_int(message)):
             self._upload = None
             return [self._ack(target, refusal)]
         upload.next_seq, upload.asked_s = upload.next_seq + 1, now_s
@@ -130,7 +130,7 @@ class ItemProtocol:
         item = self._store.message(message.seq, target)
         if item is None:
             return [self._count(target), self._ack(target, wire.MAV_MISSION_INVALID_SEQUENCE)]
-        return [_as_float(item) if message.get_type() == "MISSION_REQUEST" else item]
+        return [as_float(item) if message.get_type() == "MISSION_REQUEST" else item]
 
     def _on_clear(self, message: Any, target: Target, peer: Hashable, now_s: float) -> list[MAVLink_message]:
         if not self._store.may_clear():
@@ -156,7 +156,7 @@ class ItemProtocol:
         return wire.MAVLink_mission_ack_message(*target, result, self._store.mission_type)
 
 
-def _as_int(item: Any) -> ItemInt:
+def as_int(item: Any) -> ItemInt:
     if isinstance(item, ItemInt):
         return item
     fields = {name: getattr(item, name) for name in item.fieldnames}
@@ -169,7 +169,7 @@ def _e7(degrees: float) -> int:
     return round(degrees * 1e7) if abs(degrees) <= 200 else 2_000_000_000
 
 
-def _as_float(item: ItemInt) -> wire.MAVLink_mission_item_message:
+def as_float(item: ItemInt) -> wire.MAVLink_mission_item_message:
     fields = {name: getattr(item, name) for name in item.fieldnames}
     fields["x"], fields["y"] = item.x / 1e7, item.y / 1e7
     return wire.MAVLink_mission_item_message(**fields)

@@ -1,6 +1,7 @@
 """The simulated vehicle's MAVLink side as a machine without sockets or clock: what comes in, what goes out.
 
-Unasked it sends HEARTBEAT, TIMESYNC and STATUSTEXT and no position, as ArduCopter does.
+What is particular to an autopilot is in its dialect. Unasked ArduCopter sends HEARTBEAT, TIMESYNC and STATUSTEXT and
+no position; PX4 sends nearly everything.
 """
 
 from __future__ import annotations
@@ -12,18 +13,15 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
-from telemetry.simulation.simulator.autopilot.pilot import HomeSet, Reached, StateChanged, Text
+from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.own_log import OwnLogs
-from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS, RESULTS, Commands, read_order, whole
+from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, read_order, whole
+from telemetry.simulation.simulator.protocol.dialects import DIALECTS
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
-from telemetry.simulation.simulator.protocol.message_streams import FIRMWARE, Streams
-from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
-from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterProtocol
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 HEARTBEAT_S = 1.0
-TIMESYNC_S = 10.0
 NEWS_S = 0.15
 """After this the other ground stations hear that one of them has written a mission; between 0.1 s and 0.2 s, measured
 on the real ArduCopter."""
@@ -66,28 +64,32 @@ class Endpoint:
     def __init__(self, vehicle: SimulatedVehicle) -> None:
         self.vehicle = vehicle
         self._pilot = vehicle.autopilot
-        self._missions = MissionProtocol(self._pilot)
-        self._parameters = ParameterProtocol(vehicle.parameters)
-        self._streams = Streams(vehicle, self._missions)
-        self._commands = Commands(self._pilot)
-        self._own_logs = OwnLogs(vehicle, MODE_NUMBERS, FIRMWARE)
+        self._dialect = dialect = DIALECTS[vehicle.personality.make]
+        parts = dialect.parts(vehicle)
+        self._missions, self._parameters = parts.missions, parts.parameters
+        self._streams, self._commands = parts.streams, parts.commands
+        self._own_logs = OwnLogs(vehicle, dialect.mode_numbers, dialect.firmware, are_kept=dialect.keeps_logs)
         self._logs = LogProtocol(vehicle, self._own_logs)
         self._peers: dict[Hashable, _Peer] = {}
         self._news: list[tuple[float, Reply]] = []
         """That the other ground stations have not heard yet, and when they will."""
         self._heartbeat = _Stream(HEARTBEAT_S, 0.0)
-        self._timesync = _Stream(TIMESYNC_S, TIMESYNC_S)
+        self._timesync = _Stream(dialect.timesync_s, dialect.timesync_s)
+        self._texts = 0
 
     @property
     def system_id(self) -> int:
-        return int(self.vehicle.parameters["MAV_SYSID"])
+        return int(self.vehicle.parameters[self.vehicle.personality.system_id])
 
     @property
     def component_id(self) -> int:
         return wire.MAV_COMP_ID_AUTOPILOT1
 
     def connect(self, peer: Hashable) -> None:
-        self._peers.setdefault(peer, _Peer())
+        if peer not in self._peers:
+            now_s = self.vehicle.now_s
+            unasked = {number: _Stream(1 / hz, now_s) for number, hz in self._dialect.unasked_hz.items()}
+            self._peers[peer] = _Peer(unasked)
 
     def disconnect(self, peer: Hashable) -> None:
         self._peers.pop(peer, None)
@@ -137,7 +139,7 @@ class Endpoint:
         if kind in ("COMMAND_LONG", "COMMAND_INT"):
             return self._on_command(message, peer)
         if kind == "SET_MODE":
-            self._commands.set_mode(message.base_mode, message.custom_mode)
+            self._commands.set_mode_message(message)
         elif kind in ("SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"):
             self._commands.position_target(message)
         elif kind == "REQUEST_DATA_STREAM":
@@ -155,7 +157,7 @@ class Endpoint:
         return [reply for value in self._parameters.on_set(message) for reply in self._to_all(value)]
 
     def _on_heartbeat(self, message: Any) -> None:
-        if message.get_srcSystem() == self.vehicle.parameters["MAV_GCS_SYSID"]:
+        if self._dialect.hears(self.vehicle.parameters, message):
             self._pilot.gcs_heard()
 
     def _on_command(self, message: Any, peer: Hashable) -> list[MAVLink_message]:
@@ -167,7 +169,7 @@ class Endpoint:
             result, extra = self._interval(peer, whole(first))
         elif order.command in REQUESTS:
             requested = self._streams.build(REQUESTS[order.command] or whole(first))
-            result, extra = (RESULTS["accepted"], [requested]) if requested else (RESULTS["failed"], [])
+            result, extra = (RESULTS["accepted"], [requested]) if requested else (self._dialect.unknown_message, [])
         else:
             result = self._commands.run(order)
         sender = message.get_srcSystem(), message.get_srcComponent()
@@ -175,8 +177,10 @@ class Endpoint:
 
     def _set_interval(self, peer: Hashable, message_id: int, interval_us: float) -> int:
         if message_id not in self._streams:
-            return RESULTS["denied"]
+            return self._dialect.unknown_stream
         streams = self._peers[peer].streams
+        if interval_us == 0 and message_id in self._dialect.unasked_hz:
+            interval_us = 1e6 / self._dialect.unasked_hz[message_id]
         if interval_us > 0:
             streams[message_id] = _Stream(interval_us / 1e6, self.vehicle.now_s)
         else:
@@ -212,17 +216,12 @@ class Endpoint:
         out: list[Reply] = []
         self._own_logs.look()
         for event in self._pilot.take_events():
-            match event:
-                case Text(severity, text):
-                    self._own_logs.on_text(text)
-                    out += self._to_all(wire.MAVLink_statustext_message(severity, text.encode()[:50]))
-                case Reached(seq):
-                    out += self._to_all(wire.MAVLink_mission_item_reached_message(seq))
-                case HomeSet():
-                    for message in (self._streams.gps_global_origin(), self._streams.home_position()):
-                        out += self._to_all(message) if message else []
-                case StateChanged():
-                    out += self._to_all(self._streams.heartbeat())
+            messages = self._streams.on_event(event)
+            if isinstance(event, Text):
+                self._own_logs.on_text(event.text)
+                self._texts += 1
+                messages = self._dialect.text(event, self._texts)
+            out += [reply for message in messages for reply in self._to_all(message)]
         return out
 
     def _to_all(self, message: Any) -> list[Reply]:

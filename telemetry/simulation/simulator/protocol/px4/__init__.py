@@ -1,0 +1,1 @@
+"""PX4's MAVLink: its missions, parameters, streams and commands."""
