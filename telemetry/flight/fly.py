@@ -15,13 +15,14 @@ from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
 from planning.model import Mission, finite_or_none
 from planning.terrain.dsm import Dsm
-from telemetry.errors import RefusedError, TelemetryError
+from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
 from telemetry.flight.guided.targets import guided_plan
 from telemetry.flight.preflight.preflight import Preflight
 from telemetry.flight.preflight.prepare import FlyOptions, Prepared, Report, connect, prepare
 from telemetry.flight.watch import Asks, Subscribes, Watch, watching
+from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import FlightStatus, PlanRecord, Topic, UploadReport, VehicleText
-from telemetry.topics.requests import ReturnHome, StartAuto, StartGuided
+from telemetry.topics.requests import ReturnHome, StartAuto, StartGuided, TickPoint
 from telemetry.topics.vehicle import VehicleState
 
 __all__ = ["FlyOptions", "FlyResult", "Observer", "fly"]
@@ -83,6 +84,7 @@ async def fly(
     async with watching(bus, on_text=lambda text: _tell_text(text, report)) as watch:
         await connect(client, watch, options.address, options.operator, report, timeout_s=options.connect_s)
         prepared = await prepare(client, watch, mission, options, report)
+        await _write_ticks_down(client, bus, watch, prepared, options)
         bus.publish(Topic.PLAN, _record(prepared, options))
         observer.on_start(prepared)
         watcher = _Watcher(client, watch, options, observer, go_home)
@@ -94,6 +96,23 @@ async def fly(
         flight = await watcher.follow(started_utc_s)
     completed = flight.phase == "landed" and flight.broke_off_at is None
     return FlyResult(completed, _ending(flight), prepared.mission, prepared.upload, prepared.preflight, flight)
+
+
+async def _write_ticks_down(
+    client: Asks, bus: Subscribes, watch: Watch, prepared: Prepared, options: FlyOptions
+) -> None:
+    """The crew's checklist, for the log of commands and for the recording. Raises NotAllowedError: a point is open."""
+    points, profile = options.checklist, options.profile.name
+    for number, point in enumerate(points, start=1):
+        if not point.ticked_by:
+            what = f'Point {number} of the checklist is open: "{point.text}".'
+            raise NotAllowedError(what, where="the check before the start", advice="Look, then tick it.")
+        by = "" if point.ticked_by == options.operator.name else point.ticked_by
+        await client.call(TickPoint(options.operator, number, len(points), point.text, profile, by=by))
+    if points:
+        vehicle = "" if watch.link is None or watch.link.adopted is None else watch.link.adopted.id
+        now_s, digest = time.time(), prepared.upload.onboard.digest
+        bus.publish(Topic.CHECKLIST, ChecklistRecord(now_s, profile, vehicle, digest, points, started_utc_s=now_s))
 
 
 async def _start(client: Asks, watch: Watch, prepared: Prepared, options: FlyOptions, report: Report) -> float:

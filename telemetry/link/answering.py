@@ -92,6 +92,7 @@ class Answering:
             requests.ListVehicleLogs: self._list_logs,
             requests.ReadVehicleLog: self._read_log,
             requests.HighestToken: self._highest_token,
+            requests.TickPoint: self._tick_point,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
             requests.FlyWay: self._fly_way,
@@ -220,6 +221,12 @@ class Answering:
     async def _highest_token(self, request: requests.HighestToken) -> int:
         del request
         return self._right.highest
+
+    async def _tick_point(self, request: requests.TickPoint) -> None:
+        self._link.need_session()
+        what = "tick" if request.ticked else "take back the tick of"
+        point = f"point {request.number} of {request.of} of the checklist of {request.profile}: {request.text}"
+        await self._record(request, f"{what} {point}{f' (by {request.by})' if request.by else ''}")
 
     async def _start_auto(self, request: requests.StartAuto) -> None:
         session = self._link.need_session()

@@ -19,6 +19,7 @@ from telemetry.recording.mcap_files.reader import Recording
 from telemetry.recording.recorded_flight import FlightLog, Stamped, StateHistory, track_of, truth_of
 from telemetry.recording.tlog import Data, frame_address
 from telemetry.recording.tlog_flight import mission_flown
+from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import CommandRecord, PlanRecord, RawFrame, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
@@ -28,11 +29,15 @@ _READ = (
     Topic.TEXT,
     Topic.RAW,
     Topic.PLAN,
+    Topic.CHECKLIST,
     Topic.COMMAND,
     Topic.ALERT,
     Topic.AVOIDANCE,
     Topic.PERCEPTION_SETTINGS,
 )
+STARTED_BEFORE_S = 120.0
+"""A list that was ticked for a start so long before the recording began is of a flight before: a vehicle that does not
+arm is asked again for no longer."""
 _GLOBAL_POSITION = 33
 _DECODED = frozenset({_GLOBAL_POSITION, 39, 44, 46, 47, 73, 86, 108})
 """Message ids of positions, missions, reached items, sent targets and the simulator's truth."""
@@ -51,6 +56,7 @@ class _Parts:
         self.texts: list[VehicleText] = []
         self.commands: list[CommandRecord] = []
         self.plans: list[PlanRecord] = []
+        self.checklist: ChecklistRecord | None = None
         self.alerts: list[ObstacleAlert] = []
         self.avoidance: list[tuple[float, AvoidanceStatus]] = []
         self.settings: list[tuple[float, PerceptionSettings]] = []
@@ -66,6 +72,11 @@ class _Parts:
     def on_avoidance(self, status: AvoidanceStatus, t_utc_s: float) -> None:
         if not self.avoidance or self.avoidance[-1][1].state != status.state:
             self.avoidance.append((t_utc_s, status))
+
+    def on_checklist(self, record: ChecklistRecord, began_utc_s: float) -> None:
+        """What is ticked, or open again, after the start is for the next one."""
+        if record.started_utc_s is not None and record.started_utc_s >= began_utc_s - STARTED_BEFORE_S:
+            self.checklist = record
 
     def on_settings(self, settings: PerceptionSettings, t_utc_s: float) -> None:
         if not self.settings or self.settings[-1][1] != settings:
@@ -115,6 +126,8 @@ def read_mcap_flight(path: Path, data: Data) -> FlightLog:
             parts.commands.append(message)
         elif isinstance(message, PlanRecord):
             parts.plans.append(message)
+        elif isinstance(message, ChecklistRecord):
+            parts.on_checklist(message, recording.start_utc_s)
         elif isinstance(message, ObstacleAlert) and message.phase != "goes_on":
             parts.alerts.append(message)
         elif isinstance(message, AvoidanceStatus):
@@ -157,6 +170,7 @@ def _flight_log(recording: Recording, parts: _Parts) -> FlightLog:
         alerts=tuple(parts.alerts),
         avoidance=tuple(parts.avoidance),
         settings=tuple(parts.settings),
+        checklist=parts.checklist,
         ground=ground,
     )
 

@@ -13,6 +13,7 @@ from mapping.geometry.arrays import F64
 from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from telemetry.recording.frame_facts import SentTarget, TruePosition
+from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import CommandRecord, PlanRecord, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus, ObstacleAlert, PerceptionSettings
 from telemetry.topics.vehicle import VehicleState
@@ -85,6 +86,8 @@ class FlightLog:
     """(t_utc_s, what it said of itself) whenever its state changed."""
     settings: tuple[tuple[float, PerceptionSettings], ...] = ()
     """(t_utc_s, how objects were followed and obstacles looked for) at every change, the first known included."""
+    checklist: ChecklistRecord | None = None
+    """The crew's list as it was ticked for this flight's start; None: nothing was demanded, or none was started."""
     ground: Dsm | None = None
     """The surface model that the recording itself carries."""
 

@@ -11,6 +11,7 @@ from typing import Literal
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SlamPose, UwbScan
 from planning.errors import DescribedError
+from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.looks import CloudLook, RadarLook
 from telemetry.topics.obstacles import (
     AvoidanceStatus,
@@ -38,6 +39,7 @@ class Topic(StrEnum):
     FLIGHT = "flight/status"  # FlightStatus, latest wins
     COMMAND = "flight/command"  # CommandRecord, each arrives, published before the command is sent
     PLAN = "plan/active"  # PlanRecord, latest wins
+    CHECKLIST = "checklist/ticked"  # ChecklistRecord, latest wins
     RECORDER = "recorder/status"  # RecorderStatus, latest wins, at 1 Hz and on change
     REPLAY = "replayer/status"  # ReplayStatus, latest wins
     RADAR_FRAME = "sensor/radar"  # RadarFrame, each arrives
@@ -357,6 +359,7 @@ Published = (
     | FlightStatus
     | CommandRecord
     | PlanRecord
+    | ChecklistRecord
     | RecorderStatus
     | ReplayStatus
     | ServerAlive
@@ -387,6 +390,7 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.FLIGHT: FlightStatus,
     Topic.COMMAND: CommandRecord,
     Topic.PLAN: PlanRecord,
+    Topic.CHECKLIST: ChecklistRecord,
     Topic.RECORDER: RecorderStatus,
     Topic.REPLAY: ReplayStatus,
     Topic.SERVER: ServerAlive,

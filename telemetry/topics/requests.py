@@ -159,6 +159,20 @@ class Disarm(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class TickPoint(OperatorRequest):
+    """Writes down that a point of the checklist was ticked, or no longer is; the vehicle is told nothing. -> None"""
+
+    number: int
+    """1 is the first point."""
+    of: int
+    text: str
+    profile: str
+    ticked: bool = True
+    by: str = ""
+    """Who looked, where that is not the operator."""
+
+
+@dataclass(frozen=True, slots=True)
 class StartAuto(OperatorRequest):
     """Arms if need be and flies the mission on board from ``from_item`` on. Only if its digest is this. -> None
 
@@ -288,6 +302,7 @@ LinkRequest = (
     | HighestToken
     | Arm
     | Disarm
+    | TickPoint
     | StartAuto
     | StartGuided
     | FlyWay

@@ -20,8 +20,9 @@ from telemetry.errors import (
 )
 from telemetry.flight import fly as fly_module
 from telemetry.flight.fly import FlyResult, fly
+from telemetry.topics.checklist import ChecklistPoint
 from telemetry.topics.messages import ConnectionStatus, ErrorInfo, FlightStatus, LinkStatus, Topic, VehicleText
-from telemetry.topics.requests import Connect, ReadParameters, ReturnHome, StartAuto, StartGuided, Upload
+from telemetry.topics.requests import Connect, ReadParameters, ReturnHome, StartAuto, StartGuided, TickPoint, Upload
 from tests.server.flight_logs import PLAIN
 from tests.telemetry.fly_bench import ADDRESS, OPTIONS, PLANNED, VEHICLE, Heard, Pilot, flown
 from tests.telemetry.small_bus import SmallBus
@@ -49,6 +50,26 @@ def test_the_firmware_is_told_though_it_is_known_only_after_the_vehicle_was_hear
 
     _, heard = flown(Late(SmallBus()))
     assert "Vehicle 1: ardupilot 4.7.0" in heard.lines
+
+
+def test_what_the_crew_ticked_is_written_down_before_the_start() -> None:
+    pilot, points = (
+        Pilot(SmallBus()),
+        (ChecklistPoint("Props", "", "Anna", 1.0), ChecklistPoint("Wind", "", "Anna", 2.0)),
+    )
+    result, _ = flown(pilot, replace(OPTIONS, checklist=points))
+    assert [type(request) for request in pilot.asked[-3:]] == [TickPoint, TickPoint, StartAuto]
+    assert pilot.asked[-2] == TickPoint(OPTIONS.operator, 2, 2, "Wind", "quad", by="Anna")
+    record = pilot.bus.last[Topic.CHECKLIST]
+    assert (record.points, record.mission_digest, record.vehicle) == (points, result.upload.onboard.digest, VEHICLE.id)
+    assert record.started_utc_s is not None
+
+
+def test_with_an_open_point_nothing_is_started() -> None:
+    pilot = Pilot(SmallBus())
+    with pytest.raises(NotAllowedError, match='Point 1 of the checklist is open: "Props"'):
+        flown(pilot, replace(OPTIONS, checklist=(ChecklistPoint("Props"),)))
+    assert pilot.of(StartAuto) == []
 
 
 def test_what_is_flown_is_put_on_record() -> None:

@@ -13,6 +13,7 @@ from planning.formats.wpl import read_wpl
 from telemetry.errors import RecordingError
 from telemetry.recording.flight_log import FlightLog, read_flight_log
 from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.checklist import ChecklistPoint, ChecklistRecord
 from telemetry.topics.messages import Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus
 from tests.telemetry.recordings import (
@@ -248,3 +249,34 @@ def test_what_avoidance_said_of_itself_is_kept_where_its_state_changed(tmp_path:
     writer.close()
     kept = read_flight_log(path).avoidance
     assert [(round(t - T0_UTC_S, 1), status.state) for t, status in kept] == [(5.0, "climbing"), (9.0, "offset")]
+
+
+def _ticked(t_s: float, *, by: str, started: bool) -> ChecklistRecord:
+    t_utc_s = T0_UTC_S + t_s
+    point = ChecklistPoint("Propellers", "Vehicle", by, t_utc_s - 1.0)
+    return ChecklistRecord(t_utc_s, "Quad", "x", "d", (point,), t_utc_s if started else None)
+
+
+@pytest.mark.parametrize(
+    ("told", "by"),
+    [
+        ([], None),
+        ([_ticked(0.1, by="Anna", started=False)], None),
+        ([_ticked(-100.0, by="Anna", started=True)], "Anna"),
+        ([_ticked(-200.0, by="Anna", started=True)], None),
+        ([_ticked(0.1, by="Anna", started=True), _ticked(5.0, by="", started=False)], "Anna"),
+        ([_ticked(0.1, by="Anna", started=True), _ticked(9.0, by="Ben", started=True)], "Ben"),
+    ],
+)
+def test_the_checklist_is_the_one_that_was_ticked_for_this_flights_start(
+    tmp_path: Path, told: list[ChecklistRecord], by: str | None
+) -> None:
+    path = tmp_path / "ticked.mcap"
+    writer = RecordingWriter(path, t_mono_s=T0_MONO_S, t_utc_s=T0_UTC_S)
+    for t_s, topic, message in flight(5.0):
+        writer.write(topic, message, T0_UTC_S + t_s)
+    for record in told:
+        writer.write(Topic.CHECKLIST, record, T0_UTC_S + max(0.0, record.t_utc_s - T0_UTC_S))
+    writer.close()
+    log = read_flight_log(path)
+    assert (None if log.checklist is None else log.checklist.points[0].ticked_by) == by

@@ -21,6 +21,7 @@ from telemetry.flight.preflight.resume import Resumption, plan_resumption
 from telemetry.flight.watch import Asks, Watch
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.items import items_from_mission
+from telemetry.topics.checklist import ChecklistPoint
 from telemetry.topics.messages import ErrorInfo, UploadReport
 from telemetry.topics.requests import Connect, Operator, ReadParameters, Upload
 from telemetry.topics.vehicle import VehicleState
@@ -49,6 +50,8 @@ class FlyOptions:
     """Above 1: go on there with a mission that broke off."""
     accept: frozenset[str] = frozenset()
     """Codes of rows of the check that may be less than good."""
+    checklist: tuple[ChecklistPoint, ...] = ()
+    """As the crew ticked it; written down before the start."""
     name: str = "mission"
     connect_s: float = CONNECT_S
     ready_s: float = 120.0
