@@ -11,6 +11,7 @@ from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_vehicles import OtherVehicles
+from server.flying.checklists import Checklists
 from server.flying.recordings import RecordingDesk
 from server.flying.reviewing import Reviewing
 from server.flying.scenery import Scenery
@@ -42,7 +43,7 @@ class Fleet:
         self._flights = {flying.number: flying for flying in flights}
         self._present, self._shared = present, shared
         workspace, library, shelf = shared.workspace, shared.library, shared.shelf
-        self.shelf, self._replay = shelf, Channel("replay", present)
+        self.shelf, self.checklists, self._replay = shelf, shared.checklists, Channel("replay", present)
         self.reviewing = Reviewing(
             library,
             shelf,
@@ -73,7 +74,8 @@ class Fleet:
         """Joins the buses; nodes that a server before this one has left running are taken over. Raises BusError."""
         present = Present(hub)
         shelf = await asyncio.to_thread(RecordingShelf, library)
-        shared = Shared(library, hub, workspace, scenarios, shelf, Lane("flight"), Replayed(present))
+        checklists = await asyncio.to_thread(Checklists, library.root)
+        shared = Shared(library, hub, workspace, scenarios, shelf, Lane("flight"), Replayed(present), checklists)
         flights: list[Flying] = []
         try:
             for wanted in await asyncio.to_thread(_wanted, settings, library, demo):

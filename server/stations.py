@@ -16,6 +16,8 @@ from server.door.lease import Lease
 from server.door.operators import Operators
 from server.errors import reported
 from server.flying.apart.other_vehicles import Other, known
+from server.flying.checklist_desk import ChecklistDesk
+from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
 from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
@@ -70,6 +72,7 @@ class Shared:
     shelf: RecordingShelf
     lane: Lane
     replayed: Replayed
+    checklists: Checklists
     channels: dict[int, Channel] = field(default_factory=dict)
     """By the vehicle's number."""
 
@@ -128,11 +131,13 @@ class Flying:
         self.obstacles, self.looking = self._obstacles.desk, self._obstacles.looking
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
+        checklist = ChecklistDesk(link, shared.checklists, aboard, bus)
+        alone = wanted.is_alone
         self.desk = FlightDesk(
-            link, work, aboard, workspace, self.live, self._watch, bus, present, is_alone=wanted.is_alone
+            link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, is_alone=alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
-        name = "" if wanted.is_alone else wanted.name
+        name = "" if alone else wanted.name
         self.parameters = ParameterDesk(link, self.live, aboard, library.root, self.desk.on_parameters, name)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
         self.logs = VehicleLogs(link, self.live, library, name)

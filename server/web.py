@@ -22,6 +22,7 @@ from planning.errors import DescribedError
 from server.api import (
     account_routes,
     audit_routes,
+    checklist_routes,
     console_routes,
     flight_routes,
     link_routes,
@@ -86,6 +87,7 @@ ROUTERS = (
     link_routes,
     vehicle_log_routes,
     flight_routes,
+    checklist_routes,
     parameter_routes,
     obstacle_routes,
     sensor_routes,

@@ -14,13 +14,14 @@ from dataclasses import replace
 from server.errors import CheckNeededError, ConflictError
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
+from server.flying.checklist_desk import ChecklistDesk
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard, onboard
 from server.obstacles.obstacle_watch import Watch
-from server.schemas import CheckRow, FlyMessage, FlyState, Pages, PreflightDoc, StartFlight
+from server.schemas import CheckRow, FlyMessage, FlyState, Pages, PreflightDoc, StartFlight, TickBody
 from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
@@ -45,6 +46,7 @@ class FlightDesk:
         link: LinkClient,
         work: FlightWork,
         aboard: Aboard,
+        checklist: ChecklistDesk,
         workspace: Workspace,
         live: Channel,
         watch: Watch,
@@ -55,6 +57,7 @@ class FlightDesk:
     ) -> None:
         """``is_alone``: the station has no other vehicle."""
         self._link, self._work, self._aboard, self._workspace = link, work, aboard, workspace
+        self._checklist = checklist
         self._live, self._watch, self._bus, self._pages = live, watch, bus, pages
         self._utc_minus_mono_s = time.time() - time.monotonic()
         self._flight = FlightStatus()
@@ -70,6 +73,7 @@ class FlightDesk:
         return FlyState(
             onboard=self._aboard.doc(self._workspace.document),
             preflight=None if self._ready is None else self._preflight(self._ready),
+            checklist=self._checklist.doc,
             resume_from_item=self._flight.broke_off_at,
             at_fence=self._at_fence,
             busy=self._busy,
@@ -82,6 +86,7 @@ class FlightDesk:
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
             self._at_fence = ""
+        self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
         self.refresh()
@@ -99,6 +104,7 @@ class FlightDesk:
     def on_disarmed(self) -> None:
         """A flight changes what was checked before it, the battery above all."""
         self._ready = None
+        self._checklist.forget("The vehicle was disarmed: each flight is ticked for itself.")
         self.refresh()
 
     def on_parameters(self) -> None:
@@ -152,7 +158,8 @@ class FlightDesk:
         return self.state
 
     async def start(self, operator: Operator, body: StartFlight) -> None:
-        """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted."""
+        """Raises CheckNeededError unless a fresh check of this very mission went well, given what is accepted, and each
+        point of the crew's checklist is ticked for it."""
         async with self._doing("Starting"):
             ready = self._check_start(body)
             record = self._aboard.known_record(body.digest)
@@ -160,7 +167,16 @@ class FlightDesk:
             # What was prepared meanwhile may have taken its time.
             self._check_start(body)
             self._bus.publish(Topic.PLAN, replace(record, t_utc_s=time.time()))
+            self._checklist.started()
             await self._link.call(request)
+
+    async def tick(self, operator: Operator, body: TickBody) -> FlyState:
+        """Raises CheckNeededError where what was ticked is not what is asked any more."""
+        try:
+            await self._checklist.tick(operator, body)
+        finally:
+            self.refresh()
+        return self.state
 
     async def command(self, request: LinkRequest) -> None:
         """At any time: whatever else is being done, the vehicle can be told to hold, return or land."""
@@ -172,7 +188,7 @@ class FlightDesk:
         return preflight_now(ready, self._watch.avoidance, self._others, utc_minus_mono_s=self._utc_minus_mono_s)
 
     def _check_start(self, body: StartFlight) -> Ready:
-        return check_start(
+        ready = check_start(
             self._ready,
             body,
             self._state(),
@@ -181,6 +197,8 @@ class FlightDesk:
             now_mono_s=time.monotonic(),
             utc_minus_mono_s=self._utc_minus_mono_s,
         )
+        self._checklist.check(body.digest)
+        return ready
 
     async def _send(
         self, operator: Operator, items: tuple[Item, ...], record: PlanRecord, home: tuple[float, float, float]

@@ -69,6 +69,7 @@ def review(
         plan_name=log.plan.name if log.plan and mission is None else "",
         terrain_name=terrain_name,
         other_surface=other or "",
+        checklist=log.checklist,
         notes=[*([other] if other else []), *_notes(flight, judged, dsm, log)],
     )
 

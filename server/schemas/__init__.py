@@ -14,6 +14,7 @@ from server.schemas.account_docs import (
     SessionDoc,
     SignIn,
 )
+from server.schemas.checklist_docs import ChecklistDoc, ChecklistText, TickBody, WriteChecklist
 from server.schemas.flight_docs import (
     AdoptVehicle,
     CheckRow,

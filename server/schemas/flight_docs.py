@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from server.schemas.checklist_docs import ChecklistDoc
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
 from telemetry.topics.messages import Rounded
@@ -112,6 +113,8 @@ class FlyState(Strict):
 
     onboard: OnboardDoc
     preflight: PreflightDoc | None = None
+    checklist: ChecklistDoc | None = None
+    """The crew's own, of the mission on board; null where none of a plan is."""
     resume_from_item: int | None = None
     """After a flight that broke off: where it can go on."""
     at_fence: str = ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from server.schemas.flight_docs import RecordingDoc
 from server.schemas.strict_model import Strict
+from telemetry.topics.checklist import ChecklistRecord
 
 
 class ReviewFigures(Strict):
@@ -89,5 +90,7 @@ class ReviewDoc(Strict):
     terrain_name: str
     other_surface: str
     """That this is another surface model than the mission was planned on, and how far home moves; empty: it is not."""
+    checklist: ChecklistRecord | None = None
+    """As it was ticked for this flight's start; null where nothing was demanded."""
     notes: list[str]
     """What had to be assumed or could not be told."""

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from server import schemas
 from server.schemas import (
     account_docs,
+    checklist_docs,
     flight_docs,
     guided_docs,
     library_docs,
@@ -43,6 +44,7 @@ ANSWERS = (
     schemas.SessionDoc,
     schemas.InvitationDoc,
     schemas.AuditDoc,
+    schemas.ChecklistText,
     schemas.ParametersDoc,
     schemas.WrittenAnswer,
     schemas.ComparedDoc,
@@ -81,6 +83,7 @@ def _models() -> Iterator[type[BaseModel]]:
         view_docs,
         account_docs,
         station_docs,
+        checklist_docs,
         flight_docs,
         guided_docs,
         review_docs,

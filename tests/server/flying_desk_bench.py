@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from server.flying.checklist_desk import ChecklistDesk
+from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
 from server.flying.work import FlightWork
 from server.heard.onboard import Aboard
@@ -17,7 +19,8 @@ from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMessage
 from server.work.jobs import Lane
 from telemetry.mavlink.verify import as_stored, compare, digest
-from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, UploadReport
+from telemetry.topics.checklist import ChecklistRecord
+from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, Topic, UploadReport
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
@@ -128,12 +131,19 @@ class Bench:
         self.watch = SimpleNamespace(avoidance=AvoidanceStatus())
         self.told: list[FlyState] = []
         self.records: list[PlanRecord] = []
+        self.lists: list[ChecklistRecord] = []
         me: Any = self
         work = FlightWork(made.library, me.vehicle, me, lanes[1])
-        bus: Any = SimpleNamespace(publish=lambda topic, record: self.records.append(record))
+        bus: Any = SimpleNamespace(publish=self._heard)
         self.aboard = Aboard(file)
-        self.desk = FlightDesk(me.vehicle, work, self.aboard, me, me.live, me.watch, bus, self, is_alone=is_alone)
+        checklist = ChecklistDesk(me.vehicle, Checklists(made.library.root), self.aboard, bus)
+        self.desk = FlightDesk(
+            me.vehicle, work, self.aboard, checklist, me, me.live, me.watch, bus, self, is_alone=is_alone
+        )
         self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
+
+    def _heard(self, topic: str, record: Any) -> None:
+        (self.lists if topic == Topic.CHECKLIST else self.records).append(record)
 
     @property
     def document(self) -> PlanDoc:

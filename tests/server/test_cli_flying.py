@@ -43,6 +43,7 @@ TO_AND_FRO = mission([(50.0, 150.0, 12.0), *8 * [(110.0, 150.0, 12.0), (60.0, 15
 """Still on its way when a busy machine has heard Ctrl+C twice."""
 VEHICLE = ("--boot-s", 1, "--parameter", "RTL_ALT=2000", *QUICKLY_DOWN)
 HOME = f"{SHORT.home.lat_deg:.7f},{SHORT.home.lon_deg:.7f},100"
+CHECKLIST = "# Vehicle\nPropellers\n# Place\nNo people\n"
 KEYS = [
     "completed", "cross_track_max_m", "cross_track_mean_m", "cross_track_p95_m", "height_error_max_m",
     "min_distance_m", "lag_s", "duration_s",
@@ -74,9 +75,11 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
 @pytest.fixture(scope="module")
 def flight(ground: Ground, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
     record = tmp_path_factory.mktemp("recordings") / "short.mcap"
+    checklist = record.with_name("checklist.txt")
+    checklist.write_text(CHECKLIST)
     run = hedgehop(
         "fly", ground.mission, "--link", ground.link, "--dsm", ground.dsm, "--profile", "mapper-rtk", "--record",
-        record, "--json",
+        record, "--json", "--checklist", checklist, "--checklist-done-by", "Anna",
     )  # fmt: skip
     return run, record
 
@@ -345,3 +348,15 @@ def test_a_recording_that_cannot_be_written_where_it_should_stays(tmp_path: Path
     (kept,) = tmp_path.glob("hedgehop-kept-*/flight.mcap")
     assert kept.read_bytes() == b"precious"
     assert str(kept) in caught.value.advice
+
+
+def test_the_checklist_that_somebody_answers_for_stands_in_the_recording(flight: tuple[Run, Path]) -> None:
+    run, record = flight
+    assert "Checklist of 2 points: done by Anna" in run.err
+    log = read_flight_log(record)
+    assert log.checklist is not None
+    assert [(p.heading, p.text, p.ticked_by) for p in log.checklist.points] == [
+        ("Vehicle", "Propellers", "Anna"),
+        ("Place", "No people", "Anna"),
+    ]
+    assert any(c.words.endswith("Propellers (by Anna)") for c in log.commands)

@@ -84,6 +84,9 @@ export const LIMITS = {
   ViewDoc: {
     vertical_exaggeration: { min: 1, max: 5, initial: 1.0 },
   },
+  TickBody: {
+    number: { min: 1, max: 60 },
+  },
   StartFlight: {
     from_item: { min: 1, initial: 1 },
   },
@@ -229,6 +232,23 @@ export interface Candidate {
   component_id: number;
   autopilot: string;
   vehicle_type: number;
+}
+
+export interface ChecklistPoint {
+  text: string;
+  heading: string;
+  ticked_by: string;
+  ticked_utc_s: number | null;
+}
+
+/** A vehicle's checklist as it is ticked by now. */
+export interface ChecklistRecord {
+  t_utc_s: number;
+  profile: string;
+  vehicle: string;
+  mission_digest: string;
+  points: ChecklistPoint[];
+  started_utc_s: number | null;
 }
 
 /** One way to vehicles, as configured. */
@@ -592,6 +612,7 @@ export interface VehicleState {
   mission_reached: number | null;
   mission_id: number | null;
   rc_rssi: number | null;
+  wind_t_mono_s: number | null;
   wind_speed_m_s: number | null;
   wind_from_rad: number | null;
   estimator_t_mono_s: number | null;
@@ -1251,6 +1272,49 @@ export interface AuditDoc {
   newest: AuditEntryDoc[];
 }
 
+/** A line for each point; ``#`` begins a heading. */
+export interface ChecklistText {
+  profile: string;
+  /** Empty: a start with this profile demands nothing. */
+  text: string;
+  revision: string;
+  /** What the last change replaced; null: nothing was written before. */
+  before: string | null;
+  changed_by: string;
+  changed_utc: string;
+  /** For a low flight, in few words. */
+  suggested: string;
+}
+
+/** Of the profile that the mission on board was planned with, as it is ticked by now. */
+export interface ChecklistDoc {
+  profile: string;
+  /** Of the points' words. */
+  revision: string;
+  points: ChecklistPoint[];
+  /** Why points that were ticked are open again. */
+  why_again: string;
+  /** Why nobody knows what the list demands: nothing is started then. */
+  fault: string;
+}
+
+export interface WriteChecklist {
+  profile: string;
+  text: string;
+  /** The revision of the text that the writer has seen. */
+  instead_of: string;
+}
+
+export interface TickBody {
+  /** Of the mission on board that it is ticked for. */
+  digest: string;
+  /** Of the points as they were shown. */
+  revision: string;
+  /** 1 is the first point. */
+  number: number;
+  ticked?: boolean;
+}
+
 /** Where the vehicle is against the plan and the surface model; null where it cannot be told. */
 export interface FollowDoc {
   /** Distance flown along the planned line, at the place nearest to the vehicle. */
@@ -1330,6 +1394,8 @@ export interface OnboardDoc {
 export interface FlyState {
   onboard: OnboardDoc;
   preflight: PreflightDoc | null;
+  /** The crew's own, of the mission on board; null where none of a plan is. */
+  checklist: ChecklistDoc | null;
   /** After a flight that broke off: where it can go on. */
   resume_from_item: number | null;
   /** What the vehicle does when it crosses its fence, as read at the last check; empty: not known. */
@@ -1569,6 +1635,8 @@ export interface ReviewDoc {
   terrain_name: string;
   /** That this is another surface model than the mission was planned on, and how far home moves; empty: it is not. */
   other_surface: string;
+  /** As it was ticked for this flight's start; null where nothing was demanded. */
+  checklist: ChecklistRecord | null;
   /** What had to be assumed or could not be told. */
   notes: string[];
 }

@@ -68,6 +68,7 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
       rounded_note: "",
     },
     preflight: null,
+    checklist: null,
     resume_from_item: null,
     at_fence: "",
     busy: "",

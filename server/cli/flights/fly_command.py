@@ -26,6 +26,7 @@ from planning.part import mission_places
 from planning.terrain.dsm import Dsm
 from server.cli.review_command import tell
 from server.cli.shared import options as o
+from server.cli.shared.checklist_asked import check_checklist, ticked
 from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.fence_given import fence_stays
 from server.cli.shared.files_in_out import check_new, read_small
@@ -69,6 +70,12 @@ def fly(
     accept: Annotated[
         list[Acceptable] | None, Option(help="Fly although this row of the check is only acceptable; several times.")
     ] = None,
+    checklist: Annotated[
+        Path | None, Option(metavar="FILE", help="Ask each line of this text on the terminal before anything is sent.")
+    ] = None,
+    checklist_done_by: Annotated[
+        str, Option(metavar="NAME", help="Who has looked at each point of the checklist: then none is asked.")
+    ] = "",
     record: Annotated[Path | None, Option(metavar="FILE", help="Keep the recording (.mcap) here.")] = None,
     data_dir: o.Keys = None,
     as_json: o.AsJson = False,
@@ -84,6 +91,7 @@ def fly(
     parse_address(link)
     if record is not None:
         check_new(record)
+    points = check_checklist(checklist, checklist_done_by)
     request = judged_by(flight, given, demands, mode)
     model = None if dsm is None else read_around(dsm, StepTimer(progress), how, partial(mission_places, mission=flight))
     other = None if model is None else other_surface(flight, model)
@@ -99,6 +107,7 @@ def fly(
         dsm=model,
         from_item=from_item,
         accept=frozenset(accept or ()),
+        checklist=ticked(points, checklist_done_by),
         name=mission.stem,
     )
     result, doc = asyncio.run(_Conductor(flight, options, record, data_dir).run())
