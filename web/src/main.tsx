@@ -40,6 +40,7 @@ import "./styles/traversability.css";
 import "./styles/studies.css";
 import "./styles/parameters.css";
 import "./styles/guided.css";
+import "./styles/checklist.css";
 import { App } from "./shell/App";
 import { fontReady } from "./shell/font";
 import { startKeyboard } from "./shell/keyboard";

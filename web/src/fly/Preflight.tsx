@@ -1,5 +1,5 @@
 import { clock, metres } from "../format";
-import type { CheckRow, PreflightDoc } from "../messages";
+import type { CheckRow, FlyState, PreflightDoc } from "../messages";
 import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { whyNotCommand, whyUnheard } from "../store/reach";
@@ -18,6 +18,8 @@ import {
   way,
   wayToFly,
 } from "../vehicle/orders";
+import { checklistObstacle } from "../store/checklist";
+import { Checklist } from "./Checklist";
 import { openChecks, unaccepted } from "./next_step";
 
 const MARKS: Record<CheckRow["state"], { icon: IconName; word: string }> = {
@@ -69,16 +71,19 @@ function Row({ row }: { row: CheckRow }) {
   );
 }
 
-function summaryOf(preflight: PreflightDoc | null | undefined): string {
+function summaryOf({ preflight, checklist }: FlyState): string {
   if (!preflight) return "not checked yet";
   if (openChecks(preflight.rows).length > 0) return "not ready";
-  return unaccepted(preflight.rows, accepted.value).length > 0 ? "to be accepted" : "ready";
+  if (unaccepted(preflight.rows, accepted.value).length > 0) return "to be accepted";
+  return checklistObstacle(checklist) === null ? "ready" : "to be ticked";
 }
 
 /** The next action asks to mend, or to tick, what stands here. */
-const needsAttention = (preflight: PreflightDoc | null | undefined) =>
-  preflight != null &&
-  (openChecks(preflight.rows).length > 0 || unaccepted(preflight.rows, accepted.value).length > 0);
+const needsAttention = ({ preflight, checklist }: FlyState) =>
+  preflight !== null &&
+  (openChecks(preflight.rows).length > 0 ||
+    unaccepted(preflight.rows, accepted.value).length > 0 ||
+    checklistObstacle(checklist) !== null);
 
 function Shift({ preflight }: { preflight: PreflightDoc }) {
   if (!preflight.rereferenced || preflight.home_shift_m === null) return null;
@@ -126,9 +131,9 @@ export function PreflightSection() {
       id="preflight"
       title="Before the start"
       icon="check"
-      summary={whyUnheard.value ? "not known now" : isInAir.value ? "in the air" : summaryOf(preflight)}
+      summary={whyUnheard.value ? "not known now" : isInAir.value ? "in the air" : summaryOf(state)}
       startsOpen={!isInAir.value}
-      isUrgent={!isInAir.value && needsAttention(preflight)}
+      isUrgent={!isInAir.value && needsAttention(state)}
     >
       {preflight ? (
         <>
@@ -159,6 +164,7 @@ export function PreflightSection() {
           return height, GNSS, battery.
         </p>
       )}
+      {preflight && <Checklist />}
       <ResumeChoice />
       <div class="inline-choice">
         <span>Way</span>

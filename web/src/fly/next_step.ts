@@ -7,6 +7,7 @@ import {
   type TransferStatus,
   type VehicleState,
 } from "../messages";
+import { checklistObstacle } from "../store/checklist";
 import { isAcceptable, type Accepted } from "../vehicle/orders";
 
 /** What the page knows when it says what comes next. */
@@ -68,7 +69,8 @@ function onGround(facts: Facts): Step {
   if (openChecks(rows).length > 0) return { id: "check", why: "Mend what stands above, then check again" };
   const left = unaccepted(rows, accepted).length;
   if (left > 0) return { id: "start", why: "Tick what you accept first" };
-  return { id: "start" };
+  const unticked = checklistObstacle(fly?.checklist);
+  return unticked === null ? { id: "start" } : { id: "start", why: unticked };
 }
 
 export function nextStep(facts: Facts): Step {

@@ -14,6 +14,7 @@ import { OtherSurface } from "../ui/OtherSurface";
 import { EventList } from "./EventList";
 import { Figures } from "./Figures";
 import { StudyRight } from "./Studies";
+import { Ticked } from "./Ticked";
 
 type Part = "figures" | "instruments" | "events";
 
@@ -94,6 +95,7 @@ function FlightsRight() {
         </div>
         <div class="part part-figures">
           <Figures review={open} />
+          <Ticked review={open} />
           <Notes open={open} />
         </div>
         <div class="part part-events">

@@ -3,6 +3,7 @@ import { AuditDialog } from "../account/AuditDialog";
 import { ParametersDialog } from "../fly/ParametersDialog";
 import { AskedForControl } from "../account/AskedForControl";
 import { Scene } from "../scene/Scene";
+import { ChecklistDialog } from "../plan/ChecklistDialog";
 import { SaveAsDialog, PlansDialog } from "../plan/PlansDialog";
 import { SpaceDialog } from "../review/SpaceDialog";
 import { Alarms } from "./Alarms";
@@ -54,6 +55,7 @@ export function App() {
       {openDialog.value === "accounts" && <AccountsDialog />}
       {openDialog.value === "audit" && <AuditDialog />}
       {openDialog.value === "parameters" && <ParametersDialog />}
+      {openDialog.value === "checklist" && <ChecklistDialog />}
       {openDialog.value === "space" && <SpaceDialog />}
       <AskedForControl />
       {openDialog.value === "save_as" && <SaveAsDialog />}

@@ -11,7 +11,7 @@ export const viewId = signal<ViewId>(viewIn(location.hash) ?? viewIn(lastView.va
 export const study = signal<StudyId>(studyIn(location.hash) ?? "flights");
 
 export const openDialog = signal<
-  "help" | "plans" | "save_as" | "accounts" | "audit" | "space" | "parameters" | null
+  "help" | "plans" | "save_as" | "accounts" | "audit" | "space" | "parameters" | "checklist" | null
 >(null);
 /** On narrow screens the side panels are drawers: at most one is open. */
 export const drawer = signal<"left" | "right" | null>(null);

@@ -1,11 +1,12 @@
 import { duration } from "../../format";
 import { LIMITS, type PlanDoc, type ProfileDoc } from "../../messages";
-import { Segmented } from "../../ui/Button";
+import { Button, Segmented } from "../../ui/Button";
 import { NumberField } from "../../ui/NumberField";
 import { Section } from "../../ui/Section";
 import { TextField } from "../../ui/fields";
 import { edit, editGroup } from "../../store/plan";
 import { library } from "../../store/state";
+import { openChecklist } from "../../vehicle/open_checklist";
 
 const { endurance_s: ENDURANCE, reserve_share: RESERVE } = LIMITS.ProfileDoc;
 
@@ -126,6 +127,9 @@ export function VehicleSection({ plan: { profile } }: { plan: PlanDoc }) {
           onChange={(brake_jerk_m_s3) => set("Braking jerk", { brake_jerk_m_s3 })}
         />
       </div>
+      <Button icon="check" testid="checklist-edit" onClick={() => openChecklist(profile.name)}>
+        Checklist before the start…
+      </Button>
       <p class="hint">
         Usable: {duration(profile.endurance_s * (1 - profile.reserve_share))} of{" "}
         {duration(profile.endurance_s)}. Position error: 2.5 m standalone GNSS, 0.1 m RTK.
