@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from mapping.geometry.frames import offset_m
@@ -87,16 +87,19 @@ class Health:
         self, state: VehicleState, profile: VehicleProfile | None = None, *, now_mono_s: float | None = None
     ) -> tuple[HealthRow, ...]:
         """In the order in which a pilot looks. ``profile``: the vehicle that the plan aboard was made for, None: not
-        known. ``now_mono_s``: the state's clock, where what is old must not be believed; None for recordings."""
+        known. ``now_mono_s``: the state's clock; None for recordings, whose newest word stands for it."""
         who = profile or ANY_VEHICLE
-        heard = _Heard(now_mono_s)
+        heard = _Heard(_newest_mono_s(state) if now_mono_s is None else now_mono_s)
+        old_wind = heard.if_told("wind", state.wind_t_mono_s)
+        if old_wind is not None:
+            state = replace(state, wind_speed_m_s=None, wind_from_rad=None)
         return (
-            _ready(state),
+            heard.if_told("ready", state.heartbeat_t_mono_s) or _ready(state),
             heard.row("estimator", state.estimator_t_mono_s) or _estimator(state),
             heard.row("gnss", state.gnss_t_mono_s) or _gnss(state, who),
             heard.row("vibration", state.vibration_t_mono_s) or self._vibration(state),
             heard.row("battery", state.battery_t_mono_s) or self._battery(state, who, is_known=profile is not None),
-            _wind(state, who),
+            old_wind or _wind(state, who),
         )
 
     def _vibration(self, state: VehicleState) -> HealthRow:
@@ -133,7 +136,8 @@ class Health:
         home_s = way_home_s(state, profile)
         if home_s is None:
             return HealthRow("battery", _by_share(share, profile), value, over)
-        limit = f"way home {_minutes(math.ceil(home_s - ROUNDED_S))}"
+        still = " in still air, for the wind is not known" if state.wind_speed_m_s is None else ""
+        limit = f"way home {_minutes(math.ceil(home_s - ROUNDED_S))}{still}"
         if left_s <= home_s:
             return HealthRow("battery", "bad", value, limit, "The way home needs the reserve. Return now.")
         if left_s <= home_s + NEAR_HOME_S:
@@ -151,7 +155,8 @@ class Health:
 def way_home_s(state: VehicleState, profile: VehicleProfile) -> float | None:
     """Seconds to home and onto the ground by the way that autopilots return: up, straight, down. None: not known.
 
-    The wind that the vehicle tells blows against it, whatever its direction: it may turn.
+    The wind that the vehicle tells blows against it, whatever its direction: it may turn. One that it does not tell
+    is taken for none, which whoever shows this has to say.
     """
     if state.lat_deg is None or state.lon_deg is None or state.home_lat_deg is None or state.home_lon_deg is None:
         return None
@@ -173,9 +178,26 @@ class _Heard:
         """Unknown, where nothing is heard of it; None where it may be judged."""
         if t_mono_s is None:
             return HealthRow(code, "unknown", "Not heard yet")
-        if self._now_mono_s is None or self._now_mono_s - t_mono_s < UNHEARD_S:
+        return self.if_told(code, t_mono_s)
+
+    def if_told(self, code: Code, t_mono_s: float | None) -> HealthRow | None:
+        """The same where not every recording keeps when it came: None as well."""
+        if t_mono_s is None or self._now_mono_s is None or self._now_mono_s - t_mono_s < UNHEARD_S:
             return None
         return HealthRow(code, "unknown", f"Not heard for {self._now_mono_s - t_mono_s:.0f} s")
+
+
+def _newest_mono_s(state: VehicleState) -> float | None:
+    told = (
+        state.heartbeat_t_mono_s,
+        state.position_t_mono_s,
+        state.attitude_t_mono_s,
+        state.battery_t_mono_s,
+        state.gnss_t_mono_s,
+        state.estimator_t_mono_s,
+        state.vibration_t_mono_s,
+    )
+    return max((t_mono_s for t_mono_s in told if t_mono_s is not None), default=None)
 
 
 def _ready(state: VehicleState) -> HealthRow:
@@ -223,6 +245,9 @@ def _gnss(state: VehicleState, profile: VehicleProfile) -> HealthRow:
         return HealthRow("gnss", "unknown", value, limit, "The receiver does not say how accurate it is.")
     if worst_m > profile.position_error_m:
         return HealthRow("gnss", "near", value, limit, "Less accurate than the plan counts on: keep more distance.")
+    if place_m is None or height_m is None:
+        what = "place" if place_m is None else "height"
+        return HealthRow("gnss", "unknown", value, limit, f"The receiver does not say how accurate its {what} is.")
     return HealthRow("gnss", "good", value, limit)
 
 

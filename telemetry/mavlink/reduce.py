@@ -286,19 +286,21 @@ def _estimator_ok(flags: int, bad: int) -> bool:
     return flags & needed == needed and not flags & bad
 
 
-def _wind(_: VehicleState, message: Any, __: float) -> Changes:
+def _wind(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     from_deg = finite(message.direction)
     return {
+        "wind_t_mono_s": t_mono_s,
         "wind_speed_m_s": finite(message.speed),
         "wind_from_rad": None if from_deg is None else heading(math.radians(from_deg)),
     }
 
 
-def _wind_cov(_: VehicleState, message: Any, __: float) -> Changes:
+def _wind_cov(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
     north, east = finite(message.wind_x), finite(message.wind_y)
-    if north is None or east is None:
-        return {"wind_speed_m_s": None, "wind_from_rad": None}
-    return {"wind_speed_m_s": math.hypot(north, east), "wind_from_rad": heading(math.atan2(-east, -north))}
+    told: Changes = {"wind_t_mono_s": t_mono_s, "wind_speed_m_s": None, "wind_from_rad": None}
+    if north is not None and east is not None:
+        told |= {"wind_speed_m_s": math.hypot(north, east), "wind_from_rad": heading(math.atan2(-east, -north))}
+    return told
 
 
 def _rssi(_: VehicleState, message: Any, __: float) -> Changes:

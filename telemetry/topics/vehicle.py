@@ -95,6 +95,8 @@ class VehicleState:
 
     rc_rssi: float | None = None
     """0 to 1"""
+    wind_t_mono_s: float | None = None
+    """None in recordings of before it was kept, and in vehicles' own logs."""
     wind_speed_m_s: float | None = None
     wind_from_rad: float | None = None
     """Direction that the wind comes from, clockwise from north."""

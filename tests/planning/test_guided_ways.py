@@ -251,7 +251,7 @@ def test_back_does_not_land_where_nobody_has_looked() -> None:
     """The flown way is known from where the ground station began to listen on: that need not be home."""
     dsm, start = model(flat()), here(model(flat()), 100.0, 60.0, 16.0)
     cut = tuple((*at(dsm, 60.0 + k, 60.0), 16.0) for k in range(10, 41))
-    with pytest.raises(MissionError, match="10.0 m beside home") as error:
+    with pytest.raises(MissionError, match=r"10\.0 m beside home") as error:
         asked(flat(), Back(cut), start=start)
     assert error.value.advice
     z = flat()

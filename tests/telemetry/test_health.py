@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -64,6 +65,9 @@ def test_all_is_well_in_words() -> None:
         ("gnss", {"gnss_fix": "2d"}, "bad"),
         ("gnss", {"vertical_accuracy_m": 1.1}, "near"),
         ("gnss", {"horizontal_accuracy_m": None, "vertical_accuracy_m": None}, "unknown"),
+        ("gnss", {"vertical_accuracy_m": None}, "unknown"),
+        ("gnss", {"horizontal_accuracy_m": None}, "unknown"),
+        ("gnss", {"horizontal_accuracy_m": 1.1, "vertical_accuracy_m": None}, "near"),
         ("vibration", {"vibration_m_s2": 30.0}, "near"),
         ("vibration", {"vibration_m_s2": 60.0}, "bad"),
         ("vibration", {"vibration_m_s2": 6.0, "autopilot": "px4"}, "near"),
@@ -94,6 +98,29 @@ def test_what_is_old_is_not_believed_live_but_in_a_recording(code) -> None:
     assert row(code, now_mono_s=112.4).level == "unknown"
     assert row(code, now_mono_s=None).level == "good"
     assert row(code, **{f"{code}_t_mono_s": None}, now_mono_s=None).value == "Not heard yet"
+
+
+@pytest.mark.parametrize("code", ["ready", "wind"])
+def test_a_heartbeat_and_a_wind_of_long_ago_are_no_word_of_now(code) -> None:
+    stamp = {"ready": "heartbeat_t_mono_s", "wind": "wind_t_mono_s"}[code]
+    fresh: dict[str, Any] = {stamp: 91.0}
+    assert row(code, **fresh).level == "good"
+    old: dict[str, Any] = {stamp: 88.5}
+    found = row(code, **old)
+    assert (found.level, found.value, found.limit) == ("unknown", "Not heard for 12 s", "")
+
+
+def test_what_fell_silent_long_before_the_rest_is_not_believed_in_a_recording_either() -> None:
+    for code in ("estimator", "gnss", "vibration", "battery"):
+        old: dict[str, Any] = {f"{code}_t_mono_s": 88.0}
+        assert row(code, now_mono_s=None, heartbeat_t_mono_s=100.0, **old).value == "Not heard for 12 s"
+    assert row("wind", now_mono_s=None, heartbeat_t_mono_s=100.0, wind_t_mono_s=88.0).level == "unknown"
+    assert row("wind", now_mono_s=None).level == "good"
+
+
+@pytest.mark.parametrize("changes", [{"wind_speed_m_s": None}, {"wind_t_mono_s": 88.0}])
+def test_a_way_home_without_a_known_wind_says_that_it_counts_on_none(changes) -> None:
+    assert row("battery", **changes).limit == "way home 1 min 05 s in still air, for the wind is not known"
 
 
 def test_the_way_home_is_up_across_against_the_wind_and_down_slowly_at_the_end() -> None:

@@ -126,6 +126,7 @@ def test_not_a_number_is_missing() -> None:
     assert (state.roll_rad, state.pitch_rad, state.heading_rad) == (None, None, None)
     assert (state.ground_speed_m_s, state.climb_m_s) == (None, None)
     assert (state.wind_speed_m_s, state.wind_from_rad) == (None, None)
+    assert state.wind_t_mono_s is not None
 
 
 @given(yaw=st.floats(width=32))
