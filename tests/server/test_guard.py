@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import socket
+import threading
 import time
 from collections.abc import Iterator
 
@@ -112,14 +114,32 @@ def test_who_sends_too_much_hears_why(served: Running) -> None:
     assert nothing_is_kept(served)
 
 
-def test_an_endless_body_is_cut_off(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who goes on after all that is read of it gets the sentence or a broken connection."""
+def test_an_endless_body_is_answered_and_then_cut_off(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who listens while sending, as browsers do, hears why before the connection ends, however long they go on."""
     monkeypatch.setattr(guard, "DRAIN_LIMIT_BYTES", 1024**2)
-    upload, status = Upload(400), 413
-    with contextlib.suppress(httpx.WriteError, httpx.ReadError, httpx.RemoteProtocolError):
-        status = upload.to(served).status_code
-    assert status == 413
-    assert upload.sent < upload.size / 4
+    size, sent = 400 * 1024**2, 0
+
+    def send() -> None:
+        nonlocal sent
+        with contextlib.suppress(ConnectionError):
+            while sent < size:
+                raw.sendall(b"x" * 65536)
+                sent += 65536
+
+    with socket.create_connection(("127.0.0.1", served.settings.port), timeout=60) as raw:
+        raw.sendall(_chunked(served) + b"%x\r\n" % size)
+        sender = threading.Thread(target=send)
+        sender.start()
+        heard = b""
+        with contextlib.suppress(ConnectionError):
+            while more := raw.recv(65536):
+                heard += more
+        sender.join(60)
+    assert not sender.is_alive()
+    head, _, answer = heard.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 413 ")
+    assert json.loads(answer)["what"] == "The body is larger than 1 MiB."
+    assert sent < size / 4
     assert nothing_is_kept(served)
 
 
@@ -202,6 +222,10 @@ def _announced(served: Running, length: int) -> bytes:
         f"Origin: {served.origin}\r\nCookie: {served.cookie}\r\nContent-Type: application/octet-stream\r\n"
         f"Content-Length: {length}\r\n\r\n"
     ).encode()
+
+
+def _chunked(served: Running) -> bytes:
+    return _announced(served, 0).replace(b"Content-Length: 0", b"Transfer-Encoding: chunked")
 
 
 def _answer(served: Running, request: bytes) -> bytes:
