@@ -18,7 +18,7 @@ from websockets.typing import Origin
 from tests.server.running import client
 
 AGAIN_S = 0.3
-KEPT = {"nodes", "link", "alarms", "text", "obstacles", "fly", "lease", "vehicle"}
+KEPT = {"nodes", "link", "alarms", "text", "obstacles", "fly", "lease", "vehicle", "recorder"}
 
 
 @dataclass(frozen=True, slots=True)

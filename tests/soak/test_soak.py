@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from tests.soak.faults import Done, Fault, drawn
-from tests.soak.flight import Flown, fly
+from tests.soak.flight import Flown, fly, records_again
 from tests.soak.page import Page, Told
 from tests.soak.verdict import broken
 
@@ -55,6 +55,19 @@ def test_a_fault_that_is_told_and_mended_breaks_nothing() -> None:
 ])  # fmt: skip
 def test_what_must_not_be_is_said(flight: Flown, words: str) -> None:
     assert [sentence for sentence in broken(flight) if words in sentence]
+
+
+def test_a_recorder_is_back_once_it_says_that_it_has_written() -> None:
+    """What it said before it died may come late."""
+    done = Done(Fault(1.0, "recorder", "kill"), 1, 100.0, 100.0)
+
+    def says(at_s: float, **status: Any) -> Told:
+        return told(101.0, "recorder", recorder={"t_mono_s": at_s, "recording": True, "messages": 7} | status)
+
+    late, idle, not_yet = says(99.9), says(100.9, recording=False), says(100.9, messages=0)
+    page = flown(late, idle, not_yet).page
+    assert not records_again(page, done)
+    assert records_again(flown(late, idle, not_yet, says(100.9)).page, done)
 
 
 def test_faults_follow_from_their_seed() -> None:

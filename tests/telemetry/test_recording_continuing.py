@@ -92,6 +92,37 @@ def test_killed_twice_a_flight_is_one_whole_file_with_two_gaps(station: Station,
         assert len(times) == pytest.approx(470, abs=3)
 
 
+def gaps(folder: Path) -> list[str]:
+    return [fault.partition(" from")[0] for fault in read_flight_log(only(folder)).faults if "Nothing was" in fault]
+
+
+def test_a_gap_is_told_as_soon_as_anything_is_counted_as_written(station: Station, tmp_path: Path) -> None:
+    """Whoever reads a file in flight has to wait for that: a recorder that only just began has told nothing yet."""
+    station.fly(5.0)
+    station.kill(2.0)
+    station.start_again()
+    assert station.recorder.status().recording
+    assert (station.recorder.status().messages, gaps(tmp_path)) == (0, [])
+    station.fly(0.1)
+    assert station.recorder.status().messages > 0
+    assert gaps(tmp_path) == ["Nothing was recorded for 2.1 s"]
+
+
+def test_one_that_dies_again_before_it_has_written_anything_leaves_one_gap_over_both(
+    station: Station, tmp_path: Path
+) -> None:
+    station.fly(5.0)
+    station.kill(2.0)
+    station.start_again()
+    station.recorder.work()
+    station.fly(0.0)
+    assert gaps(tmp_path) == ["Nothing was recorded for 2.0 s"]
+    station.kill(3.0)
+    station.start_again()
+    station.fly(1.0)
+    assert gaps(tmp_path) == ["Nothing was recorded for 5.1 s"]
+
+
 def test_it_ends_when_the_vehicle_was_disarmed_meanwhile(station: Station, tmp_path: Path) -> None:
     station.fly(5.0)
     station.kill(3.0)
