@@ -48,6 +48,7 @@ class RadarTargets:
         xyz, speed, snr = (column.astype(np.float64) for column in frame.columns())
         finite = np.isfinite(xyz).all(axis=1) & np.isfinite(speed) & np.isfinite(snr)
         self._count("points: not finite", len(xyz) - int(finite.sum()))
+        self._count(f"points: more than {MOST_TARGETS:,} in a frame", max(0, int(finite.sum()) - MOST_TARGETS))
         xyz, speed, snr = xyz[finite][:MOST_TARGETS], speed[finite][:MOST_TARGETS], snr[finite][:MOST_TARGETS]
         range_m = np.linalg.norm(xyz, axis=1)
         all_xyz = xyz

@@ -43,6 +43,8 @@ class UwbScans:
     intensity: NDArray[Any]
     """(scans, bins)"""
     geometry: UwbGeometry
+    left_out: str = ""
+    """Which of the log are not among them, and why; empty: all are."""
 
 
 def traversable_ground(

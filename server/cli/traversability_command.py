@@ -100,7 +100,7 @@ def traversability(
     timer(RADAR_STEP, None)
     radar = None
     if scans is not None and uwb is not None:
-        radar = Radar(cleared_ground(ground, scans, params), uwb.name, len(scans.t_s), in_words(params))
+        radar = Radar(cleared_ground(ground, scans, params), uwb.name, len(scans.t_s), in_words(params), scans.left_out)
     found = None if place is None else sites_near(ground, place, rotor_span_m, radius_m)
     sites = [] if found is None else [_rounded(site) for site in described(ground, found)]
     _write(out, Maps(ground, radar), None if found is None else sites)
@@ -158,7 +158,7 @@ def _summary(maps: Maps, found: LandingSites | None, sites: list[dict[str, Any]]
         summary |= {"scans": radar.scans, **counts}
     if found is not None:
         summary |= {"sites": sites, "no_site": found.no_site, "caution": CAUTION if found.sites else ""}
-    return summary if radar is None else summary | {"uwb_rule": radar.rule}
+    return summary if radar is None else summary | {"uwb_rule": radar.rule, "uwb_left_out": radar.left_out}
 
 
 def _lines(summary: dict[str, Any], out: Path) -> list[str]:
@@ -169,6 +169,7 @@ def _lines(summary: dict[str, Any], out: Path) -> list[str]:
             f"  {summary['cleared']:,} of them cleared as soft vegetation by {summary['scans']:,} scans: "
             f"a rover may pass, a rotor may not touch ({summary['uwb_rule']})"
         )
+        lines += [f"  {part}" for part in [summary["uwb_left_out"]] if part]
     for site in summary.get("sites", ()):
         place = f"{site['lat_deg']:.7f}, {site['lon_deg']:.7f}"
         lines.append(f"  Landing site {site['rank']} at {place}: {'; '.join(site['reasons'])}")

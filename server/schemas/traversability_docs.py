@@ -75,6 +75,8 @@ class TraversabilityState(Strict):
     """Name of the radar log that cleared it; empty: none."""
     uwb_rule: str = ""
     """How it was fused, and with which numbers."""
+    uwb_left_out: str = ""
+    """Which of its scans count for nothing, and why; empty: all count."""
     scans: int = 0
     legend: list[str] = Field(default_factory=list)
     """What the colours of the layer on show mean, from the lowest to the highest."""

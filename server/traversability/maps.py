@@ -33,6 +33,8 @@ class Radar:
     scans: int
     rule: str = ""
     """How it was fused."""
+    left_out: str = ""
+    """Which scans of the log count for nothing, and why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,7 @@ def write_maps(path: Path, maps: Maps) -> None:
             "log": np.array(radar.log),
             "scans": np.array(radar.scans),
             "rule": np.array(radar.rule),
+            "left_out": np.array(radar.left_out),
         }
     with storage_errors(path):
         write_durably(path, lambda file: np.savez(file, **arrays))  # pyright: ignore[reportArgumentType]
@@ -125,5 +128,6 @@ def _ground(arrays: np.lib.npyio.NpzFile) -> TraversableGround:
 
 def _radar(arrays: np.lib.npyio.NpzFile) -> Radar:
     cleared = Cleared(arrays["probability"], arrays["time_in_view_s"], arrays["cleared"], arrays["seen"])
-    rule = str(arrays["rule"]) if "rule" in arrays.files else ""
-    return Radar(cleared, str(arrays["log"]), int(arrays["scans"]), rule)
+    # Maps that were kept before they were told have neither.
+    rule, left_out = (str(arrays[name]) if name in arrays.files else "" for name in ("rule", "left_out"))
+    return Radar(cleared, str(arrays["log"]), int(arrays["scans"]), rule, left_out)

@@ -45,6 +45,7 @@ class Worked:
     north_m: float
     cell_m: float
     uwb_rule: str = ""
+    uwb_left_out: str = ""
 
     def overlay(self, terrain_id: str, layer: LayerName) -> OverlayScene:
         """A layer of the radar's is the map before clearing as long as there is no log."""
@@ -85,7 +86,7 @@ def clear_foliage(
         maps = read_maps(source)
     report("Clearing foliage", None)
     params = params or UwbParams()
-    radar = Radar(cleared_ground(maps.ground, scans, params), name, len(scans.t_s), in_words(params))
+    radar = Radar(cleared_ground(maps.ground, scans, params), name, len(scans.t_s), in_words(params), scans.left_out)
     cleared = replace(maps, radar=radar)
     report("Storing", None)
     write_maps(target, cleared)
@@ -144,6 +145,7 @@ def _worked(maps: Maps) -> Worked:
         north_m=dsm.transform.f,
         cell_m=factor * dsm.resolution_m,
         uwb_rule="" if radar is None else radar.rule,
+        uwb_left_out="" if radar is None else radar.left_out,
     )
 
 

@@ -33,6 +33,7 @@ class Kept:
             seen=worked.seen,
             uwb_log=worked.uwb_log,
             uwb_rule=worked.uwb_rule,
+            uwb_left_out=worked.uwb_left_out,
             scans=worked.scans,
         )
 

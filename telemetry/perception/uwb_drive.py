@@ -81,6 +81,16 @@ class UwbDrive:
         while self._waiting:
             self._take(self._waiting.popleft())
 
+    @property
+    def left_out(self) -> str:
+        """What counts for nothing, and why, for people; empty: everything counts."""
+        reasons = (
+            (self.unplaced, "where the vehicle was is not known"),
+            (self.other_geometry, "other range bins than at first"),
+        )
+        parts = [f"{count:,}, {why}" for count, why in reasons if count]
+        return f"Scans left out: {'; '.join(parts)}." if parts else ""
+
     def scans(self) -> UwbScans:
         """Those with a place, in their order; times count from the first. At least one must be there."""
         assert self._geometry is not None
@@ -91,6 +101,7 @@ class UwbDrive:
             np.array(self._heading_rad, np.float64),
             np.array(self._intensity, np.float32),
             self._geometry,
+            self.left_out,
         )
 
     def _place(self) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.ground import GroundGrid, ground_grid
-from mapping.perceiving.radar_perception import RadarPerception
+from mapping.perceiving.radar_perception import MOST_TARGETS, RadarPerception, RadarTargets
 from tests.mapping.flights import Flight, flat_ground, radar_frame, snr_db
 
 AWAY_M = 14.0
@@ -233,3 +234,11 @@ def test_the_gate_is_the_settings_choice_and_may_change_in_flight() -> None:
         flight.radar(np.array([aside, above]), 40.0)
     assert len(flight.perception.map.occupied()) == 2
     assert RadarPerception.reach_down(wide) == pytest.approx(math.tan(math.radians(30)))
+
+
+def test_targets_beyond_the_most_of_a_frame_are_counted() -> None:
+    dropped: Counter[str] = Counter()
+    xyz_m = np.tile([0.0, 10.0, 0.0], (MOST_TARGETS + 7, 1))
+    kept = RadarTargets(dropped).kept(radar_frame(1.0, 0, xyz_m, np.zeros(len(xyz_m)), np.full(len(xyz_m), 20.0)))
+    assert len(kept[0]) == MOST_TARGETS
+    assert dropped == {"points: more than 2,000 in a frame": 7}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -22,8 +24,12 @@ from server.traversability import task
 from server.traversability.landing_site_task import find_sites
 from server.traversability.legend import LEGENDS, chance_classes, classes, legend_of, painted, time_classes
 from server.traversability.maps import Maps, Radar, keep, kept_in, read_maps, settle, write_maps
+from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.sensors.uwb_log import write_uwb_log
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 from tests.server.scene_fixtures import hill
+from tests.telemetry.uwb_drives import T0_MONO_S, T0_UTC_S, on_the_bus, scan_of
 
 LAYERS: tuple[LayerName, ...] = get_args(LayerName)
 
@@ -168,6 +174,25 @@ def test_a_log_is_taken_in_whether_or_not_there_is_a_map_yet(terrain: Path, tmp_
     )
     assert "the paper's rule" in paper.uwb_rule
     assert task.read_again(tmp_path / "c.npz", report=quiet).uwb_rule == paper.uwb_rule
+    assert paper.uwb_left_out == ""
+
+
+def test_scans_of_a_recording_that_count_for_nothing_are_told_and_kept_with_the_map(
+    terrain: Path, tmp_path: Path
+) -> None:
+    level = load_terrain(terrain)
+    along = np.column_stack([np.linspace(500_060.0, 500_062.0, 60), np.full(60, 3_999_942.0)])
+    drive = scans(level.lat_lon_from_xy(along))
+    with closing(RecordingWriter(tmp_path / "late.mcap", t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name="late")) as writer:
+        early = scan_of(0, T0_MONO_S, drive.intensity[0])
+        writer.write(Topic.UWB_SCAN, early, early.t_utc_s)
+        for message in on_the_bus(replace(drive, t_s=drive.t_s + 60.0)):
+            topic = Topic.VEHICLE if isinstance(message, VehicleState) else Topic.UWB_SCAN
+            writer.write(topic, message, message.t_utc_s)
+    told = "Scans left out: 1, where the vehicle was is not known."
+    worked = task.clear_foliage(terrain, None, tmp_path / "d.npz", tmp_path / "late.mcap", "late.mcap", report=quiet)
+    assert worked.uwb_left_out == told
+    assert task.read_again(tmp_path / "d.npz", report=quiet).uwb_left_out == told
 
 
 def test_what_is_no_log_is_named_as_the_operator_knows_it(terrain: Path, tmp_path: Path) -> None:

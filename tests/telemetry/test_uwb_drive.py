@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,11 @@ from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.perception import uwb_drive
 from telemetry.perception.uwb_drive import UwbDrive, read_scans, recorded_scans
+from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.topics.messages import Topic
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import write_flight
-from tests.telemetry.uwb_drives import on_the_bus, scan_of, state_of, write_recording
+from tests.telemetry.uwb_drives import T0_MONO_S, T0_UTC_S, on_the_bus, scan_of, state_of, write_recording
 
 HERE = (-37.0, 175.0)
 METRE_DEG = 1.0 / 111_132.0
@@ -73,6 +78,9 @@ def test_what_cannot_be_placed_is_counted() -> None:
     drive.on_scan(scan_of(4, 9.97, np.ones(17)))
     drive.on_scan(scan_of(5, 9.98, np.ones(16), bin_m=0.2))
     assert (len(drive), drive.other_geometry) == (2, 2)
+    assert drive.left_out == (
+        "Scans left out: 2, where the vehicle was is not known; 2, other range bins than at first."
+    )
 
 
 def test_a_drive_takes_so_much_and_no_more() -> None:
@@ -89,6 +97,19 @@ def test_a_recording_gives_the_same_scans_back(tmp_path: Path) -> None:
     assert np.array_equal(found.heading_rad, live.heading_rad)
     assert np.array_equal(found.intensity, live.intensity)
     assert read_scans(tmp_path / "drive.mcap", "drive.mcap").geometry == log().geometry
+
+
+def test_what_of_a_recording_counts_for_nothing_is_told_with_the_scans(tmp_path: Path) -> None:
+    assert recorded_scans(write_recording(tmp_path / "drive.mcap", log())).left_out == ""
+    with closing(RecordingWriter(tmp_path / "late.mcap", t_utc_s=T0_UTC_S, t_mono_s=T0_MONO_S, name="late")) as writer:
+        for k in range(3):  # the link was connected after the sensor
+            writer.write(Topic.UWB_SCAN, early := scan_of(k, T0_MONO_S + k, np.ones(16)), early.t_utc_s)
+        for message in on_the_bus(replace(log(), t_s=log().t_s + 60.0)):
+            topic = Topic.VEHICLE if isinstance(message, VehicleState) else Topic.UWB_SCAN
+            writer.write(topic, message, message.t_utc_s)
+    found = recorded_scans(tmp_path / "late.mcap")
+    assert len(found.t_s) == 40
+    assert found.left_out == "Scans left out: 3, where the vehicle was is not known."
 
 
 def test_a_recording_of_more_scans_than_are_kept_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1990,6 +1990,8 @@ export interface TraversabilityState {
   uwb_log: string;
   /** How it was fused, and with which numbers. */
   uwb_rule: string;
+  /** Which of its scans count for nothing, and why; empty: all count. */
+  uwb_left_out: string;
   scans: number;
   /** What the colours of the layer on show mean, from the lowest to the highest. */
   legend: string[];

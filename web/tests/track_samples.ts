@@ -75,6 +75,7 @@ export const ground = (fields: Partial<TraversabilityState> = {}): Traversabilit
   seen: 0,
   uwb_log: "",
   uwb_rule: "",
+  uwb_left_out: "",
   scans: 0,
   legend: ["Hard", "Untraversable"],
   legend_colors: ["#a696d6", "#3a1c78"],

@@ -28,6 +28,7 @@ const NOTHING: TraversabilityState = {
   seen: 0,
   uwb_log: "",
   uwb_rule: "",
+  uwb_left_out: "",
   scans: 0,
   legend: [],
   legend_colors: [],

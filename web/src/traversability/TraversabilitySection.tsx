@@ -54,6 +54,7 @@ function RadarLog({ state, isBusy }: { state: TraversabilityState; isBusy: boole
         )}
       </p>
       {state.uwb_rule !== "" && <p class="hint">{state.uwb_rule}</p>}
+      {state.uwb_left_out !== "" && <p class="says-near">{state.uwb_left_out}</p>}
       <Fusion />
       <LiveRadar live={state.live} hasTerrain />
       <Button
