@@ -42,7 +42,7 @@ setup: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## install everyt
 	@echo 'Ready: make demo'
 
 demo: $(STAMPS)/project web/dist/index.html $(STAMPS)/kernels ## start Hedgehop with a generated hillside and print its sign-in link
-	@.venv/bin/hedgehop serve --demo --demo-vehicles $(or $(VEHICLES),1)
+	@.venv/bin/hedgehop serve --demo --demo-vehicles $(or $(VEHICLES),1) $(if $(AUTOPILOTS),--demo-autopilots $(AUTOPILOTS))
 
 test: $(STAMPS)/test web/dist/index.html $(STAMPS)/kernels ## run the tests of the console and of the Python packages
 	@cd web && $(WITH_NODE) npm test

@@ -203,6 +203,7 @@ def _wanted(settings: Settings, library: Library, demo: bool) -> list[VehicleWan
             is_alone=len(wanted) == 1,
             demo_radar=settings.demo_radar,
             demo_world=settings.demo_world,
+            demo_autopilot=settings.demo_autopilot(number - FIRST_VEHICLE),
         )
         for number, (name, links) in wanted.items()
     ]

@@ -30,6 +30,12 @@ def _split(value: object) -> object:
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_split)]
 
 
+DemoAutopilot = Literal["ardupilot", "px4"]
+DemoAutopilots = Annotated[
+    tuple[DemoAutopilot, ...], NoDecode, BeforeValidator(_split), Field(max_length=MOST_VEHICLES)
+]
+
+
 def named_links(text: str) -> tuple[str, tuple[str, ...]]:
     """``NAME=LINK[,LINK]``: a vehicle's name and the connections to it. Raises ValueError."""
     name, _, links = text.partition("=")
@@ -111,6 +117,9 @@ class Settings(BaseSettings):
     Wasp=udpin:0.0.0.0:14560. What link names is the first vehicle then, and these come after it."""
     demo_vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 1
     """How many simulated vehicles the demo has. Only the first one has sensors."""
+    demo_autopilots: DemoAutopilots = ()
+    """Whose behaviour the demo's simulated vehicles have, one after the other, separated by commas: ardupilot or px4.
+    Vehicles beyond them are ArduCopters."""
     demo_world: bool = True
     """Whether the demo's simulated vehicle has radar and camera, in a world with things that its surface model does not
     know."""
@@ -131,6 +140,10 @@ class Settings(BaseSettings):
         if twice := set(self.link) & {link for text in self.vehicle for link in named_links(text)[1]}:
             raise ValueError(f"{sorted(twice)[0]} is a connection of two vehicles.")
         return self
+
+    def demo_autopilot(self, index: int) -> DemoAutopilot:
+        """Of the demo's vehicle number ``index``, from 0 on."""
+        return self.demo_autopilots[index] if index < len(self.demo_autopilots) else "ardupilot"
 
     @property
     def vehicles(self) -> list[tuple[str, tuple[str, ...]]]:
@@ -241,6 +254,7 @@ _DOCUMENTED = {
     "tls_key": "none",
     "link": "none",
     "vehicle": "none",
+    "demo_autopilots": "none",
     "allowed_hosts": "none",
     "allowed_origins": "none",
     "console_dir": "`web/dist` of the project",

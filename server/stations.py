@@ -39,6 +39,7 @@ from server.obstacles.obstacles import Obstacles
 from server.obstacles.replayed import Replayed
 from server.schemas import LinkMessage, NoticeMessage, ServerMessage, TransferMessage, VehicleAlarm, VehicleDoc
 from server.schemas.station_docs import FIRST_VEHICLE
+from server.settings import DemoAutopilot
 from server.studies.scenario_desk import ScenarioDesk
 from server.work.jobs import Lane
 from server.workspace import Workspace
@@ -93,6 +94,7 @@ class VehicleWanted:
     """Sentences about it need not name it."""
     demo_radar: RadarKind = "model"
     demo_world: bool = True
+    demo_autopilot: DemoAutopilot = "ardupilot"
 
 
 class Flying:
@@ -107,7 +109,9 @@ class Flying:
         self._present = present = Present(pages)
         runtime_dir = folder / RUNTIME_FOLDER
         link, aboard = LinkClient(bus, lease.issue_above), Aboard(folder / "onboard.json")
-        self.nodes = Nodes(bus, runtime_dir, recordings, present, demo_radar=wanted.demo_radar)
+        self.nodes = Nodes(
+            bus, runtime_dir, recordings, present, demo_radar=wanted.demo_radar, demo_autopilot=wanted.demo_autopilot
+        )
         self.agents = Agents(bus)
         self.live, self._aboard = Channel("live", present), aboard
         shared.channels[number] = self.live

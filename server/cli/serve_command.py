@@ -47,6 +47,13 @@ def serve(
         Option(metavar="NAME=LINK[,LINK]", help="One of several vehicles and its connections; once for each of them."),
     ] = None,
     demo_vehicles: Annotated[int | None, Option(help="How many simulated vehicles the demo has; default 1.")] = None,
+    demo_autopilots: Annotated[
+        str | None,
+        Option(
+            metavar="NAME,...",
+            help="ardupilot or px4, for each of the demo's vehicles; default: ardupilot.",
+        ),
+    ] = None,
     data_dir: Annotated[
         Path | None, Option(help="Where models and plans are kept; default: the user's data home.")
     ] = None,
@@ -68,6 +75,7 @@ def serve(
         link=link or None,
         vehicle=vehicle or None,
         demo_vehicles=demo_vehicles,
+        demo_autopilots=demo_autopilots,
         demo_world=demo_world,
         demo_radar=radar,
     )

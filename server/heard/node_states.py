@@ -8,6 +8,7 @@ from pathlib import Path
 
 from server.heard.ground_task import Ground
 from server.schemas import NodeDoc, NodesMessage, Pages
+from server.settings import DemoAutopilot
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
 from telemetry.bus.node_lock import running_node
@@ -20,6 +21,8 @@ TRACKS = "tracks"
 SIMULATED_SENSORS = "sensors"
 
 _SENSOR_SEED = 1
+_RETURN_HEIGHT: dict[DemoAutopilot, str] = {"ardupilot": "RTL_ALT={1:.0f}", "px4": "RTL_RETURN_ALT={0:.2f}"}
+"""For metres and centimetres above home."""
 _CALL_TIMEOUT_S = 15.0
 """A node may have to start first, on a busy machine."""
 
@@ -28,10 +31,18 @@ class Nodes:
     """Starts nodes when they are needed. Those that outlived a server before this one are taken over."""
 
     def __init__(
-        self, bus: Bus, runtime_dir: Path, recordings_dir: Path, pages: Pages, *, demo_radar: RadarKind = "model"
+        self,
+        bus: Bus,
+        runtime_dir: Path,
+        recordings_dir: Path,
+        pages: Pages,
+        *,
+        demo_radar: RadarKind = "model",
+        demo_autopilot: DemoAutopilot = "ardupilot",
     ) -> None:
         self._bus, self._runtime_dir, self._recordings_dir, self._pages = bus, runtime_dir, recordings_dir, pages
-        self._demo_radar = demo_radar
+        self._demo_radar: RadarKind = demo_radar
+        self._demo_autopilot: DemoAutopilot = demo_autopilot
         self.supervisor = Supervisor(runtime_dir, changed=self._changed)
         self.changed = asyncio.Event()
         """Set whenever a node's state is another."""
@@ -90,8 +101,9 @@ class Nodes:
     async def simulator(self, ground: Ground, link: str, *, rtl_height_m: float, world: Path | None = None) -> None:
         """Set up as the plan's profile says of its vehicle; ``world``: what it may crash into."""
         home = f"{ground.home_lat_deg:.9f},{ground.home_lon_deg:.9f},{ground.home_alt_m:.3f}"
-        rtl = f"RTL_ALT={100 * rtl_height_m:.0f}"
+        rtl = _RETURN_HEIGHT[self._demo_autopilot].format(rtl_height_m, 100 * rtl_height_m)
         arguments = ["--home", home, "--dsm", str(ground.path), "--link", link, "--parameter", rtl]
+        arguments += ["--autopilot", self._demo_autopilot]
         if world is not None:
             arguments += ["--world", str(world)]
         await self.supervisor.start(SIMULATOR, arguments)

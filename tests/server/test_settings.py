@@ -92,3 +92,11 @@ def test_the_documented_example_is_accepted(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "settings.toml").write_text(example)
     monkeypatch.setenv("HEDGEHOP_SETTINGS_FILE", str(tmp_path / "settings.toml"))
     assert load_settings().allowed_origins == ("https://gcs.example",)
+
+
+def test_the_demo_has_autopilots_of_its_vehicles_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HEDGEHOP_DEMO_AUTOPILOTS", "ardupilot, px4")
+    settings = load_settings()
+    assert [settings.demo_autopilot(index) for index in range(3)] == ["ardupilot", "px4", "ardupilot"]
+    with pytest.raises(StartError, match="demo_autopilots"):
+        load_settings(demo_autopilots="px5")

@@ -51,6 +51,27 @@ def test_mavsdk_uploads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> Non
     assert own.faults == ()
 
 
+@pytest.mark.slow
+def test_mavsdk_flies_the_simulated_px4(tmp_path: Path) -> None:
+    quick = ("--speedup", "8", "--parameter", "MPC_LAND_SPEED=1.5", "--parameter", "MPC_LAND_CRWL=1")
+    with simulated_vehicle(tmp_path, "--autopilot", "px4", *quick) as (_, port):
+        done = subprocess.run(
+            [sys.executable, "-m", "tests.telemetry.mavsdk_px4_pilot", f"tcpout://127.0.0.1:{port}", "-371244507",
+             "1756892878"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=2 * PATIENCE_S,
+        )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    seen = json.loads(done.stdout.strip().splitlines()[-1])
+    assert (seen["autopilot"], seen["cone_deg"]) == ("PX4", 45)
+    assert [row[:2] for row in seen["kept"]] == [[6, 22], [6, 16], [6, 16], [2, 20]]
+    assert seen["kept"][1][2:] == pytest.approx([1.6, -371243007, 1756892878, 12.34], abs=1e-5)
+    assert seen["high_m"] > 14
+    assert abs(seen["end_m"]) < 0.5
+
+
 class _Station:
     """A datagram socket with the transfer machines behind it."""
 
