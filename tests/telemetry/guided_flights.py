@@ -16,7 +16,8 @@ from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.targets import guided_plan
 from telemetry.mavlink.actions import Action, Send
 from telemetry.mavlink.reduce import reduce
-from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.airframe.gnss import GnssKind
+from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES, Make
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 from telemetry.topics.requests import Operator, StartGuided
@@ -39,16 +40,25 @@ class ScriptedFlight:
         *,
         feed: Feed | None = None,
         silent_s: tuple[float, float] = (math.inf, math.inf),
+        make: Make = "ardupilot",
+        gnss: GnssKind = "perfect",
+        seed: int = 0,
         **parameters: float,
     ) -> None:
+        personality = PERSONALITIES[make]
         self._silent_s, self._flies_s = silent_s, math.inf
         self.sent: list[Any] = []
-        plan = guided_plan(replace(read_wpl(mission.read_bytes()), firmware="ardupilot"))
+        plan = guided_plan(replace(read_wpl(mission.read_bytes()), firmware=make))
         home = read_wpl(mission.read_bytes()).home
         self.frame = NeuFrame(home.lat_deg, home.lon_deg, home.alt_dsm_m)
         self.bench = Bench(
             SimulatedVehicle(
-                self.frame, gnss="perfect", boot_s=0.5, parameters=Parameters(BATT_CAPACITY=60000, **parameters)
+                self.frame,
+                make=make,
+                gnss=gnss,
+                seed=seed,
+                boot_s=0.5,
+                parameters=personality.parameters(**{personality.capacity: 60000.0, **parameters}),
             )
         )
         self.line = np.array(
@@ -63,7 +73,7 @@ class ScriptedFlight:
         while self._state is None or self._state.alt_amsl_m is None:
             self._advance()
         asked = StartGuided(Operator("Ann", 1), plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
-        self.script = GuidedScript(asked, self._state, firmware="ardupilot", target=(1, 1), feed=feed)
+        self.script = GuidedScript(asked, self._state, firmware=make, target=(1, 1), feed=feed)
         self.track = self._fly()
 
     def _fly(self) -> F64:

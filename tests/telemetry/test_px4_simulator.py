@@ -7,11 +7,17 @@ import struct
 from collections import Counter
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from telemetry.mavlink.modes import mode_name
+from telemetry.mavlink.upload import MissionUpload
 from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
+from telemetry.simulation.simulator.protocol.px4.px4_missions import Px4Missions
+from tests.telemetry.lossy import Faults, Run
+from tests.telemetry.mission_samples import mission
+from tests.telemetry.mission_vehicles import HOME
 from tests.telemetry.simulator_bench import Bench
 
 LAT, LON, HOME_ALT_M = -371244507, 1756892878, 803.24
@@ -143,6 +149,32 @@ def test_a_broken_off_upload_leaves_the_old_mission() -> None:
     assert len(bench.of("MISSION_REQUEST_INT")) >= 9  # again every quarter of a second
     bench.advance(5.0)
     assert [one.command for one in read_back(bench)] == [SPEED, TAKEOFF, 16, 16, 20]
+
+
+class _OverRadio:
+    """The simulated PX4's mission protocol, for a link with losses."""
+
+    def __init__(self, bench: Bench) -> None:
+        pilot = bench.vehicle.autopilot
+        assert isinstance(pilot, Px4Pilot)
+        self._missions = Px4Missions(pilot)
+
+    def on_message(self, message: Any, now_s: float) -> list[Any]:
+        if not message.get_type().startswith("MISSION"):
+            return []
+        return [reply for _, reply in self._missions.on_message(message, "radio", now_s)]
+
+    def on_tick(self, now_s: float) -> list[Any]:
+        return [reply for _, reply in self._missions.on_tick(now_s)]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.1, 0.3])
+def test_hedgehops_upload_arrives_over_loss(loss: float) -> None:
+    for seed in range(5):
+        vehicle = _OverRadio(ready())
+        machine = MissionUpload(mission(40), HOME, firmware="px4", target=(1, 1), now_s=0.0)
+        run = Run(machine, vehicle, Faults(loss=loss), seed=seed).until_end()
+        assert run.result.verified, run.result.differences
 
 
 def test_fence_and_rally_points_are_kept() -> None:
