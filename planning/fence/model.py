@@ -142,6 +142,18 @@ def fence(
     return Fence(tuple(polygons), tuple(circles), low_m, high_m)
 
 
+def within_both(one: Fence, other: Fence) -> Fence:
+    """The fence of who keeps to both."""
+    floors_m = [each.floor_rel_home_m for each in (one, other) if each.floor_rel_home_m is not None]
+    ceilings_m = [each.ceiling_rel_home_m for each in (one, other) if each.ceiling_rel_home_m is not None]
+    return Fence(
+        tuple(dict.fromkeys((*one.polygons, *other.polygons))),
+        tuple(dict.fromkeys((*one.circles, *other.circles))),
+        max(floors_m, default=None),
+        min(ceilings_m, default=None),
+    )
+
+
 def fence_words(fence: Fence, rally: tuple[RallyPoint, ...]) -> str:
     """What there is, counted."""
     counts = (

@@ -29,7 +29,7 @@ class WayAsked:
     body: WayBody
     terrain: Path
     document: PlanDoc
-    """Whose vehicle and demands count, and what was seen and taken into its surface model."""
+    """Whose vehicle, demands and fence count, and what was seen and taken into its surface model."""
     state: VehicleState
     now_mono_s: float
     parameters: dict[str, float | None]
@@ -51,14 +51,19 @@ class WayJudged:
 
 def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     """Raises NotAllowedError, MissionError, ParameterError and PlanningError."""
+    from planning.fence.model import within_both
     from planning.formats.fence_items import fence_of, rally_of
     from server.library.documents import demands_from_doc
+    from server.library.fences import fence_from_doc
     from server.library.terrains import load_terrain
     from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for
     from telemetry.mavlink.items import mission_items
 
     report("Judging the way", None)
     demands = replace(demands_from_doc(asked.document), way="guided")
+    fence = within_both(
+        fence_from_doc(asked.document)[0], fence_of(mission_items(asked.aboard.fence), "the fence on board", [])
+    )
     rally = rally_of(mission_items(asked.aboard.rally), "the rally points on board")
     wish = wish_of(asked.body, asked.flown)
     if isinstance(wish, Rally):
@@ -75,7 +80,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
             demands.profile,
             demands.clearance(),
             asked.parameters,
-            fence_of(mission_items(asked.aboard.fence), "the fence on board", []),
+            fence,
             rally,
         ),
         speed_m_s=speed_m_s,

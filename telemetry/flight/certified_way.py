@@ -43,7 +43,7 @@ class Flown:
     parameters: Mapping[str, float | None]
     """As read from it: ``telemetry.flight.preflight.parameters.NAMES``."""
     fence: Fence = NO_FENCE
-    """On board."""
+    """On board, and the plan's where there is one."""
     rally: tuple[RallyPoint, ...] = ()
 
 

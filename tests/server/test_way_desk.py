@@ -21,7 +21,7 @@ from server.flying.way_desk import WayDesk, flown_places
 from server.flying.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.scene.mirror import Voxels
-from server.schemas import FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
+from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, NoVehicleError
@@ -148,6 +148,21 @@ def test_what_is_not_certified_is_shown_and_not_flown(made: Made, lane: Lane, ru
         for accepts in (False, True):
             with pytest.raises(NotCertifiedError, match="fence"):
                 await bench.desk.fly(ME, FlyWayBody(id=way.id, accept_return=accepts))
+
+    runner.run(scenario())
+
+
+def test_the_plans_own_ceiling_holds_although_no_vehicle_keeps_it(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        ceiling = FenceDoc(ceiling_rel_home_m=40.0)
+        bench.document = bench.document.model_copy(update={"fence": ceiling})
+        assert (await bench.judged(action="height", height_m=20.0)).problem is None
+        way = await bench.judged(action="height", height_m=60.0)
+        assert way.problem == "way"
+        assert "ceiling" in way.reasons[0].text
 
     runner.run(scenario())
 

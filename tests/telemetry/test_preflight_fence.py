@@ -58,6 +58,16 @@ def test_a_fence_that_the_plan_does_not_have_is_flown_within_all_the_same() -> N
     assert flown_within(PLANNED, aboard()) == PLANNED
 
 
+def test_a_plan_with_a_ceiling_alone_is_flown_within_the_vehicles_shapes_as_well() -> None:
+    planned = (replace(NO_FENCE, ceiling_rel_home_m=60.0), RALLY)
+    row = judged(aboard(), planned=planned)
+    assert "but the fence is not the plan's" in row.text
+    assert "hedgehop fence LINK clear" in row.mend
+    within = flown_within(planned, aboard())
+    assert within[0] == replace(FENCE, ceiling_rel_home_m=60.0)
+    assert within[1] == RALLY
+
+
 def test_nothing_anywhere_is_no_row() -> None:
     assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS, "ardupilot") is None
 

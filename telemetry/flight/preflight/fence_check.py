@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from planning.errors import FormatError
-from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words
+from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from planning.model import Firmware, MissionItem
 from telemetry.flight.preflight.checks import Row
@@ -47,11 +47,12 @@ def sent_places(planned: Places, firmware: Firmware) -> dict[PlaceList, tuple[It
 
 
 def flown_within(planned: Places, aboard: PlacesOnboard) -> Places:
-    """What a flight is held against: the plan's, and where the plan has none, what the vehicle holds all the same.
+    """What a flight is held against: the plan's fence and the vehicle's; the plan's rally points, else the vehicle's.
 
+    A plan's floor and ceiling are never on board: they are no reason to look away from shapes that are.
     Raises FormatError for a list on board that means nothing.
     """
-    fence = planned[0] or fence_of(mission_items(aboard.fence), "the fence on board", [])
+    fence = within_both(planned[0], fence_of(mission_items(aboard.fence), "the fence on board", []))
     return fence, planned[1] or rally_of(mission_items(aboard.rally), "the rally points on board")
 
 
@@ -67,19 +68,24 @@ def fence_row(
         held = flown_within(NOTHING, aboard)
     except FormatError as error:
         return Row("fence", "bad", f"The vehicle's own list is not understood: {error.where}: {error.what}", _CLEAR)
+    strange: list[str] = []
     for kind, sent in sent_places(planned, firmware).items():
         found = aboard.fence if kind == "fence" else aboard.rally
+        if found and not sent:
+            strange.append("the fence is" if kind == "fence" else "the rally points are")
         if sent and compare(sent, found, firmware=firmware)[1]:
             what = "fence" if kind == "fence" else "list of rally points"
             return Row("fence", "bad", f"The {what} on board is not the plan's.", "Upload the plan again.")
     if not wanted and not any(held):
         return None
     whose = "the plan's" if wanted else "another than the plan's, which has none"
+    if wanted and strange:
+        whose = f"but {' and '.join(strange)} not the plan's"
     text = f"{fence_words(*held)} on board, {whose}; the flight is held against it."
     deaf = _deaf(held[0], parameters, firmware)
     if deaf:
         return Row("fence", "accept", f"{text} {deaf}", "Set it under Parameters, or accept it.")
-    return Row("fence", "good", f"{text} {at_fence(parameters, firmware)}".strip(), "" if wanted else _CLEAR)
+    return Row("fence", "good", f"{text} {at_fence(parameters, firmware)}".strip(), _CLEAR if strange else "")
 
 
 _CLEAR = "To remove it, use: hedgehop fence LINK clear, hedgehop rally LINK clear."
