@@ -1,7 +1,7 @@
 import { duration, number, withUnit } from "../format";
 import type { VehicleDoc } from "../messages";
 import { acknowledgeElsewhere, active, calling, fleet } from "../store/fleet";
-import { failed } from "../store/reach";
+import { failed, late_s } from "../store/reach";
 import { chooseVehicle } from "../store/stream";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -26,8 +26,8 @@ function facts(vehicle: VehicleDoc, isPast: boolean): string {
 }
 
 function Vehicle({ vehicle }: { vehicle: VehicleDoc }) {
-  // Without the server nobody tells what has become of it.
-  const isPast = failed.value === "server";
+  // Without the server, or behind a slow line, nobody tells what has become of it.
+  const isPast = failed.value === "server" || late_s.value !== null;
   const level = vehicle.alarm ? "bad" : vehicle.link === "stale" || vehicle.link === "lost" ? "near" : "";
   const holder = vehicle.holder ? `${vehicle.holder} is in charge` : "Nobody is in charge";
   return (
