@@ -18,6 +18,8 @@ from mapping.geometry.arrays import F64
 Forward = Literal["x", "z", "-x", "-z"]
 _FORWARD = {"x": (1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0), "-x": (-1.0, 0.0, 0.0), "-z": (0.0, 0.0, -1.0)}
 _COLUMNS, _FEWEST = 8, 3
+_MOST_COLUMNS = 64
+"""A capture may hold more than it is read for; a row of the radar's samples holds thousands of values."""
 _HALF_WINDOW_S = 0.1
 """To both sides: over so long a velocity is taken."""
 
@@ -69,6 +71,10 @@ def _rows(path: Path) -> F64:
             if values is None and number == 1:
                 continue
             where = f"{path.name}, line {number}"
+            if len(fields) > _MOST_COLUMNS:
+                what = f"A row of {len(fields):,} values is none of a capture."
+                advice = "These look like the radar's samples: radar.csv comes first, optitrack.csv second."
+                raise RadarDataError(what, where=where, advice=advice)
             if values is None or len(values) < _COLUMNS or not all(map(math.isfinite, values[:_COLUMNS])):
                 advice = "A row is time in ns, x, y, z in metres and a quaternion."
                 raise RadarDataError(f"There are no {_COLUMNS} numbers.", where=where, advice=advice)

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mapping.errors import RadarDataError
+from mapping.radar.params import POSITION2GO
+from telemetry.sensors.adc.oda import open_oda
 from telemetry.sensors.optitrack import read_optitrack
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World
@@ -47,9 +50,8 @@ def capture_line(t_s: float) -> str:
     return ",".join([str(CAPTURE_ZERO_NS + round(t_s * 1e9)), *(f"{value:.6f}" for value in values)])
 
 
-@pytest.fixture(scope="module")
-def data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("oda")
+def made(folder: Path) -> Path:
+    """The two files of a flight towards the poles."""
     poles = [
         {"type": "cylinder", "at_m": list(place), "radius_m": 0.15, "height_m": 4.0, "material": "plaster"}
         for place in POLES_EN_M
@@ -63,6 +65,11 @@ def data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
     heading = "time [ns],x,y,z,a [rad],b [rad],c [rad],d [rad]"
     (folder / "optitrack.csv").write_text("\n".join([heading, *(capture_line(t) for t in captured_s)]))
     return folder
+
+
+@pytest.fixture(scope="module")
+def data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("oda"))
 
 
 def tracks(folder: Path, *more: object, offset_s: float = LATE_S) -> Run:
@@ -82,8 +89,14 @@ def test_poles_are_followed_where_they_are(data_set: Path, tmp_path: Path) -> No
         assert pole["followed"] > 0.75 * pole["in_view"]
         assert pole["range_rms_m"] < 0.15
         assert pole["bearing_rms_deg"] < 2.5
+    beside = {figure["words"]: (figure["value"], figure["paper"]) for figure in run.json["figures"]}
+    assert beside["pole 1: range error (RMS)"] == (
+        pytest.approx(run.json["poles"][0]["range_rms_m"], abs=1e-4),
+        "0.15 m (the sensor's)",
+    )
+    assert beside["processing and following of a frame, median"][1] == "0.78 ms (Intel Up Core)"
     with Image.open(tmp_path / "tracks.png") as image:
-        assert image.size >= (1000, 500)
+        assert image.size >= (1000, 1000)
         assert len(set(image.convert("L").get_flattened_data())) > 20
 
 
@@ -114,7 +127,16 @@ def test_what_does_not_fit_is_refused_in_clear_words(data_set: Path, tmp_path: P
     assert run.code == 2
     assert "--offset-s" in run.err
     files = (data_set / "radar.csv", data_set / "optitrack.csv")
-    assert "is no place" in hedgehop("radar", "tracks", *files, "--pole", "here").err
+    for words in ("here", "nan,-5", "1,2,3"):
+        assert "is no place" in hedgehop("radar", "tracks", *files, "--pole", words).err
+    far = hedgehop("radar", "tracks", *files, "--pole", "0.6,-5", "--pole", "40,-5", "--offset-s", LATE_S)
+    assert far.code == 2
+    assert "Pole 2, x 40 m and z -5 m, is never nearer than" in " ".join(far.err.split())
+    swapped = hedgehop("radar", "tracks", *reversed(files), "--pole", "0,-5")
+    assert swapped.code == 2
+    assert "radar.csv comes first, optitrack.csv second" in " ".join(swapped.err.split())
+    with pytest.raises(RadarDataError, match="row of 8 values"):
+        open_oda(files[1], POSITION2GO).any_frame()
     good = (data_set / "optitrack.csv").read_text().splitlines()
     for lines, words in (
         ([*good[:5], "1,2,3"], "line 6: There are no 8 numbers"),

@@ -15,26 +15,39 @@ from telemetry.simulation.scenarios.stage.result import ScenarioResult
 
 _COLOURS = ("#1f6f8b", "#e4572e", "#2e6b34", "#7d3fd1", "#8a6d1d")
 _PRINTED = "#333333"
-MANY = 60
+MOST_COLUMNS = 3
+MANY = 40
 """More points than these are drawn small."""
 
 
 def write_charts(folder: Path, result: ScenarioResult) -> list[Path]:
     """One figure for each part of the scenario that has curves. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = [part for part in result.flights if part.charts]
-    return [_write(folder, part.title, part.charts, f"{result.name}, seed {result.seed}") for part in drawn]
+    return [
+        write_figure(folder / _file_name(part.title), part.charts, f"{result.name}, seed {result.seed}: {part.title}")
+        for part in drawn
+    ]
 
 
-def _write(folder: Path, title: str, charts: tuple[Chart, ...], whole: str) -> Path:
-    figure = Figure(figsize=(4.8 * len(charts), 4.8), dpi=120, layout="constrained")
+def write_figure(path: Path, charts: tuple[Chart, ...], title: str) -> Path:
+    """Several charts side by side, in rows. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    columns = min(len(charts), MOST_COLUMNS)
+    rows = -(-len(charts) // columns)
+    figure = Figure(figsize=(4.8 * columns, 4.8 * rows), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, chart in zip(figure.subplots(1, len(charts), squeeze=False)[0], charts, strict=True):
+    places = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, chart in zip(places, charts, strict=False):
         _draw(axes, chart)
-    figure.suptitle(f"{whole}: {title}", fontsize=10, color="#555555")
-    path = folder / f"{re.sub('[^a-z0-9]+', '-', title.lower()).strip('-')}.png"
+    for axes in places[len(charts) :]:
+        axes.set_axis_off()
+    figure.suptitle(title, fontsize=10, color="#555555")
     figure.savefig(path, metadata={"Software": None})
     return path
+
+
+def _file_name(title: str) -> str:
+    return f"{re.sub('[^a-z0-9]+', '-', title.lower()).strip('-')}.png"
 
 
 def _draw(axes: Axes, chart: Chart) -> None:
@@ -51,10 +64,12 @@ def _draw(axes: Axes, chart: Chart) -> None:
     if chart.is_true:
         axes.set_aspect("equal", adjustable="box")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2)
 
 
 def _style(one: Series) -> dict[str, Any]:
+    if one.printed and one.drawn == "line":
+        return {"linestyle": "--", "zorder": 5}
     if one.printed:
         return {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2, "zorder": 5}
     if one.drawn == "points":

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from typer import Argument, Option
 
-from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
-from mapping.radar.detections import Detections
-from mapping.radar.params import POSITION2GO
 from server.cli.radar.process_command import RadarOptionsError
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import answer, end_progress, progress, say
-from telemetry.sensors.adc.oda import open_oda
-from telemetry.sensors.optitrack import read_optitrack
-from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison, compared
+from server.studies.oda_tracks import TracksWanted, tracks_against_truth
+from telemetry.simulation.scenarios.arena.against_truth import Pole, TruthComparison, rms
+from telemetry.simulation.scenarios.arena.truth_figures import truth_part
+from telemetry.simulation.scenarios.stage.result import FlightResult, figure_json
+
+DRAWN = "tracks.png"
 
 
 @command
@@ -32,60 +32,52 @@ def tracks(
     forward: Annotated[
         Literal["x", "z", "-x", "-z"], Option(help="Which of the captured body's axes is its nose.")
     ] = "x",
-    plots: Annotated[Path | None, Option(metavar="DIR", help="Draw both there (tracks.png).")] = None,
+    plots: Annotated[Path | None, Option(metavar="DIR", help="Draw ways and errors there (tracks.png).")] = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Follow what a Position2Go's samples show and hold it against where the poles truly were."""
-    places = np.array([_place(words) for words in pole])
-    capture = read_optitrack(optitrack, forward=forward)
-    found = compared(_frames(file), capture, places, offset_s=offset_s)
+    wanted = TracksWanted(tuple(_place(words) for words in pole), offset_s, forward)
+    found = tracks_against_truth(file, optitrack, wanted, progress)
     end_progress()
+    part = truth_part(found, f"{file.name}, {found.frames} frames")
     if plots is not None:
-        from server.cli.plots.radar_tracks_plot import write_tracks
+        # Loaded only now: drawing is rarely asked for.
+        from server.cli.plots.chart_plots import write_figure
 
-        say(f"Drawn: {write_tracks(plots, found, f'{file.name}, {found.frames} frames')}")
-    poles = [_figures(pole) for pole in found.poles]
+        say(f"Drawn: {write_figure(plots / DRAWN, part.charts, part.title)}")
     counts = {"frames": found.frames, "left_out": found.left_out, "others": len(found.others)}
-    answer({**counts, "poles": poles}, _lines(file, found, poles), as_json=as_json)
+    poles = [_summary(pole) for pole in found.poles]
+    figures = [figure_json(figure) for figure in part.figures]
+    answer({**counts, "poles": poles, "figures": figures}, _lines(file, found, part), as_json=as_json)
 
 
 def _place(words: str) -> tuple[float, float]:
-    """East and north."""
+    """x and z."""
     try:
         x, z = (float(word) for word in words.split(","))
+        if not (math.isfinite(x) and math.isfinite(z)):
+            raise ValueError
     except ValueError:
         what = f'"{words}" is no place.'
         raise RadarOptionsError(what, where="--pole", advice="Write x and z in metres, as 1.5,-3.") from None
-    return x, -z
+    return x, z
 
 
-def _frames(file: Path) -> Iterator[tuple[float, Detections]]:
-    chain = RadarChain(POSITION2GO, POSITION2GO_SETTINGS)
-    for number, frame in enumerate(open_oda(file, POSITION2GO).frames()):
-        progress(f"Frame {number}", None)
-        yield frame.t_s, chain.process(frame.cube)
-
-
-def _lines(file: Path, found: TruthComparison, poles: list[dict[str, Any]]) -> Iterator[str]:
+def _lines(file: Path, found: TruthComparison, part: FlightResult) -> Iterator[str]:
     yield f"{file.name}: {found.frames:,} frames; {found.left_out:,} outside the capture's time"
-    for number, one in enumerate(poles, start=1):
-        words = f"  pole {number}: in view in {one['in_view']} frames, followed in {one['followed']}"
-        if one["followed"]:
-            words += f"; off by {one['range_rms_m']:.2f} m in range, {one['bearing_rms_deg']:.1f} deg in bearing (RMS)"
-        yield words
-    yield f"  where no pole is: {len(found.others)} times an object in a frame"
+    for figure in part.figures:
+        yield f"  {figure.line()}"
+    for note in part.notes:
+        yield f"  {note}"
 
 
-def _figures(pole: Pole) -> dict[str, Any]:
-    def rms(errors: list[float]) -> float | None:
-        return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
-
-    bearing_rad = rms(pole.bearing_error_rad)
+def _summary(pole: Pole) -> dict[str, Any]:
+    has_errors = bool(pole.errors)
     return {
         "x_m": pole.place_en_m[0],
         "z_m": -pole.place_en_m[1],
         "in_view": len(pole.in_view),
         "followed": len(pole.followed),
-        "range_rms_m": rms(pole.range_error_m),
-        "bearing_rms_deg": None if bearing_rad is None else float(np.degrees(bearing_rad)),
+        "range_rms_m": rms([error.range_m for error in pole.errors]) if has_errors else None,
+        "bearing_rms_deg": math.degrees(rms([error.bearing_rad for error in pole.errors])) if has_errors else None,
     }

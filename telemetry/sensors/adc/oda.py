@@ -19,6 +19,8 @@ from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, refuse_c
 
 RATE_HZ = 15.7
 _BLOCKS = 4
+_CAPTURE_COLUMNS = 8
+"""Of the data set's optitrack.csv, which lies beside it."""
 _LONGEST_S = 86_400.0
 """Of one recording: times farther apart are not in ns."""
 
@@ -125,7 +127,9 @@ def _fields(line: str, params: FmcwParams, where: str) -> list[str]:
             f"A row of {len(fields):,} values; a frame of {params.chirps} chirps x {params.samples} samples of two "
             f"receivers has {expected:,}.",
             where=where,
-            advice="The row was cut off, or the file comes from another radar.",
+            advice="This looks like optitrack.csv: radar.csv comes first, optitrack.csv second."
+            if len(fields) == _CAPTURE_COLUMNS
+            else "The row was cut off, or the file comes from another radar.",
         )
     return fields
 

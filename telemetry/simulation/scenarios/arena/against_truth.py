@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import F64
@@ -29,6 +30,18 @@ class Seen(NamedTuple):
     forward_m: float
 
 
+class TrackError(NamedTuple):
+    """Of one frame: where the pole truly was, and by how much its track missed it."""
+
+    off_rad: float
+    """Of the boresight, to either side."""
+    away_m: float
+    range_m: float
+    """Positive: the track had it farther away."""
+    bearing_rad: float
+    """Positive: the track had it farther to the right."""
+
+
 @dataclass(slots=True)
 class Pole:
     """One that stands, and what was followed of it."""
@@ -38,8 +51,8 @@ class Pole:
     """Where it truly was, of each frame with it in view."""
     followed: list[Seen] = field(default_factory=list)
     """Where its track had it."""
-    range_error_m: list[float] = field(default_factory=list)
-    bearing_error_rad: list[float] = field(default_factory=list)
+    errors: list[TrackError] = field(default_factory=list)
+    """One for each of ``followed``."""
 
 
 @dataclass(slots=True)
@@ -51,12 +64,17 @@ class TruthComparison:
     left_out: int = 0
     """Frames of times that the capture does not cover."""
     path_en_m: list[tuple[float, float]] = field(default_factory=list)
+    frame_s: list[float] = field(default_factory=list)
+    """What processing and following of each frame took, where it was measured."""
 
 
 def compared(
     frames: Iterable[tuple[float, Detections]], capture: Capture, poles_en_m: F64, *, offset_s: float = 0.0
 ) -> TruthComparison:
-    """``offset_s``: how long after the capture's first row the radar's first frame was. Raises RadarDataError."""
+    """``offset_s``: how long after the capture's first row the radar's first frame was.
+
+    Raises RadarDataError where the times have nothing in common, or a pole stands where no radar could see it.
+    """
     radar = Position2GoModel()
     tracker = Tracker(radar.errors.params())
     found = TruthComparison([Pole((float(east), float(north))) for east, north in poles_en_m])
@@ -78,8 +96,25 @@ def compared(
         _note(found, radar, [s for s in states if s.confirmed and s.seen], (t_s, position, heading_rad))
     if not found.frames:
         what = f"None of the radar's {found.left_out} frames lies within the {capture.t_s[-1]:.1f} s of the capture."
-        raise RadarDataError(what, advice="Give the time between the two files' beginnings: --offset-s.")
+        advice = "Give the time between the two files' beginnings: --offset-s."
+        raise RadarDataError(what, where="times", advice=advice)
+    _check_places(found, radar)
     return found
+
+
+def _check_places(found: TruthComparison, radar: Position2GoModel) -> None:
+    """Raises RadarDataError for a pole beyond the radar's reach from all of the way: most likely a slip."""
+    path = np.array(found.path_en_m)
+    for number, pole in enumerate(found.poles, start=1):
+        nearest_m = float(np.hypot(*(path - pole.place_en_m).T).min())
+        if nearest_m > radar.farthest_m:
+            east, north = pole.place_en_m
+            raise RadarDataError(
+                f"Pole {number}, x {east:g} m and z {0.0 - north:g} m, is never nearer than {nearest_m:.1f} m to the "
+                f"vehicle, and the radar sees {radar.farthest_m:g} m.",
+                where=f"pole {number}",
+                advice="Give its x and z in the capture's metres.",
+            )
 
 
 def _in_view(radar: Position2GoModel, found: Detections) -> F64:
@@ -107,9 +142,16 @@ def _note(
         if followed:
             place = places[nearest]
             pole.followed.append(Seen(t_s, *place))
-            pole.range_error_m.append(math.hypot(*place) - float(range_m[0]))
-            pole.bearing_error_rad.append(math.remainder(math.atan2(*place) - float(bearing_rad[0]), math.tau))
+            true_m, true_rad = float(range_m[0]), float(bearing_rad[0])
+            turned_rad = math.remainder(math.atan2(*place) - true_rad, math.tau)
+            pole.errors.append(TrackError(abs(true_rad), true_m, math.hypot(*place) - true_m, turned_rad))
     found.others += [Seen(t_s, *places[k]) for k in sorted(free)]
+
+
+def rms(errors: ArrayLike) -> float:
+    """NaN where there are none."""
+    values = np.asarray(errors, np.float64)
+    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan
 
 
 def _from_nose(away_en_m: F64, heading_rad: float) -> tuple[float, float]:

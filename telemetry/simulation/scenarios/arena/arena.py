@@ -10,6 +10,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
+from telemetry.simulation.scenarios.arena.against_truth import rms
 from telemetry.simulation.scenarios.arena.arena_course import (
     HALF_M,
     POLE_RADIUS_M,
@@ -100,10 +101,10 @@ def _figures(title: str, ways: Sequence[Approach], flown: Sequence[ArenaFlown], 
         Figure(f"{title}: came through", float(np.mean([one.arrived for one in flown])), least=THROUGH),
         Figure(f"{title}: would have been avoided straight on", float(1.0 - straight.mean())),
         Figure(f"{title}: median gap between the hulls", float(np.median([o.nearest_gap_m for o in flown])), unit=" m"),
-        Figure(f"{title}: range error, root mean square", _rms(errors[:, 1]), unit=" m", paper="0.15 m (the sensor's)"),
+        Figure(f"{title}: range error, root mean square", rms(errors[:, 1]), unit=" m", paper="0.15 m (the sensor's)"),
         Figure(
             f"{title}: bearing error, root mean square",
-            math.degrees(_rms(errors[:, 2])),
+            math.degrees(rms(errors[:, 2])),
             unit=" deg",
             paper="2 deg inside 20, 8 deg to 65 (the sensor's)",
         ),
@@ -126,10 +127,6 @@ def _alerts(flown: Sequence[ArenaFlown]) -> tuple[AlertSeen, ...]:
             out.append(AlertSeen(began_s + one.first_evasion_s, "radar", None))
         began_s += one.duration_s
     return tuple(out)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 def errors_by_angle(errors: Errors) -> list[tuple[int, float, float, int]]:

@@ -71,7 +71,8 @@ class Figure:
         limit = f"at most {_short(self.most)}" if self.most is not None else limit
         verdict = f"  ({limit}{self.unit}: {self.verdict})" if limit else ""
         printed = f"  (paper: {self.paper})" if self.paper else ""
-        return f"{self.words}: {_short(self.value)}{self.unit}{verdict}{printed}"
+        unit = "" if math.isnan(self.value) else self.unit
+        return f"{self.words}: {_short(self.value)}{unit}{verdict}{printed}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,19 +170,20 @@ def _flight_json(flight: FlightResult) -> dict[str, Any]:
         "vision": _map_json(flight.vision),
         "false_alarms_per_km": _number(flight.false_alarms_per_km),
         "missed": flight.missed,
-        "figures": [
-            {
-                "words": figure.words,
-                "value": _number(figure.value),
-                "least": figure.least,
-                "most": figure.most,
-                "unit": figure.unit.strip(),
-                "reached": figure.reached,
-                "paper": figure.paper,
-            }
-            for figure in flight.figures
-        ],
+        "figures": [figure_json(figure) for figure in flight.figures],
         "notes": list(flight.notes),
+    }
+
+
+def figure_json(figure: Figure) -> dict[str, Any]:
+    return {
+        "words": figure.words,
+        "value": _number(figure.value),
+        "least": figure.least,
+        "most": figure.most,
+        "unit": figure.unit.strip(),
+        "reached": figure.reached,
+        "paper": figure.paper,
     }
 
 
