@@ -14,7 +14,7 @@ from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, check_new
 from server.cli.shared.output import end_progress, print_json, progress, say
-from telemetry.simulation.scenarios.catalogue import NAMES, SCENARIOS, run_scenario, scenario_named
+from telemetry.simulation.scenarios.catalogue import NAMES, run_scenario
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, tally, tally_json
 from telemetry.topics.vehicle import RadarKind
 
@@ -55,7 +55,7 @@ def scenario(
     """
     _check(name, record, seed, seeds)
     own = _own(name, radar, figures or [])
-    _check_plots(name, plots, seeds)
+    _check_plots(plots, seeds)
     results: list[ScenarioResult] = []
     for number in range(seed, seed + seeds):
         progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
@@ -81,14 +81,9 @@ def _draw(plots: Path, result: ScenarioResult) -> None:
         say(f"Drawn: {path}")
 
 
-def _check_plots(name: str, plots: Path | None, seeds: int) -> None:
+def _check_plots(plots: Path | None, seeds: int) -> None:
     if plots is None:
         return
-    if not scenario_named(name).draws:
-        able = ", ".join(scenario.name for scenario in SCENARIOS if scenario.draws)
-        raise ParameterError(
-            f"There is nothing to draw of {name}.", where="--plots", advice=f"Leave --plots away, or run one of {able}."
-        )
     if seeds > 1:
         raise ParameterError(
             f"Figures show one seed, not {seeds}.", where="--plots", advice="Leave --seeds away, or --plots."

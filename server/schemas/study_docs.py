@@ -115,7 +115,6 @@ class ScenarioDoc(Strict):
     flown: str
     held: str
     paper: str
-    has_charts: bool
     command_line_only: bool
     """Too long for a browser."""
 

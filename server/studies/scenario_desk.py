@@ -45,7 +45,6 @@ def scenario_docs() -> list[ScenarioDoc]:
             flown=one.flown,
             held=one.held,
             paper=one.paper,
-            has_charts=one.draws,
             command_line_only=one.hours,
         )
         for one in SCENARIOS

@@ -91,7 +91,6 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
         ("wood", "--seeds", 0): "--seeds",
         ("wood", "--seed", LARGEST_SEED + 1): "--seed",
         ("wood", "--seed", LARGEST_SEED - 1, "--seeds", 3): "The last seed would be 10,001",
-        ("wood", "--plots", tmp_path): "There is nothing to draw of wood",
         ("foliage", "--plots", tmp_path, "--seeds", 2): "Figures show one seed, not 2",
     }
     for arguments, words in wrong.items():

@@ -43,6 +43,12 @@ def test_maps_of_what_stands_there_are_mostly_right_and_mostly_whole(name: str) 
         assert figures.recall is not None
         assert figures.precision > 0.7
         assert figures.recall > 0.6
+    above, side, *_, share = flight.charts
+    assert len(flight.charts) == 5
+    assert all(len(one.x) > 20 for one in above.series[:3])
+    assert any(one.printed for one in side.series) == (name == "wood")
+    shown = {one.name: dict(zip(one.x, one.y, strict=True)) for one in share.series}
+    assert shown["radar: precision"][2.0] == pytest.approx(100 * (flight.radar.precision or 0.0), abs=1e-3)
 
 
 def hugging_is_safe(result: ScenarioResult) -> None:
@@ -56,6 +62,12 @@ def hugging_is_safe(result: ScenarioResult) -> None:
 def test_things_strewn_over_a_volcano_are_told_before_it_is_too_late() -> None:
     result = terrain_hugging.run_over(terrain_hugging.etna(), ScenarioRequest(51), "etna-like", most_m=150.0)
     hugging_is_safe(result)
+    profile, distances, false, cross = result.flights[0].charts
+    assert sum(one.name in ("", "what the model does not know") for one in profile.series) >= 2
+    told, needed = distances.series[:2]
+    assert all(one > least for one, least in zip(told.y, needed.y, strict=True))
+    assert false.series[0].x[-1] == pytest.approx(150.0, abs=5.0)
+    assert max(cross.series[0].y) < 2.0
 
 
 def test_things_strewn_over_real_bush_are_told_before_it_is_too_late(shared_data: Path) -> None:

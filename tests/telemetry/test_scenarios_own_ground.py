@@ -42,7 +42,7 @@ SHARE = "share of unknown objects alarmed in time"
 
 def plan() -> Hugging:
     course = Course((Waypoint((0.0, 120.0, 6.0), 3.0),), takeoff_m=6.0)
-    return Hugging(field(VALLEY, ()), course_mission(course, VALLEY), VALLEY, LINE)
+    return Hugging(field(VALLEY, ()), course_mission(course, VALLEY), VALLEY, LINE, 5.0)
 
 
 def world_file(path: Path, *objects: Object, **more: object) -> Path:

@@ -2127,7 +2127,6 @@ export interface ScenarioDoc {
   flown: string;
   held: string;
   paper: string;
-  has_charts: boolean;
   /** Too long for a browser. */
   command_line_only: boolean;
 }

@@ -19,8 +19,6 @@ class Scenario:
     """Whose field test, with the figures."""
     module: str
     function: str = "run"
-    draws: bool = True
-    """Whether some of it is a curve."""
     hours: bool = False
     """Too long, and too much of the disk, for anybody to wait for in a browser."""
 
@@ -41,7 +39,6 @@ SCENARIOS = (
         "Miccinesi 2022, figs 16-21",
         "radar.radar_maps",
         "run_wood",
-        draws=False,
     ),
     Scenario(
         "ruined-building",
@@ -50,7 +47,6 @@ SCENARIOS = (
         "Miccinesi 2022, figs 16-21",
         "radar.radar_maps",
         "run_ruin",
-        draws=False,
     ),
     Scenario(
         "castle-building",
@@ -65,7 +61,6 @@ SCENARIOS = (
         "False alarms per km, objects alarmed in time.",
         "Melita 2020, the flight on Etna",
         "hugging.terrain_hugging",
-        draws=False,
     ),
     Scenario(
         "long-flight",
@@ -73,7 +68,6 @@ SCENARIOS = (
         "The map's memory grows with new voxels alone.",
         "Bigazzi 2022, the global map",
         "hugging.long_flight",
-        draws=False,
         hours=True,
     ),
     Scenario(

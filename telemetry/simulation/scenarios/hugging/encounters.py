@@ -31,6 +31,10 @@ class Passed:
     """An object in the way, and how far away its surface was when the vehicle could first have begun to brake."""
 
     name: str
+    at: int
+    """Of the flight's places, the one where it could first have begun to brake."""
+    met: int
+    """Likewise, where it came to the object."""
     distance_m: float
     needed_m: float
     seen_by: tuple[Sensor, ...]
@@ -45,6 +49,8 @@ class Passed:
 class Encounters:
     """All of one flight."""
 
+    passed: tuple[Passed, ...]
+    false: tuple[Told, ...]
     false_per_km: float
     missed: int
     figures: tuple[Figure, ...]
@@ -62,7 +68,8 @@ def encounters(flown: Flown, world: World, settings: PerceptionSettings) -> Enco
         Figure("share of unknown objects alarmed in time", in_time, least=LEAST_ALARMED),
     )
     flew = f"{flown.way_m:.0f} m flown, through {len(passed)} unknown objects in the way"
-    return Encounters(per_km, missed, figures, (flew, *_words(passed, false, flown, world)))
+    notes = flew, *_words(passed, false, flown, world)
+    return Encounters(tuple(passed), tuple(false), per_km, missed, figures, notes)
 
 
 def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[Passed]:
@@ -81,7 +88,7 @@ def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[P
         at = min(int(np.searchsorted(times, min(told.values()))), met)
         needed_m = braking.distance_m(float(speeds[at])) + settings.vehicle_radius_m
         seen_by: tuple[Sensor, ...] = tuple(sensor for sensor, t_s in told.items() if t_s < times[met])
-        out.append(Passed(name, float(far_m[at]), float(needed_m), seen_by))
+        out.append(Passed(name, at, met, float(far_m[at]), float(needed_m), seen_by))
     return out
 
 

@@ -32,6 +32,8 @@ class Hugging:
     frame: NeuFrame
     line_enu_m: F64
     """(K, 3) From the top of the take-off to the last waypoint; up counts from home."""
+    clearance_m: float
+    """Smallest distance from the line to any of the model's cells, as certified."""
 
     @property
     def length_m(self) -> float:
@@ -58,7 +60,7 @@ def hugging(dsm: Dsm, pois: tuple[Poi, ...]) -> Hugging:
             plan.line.points_m[:, 2] - home.alt_dsm_m,
         ]
     )
-    return Hugging(plan.dsm, plan.mission, frame, line)
+    return Hugging(plan.dsm, plan.mission, frame, line, plan.certificate.min_distance_m)
 
 
 def random_route(dsm: Dsm, random: np.random.Generator, *, points: int, apart_m: float) -> tuple[Poi, ...]:

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from planning.errors import ParameterError
+from telemetry.simulation.scenarios.hugging.encounter_charts import encounter_charts
 from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.hugging.terrain_hugging import APART_M, etna
+from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import radar_figures
 from telemetry.simulation.scenarios.stage.result import (
     Figure,
@@ -103,6 +105,7 @@ def _flown(setup: Setup, seconds: float, tell: Tell, growth: Growth) -> FlightRe
         missed=found.missed,
         figures=(*found.figures, *growth_figures(growth.looks)),
         notes=(*map(_words, growth.looks), *found.notes),
+        charts=(*encounter_charts(flown, setup.world, found), growth_chart(growth.looks)),
     )
     return replace(result, duration_s=flown.armed_s)
 
@@ -140,6 +143,12 @@ def growth_figures(looks: list[Look]) -> tuple[Figure, ...]:
         Figure("map's memory in the end", sizes[-1] / 1e6, unit=" MB"),
         Figure("recording", looks[-1].file_bytes / 1e6, unit=" MB"),
     )
+
+
+def growth_chart(looks: list[Look]) -> Chart:
+    voxels = [look.voxels / 1000 for look in looks]
+    map_size = series("the map's memory", voxels, [look.map_bytes / 1e6 for look in looks])
+    return Chart("Memory by what is new", "voxels, thousands", "MB", (map_size,))
 
 
 def _words(look: Look) -> str:

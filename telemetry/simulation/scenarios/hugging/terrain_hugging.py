@@ -10,6 +10,7 @@ import numpy as np
 
 from planning.ground.demo_hillside import demo_dsm
 from planning.terrain.dsm import Dsm
+from telemetry.simulation.scenarios.hugging.encounter_charts import encounter_charts, following
 from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import Hugging, hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
@@ -48,14 +49,16 @@ def run_over(
     setup = _setup(plan, wanted, name, random, most_m)
     flown = flown_of(setup, wanted)
     found = encounters(flown, setup.world, setup.settings)
+    figures, charts = following(flown, plan)
     flight = flown.result(
         "terrain hugging",
         radar=radar_figures(flown, setup),
         vision=vision_figures(flown, setup),
         false_alarms_per_km=found.false_per_km,
         missed=found.missed,
-        figures=found.figures,
+        figures=(*found.figures, *figures),
         notes=found.notes,
+        charts=(*encounter_charts(flown, setup.world, found), *charts),
     )
     return ScenarioResult(name, wanted.seed, (flight,))
 

@@ -17,11 +17,12 @@ from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import (
     clusters_of,
-    radar_figures,
+    radar_compared,
     spread,
-    vision_figures,
+    vision_compared,
     within,
 )
+from telemetry.simulation.scenarios.stage.map_charts import map_charts
 from telemetry.simulation.scenarios.stage.result import Figure, MapFigures, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
@@ -38,6 +39,7 @@ LEVEL_WITHIN_M = 0.4
 DRAWN_M = 12.0
 """Around the reflector, from above."""
 WOOD, RUIN = "wood", "ruined-building"
+PRINTED_WOOD_M = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,21 +185,31 @@ def _share(hits: Bools) -> float:
 
 
 def run_wood(wanted: ScenarioRequest) -> ScenarioResult:
-    return _mapped(WOOD, scenes.wood(wanted.seed), wanted)
+    """The paper's stood about 60 m from the start (3.2)."""
+    return _mapped(WOOD, scenes.wood(wanted.seed), wanted, ("figs 16, 17", "fig. 18"), PRINTED_WOOD_M)
 
 
 def run_ruin(wanted: ScenarioRequest) -> ScenarioResult:
-    return _mapped(RUIN, scenes.ruined_building(wanted.seed), wanted)
+    return _mapped(RUIN, scenes.ruined_building(wanted.seed), wanted, ("figs 20, 21", "as fig. 18"), None)
 
 
-def _mapped(name: str, scene: scenes.ScenarioScene, wanted: ScenarioRequest) -> ScenarioResult:
+def _mapped(
+    name: str,
+    scene: scenes.ScenarioScene,
+    wanted: ScenarioRequest,
+    drawn_in: tuple[str, str],
+    begins_north_m: float | None,
+) -> ScenarioResult:
     setup = setup_of(scene, wanted, name)
     flown = flown_of(setup, wanted)
-    radar, vision = radar_figures(flown, setup), vision_figures(flown, setup)
+    maps = radar_compared(flown, setup), vision_compared(flown, setup)
+    radar, vision = (one.figures for one in maps)
+    own = begins_north_m if wanted.world is None else None
+    charts = map_charts(maps, flown, setup.world, figures=drawn_in, begins_north_m=own)
     figures = (
         Figure("contacts", float(flown.contact), most=0.0),
         Figure("precision of the radar map", radar.precision or 0.0),
         Figure("recall of the radar map", radar.recall or 0.0),
     )
-    flight = flown.result("mapping flight", radar=radar, vision=vision, figures=figures)
+    flight = flown.result("mapping flight", radar=radar, vision=vision, figures=figures, charts=charts)
     return ScenarioResult(name, wanted.seed, (flight,))

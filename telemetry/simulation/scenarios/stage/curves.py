@@ -47,11 +47,17 @@ def series(
     *,
     drawn: Literal["line", "points"] = "line",
     printed: bool = False,
+    most: int = MOST_POINTS,
 ) -> Series:
     """With every n-th point where there are too many; what is no number is left out."""
     places = np.column_stack([np.asarray(x, np.float64).ravel(), np.asarray(y, np.float64).ravel()])
-    kept = _thinned(places[np.isfinite(places).all(axis=1)])
+    kept = _thinned(places[np.isfinite(places).all(axis=1)], most)
     return Series(name, tuple(kept[:, 0].round(4).tolist()), tuple(kept[:, 1].round(4).tolist()), drawn, printed)
+
+
+def not_empty(*lines: Series) -> tuple[Series, ...]:
+    """Those that have anything to draw: a key to nothing only asks for a second look."""
+    return tuple(one for one in lines if one.x)
 
 
 def ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -62,9 +68,9 @@ def ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     )
 
 
-def _thinned(places: F64) -> F64:
+def _thinned(places: F64, most: int) -> F64:
     """The last point stays: it is an end."""
-    step = math.ceil(len(places) / MOST_POINTS)
+    step = math.ceil(len(places) / most)
     if step <= 1:
         return places
     return np.concatenate([places[:-1:step], places[-1:]])

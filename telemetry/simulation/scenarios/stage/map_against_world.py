@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -64,11 +65,21 @@ def recall(truth_enu: F64, map_enu: F64, *, voxel_m: float, within_m: float) -> 
     """Share of the voxels that hold true surface near which the map has an occupied one."""
     if len(truth_enu) == 0:
         return None
-    wanted = (np.unique(np.floor(truth_enu / voxel_m).astype(np.int64), axis=0) + 0.5) * voxel_m
+    return float(np.mean(_missed_m(_holding(truth_enu, voxel_m), map_enu) <= within_m))
+
+
+def _holding(truth_enu: F64, voxel_m: float) -> F64:
+    """(M, 3) middles of the voxels that hold true surface."""
+    keys = np.unique(np.floor(truth_enu / voxel_m).astype(np.int64), axis=0)
+    return (keys.astype(np.float64) + 0.5) * voxel_m
+
+
+def _missed_m(wanted_enu: F64, map_enu: F64) -> F64:
+    """(M,) from each to the nearest occupied voxel of the map; infinite where that has none."""
     if len(map_enu) == 0:
-        return 0.0
-    away_m, _ = KDTree(map_enu).query(wanted)
-    return float(np.mean(away_m <= within_m))
+        return np.full(len(wanted_enu), np.inf)
+    away_m, _ = KDTree(map_enu).query(wanted_enu)
+    return np.array(away_m, dtype=np.float64)
 
 
 def clusters_of(points_enu: F64, *, link_m: float) -> I64:
@@ -92,30 +103,67 @@ def clusters_of(points_enu: F64, *, link_m: float) -> I64:
     return label
 
 
+@dataclass(frozen=True, slots=True)
+class MapComparison:
+    """One sensor's map beside the true surfaces, voxel by voxel."""
+
+    sensor: Sensor
+    voxels_enu: F64
+    """(N, 3) Occupied ones, in the world's frame."""
+    away_m: F64
+    """(N,) From each to the nearest true surface."""
+    true_enu: F64
+    """(M, 3) Voxels that hold true surface, of those that could have been seen."""
+    missed_m: F64
+    """(M,) From each to the nearest occupied one; infinite in an empty map."""
+
+    @property
+    def near_m(self) -> float:
+        return NEAR_M[self.sensor]
+
+    def precision(self, within_m: float) -> float:
+        return float(np.mean(self.away_m <= within_m))
+
+    def recall(self, within_m: float) -> float | None:
+        return float(np.mean(self.missed_m <= within_m)) if len(self.missed_m) else None
+
+    @property
+    def figures(self) -> MapFigures:
+        if len(self.voxels_enu) == 0:
+            return MapFigures()
+        return MapFigures(
+            voxels=len(self.voxels_enu),
+            within_m=within(self.away_m),
+            vertical_spread_m=spread(self.voxels_enu[:, 2]),
+            precision=self.precision(self.near_m),
+            recall=self.recall(self.near_m),
+        )
+
+
 def radar_figures(flown: Flown, setup: Setup) -> MapFigures:
-    """What the global map believes in the end; known ground is not asked about."""
-    return _figures("radar", flown.voxels("radar"), flown, setup)
+    return radar_compared(flown, setup).figures
 
 
 def vision_figures(flown: Flown, setup: Setup) -> MapFigures:
+    return vision_compared(flown, setup).figures
+
+
+def radar_compared(flown: Flown, setup: Setup) -> MapComparison:
+    """What the global map believes in the end; known ground is not asked about."""
+    return _compared("radar", flown.voxels("radar"), setup.settings.radar_resolution_m, flown, setup)
+
+
+def vision_compared(flown: Flown, setup: Setup) -> MapComparison:
     """Of all local maps together, as the flight went by."""
-    if not flown.vision:
-        return MapFigures()
     edge = setup.settings.vision_resolution_m
-    keys = np.unique(np.floor(np.concatenate(flown.vision) / edge).astype(np.int64), axis=0)
-    return _figures("vision", (keys.astype(np.float64) + 0.5) * edge, flown, setup)
+    seen = np.concatenate(flown.vision) if flown.vision else np.empty((0, 3))
+    keys = np.unique(np.floor(seen / edge).astype(np.int64), axis=0)
+    return _compared("vision", (keys.astype(np.float64) + 0.5) * edge, edge, flown, setup)
 
 
-def _figures(sensor: Sensor, voxels: F64, flown: Flown, setup: Setup) -> MapFigures:
+def _compared(sensor: Sensor, voxels: F64, edge_m: float, flown: Flown, setup: Setup) -> MapComparison:
     if len(voxels) == 0:
-        return MapFigures()
+        return MapComparison(sensor, voxels, np.empty(0), np.empty((0, 3)), np.empty(0))
+    wanted = _holding(level_slice(setup.world, flown.track, most_m=REACH_M[sensor]), edge_m)
     away_m = setup.world.surface_distance_m(voxels)
-    truth = level_slice(setup.world, flown.track, most_m=REACH_M[sensor])
-    edge = setup.settings.radar_resolution_m if sensor == "radar" else setup.settings.vision_resolution_m
-    return MapFigures(
-        voxels=len(voxels),
-        within_m=within(away_m),
-        vertical_spread_m=spread(voxels[:, 2]),
-        precision=float(np.mean(away_m <= NEAR_M[sensor])),
-        recall=recall(truth, voxels, voxel_m=edge, within_m=NEAR_M[sensor]),
-    )
+    return MapComparison(sensor, voxels, away_m, wanted, _missed_m(wanted, voxels))
