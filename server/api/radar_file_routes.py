@@ -16,7 +16,15 @@ from server.api.terrain_routes import RAW_BODY, FileName
 from server.api.uploads import display_name, stream_to_disk
 from server.errors import BadRequestError, TooLargeError
 from server.library.radar_files import ending_of
-from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading
+from server.schemas import (
+    JobDoc,
+    RadarFileDoc,
+    RadarFrame,
+    RadarOpened,
+    RadarReading,
+    RadarTracksBody,
+    RadarTracksDoc,
+)
 from server.schemas.study_docs import PageName
 
 router = APIRouter(prefix="/api/radar", tags=["radar"], responses=ERROR_RESPONSES)
@@ -67,6 +75,32 @@ async def set_cfg(file_id: str, request: Request, filename: FileName) -> Respons
 @router.delete("/files/{file_id}/cfg", response_model=RadarFileDoc)
 async def remove_cfg(file_id: str, request: Request) -> Response:
     return answer(await parts_of(request).radar.set_cfg(file_id, None))
+
+
+@router.put("/files/{file_id}/capture", response_model=RadarFileDoc, openapi_extra=RAW_BODY)
+async def set_capture(file_id: str, request: Request, filename: FileName) -> Response:
+    """The ODA data set's ``optitrack.csv`` of the same flight."""
+    name, parts = display_name(filename), parts_of(request)
+    upload = await stream_to_disk(request, parts.library.new_upload(".csv"))
+    return answer(await parts.radar.set_capture(file_id, upload, name))
+
+
+@router.delete("/files/{file_id}/capture", response_model=RadarFileDoc)
+async def remove_capture(file_id: str, request: Request) -> Response:
+    return answer(await parts_of(request).radar.set_capture(file_id, None))
+
+
+@router.post("/files/{file_id}/tracks", response_model=JobDoc, status_code=202)
+async def follow(file_id: str, body: RadarTracksBody, request: Request) -> Response:
+    """A job that follows what the samples show and holds it against the capture and the poles' places."""
+    parts = parts_of(request)
+    return answer(parts.radar.follow(file_id, body, parts.workspace.board), 202)
+
+
+@router.get("/files/{file_id}/tracks", response_model=RadarTracksDoc)
+async def tracks(file_id: str, request: Request) -> Response:
+    """What the last such job came to, figure by figure beside the paper's."""
+    return answer(await parts_of(request).radar.tracks(file_id))
 
 
 @router.delete("/files/{file_id}", **DONE)

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
+import re
 import time
 from dataclasses import dataclass
 
@@ -27,6 +28,8 @@ JSON_LIMIT_BYTES = 2 * 1024**2
 """A plan of 5000 points is half of it; the loop that reads it passes on what vehicles say."""
 IMPORT_LIMIT_BYTES = 20 * 1024**2
 _SMALL_FILES = frozenset({"/api/plan/import", "/api/parameters/compare", "/api/parameters/descriptions"})
+_CAPTURES = re.compile(r"/api/radar/files/[^/]+/capture")
+"""Half an hour of motion capture, 80 times a second, is larger than what a body of JSON may be."""
 CHUNK_TIMEOUT_S = 30.0
 SLOWEST_BYTES_PER_S = 4096
 """Of a body, once it has been waited for so long in all."""
@@ -173,7 +176,8 @@ class Guard:
     def _body_limit(self, path: str) -> int:
         if path in UPLOADS:
             return self._upload_limit
-        return IMPORT_LIMIT_BYTES if path in _SMALL_FILES else JSON_LIMIT_BYTES
+        is_small_file = path in _SMALL_FILES or _CAPTURES.fullmatch(path) is not None
+        return IMPORT_LIMIT_BYTES if is_small_file else JSON_LIMIT_BYTES
 
 
 def _check_body(headers: Headers, limit: int) -> None:

@@ -1,4 +1,4 @@
-"""Files of raw radar samples: ``radar/<id>/{manifest.json, samples, configuration}``.
+"""Files of raw radar samples: ``radar/<id>/{manifest.json, samples, configuration, capture, tracks}``.
 
 No two files ever have the same name, so that whoever keeps one open by its path never has another.
 """
@@ -6,14 +6,15 @@ No two files ever have the same name, so that whoever keeps one open by its path
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from server.errors import BadRequestError
+from server.errors import BadRequestError, ConflictError, NotFoundError
 from server.library.shelf import MANIFEST, OnDamage, Shelf, utc_now, write_manifest
 from server.library.whole_files import new_directory, new_id, storage_errors, write_atomically, write_durably
-from server.schemas import RadarFileDoc
+from server.schemas import RadarFileDoc, RadarTracksDoc
 
 FOLDER = "radar"
 ENDINGS = (".npy", ".bin", ".csv")
@@ -26,7 +27,16 @@ class RadarFileManifest(BaseModel):
     doc: RadarFileDoc
     samples: str
     cfg: str = ""
-    """File names within the folder; no configuration: empty."""
+    capture: str = ""
+    tracks: str = ""
+    """File names within the folder; empty: there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class RadarPaths:
+    samples: Path
+    cfg: Path | None
+    capture: Path | None
 
 
 class RadarShelf:
@@ -45,10 +55,11 @@ class RadarShelf:
         """Raises NotFoundError."""
         return self._shelf.get(file_id)
 
-    def paths(self, file_id: str) -> tuple[Path, Path | None]:
-        """Samples, and the configuration if there is one. Raises NotFoundError."""
+    def paths(self, file_id: str) -> RadarPaths:
+        """Raises NotFoundError."""
         folder, manifest = self._shelf.directory(file_id), self.get(file_id)
-        return folder / manifest.samples, folder / manifest.cfg if manifest.cfg else None
+        cfg = folder / manifest.cfg if manifest.cfg else None
+        return RadarPaths(folder / manifest.samples, cfg, folder / manifest.capture if manifest.capture else None)
 
     def add(self, upload: Path, name: str) -> RadarFileDoc:
         """Takes an uploaded file in. Raises BadRequestError for another ending, StorageError."""
@@ -70,11 +81,54 @@ class RadarShelf:
         with storage_errors(folder):
             if data is not None:
                 write_durably(folder / cfg, lambda file: file.write(data))
-            write_atomically(folder / MANIFEST, manifest.model_dump_json().encode())
-            if before.cfg:
-                (folder / before.cfg).unlink(missing_ok=True)
-        self._shelf.put(file_id, manifest)
+        self._write(folder, manifest, gone=(before.cfg,))
         return doc
+
+    def set_capture(self, file_id: str, upload: Path | None, name: str) -> RadarFileDoc:
+        """Takes in what motion capture saw, or takes it away; tracks that were held against another go with it.
+
+        Raises NotFoundError, StorageError.
+        """
+        folder, before = self._shelf.directory(file_id), self.get(file_id)
+        capture = f"{new_id()}.csv" if upload is not None else ""
+        update = {"capture_name": name if upload is not None else "", "has_tracks": False}
+        manifest = before.model_copy(
+            update={"doc": before.doc.model_copy(update=update), "capture": capture, "tracks": ""}
+        )
+        with storage_errors(folder):
+            if upload is not None:
+                os.rename(upload, folder / capture)
+        self._write(folder, manifest, gone=(before.capture, before.tracks))
+        return manifest.doc
+
+    def set_tracks(self, file_id: str, tracks: RadarTracksDoc, capture: Path) -> RadarFileDoc:
+        """Keeps what came out against ``capture``. Raises NotFoundError, ConflictError for another by now."""
+        folder, before = self._shelf.directory(file_id), self.get(file_id)
+        if before.capture != capture.name:
+            what = f"{before.doc.name} was given another capture meanwhile."
+            raise ConflictError(what, where=before.doc.name, advice="Follow the poles again.")
+        name = f"{new_id()}.json"
+        with storage_errors(folder):
+            write_durably(folder / name, lambda file: file.write(tracks.model_dump_json().encode()))
+        doc = before.doc.model_copy(update={"has_tracks": True})
+        self._write(folder, before.model_copy(update={"doc": doc, "tracks": name}), gone=(before.tracks,))
+        return doc
+
+    def tracks(self, file_id: str) -> RadarTracksDoc:
+        """Raises NotFoundError, StorageError."""
+        folder, manifest = self._shelf.directory(file_id), self.get(file_id)
+        if not manifest.tracks:
+            what = f"{manifest.doc.name} has not been held against a capture yet."
+            raise NotFoundError(what, where=manifest.doc.name, advice="Give its optitrack.csv and the poles.")
+        with storage_errors(folder):
+            return RadarTracksDoc.model_validate_json((folder / manifest.tracks).read_bytes())
+
+    def _write(self, folder: Path, manifest: RadarFileManifest, *, gone: tuple[str, ...]) -> None:
+        with storage_errors(folder):
+            write_atomically(folder / MANIFEST, manifest.model_dump_json().encode())
+            for name in filter(None, gone):
+                (folder / name).unlink(missing_ok=True)
+        self._shelf.put(manifest.doc.id, manifest)
 
     def delete(self, file_id: str) -> None:
         """Raises NotFoundError."""

@@ -156,10 +156,13 @@ from server.schemas.stream import (
 from server.schemas.strict_model import PROTOCOL_VERSION, Strict
 from server.schemas.study_docs import (
     ChartDoc,
+    PoleDoc,
     RadarFileDoc,
     RadarFrame,
     RadarOpened,
     RadarReading,
+    RadarTracksBody,
+    RadarTracksDoc,
     RunScenario,
     ScenarioDoc,
     ScenarioFigureDoc,

@@ -24,6 +24,10 @@ class RadarFileDoc(Strict):
     added_utc: str
     cfg_name: str = ""
     """Of the configuration that was given with it; empty: none."""
+    capture_name: str = ""
+    """Of the OptiTrack file that was given with it; empty: none."""
+    has_tracks: bool = False
+    """Whether it has been held against that capture."""
 
 
 class RadarReading(Strict):
@@ -108,6 +112,23 @@ class RadarFrame(Strict):
     detections: list[RadarDetectionDoc]
 
 
+class PoleDoc(Strict):
+    """Where a pole stood, in the capture's own metres."""
+
+    x_m: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
+    z_m: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
+
+
+class RadarTracksBody(Strict):
+    """What the ODA data set's two files do not tell themselves; as on the command line."""
+
+    poles: Annotated[list[PoleDoc], Field(min_length=1, max_length=20)]
+    offset_s: Annotated[float, Field(ge=-86_400, le=86_400, allow_inf_nan=False)] = 0.0
+    """So long after the capture's first row the radar's first frame was."""
+    forward: Literal["x", "z", "-x", "-z"] = "x"
+    """Which of the captured body's axes is its nose."""
+
+
 class ScenarioDoc(Strict):
     """A field test of the papers in simulation."""
 
@@ -187,6 +208,14 @@ class ScenarioPartDoc(Strict):
 class ScenarioResultDoc(Strict):
     run: ScenarioRunDoc
     parts: list[ScenarioPartDoc]
+
+
+class RadarTracksDoc(Strict):
+    """A radar's tracks against truth, as they were asked for."""
+
+    asked: RadarTracksBody
+    capture_name: str
+    part: ScenarioPartDoc
 
 
 class RunScenario(Strict):

@@ -36,6 +36,7 @@ ANSWERS = (
     schemas.Imported,
     schemas.RadarOpened,
     schemas.RadarFrame,
+    schemas.RadarTracksDoc,
     schemas.ScenarioDoc,
     schemas.ScenarioResultDoc,
     schemas.SectionDoc,

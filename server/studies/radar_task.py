@@ -20,12 +20,16 @@ from mapping.geometry.arrays import F64
 from mapping.radar.chain import RadarChain, Spectra
 from planning.errors import DescribedError
 from server.errors import BadRequestError
-from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading
+from server.library.radar_files import RadarPaths
+from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading, RadarTracksBody, RadarTracksDoc
 from server.schemas.study_docs import RadarDetectionDoc, RadarMap, RadarParametersDoc
+from server.studies.oda_tracks import TracksWanted, tracks_against_truth
 from server.studies.radar_facts import detection_rows, parameters
+from server.studies.scenario_task import part_doc
 from server.work.jobs import Progress
 from telemetry.sensors.adc.adc_file import AnyFrame
 from telemetry.sensors.adc.read_adc import HowRead, Reading, read_adc
+from telemetry.simulation.scenarios.arena.truth_figures import truth_part
 
 SHOWN_DB = 60.0
 """Below the strongest cell of a map."""
@@ -38,8 +42,7 @@ class Stored:
     """A kept file with what it is called."""
 
     doc: RadarFileDoc
-    samples: Path
-    cfg: Path | None
+    paths: RadarPaths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +56,7 @@ def open_file(stored: Stored, how: RadarReading, *, report: Progress) -> RadarOp
     """Reads it through. Raises RadarDataError in the operator's own file names."""
     report(f"Reading {stored.doc.name}", None)
     with _named(stored):
-        found = _opened(stored.samples, stored.cfg, how.sensor, how.samples, how.most)
+        found = _opened(stored.paths.samples, stored.paths.cfg, how.sensor, how.samples, how.most)
     facts = RadarParametersDoc(**parameters(found.reading.sensor, found.reading.file))
     notes = [_in_own_names(stored, note) for note in found.reading.notes]
     return RadarOpened(file=stored.doc, frames=found.count, parameters=facts, notes=notes)
@@ -63,7 +66,7 @@ def process_frame(stored: Stored, how: RadarReading, number: int, *, report: Pro
     """One frame's maps and detections. Raises RadarDataError, BadRequestError for a frame that is not there."""
     report(f"Frame {number}", None)
     with _named(stored):
-        found = _opened(stored.samples, stored.cfg, how.sensor, how.samples, how.most)
+        found = _opened(stored.paths.samples, stored.paths.cfg, how.sensor, how.samples, how.most)
         if not 0 <= number < found.count:
             what = f"There is no frame {number}: the file has {found.count}, counted from 0."
             raise BadRequestError(what, where=stored.doc.name, advice="Choose one of them.")
@@ -77,6 +80,18 @@ def process_frame(stored: Stored, how: RadarReading, number: int, *, report: Pro
         azimuth=_azimuth_map(chain, spectra),
         detections=[RadarDetectionDoc(**row) for row in detection_rows(detected)],
     )
+
+
+def follow_poles(stored: Stored, asked: RadarTracksBody, *, report: Progress) -> RadarTracksDoc:
+    """Its tracks against what motion capture saw. Raises RadarDataError in the operator's own file names."""
+    paths, doc = stored.paths, stored.doc
+    assert paths.capture is not None
+    poles = tuple((pole.x_m, pole.z_m) for pole in asked.poles)
+    with _named(stored):
+        wanted = TracksWanted(poles, asked.offset_s, asked.forward)
+        found = tracks_against_truth(paths.samples, paths.capture, wanted, report)
+    part = truth_part(found, f"{doc.name}, {found.frames} frames")
+    return RadarTracksDoc(asked=asked, capture_name=doc.capture_name, part=part_doc(part))
 
 
 @lru_cache(maxsize=2)
@@ -144,6 +159,8 @@ def _named(stored: Stored) -> Iterator[None]:
 
 
 def _in_own_names(stored: Stored, text: str) -> str:
-    if stored.cfg is not None:
-        text = text.replace(stored.cfg.name, stored.doc.cfg_name)
-    return text.replace(stored.samples.name, stored.doc.name)
+    if stored.paths.cfg is not None:
+        text = text.replace(stored.paths.cfg.name, stored.doc.cfg_name)
+    if stored.paths.capture is not None:
+        text = text.replace(stored.paths.capture.name, stored.doc.capture_name)
+    return text.replace(stored.paths.samples.name, stored.doc.name)

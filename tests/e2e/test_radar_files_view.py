@@ -12,8 +12,9 @@ from playwright.sync_api import Page, expect
 from mapping.radar.params import AWR1843, POSITION2GO
 from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.e2e.stations import Station
-from tests.e2e.steps import choose, visit
+from tests.e2e.steps import LONG_MS, choose, visit
 from tests.server.test_cli_radar import echo
+from tests.server.test_cli_radar_tracks import LATE_S, POLES_EN_M, made
 from tests.telemetry.test_adc_files import dca1000_bytes
 from tests.telemetry.test_ti_config import GOOD, config
 
@@ -91,6 +92,65 @@ def test_a_capture_asks_for_its_configuration_and_wrong_files_are_refused(
     expect(told).to_contain_text("no unclipped signal")
     page.get_by_test_id("radar-samples").select_option("auto")
     shown(page, 0)
+
+
+def test_a_capture_and_poles_make_tracks_against_truth(station: Station, page: Page, tmp_path: Path) -> None:
+    """Both files at once; what does not fit is said where it is asked for, and what came out is there again later."""
+    folder = made(tmp_path)
+    radar_files(page, station)
+    with page.expect_file_chooser() as chooser:
+        page.get_by_test_id("radar-import").click()
+    chooser.value.set_files([str(folder / "optitrack.csv"), str(folder / "radar.csv")])
+    shown(page, 0)
+    section = page.get_by_test_id("section-radar_tracks")
+    expect(section).to_contain_text("Motion capture: optitrack.csv")
+    follow, told = page.get_by_test_id("tracks-follow"), section.get_by_test_id("error-box")
+    expect(follow).to_be_disabled()
+
+    page.get_by_test_id("pole-add").click()
+    page.get_by_test_id("pole-x").fill("4000")
+    page.get_by_test_id("pole-x").press("Enter")
+    expect(section).to_contain_text("out of range: enter -1000 to 1000 m")
+    for number, (east, north) in enumerate(POLES_EN_M):
+        if number:
+            page.get_by_test_id("pole-add").click()
+        for axis, value in (("x", east), ("z", -north)):
+            page.get_by_test_id(f"pole-{axis}").nth(number).fill(str(value))
+            page.get_by_test_id(f"pole-{axis}").nth(number).press("Enter")
+    page.get_by_test_id("tracks-offset").fill("60")
+    page.get_by_test_id("tracks-offset").press("Enter")
+    follow.click()
+    expect(told).to_contain_text("lies within the 5.5 s of the capture", timeout=LONG_MS)
+    expect(told).to_contain_text("beginnings, on the left")
+    page.get_by_test_id("tracks-offset").fill(str(LATE_S))
+    page.get_by_test_id("tracks-offset").press("Enter")
+    follow.click()
+    tracks = page.get_by_test_id("radar-tracks")
+    expect(tracks).to_be_visible(timeout=LONG_MS)
+    expect(told).to_have_count(0)
+    row = tracks.get_by_test_id("scenario-figure").filter(has_text="pole 1: range error")
+    expect(row).to_contain_text("0.15 m (the sensor's)")
+    expect(tracks.get_by_test_id("scenario-chart")).to_have_count(6)
+    expect(tracks.get_by_test_id("chart-points").first).to_be_attached()
+    expect(page.get_by_test_id("tracks-against")).to_contain_text("optitrack.csv")
+
+    page.reload()
+    page.get_by_test_id("radar-choose").click()
+    page.get_by_test_id("radar-looks-tracks").click()
+    expect(tracks).to_contain_text("True way and poles")
+    expect(page.get_by_test_id("pole")).to_have_count(2)
+    page.get_by_test_id("radar-capture-remove").click()
+    expect(tracks).to_have_count(0)
+    expect(follow).to_be_disabled()
+
+
+def test_a_capture_alone_belongs_to_nothing(station: Station, page: Page, tmp_path: Path) -> None:
+    folder = made(tmp_path)
+    radar_files(page, station)
+    choose(page, page.get_by_test_id("radar-import"), folder / "optitrack.csv")
+    told = page.get_by_test_id("section-radar_files").get_by_test_id("error-box")
+    expect(told).to_contain_text("no radar file is open that it could belong to")
+    expect(page.get_by_test_id("radar-row")).to_have_count(0)
 
 
 @pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")

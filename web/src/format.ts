@@ -94,7 +94,7 @@ export const editable = (value: number) => String(Number(value.toFixed(7)));
 /** A message about a file without the words of the command line: here a form asks for the same. */
 export function forConsole(message: string): string {
   return message
-    .replace(/: --cfg FILE/g, ", on the left")
+    .replace(/: --(cfg FILE|offset-s)/g, ", on the left")
     .replace(/--samples twos-complement or offset-binary/g, "two's complement or offset binary, on the left")
     .replace(/--samples twos-complement takes/g, "“Two's complement” on the left takes")
     .replace(/Leave --samples out/g, "Choose “Told by the samples” on the left")

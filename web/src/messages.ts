@@ -170,6 +170,13 @@ export const LIMITS = {
   RadarReading: {
     most: { min: 1, max: 1_000_000 },
   },
+  PoleDoc: {
+    x_m: { min: -1_000, max: 1_000 },
+    z_m: { min: -1_000, max: 1_000 },
+  },
+  RadarTracksBody: {
+    offset_s: { min: -86_400, max: 86_400, initial: 0.0 },
+  },
   RunScenario: {
     seed: { min: 0, max: 10_000, initial: 0 },
   },
@@ -2042,6 +2049,10 @@ export interface RadarFileDoc {
   added_utc: string;
   /** Of the configuration that was given with it; empty: none. */
   cfg_name: string;
+  /** Of the OptiTrack file that was given with it; empty: none. */
+  capture_name: string;
+  /** Whether it has been held against that capture. */
+  has_tracks: boolean;
 }
 
 /** What a file does not tell itself; as on the command line. */
@@ -2121,6 +2132,21 @@ export interface RadarFrame {
   detections: RadarDetectionDoc[];
 }
 
+/** Where a pole stood, in the capture's own metres. */
+export interface PoleDoc {
+  x_m: number;
+  z_m: number;
+}
+
+/** What the ODA data set's two files do not tell themselves; as on the command line. */
+export interface RadarTracksBody {
+  poles: PoleDoc[];
+  /** So long after the capture's first row the radar's first frame was. */
+  offset_s: number;
+  /** Which of the captured body's axes is its nose. */
+  forward: "x" | "z" | "-x" | "-z";
+}
+
 /** A field test of the papers in simulation. */
 export interface ScenarioDoc {
   name: string;
@@ -2197,6 +2223,13 @@ export interface ScenarioPartDoc {
 export interface ScenarioResultDoc {
   run: ScenarioRunDoc;
   parts: ScenarioPartDoc[];
+}
+
+/** A radar's tracks against truth, as they were asked for. */
+export interface RadarTracksDoc {
+  asked: RadarTracksBody;
+  capture_name: string;
+  part: ScenarioPartDoc;
 }
 
 export interface RunScenario {

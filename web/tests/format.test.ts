@@ -95,6 +95,10 @@ describe("messages of the planner", () => {
       "Give the configuration that the radar ran with, on the left.",
     ],
     [
+      "Give the time between the two files' beginnings: --offset-s.",
+      "Give the time between the two files' beginnings, on the left.",
+    ],
+    [
       "take the whole frames alone: --frames 12.",
       "take the whole frames alone (“Only the first frames”: 12).",
     ],

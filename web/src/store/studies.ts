@@ -4,6 +4,8 @@ import type {
   RadarFrame,
   RadarOpened,
   RadarReading,
+  RadarTracksBody,
+  RadarTracksDoc,
   ScenarioDoc,
   ScenarioResultDoc,
   ScenarioRunDoc,
@@ -23,6 +25,14 @@ export const shownFrame = signal<RadarFrame | null>(null);
 export const wantedFrame = signal(0);
 /** The detection that is pointed at, in picture or table. */
 export const marked = signal<number | null>(null);
+
+/** What of the chosen file is looked at: its frames, or what was followed against truth. */
+export const looksAt = signal<"frames" | "tracks">("frames");
+/** Where the poles stood, and how the two files belong together. */
+export const NOT_ASKED: RadarTracksBody = { poles: [], offset_s: 0, forward: "x" };
+export const askedTracks = signal<RadarTracksBody>(NOT_ASKED);
+/** What the last following of the chosen file came to. */
+export const shownTracks = signal<RadarTracksDoc | null>(null);
 
 export const chosen = computed(() => radarFiles.value?.find((file) => file.id === chosenId.value) ?? null);
 

@@ -1,13 +1,18 @@
 import { useEffect, useState } from "preact/hooks";
 import { number, timecode, withUnit } from "../format";
-import { chosen, opened, shownFrame, wantedFrame } from "../store/studies";
+import { chosen, looksAt, opened, shownFrame, shownTracks, wantedFrame } from "../store/studies";
 import { errors } from "../store/state";
-import { Button } from "../ui/Button";
+import { Button, Segmented } from "../ui/Button";
 import { ErrorBox } from "../ui/Outcome";
 import { FRAME, READING, goToFrame, isBusy, stepFrame } from "./radar";
 import { RadarMaps } from "./RadarMaps";
+import { ScenarioPart } from "./ScenarioPart";
 
 const SAY_AFTER_MS = 500;
+const LOOKS = [
+  { value: "frames", label: "Frames" },
+  { value: "tracks", label: "Tracks against truth" },
+] as const;
 
 /** Says so where an answer takes longer than a moment. */
 function Working() {
@@ -70,12 +75,42 @@ function FrameSlider() {
   );
 }
 
+/** Between frames and tracks, once there are both. */
+function Choice() {
+  if (shownTracks.value === null) return null;
+  return (
+    <Segmented
+      label="Look at"
+      testid="radar-looks"
+      value={looksAt.value}
+      options={LOOKS}
+      onChange={(next) => (looksAt.value = next)}
+    />
+  );
+}
+
+/** What was followed, held against where the poles truly were. */
+function Tracks() {
+  const found = shownTracks.value;
+  return (
+    <>
+      <Heading />
+      {found && (
+        <div class="scenario-result radar-tracks" data-testid="radar-tracks" tabIndex={0}>
+          <ScenarioPart part={found.part} />
+        </div>
+      )}
+    </>
+  );
+}
+
 function Heading() {
   const [file, frame, open] = [chosen.value, shownFrame.value, opened.value];
   return (
     <header class="study-head">
       <h2>{file?.name}</h2>
-      {frame && open && (
+      <Choice />
+      {looksAt.value === "frames" && frame && open && (
         <span class="muted" data-testid="frame-shown" data-frame={frame.number}>
           frame {number(frame.number)}, {timecode(frame.t_s)}, cells of{" "}
           {withUnit(open.parameters.range_resolution_m, "m", 2)} and{" "}
@@ -100,6 +135,7 @@ export function RadarCentre() {
       </div>
     );
   }
+  if (looksAt.value === "tracks") return <Tracks />;
   return (
     <>
       <Heading />

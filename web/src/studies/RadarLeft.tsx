@@ -9,6 +9,7 @@ import { Button } from "../ui/Button";
 import { DeleteForGood } from "../ui/DeleteForGood";
 import { AutoField, SelectField } from "../ui/fields";
 import { Section } from "../ui/Section";
+import { TracksSection } from "./TracksSection";
 import { ENDINGS, FILES, READING, bringIn, choose, learnFiles, readAs, remove, setCfg } from "./radar";
 
 function Delete({ file }: { file: RadarFileDoc }) {
@@ -54,6 +55,7 @@ function Row({ file }: { file: RadarFileDoc }) {
             {bytes(file.bytes)} · {day(file.added_utc)}
           </span>
           {file.cfg_name && <span class="muted name">with {file.cfg_name}</span>}
+          {file.capture_name && <span class="muted name">with {file.capture_name}</span>}
         </span>
       </button>
       <Delete file={file} />
@@ -80,15 +82,17 @@ function Files() {
         </ul>
       )}
       <div class={`drop-zone ${all?.length === 0 ? "first" : ""}`}>
-        {all?.length === 0 && <p>Raw samples: .npy, .bin of a DCA1000, radar.csv of the ODA data set.</p>}
+        {all?.length === 0 && (
+          <p>Raw samples: .npy, .bin of a DCA1000, radar.csv of the ODA data set, with its optitrack.csv.</p>
+        )}
         <div class="row">
           <Button
             icon="import"
             testid="radar-import"
             disabled={pending.value.has(FILES)}
-            onClick={() => chooseFiles(ENDINGS, (files) => void bringIn(files))}
+            onClick={() => chooseFiles(ENDINGS, (files) => void bringIn(files), { several: true })}
           >
-            Open a radar file…
+            Open radar files…
           </Button>
         </div>
       </div>
@@ -181,6 +185,7 @@ export function RadarLeft() {
     <div class="panel-scroll">
       <Files />
       <Reading />
+      <TracksSection />
     </div>
   );
 }

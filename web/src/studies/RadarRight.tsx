@@ -1,8 +1,9 @@
 import { forConsole, number, withUnit } from "../format";
 import type { RadarDetectionDoc, RadarParametersDoc } from "../messages";
-import { marked, opened, shownFrame } from "../store/studies";
+import { looksAt, marked, opened, shownFrame, shownTracks } from "../store/studies";
 import { Icon } from "../ui/Icon";
 import { Fact } from "../ui/Section";
+import { TracksRight } from "./TracksRight";
 
 const SENSORS = { awr1843: "AWR1843", position2go: "Position2Go" } as const;
 
@@ -77,6 +78,7 @@ function Notes({ notes }: { notes: readonly string[] }) {
 /** What is true about the frame that is shown: its detections, what was assumed, and of which radar it is. */
 export function RadarRight() {
   const [open, frame] = [opened.value, shownFrame.value];
+  if (looksAt.value === "tracks" && shownTracks.value) return <TracksRight found={shownTracks.value} />;
   if (!open) {
     return (
       <div class="panel-scroll truth" tabIndex={0}>

@@ -20,11 +20,14 @@ function coloured(series: readonly SeriesDoc[]): { one: SeriesDoc; colour: strin
   });
 }
 
+/** More points than these are drawn small. */
+const MANY = 40;
+
 const cross = (x: number, y: number) => `M${x - 6} ${y - 6}l12 12m0-12l-12 12`;
 
 function Drawn({ one, colour, area }: { one: SeriesDoc; colour: string; area: Area }) {
   const at = one.x.map((x, index) => [area.x(x), area.y(one.y[index] ?? 0)] as const);
-  if (one.printed) {
+  if (one.printed && one.drawn === "points") {
     const d = at.map(([x, y]) => cross(x, y)).join("");
     return <path class="printed" d={d} stroke={colour} data-testid="printed-mark" />;
   }
@@ -32,13 +35,25 @@ function Drawn({ one, colour, area }: { one: SeriesDoc; colour: string; area: Ar
     return (
       <g fill={colour} data-testid="chart-points">
         {at.map(([x, y], index) => (
-          <circle key={index} cx={x} cy={y} r={at.length > 60 ? 2 : 5} />
+          <circle key={index} cx={x} cy={y} r={at.length > MANY ? 2 : 5} />
         ))}
       </g>
     );
   }
   const d = at.map(([x, y], index) => `${index ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
-  return <path class="curve" d={d} stroke={colour} data-testid="chart-line" />;
+  const kind = one.printed ? "curve printed-line" : "curve";
+  return <path class={kind} d={d} stroke={colour} data-testid="chart-line" />;
+}
+
+function Key({ of, colour }: { of: SeriesDoc; colour: string }) {
+  if (of.drawn === "line") {
+    return <path class={of.printed ? "curve printed-line" : "curve"} d="M0 6h18" stroke={colour} />;
+  }
+  return of.printed ? (
+    <path class="printed" d={cross(9, 6)} stroke={colour} />
+  ) : (
+    <circle cx="9" cy="6" r="4" fill={colour} />
+  );
 }
 
 function Keys({ series }: { series: readonly SeriesDoc[] }) {
@@ -49,13 +64,7 @@ function Keys({ series }: { series: readonly SeriesDoc[] }) {
         .map(({ one, colour }) => (
           <span key={one.name}>
             <svg width="18" height="12" aria-hidden="true">
-              {one.printed ? (
-                <path class="printed" d={cross(9, 6)} stroke={colour} />
-              ) : one.drawn === "points" ? (
-                <circle cx="9" cy="6" r="4" fill={colour} />
-              ) : (
-                <path class="curve" d="M0 6h18" stroke={colour} />
-              )}
+              <Key of={one} colour={colour} />
             </svg>
             {one.name}
           </span>

@@ -4,9 +4,10 @@ import { asErrorDoc, isCancelled, requestJson } from "../net/api";
 import { sendFile } from "../store/files";
 import { order } from "../store/outcomes";
 import { chosenId, marked, opened, radarFiles, reading, shownFrame, wantedFrame } from "../store/studies";
-import { pageId, setError } from "../store/state";
+import { errors, pageId, setError } from "../store/state";
 import { study } from "../store/view";
 import { Newest } from "./newest";
+import { forgetTracks, isCapture, setCapture } from "./tracks";
 
 /** Where errors of this study appear: with the files, with how they are read, with the frame. */
 export const FILES = "radar_files";
@@ -89,6 +90,7 @@ export function choose(id: string): void {
     reading.value = {};
     wantedFrame.value = 0;
   });
+  forgetTracks();
   open();
 }
 
@@ -117,11 +119,28 @@ export function goToFrame(number: number): void {
 
 export const stepFrame = (by: number) => goToFrame(wantedFrame.value + by);
 
-/** Brings files in, and opens the last of them. */
+/** Brings files in, and opens the last of them; a capture among them goes with what is open then. */
 export async function bringIn(files: readonly File[]): Promise<void> {
   if (files.length === 0) return;
   study.value = "radar";
   setError(FILES, null);
+  const captured = await Promise.all(files.map(isCapture));
+  await keep(files.filter((_, index) => !captured[index]));
+  for (const capture of files.filter((_, index) => captured[index])) {
+    if (chosenId.value === null) return refuseCapture(capture);
+    await setCapture(capture);
+  }
+}
+
+/** Unless something worse has been said already. */
+function refuseCapture({ name }: File): void {
+  if (errors.value[FILES]) return;
+  const what = `${name} is a motion capture, and no radar file is open that it could belong to.`;
+  const advice = "Open the radar.csv first, or bring in both together.";
+  setError(FILES, { code: "bad_request", what, where: name, advice });
+}
+
+async function keep(files: readonly File[]): Promise<void> {
   for (const file of files) {
     try {
       const query_ = new URLSearchParams({ filename: file.name });
