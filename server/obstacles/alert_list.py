@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from server.schemas import AlertDoc
-from telemetry.topics.obstacles import ObstacleAlert, Sensor
+from telemetry.topics.obstacles import AlertSource, ObstacleAlert
 
 KEPT_MAX = 20
 """The oldest go first, those that are over before those that go on."""
@@ -48,7 +48,7 @@ class LatchedAlerts:
                 self._docs[each] = self._docs[each].model_copy(update={"acknowledged": True})
         self._drop_done()
 
-    def give_up(self, sensor: Sensor, now_mono_s: float) -> tuple[str, ...]:
+    def give_up(self, sensor: AlertSource, now_mono_s: float) -> tuple[str, ...]:
         """What a sensor's node has not told again counts as over: it has died, or been started anew. Their ids.
 
         Not what this server says of the node itself, or of avoidance.

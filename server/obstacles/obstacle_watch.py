@@ -203,6 +203,7 @@ class Watch:
             if silent and sensor not in self._lost and self.statuses[sensor].state != "waiting":
                 self._lose(sensor, now_s)
             ended += self._alerts.give_up(sensor, now_s)
+        ended += self._alerts.give_up("traffic", now_s)
         self.refresh()
         return ended
 

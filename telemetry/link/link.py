@@ -19,7 +19,7 @@ from telemetry.link.heartbeat import PERIOD_S, Grace, Heartbeat, heartbeat
 from telemetry.link.line import Line
 from telemetry.link.peers import MOST_CANDIDATES, Peers, Source, is_same_vehicle
 from telemetry.link.publishing import StatePublisher, StatusTeller
-from telemetry.link.session import Around, Session
+from telemetry.link.session import Around, Session, Settings
 from telemetry.link.signatures import KeyRing
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.address import parse_address
@@ -30,6 +30,7 @@ from telemetry.mavlink.reduce import is_vehicle_heartbeat
 from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Published, SigningStatus, Topic
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.traffic import TrafficSettings
 
 TICK_S = 0.05
 
@@ -76,7 +77,7 @@ class Link:
         self._teller = StatusTeller(lambda status: publish(Topic.LINK, status))
         self._told_flight: FlightStatus | None = None
         self._told_avoidance: AvoidanceStatus | None = None
-        self._settings: PerceptionSettings | None = None
+        self._settings = Settings()
         self._expected: Expected | None = None
         self._around = Around(publish, self._states, self.flight, self.commands, self.spawn, self._tell, self.keys)
         self._ranges = RangeReader()
@@ -218,6 +219,7 @@ class Link:
             session.on_message(message, now_s, t_utc_s)
         elif verdict == "stranger" and line is session.vehicle.line and not session.signs:
             session.vehicle.on_foreign(message)  # a vehicle that demands signatures does not listen to it
+            session.traffic.on_message(message, session.vehicle.state, now_s)
 
     def _tell_time(self, line: Line, source: Source, now_s: float) -> None:
         """A vehicle without a clock learns the time from what it hears. A heartbeat does no harm if it is not it."""
@@ -249,9 +251,15 @@ class Link:
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         """How deep the regions are, and how large the vehicle is."""
-        self._settings = settings
+        self._settings = replace(self._settings, perception=settings)
         if self.session is not None:
             self.session.pilot.avoidance.on_settings(settings)
+
+    def on_traffic_settings(self, settings: TrafficSettings) -> None:
+        """Of which aircraft the pilot is warned."""
+        self._settings = replace(self._settings, traffic=settings)
+        if self.session is not None:
+            self.session.traffic.on_settings(settings)
 
     def _connection_changed(self) -> None:
         self._heartbeat.beat_now()

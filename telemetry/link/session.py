@@ -30,7 +30,9 @@ from telemetry.mavlink.ranges import RangeReader
 from telemetry.mavlink.signing import KEY_BYTES
 from telemetry.topics.messages import Candidate, Published, RawFrame, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
+from telemetry.topics.traffic import TrafficSettings
 from telemetry.topics.vehicle import VehicleState
+from telemetry.traffic.picture import TrafficPicture
 
 SETUP_TIMES, SETUP_EVERY_S = 5, 1.0
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
@@ -52,11 +54,20 @@ class Around:
     keys: KeyRing
 
 
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the server has told the link; None: nothing yet."""
+
+    perception: PerceptionSettings | None = None
+    traffic: TrafficSettings | None = None
+
+
 class Session:
     def __init__(
-        self, candidate: Candidate, line: Line, around: Around, ranges: RangeReader, settings: PerceptionSettings | None
+        self, candidate: Candidate, line: Line, around: Around, ranges: RangeReader, settings: Settings
     ) -> None:
         self._around, self._ranges, self._is_over = around, ranges, False
+        self.traffic = TrafficPicture(settings.traffic)
         telling = Telling(
             state=self._on_state,
             text=self._on_text,
@@ -77,8 +88,8 @@ class Session:
             read_mission=self.transfers.read_back,
             alarm=self._alarm,
         )
-        if settings is not None:
-            self.pilot.avoidance.on_settings(settings)
+        if settings.perception is not None:
+            self.pilot.avoidance.on_settings(settings.perception)
 
     def begin(self) -> None:
         self.vehicle.send_first()
@@ -112,11 +123,17 @@ class Session:
         ranges = self._ranges.on_message(message, heading_rad=heading_rad, t_mono_s=now_s, t_utc_s=t_utc_s)
         if ranges is not None:
             self._around.publish(Topic.RANGE_FRAME, ranges)
+        self.traffic.on_message(message, self.vehicle.state, now_s)
         self.pilot.avoidance.on_message(message)
 
     def on_tick(self) -> None:
         self.vehicle.on_tick()
         self.pilot.on_tick()
+        told = self.traffic.on_tick(self.vehicle.state, time.monotonic(), time.time())
+        if told is not None:
+            self._around.publish(Topic.TRAFFIC, told.status)
+            for alert in told.alerts:
+                self._around.publish(Topic.ALERT, alert)
 
     def on_sent(self, frame: bytes) -> None:
         self._around.publish(Topic.RAW, RawFrame(time.time(), True, self.vehicle.line.text, frame))

@@ -27,6 +27,7 @@ from telemetry.topics.messages import Candidate, FlightStatus, Topic
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.requests import LinkRequest, SetAvoidance
 from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.traffic import TrafficSettings
 
 PERCEPTION = (Topic.PERCEPTION_RADAR, Topic.PERCEPTION_VISION, Topic.PERCEPTION_RANGES)
 FIND_AGAIN_S = 30.0
@@ -163,7 +164,7 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
                 return answered
 
             await bus.serve("link", answer, LinkRequest)
-            for topic in (*PERCEPTION, Topic.TRACKS, Topic.PERCEPTION_SETTINGS):
+            for topic in (*PERCEPTION, Topic.TRACKS, Topic.PERCEPTION_SETTINGS, Topic.TRAFFIC_SETTINGS):
                 link.spawn(_listen(bus, link, topic))
             await node.run()
     finally:
@@ -181,6 +182,8 @@ async def _listen(bus: Bus, link: Link, topic: str) -> None:
                 link.on_tracks(message)
             elif isinstance(message, PerceptionSettings):
                 link.on_settings(message)
+            elif isinstance(message, TrafficSettings):
+                link.on_traffic_settings(message)
     finally:
         subscription.close()
 

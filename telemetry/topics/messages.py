@@ -22,6 +22,7 @@ from telemetry.topics.obstacles import (
     PerceptionStatus,
 )
 from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import SimTruth, VehicleState
 
 STALE_S, LOST_S = 1.5, 3.5
@@ -60,6 +61,8 @@ class Topic(StrEnum):
     GROUND = "ground/active"  # GroundNotice, latest wins
     PERCEPTION_SETTINGS = "perception/settings"  # PerceptionSettings, latest wins
     TRACKS = "tracks/status"  # TracksStatus, latest wins
+    TRAFFIC = "traffic/status"  # TrafficStatus, latest wins
+    TRAFFIC_SETTINGS = "traffic/settings"  # TrafficSettings, latest wins
     AVOIDANCE = "avoidance/status"  # AvoidanceStatus, latest wins
     TRUTH = "simulator/truth"  # SimTruth, latest wins, 50 Hz
     SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
@@ -376,6 +379,8 @@ Published = (
     | GroundNotice
     | PerceptionSettings
     | TracksStatus
+    | TrafficStatus
+    | TrafficSettings
     | AvoidanceStatus
     | SimTruth
 )
@@ -412,6 +417,8 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.GROUND: GroundNotice,
     Topic.PERCEPTION_SETTINGS: PerceptionSettings,
     Topic.TRACKS: TracksStatus,
+    Topic.TRAFFIC: TrafficStatus,
+    Topic.TRAFFIC_SETTINGS: TrafficSettings,
     Topic.AVOIDANCE: AvoidanceStatus,
     Topic.TRUTH: SimTruth,
 }

@@ -23,6 +23,10 @@ MapName = Literal["radar", "vision", "ranges", "vision_flight"]
 MAP_NAMES: tuple[MapName, ...] = (*SENSORS, "vision_flight")
 
 
+AlertSource = Literal["radar", "vision", "ranges", "traffic"]
+"""traffic: other aircraft tell of themselves (``telemetry.topics.traffic``)."""
+
+
 def sensor_of(name: MapName) -> Sensor:
     """Whose map it is."""
     return "vision" if name == "vision_flight" else name
@@ -224,10 +228,11 @@ class ObstacleAlert:
 
     id: str
     """One per obstacle and sensor, from begin to end."""
-    sensor: Sensor
-    kind: Literal["obstacle", "conflict", "approach", "divergence", "sensor", "avoidance"]
+    sensor: AlertSource
+    kind: Literal["obstacle", "conflict", "approach", "divergence", "sensor", "avoidance", "traffic"]
     """conflict: on the mission ahead, beyond the regions; approach: a track whose closest approach will be too near;
-    divergence, sensor: of the sensor itself; avoidance: it does not watch any more, by whatever cause."""
+    divergence, sensor: of the sensor itself; avoidance: it does not watch any more, by whatever cause; traffic: another
+    aircraft may come too near."""
     phase: Literal["begins", "goes_on", "ends"]
     t_mono_s: float
     """When the frame was measured that showed it."""
