@@ -9,6 +9,7 @@ from typing import Any
 
 from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError
+from server.flying.airspace import Airspace
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.checklists import Checklists
@@ -65,6 +66,9 @@ class Fleet:
             workspace.stage,
             {**{actor_of("live", f.number): f.live for f in flights}, "replay": self._replay},
             {actor_of("live", f.number): f.name for f in flights} if len(flights) > 1 else {},
+        )
+        self._airspace = Airspace(
+            workspace.traffic_stage, [(f.live, f.traffic) for f in flights], (self._replay, shared.replayed.traffic)
         )
 
     @classmethod
@@ -136,6 +140,7 @@ class Fleet:
             *([self._tell(), self._nearness.run(), self._others.run()] if len(self._flights) > 1 else []),
             self.recordings.run(),
             self._scenery.run(),
+            self._airspace.run(),
             *self.uwb.loops(),
         ]
 
@@ -204,6 +209,7 @@ def _wanted(settings: Settings, library: Library, demo: bool) -> list[VehicleWan
             demo_radar=settings.demo_radar,
             demo_world=settings.demo_world,
             demo_autopilot=settings.demo_autopilot(number - FIRST_VEHICLE),
+            demo_traffic=settings.demo_traffic,
         )
         for number, (name, links) in wanted.items()
     ]

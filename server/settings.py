@@ -126,6 +126,8 @@ class Settings(BaseSettings):
     demo_radar: RadarKind = "model"
     """How the demo's radar is simulated. model: its targets are drawn to the errors of the real one; iq: the samples of
     its converters are, and the whole chain of processing runs on them, at a third of a processor core."""
+    demo_traffic: bool = False
+    """Whether the demo's simulated vehicles hear of an aircraft that flies past, every eight minutes."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     """How much is written to the log."""
     console_dir: Path = Field(default_factory=default_console_dir)

@@ -95,6 +95,7 @@ class VehicleWanted:
     demo_radar: RadarKind = "model"
     demo_world: bool = True
     demo_autopilot: DemoAutopilot = "ardupilot"
+    demo_traffic: bool = False
 
 
 class Flying:
@@ -110,7 +111,13 @@ class Flying:
         runtime_dir = folder / RUNTIME_FOLDER
         link, aboard = LinkClient(bus, lease.issue_above), Aboard(folder / "onboard.json")
         self.nodes = Nodes(
-            bus, runtime_dir, recordings, present, demo_radar=wanted.demo_radar, demo_autopilot=wanted.demo_autopilot
+            bus,
+            runtime_dir,
+            recordings,
+            present,
+            demo_radar=wanted.demo_radar,
+            demo_autopilot=wanted.demo_autopilot,
+            demo_traffic=wanted.demo_traffic,
         )
         self.agents = Agents(bus)
         self.live, self._aboard = Channel("live", present), aboard
@@ -133,6 +140,7 @@ class Flying:
             workspace.sights if number == FIRST_VEHICLE else None,
         )
         self.obstacles, self.looking = self._obstacles.desk, self._obstacles.looking
+        self.traffic, self.traffic_settings = self._obstacles.traffic, self._obstacles.traffic_desk
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
         checklist = ChecklistDesk(link, shared.checklists, aboard, bus)

@@ -24,6 +24,7 @@ from server.plan.pointing import Pointing
 from server.plan.terrain_desk import TerrainDesk
 from server.scene.host import SceneHost
 from server.scene.layers.sights import Sights
+from server.scene.layers.traffic_layer import TrafficStage
 from server.scene.layers.vehicles import Vehicles
 from server.scene.view import SceneView
 from server.schemas import Pages, PlanDoc, PlanMessage, PlanState, SelectionDoc, ServerMessage, Snapshot
@@ -96,6 +97,11 @@ class Workspace:
     def sights(self) -> Sights:
         """Where the 3D view shows what they see."""
         return self._view.sights
+
+    @property
+    def traffic_stage(self) -> TrafficStage:
+        """Where the 3D view shows other aircraft."""
+        return self._view.traffic
 
     @property
     def dsm(self) -> Dsm | None:

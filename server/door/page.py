@@ -36,7 +36,7 @@ def key_of(message: schemas.ServerMessage) -> object | None:
             return message.type, message.job.id
         case schemas.VehicleMessage() | schemas.FlightMessage() | schemas.ObstaclesMessage() | schemas.TracksMessage():
             return message.type, message.source
-        case schemas.HealthMessage():
+        case schemas.HealthMessage() | schemas.TrafficMessage():
             return message.type, message.source
         case schemas.PerceptionMessage():
             return message.type, message.source, message.sensor

@@ -60,13 +60,7 @@ class Reviewing:
         present: Present,
     ) -> None:
         self._library, self._shelf, self._screen, self._channel = library, shelf, screen, channel
-        self._nodes, self._board, self._watch, self._tracks, self._present = (
-            nodes,
-            board,
-            seen.watch,
-            seen.tracks,
-            present,
-        )
+        self._nodes, self._board, self._seen, self._watch, self._present = nodes, board, seen, seen.watch, present
         self._open: _Open | None = None
         self._opening = asyncio.Lock()
         self._last: ReplayStatus | None = None
@@ -174,8 +168,7 @@ class Reviewing:
 
     def _forget(self) -> None:
         """Another recording, or none."""
-        self._watch.forget()
-        self._tracks.forget()
+        self._seen.forget()
         self._present.forget_replay()
         self._channel.forget()
 

@@ -39,8 +39,10 @@ class Nodes:
         *,
         demo_radar: RadarKind = "model",
         demo_autopilot: DemoAutopilot = "ardupilot",
+        demo_traffic: bool = False,
     ) -> None:
         self._bus, self._runtime_dir, self._recordings_dir, self._pages = bus, runtime_dir, recordings_dir, pages
+        self._demo_traffic = demo_traffic
         self._demo_radar: RadarKind = demo_radar
         self._demo_autopilot: DemoAutopilot = demo_autopilot
         self.supervisor = Supervisor(runtime_dir, changed=self._changed)
@@ -106,6 +108,8 @@ class Nodes:
         arguments += ["--autopilot", self._demo_autopilot]
         if world is not None:
             arguments += ["--world", str(world)]
+        if self._demo_traffic:
+            arguments.append("--traffic")
         await self.supervisor.start(SIMULATOR, arguments)
 
     async def stop_all(self) -> None:

@@ -14,6 +14,7 @@ from server.schemas import (
     ServerMessage,
     TextMessage,
     TracksMessage,
+    TrafficMessage,
     VehicleMessage,
 )
 
@@ -49,7 +50,8 @@ class Present:
 
 
 def _at_present(message: ServerMessage) -> ServerMessage:
-    live = isinstance(message, (VehicleMessage, PerceptionMessage, TracksMessage)) and message.source == "live"
+    aged = (VehicleMessage, PerceptionMessage, TracksMessage, TrafficMessage)
+    live = isinstance(message, aged) and message.source == "live"
     if live or isinstance(message, ReplayMessage):
         return message.model_copy(update={"now_mono_s": time.monotonic()})
     return message

@@ -26,6 +26,7 @@ from server.obstacles.replayed import MAPS, STATUSES, Replayed
 from server.obstacles.section import Looking
 from server.obstacles.sensor_nodes import KnownGround, SensorNodes
 from server.obstacles.surroundings import Surroundings
+from server.obstacles.traffic import TrafficDesk, TrafficWatch
 from server.scene.layers.sights import Sights
 from server.schemas import Pages, Source
 from server.work.jobs import Lane
@@ -67,6 +68,8 @@ class Obstacles:
             "live": TracksWatch("live", pages, self.watches["live"]),
             "replay": replayed.tracks,
         }
+        self.traffic = TrafficWatch("live", pages)
+        self.traffic_desk = TrafficDesk(folder, bus, self.traffic)
         around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
         self._manoeuvres = Manoeuvres(around, lane)
         self._coming_down = ComingDown(around, link, lane, lease)
@@ -96,6 +99,7 @@ class Obstacles:
         relay.on(Topic.CLOUD_LOOK, live.on_cloud_look)
         relay.on(Topic.ALERT, self._manoeuvres.on_alert, each=True)
         relay.on(Topic.TRACKS, self.tracks["live"].on_status)
+        relay.on(Topic.TRAFFIC, self.traffic.on_status)
 
     def loops(self) -> list[Coroutine[Any, Any, None]]:
         whole = [self._ask_for_whole(sensor) for sensor in SENSORS]
@@ -109,6 +113,7 @@ class Obstacles:
 
     async def start(self) -> None:
         await self.desk.start()
+        await self.traffic_desk.start()
         self.on_plan()
 
     async def simulated(self, ground: Ground, world: Path) -> None:
@@ -123,6 +128,8 @@ class Obstacles:
 
     async def on_link(self, status: LinkStatus) -> None:
         self.on_plan()
+        if status.adopted is None:
+            self.traffic.forget()
         await self.desk.on_link(status)
 
     def on_plan(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from server.heard.relay import Relay
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
+from server.obstacles.traffic import TrafficWatch
 from server.schemas import Pages
 from telemetry.topics.messages import Topic
 
@@ -18,6 +19,13 @@ class Replayed:
     def __init__(self, pages: Pages) -> None:
         self.watch = Watch("replay", pages)
         self.tracks = TracksWatch("replay", pages, self.watch)
+        self.traffic = TrafficWatch("replay", pages)
+
+    def forget(self) -> None:
+        """Another recording, or none."""
+        self.watch.forget()
+        self.tracks.forget()
+        self.traffic.forget()
 
     def hear(self, relay: Relay) -> None:
         """From the bus that the replay node is on."""
@@ -30,3 +38,4 @@ class Replayed:
         relay.on(Topic.ALERT, self.watch.on_alert, replayed=True, each=True)
         relay.on(Topic.AVOIDANCE, self.watch.on_avoidance, replayed=True)
         relay.on(Topic.TRACKS, self.tracks.on_status, replayed=True)
+        relay.on(Topic.TRAFFIC, self.traffic.on_status, replayed=True)

@@ -25,6 +25,7 @@ from server.scene.host import SceneHost
 from server.scene.layers.layers import MARKS, Key, layers, unchanged
 from server.scene.layers.mark_layers import cursor_nodes
 from server.scene.layers.sights import Sights
+from server.scene.layers.traffic_layer import TrafficStage
 from server.scene.layers.vehicles import Vehicles
 
 _POINTER_REACH_PX = 24.0
@@ -50,6 +51,7 @@ class SceneView:
         self._canvas = Canvas(server)
         self.vehicles = Vehicles(self._canvas)
         self.sights = Sights(server, self._canvas)
+        self.traffic = TrafficStage(self._canvas)
         self._cameras = Cameras(host, self.vehicles)
         self._layers = layers(self._watch_gizmo)
         self._keys: dict[str, Key] = {}
@@ -130,6 +132,8 @@ class SceneView:
             self._drawn = None
             self.vehicles.redraw(None)
             self.sights.redraw(None)
+            self.traffic.show(())
+            self.traffic.redraw(None)
             return
         keys = {layer.name: layer.key(drawing) for layer in self._layers}
         if self._dragged is not None:
@@ -146,6 +150,7 @@ class SceneView:
         self._canvas.draw(built)
         self._keys |= keys
         self.sights.redraw(drawing)
+        self.traffic.redraw(drawing)
         if before is None or before.terrain.terrain_id != drawing.terrain.terrain_id:
             self._aim_all(drawing)
         if before is None or before.frame != drawing.frame or before.dsm is not drawing.dsm:

@@ -148,6 +148,7 @@ from server.schemas.stream import (
     TextMessage,
     TrackMessage,
     TracksMessage,
+    TrafficMessage,
     TransferMessage,
     TraversabilityMessage,
     VehicleMessage,
@@ -171,6 +172,7 @@ from server.schemas.study_docs import (
     ScenarioRunDoc,
     SeriesDoc,
 )
+from server.schemas.traffic_docs import TrafficSettingsBody
 from server.schemas.traversability_docs import (
     LandingSiteDoc,
     LandingSitesBody,

@@ -29,6 +29,7 @@ from telemetry.topics.messages import (
 )
 from telemetry.topics.obstacles import ObstacleAlert, PerceptionStatus
 from telemetry.topics.tracks import TracksStatus
+from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import VehicleState
 
 
@@ -245,6 +246,16 @@ class TracksMessage(Message):
     status: TracksStatus | None
 
 
+class TrafficMessage(Message):
+    """Other aircraft: once a second, and when a setting changes; null: nothing was heard of any yet."""
+
+    type: Literal["traffic"] = "traffic"
+    source: Source
+    now_mono_s: float
+    settings: TrafficSettings
+    status: TrafficStatus | None
+
+
 class TraversabilityMessage(Message):
     """What is known of where ground can be driven on or landed on."""
 
@@ -314,6 +325,7 @@ ServerMessage = Annotated[
     | AlertMessage
     | ObstaclesMessage
     | TracksMessage
+    | TrafficMessage
     | TraversabilityMessage
     | RadarFilesMessage
     | ScenarioRunsMessage

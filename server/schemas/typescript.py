@@ -27,6 +27,7 @@ from server.schemas import (
     station_docs,
     stream,
     study_docs,
+    traffic_docs,
     traversability_docs,
     view_docs,
 )
@@ -91,6 +92,7 @@ def _models() -> Iterator[type[BaseModel]]:
         obstacle_docs,
         parameter_docs,
         traversability_docs,
+        traffic_docs,
         study_docs,
         stream,
     ):

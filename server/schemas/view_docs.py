@@ -29,6 +29,7 @@ class ViewDoc(Strict):
     """Voxels that are known ground, in grey: they would crowd the view from behind the vehicle."""
     show_regions: bool = True
     show_tracks: bool = True
+    show_traffic: bool = True
     show_traversability: bool = False
     """Untraversable ground, cleared foliage and landing sites."""
     traversability_layer: LayerName = "cleared"

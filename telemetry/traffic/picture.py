@@ -10,7 +10,7 @@ from telemetry.topics.traffic import Aircraft, TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import VehicleState
 from telemetry.traffic.decoding import is_traffic, reports
 from telemetry.traffic.judging import judged, shown
-from telemetry.traffic.memory import Heard, Memory
+from telemetry.traffic.memory import Memory
 from telemetry.traffic.own import Own
 from telemetry.traffic.report import Position, Report
 from telemetry.traffic.warning import Warnings
@@ -57,8 +57,11 @@ class TrafficPicture:
         self._told_s = now_s
         self._memory.forget_gone(now_s)
         own = Own.of(state, now_s)
+        numbers = self._own_numbers
         placed = [(each, each.position) for each in self._memory.aircraft.values()]
-        around = [self._judged(each, at, own, now_s) for each, at in placed if at is not None]
+        around = [
+            judged(each, at, own, self._settings, now_s, own_numbers=numbers) for each, at in placed if at is not None
+        ]
         others = tuple(sorted((it for it in around if it.trust != "own"), key=_urgency))
         nose_deg = None if own is None or own.nose_rad is None else math.degrees(own.nose_rad)
         alerts = self._warnings.on_picture(others, nose_deg, now_s, t_utc_s, armed=state.armed)
@@ -92,12 +95,12 @@ class TrafficPicture:
         if report.position is not None and heard.move(report.position, now_s):
             heard.always_here = heard.always_here and own is not None and own.may_be_echo(report.position)
 
-    def _judged(self, heard: Heard, position: Position, own: Own | None, now_s: float) -> Aircraft:
-        numbers = frozenset(self._own_names) | {
-            f"adsb {self._settings.own_icao.lower()}" if self._settings.own_icao else "",
-            self._settings.own_id,
-        }
-        return judged(heard, position, own, self._settings, now_s, own_numbers=numbers - {""})
+    @property
+    def _own_numbers(self) -> frozenset[str]:
+        """Keys and names under which the vehicle itself is told of, as it or the operator says."""
+        settings = self._settings
+        icao = f"adsb {settings.own_icao.lower()}" if settings.own_icao else ""
+        return frozenset({*self._own_names, icao, settings.own_id} - {""})
 
 
 def _urgency(it: Aircraft) -> tuple[bool, float]:

@@ -167,6 +167,13 @@ export const LIMITS = {
     rotor_span_m: { min: 0.1, max: 10, initial: 0.8 },
     radius_m: { min: 5, max: 2_000, initial: 150.0 },
   },
+  TrafficSettingsBody: {
+    warn_distance_m: { min: 50, max: 50_000 },
+    warn_height_m: { min: 10, max: 5_000 },
+    look_ahead_s: { min: 5, max: 300 },
+    show_distance_m: { min: 100, max: 500_000 },
+    show_height_m: { min: 50, max: 30_000 },
+  },
   RadarReading: {
     most: { min: 1, max: 1_000_000 },
   },
@@ -208,6 +215,34 @@ export const USUAL_CAMERA: CameraDoc = {
   sensor_width_mm: 13.2,
   sensor_height_mm: 8.8,
 };
+
+/** One other aircraft, where it should be by now. */
+export interface Aircraft {
+  key: string;
+  source: "adsb" | "remote_id" | "utm";
+  name: string;
+  kind: string;
+  trust: "other" | "own" | "echo";
+  on_ground: boolean;
+  emergency: boolean;
+  lat_deg: number;
+  lon_deg: number;
+  age_s: number;
+  within_m: number;
+  velocity_enu_m_s: [number, number] | null;
+  climb_m_s: number | null;
+  alt_m: number | null;
+  alt_datum: "ellipsoid" | "gnss" | "pressure" | "unknown";
+  distance_m: number | null;
+  bearing_deg: number | null;
+  height_m: number | null;
+  height_within_m: number;
+  closing_m_s: number | null;
+  closest_m: number | null;
+  closest_in_s: number | null;
+  conflict: boolean;
+  operator_deg: [number, number] | null;
+}
 
 /** The link node's: what is done about obstacles by itself. */
 export interface AvoidanceStatus {
@@ -375,8 +410,8 @@ export interface Obstacle {
 /** Something has entered a region, is still there (told again at most once a second), or has left it. */
 export interface ObstacleAlert {
   id: string;
-  sensor: "radar" | "vision" | "ranges";
-  kind: "obstacle" | "conflict" | "approach" | "divergence" | "sensor" | "avoidance";
+  sensor: "radar" | "vision" | "ranges" | "traffic";
+  kind: "obstacle" | "conflict" | "approach" | "divergence" | "sensor" | "avoidance" | "traffic";
   phase: "begins" | "goes_on" | "ends";
   t_mono_s: number;
   t_utc_s: number;
@@ -557,6 +592,31 @@ export interface TracksStatus {
   no_proposal: string;
   origin: MapOrigin | null;
   latency_s: number | null;
+}
+
+/** Which traffic is shown, and of which the pilot is warned. The warning's defaults are those of UgCS. */
+export interface TrafficSettings {
+  warn_distance_m: number;
+  warn_height_m: number;
+  look_ahead_s: number;
+  show_distance_m: number;
+  show_height_m: number;
+  own_icao: string;
+  own_id: string;
+}
+
+/** Of one vehicle, once a second, and when a warning begins or ends. */
+export interface TrafficStatus {
+  state: "watching" | "no_position";
+  text: string;
+  t_mono_s: number;
+  t_utc_s: number;
+  heard: number;
+  aircraft: Aircraft[];
+  hidden: number;
+  filtered: number;
+  crowded_out: number;
+  settings: TrafficSettings;
 }
 
 /** A mission on its way to or from the vehicle. */
@@ -1136,6 +1196,7 @@ export interface ViewDoc {
   show_explained: boolean;
   show_regions: boolean;
   show_tracks: boolean;
+  show_traffic: boolean;
   /** Untraversable ground, cleared foliage and landing sites. */
   show_traversability: boolean;
   traversability_layer: "before" | "cleared" | "probability" | "time_in_view";
@@ -2041,6 +2102,18 @@ export interface LandingSitesBody {
   radius_m?: number;
 }
 
+/** What an operator may change; what is left out stays. */
+export interface TrafficSettingsBody {
+  warn_distance_m?: number | null;
+  warn_height_m?: number | null;
+  look_ahead_s?: number | null;
+  show_distance_m?: number | null;
+  show_height_m?: number | null;
+  /** Six hexadecimal digits, or none. */
+  own_icao?: string | null;
+  own_id?: string | null;
+}
+
 /** A file of raw samples that is kept. */
 export interface RadarFileDoc {
   id: string;
@@ -2466,6 +2539,16 @@ export interface TracksMessage {
   status: TracksStatus | null;
 }
 
+/** Other aircraft: once a second, and when a setting changes; null: nothing was heard of any yet. */
+export interface TrafficMessage {
+  v: 1;
+  type: "traffic";
+  source: "live" | "replay";
+  now_mono_s: number;
+  settings: TrafficSettings;
+  status: TrafficStatus | null;
+}
+
 /** What is known of where ground can be driven on or landed on. */
 export interface TraversabilityMessage {
   v: 1;
@@ -2587,6 +2670,7 @@ export type ServerMessage =
   | AlertMessage
   | ObstaclesMessage
   | TracksMessage
+  | TrafficMessage
   | TraversabilityMessage
   | RadarFilesMessage
   | ScenarioRunsMessage

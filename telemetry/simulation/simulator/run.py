@@ -59,6 +59,8 @@ class SimOptions:
     """Simulated time until the position is known; a real vehicle takes about 40 s."""
     endurance_s: float = 1200.0
     """Of hovering."""
+    traffic: bool = False
+    """Whether its receiver tells of an aircraft that flies past."""
     parameters: tuple[tuple[str, float], ...] = field(default=())
     """Autopilot parameters that differ from its defaults."""
 
@@ -69,7 +71,7 @@ class Simulator:
     def __init__(self, options: SimOptions) -> None:
         self.options = options
         self.vehicle = _vehicle(options)
-        self.endpoint = Endpoint(self.vehicle)
+        self.endpoint = Endpoint(self.vehicle, traffic=options.traffic)
         self._channels: dict[Hashable, _Channel] = {}
         self._key: tuple[bytes, int] | None = None
         """With which it signs, and the time that it was given with it."""

@@ -19,9 +19,11 @@ from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, re
 from telemetry.simulation.simulator.protocol.dialects import DIALECTS
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
+from telemetry.simulation.simulator.protocol.passing_traffic import passing
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 HEARTBEAT_S = 1.0
+TRAFFIC_S = 1.0
 NEWS_S = 0.15
 """After this the other ground stations hear that one of them has written a mission; between 0.1 s and 0.2 s, measured
 on the real ArduCopter."""
@@ -61,8 +63,10 @@ class Endpoint:
     keeps simulated time.
     """
 
-    def __init__(self, vehicle: SimulatedVehicle) -> None:
+    def __init__(self, vehicle: SimulatedVehicle, *, traffic: bool = False) -> None:
+        """``traffic``: an aircraft that flies past is told of."""
         self.vehicle = vehicle
+        self._traffic = _Stream(TRAFFIC_S, 0.0) if traffic else None
         self._pilot = vehicle.autopilot
         self._dialect = dialect = DIALECTS[vehicle.personality.make]
         parts = dialect.parts(vehicle)
@@ -128,6 +132,9 @@ class Endpoint:
         if _due(self._timesync, now_s, wall_s):
             self._timesync.sent_wall_s = wall_s
             out += self._to_all(wire.MAVLink_timesync_message(0, int(now_s * 1e9)))
+        if self._traffic is not None and _due(self._traffic, now_s, wall_s):
+            self._traffic.sent_wall_s = wall_s
+            out += self._to_all(passing(self.vehicle.frame, now_s))
         for peer, state in self._peers.items():
             for message_id, stream in state.streams.items():
                 if _due(stream, now_s, wall_s) and (message := self._streams.build(message_id)):
