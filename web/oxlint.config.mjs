@@ -7,7 +7,7 @@ const FLOORS = [
   ["scene"],
   ["plan", "fly", "review", "account"],
   ["studies", "vehicle", "traversability"],
-  ["chart", "tracks"],
+  ["chart", "tracks", "traffic"],
   ["obstacles"],
   ["ui", "help"],
   ["store"],

@@ -36,6 +36,7 @@ import "./styles/polar.css";
 import "./styles/looking.css";
 import "./styles/alerts.css";
 import "./styles/tracks.css";
+import "./styles/traffic.css";
 import "./styles/traversability.css";
 import "./styles/studies.css";
 import "./styles/parameters.css";

@@ -3,6 +3,7 @@ import { adopted, isInAir, linkStatus } from "../store/flying";
 import { closeReview, isReplaying, review } from "../store/review";
 import { Manoeuvres, standLeft } from "../obstacles/Manoeuvres";
 import { ObstaclesSection } from "./ObstaclesSection";
+import { TrafficSection } from "../traffic/TrafficSection";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { ConnectionSection } from "./Connection";
@@ -83,6 +84,7 @@ export function FlyLeft() {
         {!isInAir.value && <FlightSection />}
         {!isInAir.value && <GuidedSection />}
         <ObstaclesSection />
+        <TrafficSection />
         <ParametersSection />
         <LogsSection />
       </div>

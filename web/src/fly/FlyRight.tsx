@@ -5,6 +5,7 @@ import { Looking } from "../obstacles/Looking";
 import { Sensors } from "../obstacles/Sensors";
 import { hasRoom } from "../tracks/Displays";
 import { ROWS, TrackList } from "../tracks/TrackList";
+import { TrafficList } from "../traffic/TrafficList";
 import { adopted, heard, texts } from "../store/flying";
 import { hasSensors } from "../store/obstacles";
 import { Health } from "../vehicle/Health";
@@ -44,6 +45,7 @@ export function FlyRight() {
       <div class="panel-scroll truth" tabIndex={0}>
         {isEmpty ? <Teaching /> : <Instruments source="live" />}
         {(isEmpty || !hasRoom("live")) && <TrackList source="live" rows={ROWS.narrow} />}
+        <TrafficList source="live" />
         <MissionAhead source="live" />
         <Sensors source="live" />
         <Looking source="live" />

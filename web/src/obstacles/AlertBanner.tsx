@@ -169,7 +169,13 @@ function Banner({ first, others, isReplay, onShrink }: BannerProps) {
       {alert.obstacle ? (
         <Figures obstacle={alert.obstacle} isOver={first.over} />
       ) : (
-        <p class={alert.kind === "approach" ? `alert-figures ${first.over ? "over" : ""}` : ""}>
+        <p
+          class={
+            alert.kind === "approach" || alert.kind === "traffic"
+              ? `alert-figures ${first.over ? "over" : ""}`
+              : ""
+          }
+        >
           {alert.text}
         </p>
       )}

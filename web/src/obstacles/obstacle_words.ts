@@ -18,6 +18,7 @@ const KIND_WORDS: Record<ObstacleAlert["kind"], string> = {
   divergence: "positions disagree",
   sensor: "sensor trouble",
   avoidance: "does not watch",
+  traffic: "may come too near",
 };
 
 /** A small distance in decimetres, a larger one in metres: nobody reads decimetres in a hurry. */
@@ -46,12 +47,14 @@ export function signedHeight(value_m: number): string {
 export const timeTo = (value_s: number | null) =>
   value_s === null ? "not getting nearer" : `contact in ${withUnit(value_s, "s", value_s < 10 ? 1 : 0)}`;
 
-/** Whose alert it is; avoidance, which several sensors serve, is nobody's. */
-export const alertSensor = ({ sensor, kind }: ObstacleAlert) => (kind === "avoidance" ? null : sensor);
+/** Whose alert it is; avoidance, which several sensors serve, is nobody's, and traffic tells of itself. */
+export const alertSensor = ({ sensor, kind }: ObstacleAlert): SensorName | null =>
+  kind === "avoidance" || sensor === "traffic" ? null : sensor;
 
 export const alertTitle = (alert: ObstacleAlert) => {
   const sensor = alertSensor(alert);
-  return `${sensor ? SENSOR_WORDS[sensor] : "Avoidance"}: ${KIND_WORDS[alert.kind]}`;
+  const whose = sensor ? SENSOR_WORDS[sensor] : alert.kind === "traffic" ? "Traffic" : "Avoidance";
+  return `${whose}: ${KIND_WORDS[alert.kind]}`;
 };
 
 /** What is said aloud once, when it begins; its figures go on changing, in silence. */

@@ -7,6 +7,7 @@ import { MissionAhead } from "../obstacles/MissionAhead";
 import { Looking } from "../obstacles/Looking";
 import { Sensors } from "../obstacles/Sensors";
 import { ROWS, TrackList } from "../tracks/TrackList";
+import { TrafficList } from "../traffic/TrafficList";
 import { review } from "../store/review";
 import { Segmented } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -89,6 +90,7 @@ function FlightsRight() {
           <Instruments source="replay" />
           <Health source="replay" />
           <TrackList source="replay" rows={ROWS.narrow} />
+          <TrafficList source="replay" />
           <MissionAhead source="replay" />
           <Sensors source="replay" />
           <Looking source="replay" />

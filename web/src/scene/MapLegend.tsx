@@ -5,6 +5,7 @@ import { SensorMark } from "../obstacles/SensorMark";
 import { SENSOR_WORDS } from "../obstacles/obstacle_words";
 import { drawnOf, hasSensors, obstacles, type MapName, type SensorName } from "../store/obstacles";
 import { hasTracks } from "../store/moving";
+import { hasTraffic } from "../store/traffic";
 import { isReplaying } from "../store/review";
 import { view } from "../store/state";
 import { setView } from "../store/stream";
@@ -16,7 +17,8 @@ type Layer =
   | "show_cloud"
   | "show_explained"
   | "show_regions"
-  | "show_tracks";
+  | "show_tracks"
+  | "show_traffic";
 
 interface Key {
   layer: Layer;
@@ -64,6 +66,11 @@ const KEYS: readonly Key[] = [
     label: "Moving",
     title: "Moving objects: arrow to where each goes, ellipse of its uncertainty, predicted closest approach",
   },
+  {
+    layer: "show_traffic",
+    label: "Traffic",
+    title: "Other aircraft: line to where each is in 15 s, ring of its uncertainty, height difference",
+  },
 ];
 
 const SWATCHES: Partial<Record<Layer, string>> = {
@@ -90,7 +97,7 @@ function Sample({ entry }: { entry: Key }) {
       </>
     );
   }
-  if (entry.layer === "show_tracks") return <MovingMark />;
+  if (entry.layer === "show_tracks" || entry.layer === "show_traffic") return <MovingMark />;
   return <span class={`swatch ${SWATCHES[entry.layer]}`} aria-hidden="true" />;
 }
 
@@ -143,9 +150,11 @@ function MergedMaps() {
 
 const isAny = ({ live, replay }: typeof hasSensors) => live.value || replay.value;
 
+const HAS: Partial<Record<Layer, typeof hasSensors>> = { show_tracks: hasTracks, show_traffic: hasTraffic };
+
 /** What the colours of the maps mean; each key shows and hides what it stands for. */
 export function MapLegend() {
-  const all = KEYS.filter(({ layer }) => (layer === "show_tracks" ? isAny(hasTracks) : isAny(hasSensors)));
+  const all = KEYS.filter(({ layer }) => isAny(HAS[layer] ?? hasSensors));
   if (all.length === 0) return null;
   return (
     <div

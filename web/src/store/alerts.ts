@@ -27,6 +27,7 @@ export const isCalling = (entry: AlertDoc) => !entry.over && !entry.acknowledged
 
 const KINDS: Record<ObstacleAlert["kind"], number> = {
   approach: 0,
+  traffic: 0,
   obstacle: 0,
   conflict: 1,
   divergence: 2,
@@ -42,12 +43,19 @@ function haste(time_to_contact_s: number | null): number {
 
 /** An approach is alerted when it is seconds away. */
 const APPROACH_HASTE = 1;
+/** Traffic is warned of a minute ahead: what stands in the way of the next seconds goes before it. */
+const TRAFFIC_HASTE = 2;
 
 /** Calling before seen before over; then obstacles first, what will be reached soon, and what was there first. */
 function rank(entry: AlertDoc): number[] {
   const { obstacle, kind } = entry.alert;
   const stage = isCalling(entry) ? 0 : entry.over ? 2 : 1;
-  const soon = kind === "approach" ? APPROACH_HASTE : haste(obstacle?.time_to_contact_s ?? null);
+  const soon =
+    kind === "approach"
+      ? APPROACH_HASTE
+      : kind === "traffic"
+        ? TRAFFIC_HASTE
+        : haste(obstacle?.time_to_contact_s ?? null);
   return [stage, KINDS[kind], soon, entry.began_utc_s];
 }
 

@@ -5,6 +5,7 @@ import { forgetGuided } from "./guided";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
+import { forgetTraffic } from "./traffic";
 import { forgetTraversability } from "./traversability";
 
 /**
@@ -30,6 +31,8 @@ const FORGET: Partial<Record<string, () => void>> = {
   "perception replay": () => forgetSensing("replay"),
   "tracks live": () => forgetMoving("live"),
   "tracks replay": () => forgetMoving("replay"),
+  "traffic live": () => forgetTraffic("live"),
+  "traffic replay": () => forgetTraffic("replay"),
   traversability: forgetTraversability,
   "obstacles live": () => forgetObstacles("live"),
   "obstacles replay": () => forgetObstacles("replay"),

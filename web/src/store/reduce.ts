@@ -9,6 +9,7 @@ import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
 import { takeMoving } from "./moving";
+import { takeTraffic } from "./traffic";
 import { forgetClock, takeClock } from "./server_clock";
 import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
@@ -91,6 +92,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "tracks":
       takeMoving(message, performance.now());
+      return;
+    case "traffic":
+      takeTraffic(message, performance.now());
       return;
     case "radar_files":
       radarFiles.value = message.files;

@@ -37,6 +37,7 @@ export const view = signal<ViewDoc>({
   show_explained: false,
   show_regions: true,
   show_tracks: true,
+  show_traffic: true,
   show_traversability: false,
   traversability_layer: "cleared",
   vertical_exaggeration: 1,
