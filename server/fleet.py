@@ -9,7 +9,7 @@ from typing import Any
 
 from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError
-from server.flying.airspace import Airspace
+from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.checklists import Checklists

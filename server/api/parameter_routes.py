@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from server.api.access import ERROR_RESPONSES, Fly, InCharge, answer
-from server.api.uploads import display_name
+from server.door.uploads import display_name
 from server.flying.parameter_desk import FileFormat
 from server.schemas import ComparedDoc, ParametersDoc, WriteParametersBody, WrittenAnswer
 

@@ -9,7 +9,7 @@ from fastapi.responses import Response
 
 from planning.report.exports import FileName
 from server.api.access import DONE, ERROR_RESPONSES, Work, answer, parts_of
-from server.api.uploads import display_name, stream_to_disk, suffix_of
+from server.door.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import Imported, OpenPlan, PlanEdit, PlanState, SavePlanAs, Snapshot
 
 router = APIRouter(prefix="/api", tags=["plan"], responses=ERROR_RESPONSES)

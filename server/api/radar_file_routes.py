@@ -13,7 +13,7 @@ from pydantic import RootModel
 
 from server.api.access import DONE, ERROR_RESPONSES, answer, parts_of
 from server.api.terrain_routes import RAW_BODY, FileName
-from server.api.uploads import display_name, stream_to_disk
+from server.door.uploads import display_name, stream_to_disk
 from server.errors import BadRequestError, TooLargeError
 from server.library.radar_files import ending_of
 from server.schemas import (

@@ -10,7 +10,7 @@ from pydantic import RootModel
 
 from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
-from server.api.uploads import display_name, stream_to_disk
+from server.door.uploads import display_name, stream_to_disk
 from server.library.recording_list import suffix_of_recording
 from server.schemas import OpenReview, PlayReview, RecordingDoc
 

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Work, answer, parts_of
-from server.api.uploads import display_folder, display_name, stream_to_disk, suffix_of
+from server.door.uploads import display_folder, display_name, stream_to_disk, suffix_of
 from server.errors import BadRequestError
 from server.library.terrain_picture import terrain_picture_png
 from server.library.terrains import Origin

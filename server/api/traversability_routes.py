@@ -13,7 +13,7 @@ from pydantic import Field
 
 from server.api.access import DONE, ERROR_RESPONSES, All, Work, answer, parts_of
 from server.api.terrain_routes import RAW_BODY
-from server.api.uploads import display_name, stream_to_disk, suffix_of
+from server.door.uploads import display_name, stream_to_disk, suffix_of
 from server.schemas import JobDoc, LandingSitesBody, LayerName, TraversabilityBody, TraversabilityState, UwbRule
 
 

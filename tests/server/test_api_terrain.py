@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from planning.ground.demo_hillside import small_hill
-from server.api.uploads import display_folder, display_name, suffix_of
+from server.door.uploads import display_folder, display_name, suffix_of
 from server.library.terrains import Origin, store_terrain
 from tests.server.running import Running
 

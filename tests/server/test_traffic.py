@@ -15,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 
 from server.door.page import key_of
-from server.flying.airspace import Airspace
+from server.flying.apart.airspace import Airspace
 from server.heard.present import Present
 from server.obstacles.alert_list import UNHEARD_S, LatchedAlerts
 from server.obstacles.traffic import DEAD_S, FILE, TrafficDesk, TrafficWatch, read_settings

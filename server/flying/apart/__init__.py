@@ -1,1 +1,1 @@
-"""Several vehicles held apart: in the air, and before a start."""
+"""Vehicles held apart, in the air and before a start; other aircraft drawn around them."""
