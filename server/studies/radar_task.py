@@ -23,13 +23,11 @@ from server.errors import BadRequestError
 from server.library.radar_files import RadarPaths
 from server.schemas import RadarFileDoc, RadarFrame, RadarOpened, RadarReading, RadarTracksBody, RadarTracksDoc
 from server.schemas.study_docs import RadarDetectionDoc, RadarMap, RadarParametersDoc
-from server.studies.oda_tracks import TracksWanted, tracks_against_truth
 from server.studies.radar_facts import detection_rows, parameters
 from server.studies.scenario_task import part_doc
 from server.work.jobs import Progress
 from telemetry.sensors.adc.adc_file import AnyFrame
 from telemetry.sensors.adc.read_adc import HowRead, Reading, read_adc
-from telemetry.simulation.scenarios.arena.truth_figures import truth_part
 
 SHOWN_DB = 60.0
 """Below the strongest cell of a map."""
@@ -84,6 +82,10 @@ def process_frame(stored: Stored, how: RadarReading, number: int, *, report: Pro
 
 def follow_poles(stored: Stored, asked: RadarTracksBody, *, report: Progress) -> RadarTracksDoc:
     """Its tracks against what motion capture saw. Raises RadarDataError in the operator's own file names."""
+    # Loaded only now: the simulated radar with its kernels comes along, which frames alone do not need.
+    from server.studies.oda_tracks import TracksWanted, tracks_against_truth
+    from telemetry.simulation.scenarios.arena.truth_figures import truth_part
+
     paths, doc = stored.paths, stored.doc
     assert paths.capture is not None
     poles = tuple((pole.x_m, pole.z_m) for pole in asked.poles)

@@ -130,7 +130,7 @@ export function RadarCentre() {
         <p>Range-Doppler maps and detections of raw radar samples appear here, frame by frame.</p>
         <p>
           Choose a file on the left, or drop one: a complex .npy, a DCA1000 .bin, or the ODA data set's
-          radar.csv.
+          radar.csv with its optitrack.csv.
         </p>
       </div>
     );
