@@ -71,7 +71,7 @@ def test_the_demos_aircraft_is_listed_and_what_is_warned_of_is_set(overflown: St
     expect(page.get_by_test_id("section-traffic")).to_contain_text("Set.")
     page.get_by_test_id("traffic-own_icao").fill("nobody")
     page.get_by_test_id("traffic-own_icao").press("Enter")
-    expect(page.get_by_test_id("section-traffic")).to_contain_text("own_icao")
+    expect(page.get_by_test_id("section-traffic")).to_contain_text("six hexadecimal digits")
     page.reload()
     expect(page.get_by_test_id("traffic-warn_distance_m")).to_have_value("1500", timeout=LONG_MS)
 

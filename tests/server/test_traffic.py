@@ -220,6 +220,7 @@ def test_the_demos_aircraft_reaches_the_page_by_the_settings_that_were_given(tmp
             assert again.settings.warn_distance_m == 800.0
             refused = page.http.put("/api/traffic/settings", json={"own_icao": "nobody"})
             assert refused.status_code == 422
+            assert "six hexadecimal digits" in refused.json()["what"]
     finally:
         for facts in running_nodes(tmp_path / "run"):
             os.kill(facts.pid, signal.SIGKILL)
