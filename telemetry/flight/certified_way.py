@@ -128,7 +128,9 @@ def way_request(
         for lat_deg, lon_deg, up_m in way.places[1:]
     )
     if isinstance(wish, TakeOff):
-        return StartGuided(operator, targets, way.places[-1][2], end="hold")
+        lat_deg, lon_deg, _ = way.places[0]
+        up_m = way.places[-1][2]
+        return StartGuided(operator, targets, up_m, end="hold", begins_lat_deg=lat_deg, begins_lon_deg=lon_deg)
     return FlyWay(operator, targets, *way.places[0], most_m_s, end="land" if isinstance(wish, RETURNS) else "hold")
 
 

@@ -173,7 +173,7 @@ class Pilot:
         """From where the vehicle hovers. What was under way ends; a mission that was paused is not gone on with."""
         if not request.targets or any(not 0.0 < target.speed_m_s <= request.most_m_s for target in request.targets):
             raise NotAllowedError("The way has no targets, or is faster than certified.", advice="Ask for it again.")
-        if (refusal := why_not_from(request, self.vehicle.state)) is not None:
+        if (refusal := why_not_from(request, self.vehicle.state, time.monotonic())) is not None:
             raise refusal  # before anything ends that may hold the vehicle now
         self._end_current()
         self._started_digest = None

@@ -187,12 +187,18 @@ class StartAuto(OperatorRequest):
 
 @dataclass(frozen=True, slots=True)
 class StartGuided(OperatorRequest):
-    """Takes off, hands over the targets one at a time, then returns home (Melita 2020) or holds there. -> None"""
+    """Takes off, hands over the targets one at a time, then returns home (Melita 2020) or holds there. -> None
+
+    ``begins_lat_deg`` and ``begins_lon_deg``: where a certified take-off begins; it is refused where the vehicle stands
+    elsewhere. None: a check has looked at where it stands.
+    """
 
     targets: tuple[GuidedTarget, ...]
     takeoff_alt_rel_home_m: float
     waypoint_radius_m: float = 0.5
     end: Literal["rtl", "land", "hold"] = "rtl"
+    begins_lat_deg: float | None = None
+    begins_lon_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from telemetry.mavlink.orders import FORCE, Orders
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.requests import FlyWay, Operator
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.guided_requests import target
+from tests.telemetry.guided_requests import request, target
 from tests.telemetry.guided_vehicle import GUIDED, HOME, LOITER, PX4_HOLD, Craft
 from tests.telemetry.lossy import VEHICLE, Faults, Run
 from tests.telemetry.test_guided import Watching, handed_over
@@ -143,14 +143,28 @@ def test_somebody_else_ends_it_by_another_mode() -> None:
         ({"lat_deg": HOME[0] + 2e-5}, "2.2 m from where"),
         ({"alt_rel_home_m": 8.0}, "2.0 m from where"),
         ({"lat_deg": None}, "not known to be where"),
+        ({"position_t_mono_s": -2.5}, "not known to be where"),
+        ({"position_t_mono_s": None}, "not known to be where"),
     ],
 )
 def test_it_does_not_begin_where_it_was_not_certified(state: dict[str, Any], words: str) -> None:
-    refusal = why_not_from(way(), in_air(**state))
+    refusal = why_not_from(way(), in_air(**state), 0.0)
     assert isinstance(refusal, NotAllowedError)
     assert words in str(refusal)
     assert refusal.advice
-    assert why_not_from(way(), in_air()) is None
+    assert why_not_from(way(), in_air(), 0.0) is None
+
+
+def test_a_certified_take_off_does_not_begin_where_the_vehicle_was_carried_to() -> None:
+    """Up there it would fly straight to over where it was judged, through whatever stands between."""
+    up = replace(request((target(0, 0, 10.0),), end="hold"), begins_lat_deg=HOME[0], begins_lon_deg=HOME[1])
+    stands = in_air(armed=False, landed="on_ground", alt_rel_home_m=0.4)
+    assert why_not_from(up, stands, 0.0) is None
+    for elsewhere in ({"lat_deg": HOME[0] + 2e-5}, {"lat_deg": None}, {"position_t_mono_s": -30.0}):
+        refusal = why_not_from(up, replace(stands, **elsewhere), 0.0)
+        assert isinstance(refusal, NotAllowedError)
+        assert "where the certified way begins" in str(refusal)
+    assert why_not_from(request(), replace(stands, lat_deg=HOME[0] + 2e-5), 0.0) is None
 
 
 def test_a_mode_that_is_refused_ends_it_with_the_reason_before_it_sets_out() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from telemetry.errors import NotAllowedError
-from telemetry.flight.guided.handover import away_m
+from telemetry.flight.guided.handover import away_m, is_fresh
 from telemetry.flight.guided.orders import Place
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.requests import FlyWay, StartGuided
@@ -24,19 +24,31 @@ def why_moves(state: VehicleState) -> NotAllowedError | None:
     return NotAllowedError(what, advice="Hold, then ask for the way again.")
 
 
-def why_not_from(request: StartGuided | FlyWay, state: VehicleState) -> NotAllowedError | None:
+def why_not_from(request: StartGuided | FlyWay, state: VehicleState, now_s: float) -> NotAllowedError | None:
     """A mission's script begins on the ground; a certified way in the air, at rest, where it was certified."""
-    in_air = state.armed and state.landed == "in_air"
     if isinstance(request, StartGuided):
-        return (
-            NotAllowedError("The vehicle is already flying.", advice="Land it, then start again.") if in_air else None
-        )
+        return _why_not_up(request, state, now_s)
     if not (state.armed and is_in_the_air(state)):
         return NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
     if (refusal := why_moves(state)) is not None:
         return refusal
     begins = Place(request.begins_lat_deg, request.begins_lon_deg, request.begins_alt_rel_home_m, math.nan)
-    off_m = away_m(state, begins)
+    return _why_not_at(begins, state, now_s)
+
+
+def _why_not_up(request: StartGuided, state: VehicleState, now_s: float) -> NotAllowedError | None:
+    if state.armed and state.landed == "in_air":
+        return NotAllowedError("The vehicle is already flying.", advice="Land it, then start again.")
+    lat_deg, lon_deg = request.begins_lat_deg, request.begins_lon_deg
+    if lat_deg is None or lon_deg is None:
+        return None
+    # It stands: its height is that of home, whatever it tells before it arms.
+    up_m = math.nan if state.alt_rel_home_m is None else state.alt_rel_home_m
+    return _why_not_at(Place(lat_deg, lon_deg, up_m, math.nan), state, now_s)
+
+
+def _why_not_at(begins: Place, state: VehicleState, now_s: float) -> NotAllowedError | None:
+    off_m = away_m(state, begins) if is_fresh(state, now_s) else math.inf
     if not off_m <= BEGINS_M:
         where = f"{off_m:.1f} m from" if math.isfinite(off_m) else "not known to be"
         what = f"The vehicle is {where} where the certified way begins."

@@ -128,7 +128,7 @@ class GuidedScript:
         self.phase, state = "arming", self._state
         if not self._targets:
             return self._fail(NotAllowedError("The script has no targets.", advice="Plan a mission first."))
-        refusal = why_not_from(self._request, state)
+        refusal = why_not_from(self._request, state, now_s)
         if refusal is not None:
             return self._fail(refusal)
         self._note_home(state)
