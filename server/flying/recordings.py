@@ -92,7 +92,10 @@ class Recording:
             self._shelf.changed.set()
 
     async def start(self) -> None:
-        await self._nodes.ask_recorder(StartRecording())
+        name = await self._nodes.ask_recorder(StartRecording())
+        # Its file is there before its status is: it is neither listed nor deleted meanwhile.
+        self._shelf.being_written[self._vehicle] = self._folder / str(name)
+        self._shelf.changed.set()
 
     async def stop(self) -> None:
         await self._nodes.ask_recorder(StopRecording())
