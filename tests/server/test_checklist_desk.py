@@ -243,3 +243,22 @@ def test_while_the_lists_cannot_be_read_nothing_is_started(tmp_path: Path) -> No
     assert "nobody knows what a start demands" in desk.doc.fault
     with pytest.raises(StorageError, match="cannot be read"):
         desk.desk.check("mission")
+
+
+def test_each_vehicle_of_a_station_is_ticked_for_itself_by_the_one_list(tmp_path: Path) -> None:
+    (tmp_path / "2").mkdir()
+    first, second = Desk(tmp_path), Desk(tmp_path / "2")
+    second.lists = first.lists
+    me: Any = second
+    second.desk = ChecklistDesk(me, first.lists, second.aboard, me)
+    first.write(LIST)
+    first.tick_all()
+    assert first.ticked_by == ["Anna", "Anna", "Anna"]
+    assert second.ticked_by == ["", "", ""]
+    with pytest.raises(CheckNeededError, match="3 of 3"):
+        second.desk.check("mission")
+    second.tick_all()
+    first.write(LIST + "Wind\n")
+    for desk in (first, second):
+        assert "The list was changed" in desk.doc.why_again
+        assert set(desk.ticked_by) == {""}
