@@ -12,6 +12,7 @@ from server.door.hub import Hub
 from server.door.lease import Lease
 from server.door.operators import Operators
 from server.errors import NotFoundError, NotReadyError, StaleRevisionError
+from server.flying.checklists import Checklists
 from server.heard.agents import Agents
 from server.library import Library
 from server.schemas import (
@@ -231,7 +232,7 @@ class FakeFleet:
     def __init__(self, library: Library, hub: Hub) -> None:
         self.first = FakeFlying(library, hub)
         self.flights = [self.first]
-        self.uwb = self.first.uwb
+        self.uwb, self.checklists = self.first.uwb, Checklists(library.root)
         self.recordings = self.reviewing = self.first.recording
 
     @property
