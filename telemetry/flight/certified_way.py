@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 
 from mapping.geometry.frames import apart_m
-from planning.certificate.model import ClearanceParams
+from planning.certificate.model import ClearanceParams, Reason
 from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.guided.model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
-from planning.model import VehicleProfile
+from planning.model import Firmware, VehicleProfile
 from planning.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.targets import bearing_rad
-from telemetry.flight.preflight.checks import accuracy_m, gnss_row
+from telemetry.flight.preflight.checks import STEEP_ENOUGH, accuracy_m, gnss_row
 from telemetry.flight.preflight.parameters import return_settings
 from telemetry.flight.preflight.preflight import actual_home
 from telemetry.mavlink.believing import is_in_the_air
@@ -99,7 +99,30 @@ def judged_way(
         fence=flown.fence,
         rally=flown.rally,
     )
-    return guided_way(fill_holes(ground if seen is None else seen)[0], ground, here, wish, demand)
+    way = guided_way(fill_holes(ground if seen is None else seen)[0], ground, here, wish, demand)
+    return way if isinstance(wish, RETURNS) else _own_return_known(way, state, flown)
+
+
+def _own_return_known(way: GuidedWay, state: VehicleState, flown: Flown) -> GuidedWay:
+    """Its own return is judged by how the vehicle says that it returns: without that, it is not certified.
+
+    As in the check before the start, the pilot may accept it.
+    """
+    settings = return_settings(flown.parameters, _firmware(state))
+    if settings.height_m is None:
+        what = f"The vehicle does not tell its return height ({settings.parameter}): its own return is not certified."
+        reason = Reason("return_unknown", what, "Ask again, or make sure that it is high enough.")
+    elif not settings.steep_enough:
+        what = "Close to home the vehicle climbs less on its return than the certificate takes for granted."
+        reason = Reason("return_near_home", what, STEEP_ENOUGH)
+    else:
+        return way
+    certificate = replace(way.certificate, certified=False, reasons=(*way.certificate.reasons, reason))
+    return replace(way, certificate=certificate, problem=way.problem or "return")
+
+
+def _firmware(state: VehicleState) -> Firmware:
+    return "px4" if state.autopilot == "px4" else "ardupilot"
 
 
 def _demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
@@ -107,8 +130,8 @@ def _demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
     row = gnss_row(state, flown.profile)
     if row.state in ("bad", "unknown"):
         raise NotAllowedError(row.text, advice=row.mend)
-    clearance, firmware = flown.clearance, "px4" if state.autopilot == "px4" else "ardupilot"
-    height_m = return_settings(flown.parameters, firmware).height_m
+    clearance = flown.clearance
+    height_m = return_settings(flown.parameters, _firmware(state)).height_m
     worse_m = max(0.0, max(accuracy_m(state)[:2]) - clearance.position_error_m)
     return replace(
         clearance,

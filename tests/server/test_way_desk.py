@@ -157,10 +157,11 @@ def test_the_plans_own_ceiling_holds_although_no_vehicle_keeps_it(
 ) -> None:
     async def scenario() -> None:
         bench = Bench(made, lane)
-        ceiling = FenceDoc(ceiling_rel_home_m=40.0)
+        ceiling = FenceDoc(ceiling_rel_home_m=100.0)
         bench.document = bench.document.model_copy(update={"fence": ceiling})
         assert (await bench.judged(action="height", height_m=20.0)).problem is None
-        way = await bench.judged(action="height", height_m=60.0)
+        bench.hovers(made.standing(), 30.0)
+        way = await bench.judged(action="height", height_m=120.0)
         assert way.problem == "way"
         assert "ceiling" in way.reasons[0].text
 

@@ -23,6 +23,7 @@ AWAY_M = 3.0
 """A vehicle this far from the planned home is said to stand elsewhere."""
 LARGEST_AMSL_OFFSET_M = 0.3
 WORTH_A_WORD_M = 0.05
+STEEP_ENOUGH = "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45, RTL_MIN_DIST to 10)."
 RETURN_REASONS = ("return_height", "return_near_home", "return_unknown")
 TYPICAL_ACCURACY_M: dict[GnssFix, float] = {"3d": 2.5, "dgps": 1.0, "rtk_float": 0.5, "rtk_fixed": 0.1}
 """Of receivers that do not say how accurate they are."""
@@ -166,9 +167,7 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
         return Row("rtl_height", "accept", text, f"Make sure it is {rounded_up(needed_m)} m or more.")
     if not settings.steep_enough:
         text = "Close to home the vehicle climbs less on its return than the certificate takes for granted."
-        return Row(
-            "rtl_height", "accept", text, "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45, RTL_MIN_DIST to 10)."
-        )
+        return Row("rtl_height", "accept", text, STEEP_ENOUGH)
     need = (
         f"the ways home need {rounded_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
     )

@@ -1,0 +1,55 @@
+"""A guided way is judged with what the vehicle tells of itself; what it does not tell is not taken for granted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from planning.guided.model import GoTo, GuidedWay, Home, Wish
+from planning.model import ANY_VEHICLE
+from telemetry.flight.certified_way import Flown, judged_way
+from telemetry.topics.vehicle import VehicleState
+from tests.planning.test_guided_ways import CLEARANCE, HOME, at, flat, model
+
+DSM = model(flat())
+TOLD: dict[str, float | None] = {"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 3.0}
+
+
+def judged(wish: Wish, parameters: dict[str, float | None], **more: Any) -> GuidedWay:
+    (home_lat, home_lon), (lat, lon) = at(DSM, *HOME), at(DSM, 70.0, 60.0)
+    places: dict[str, Any] = {"lat_deg": lat, "lon_deg": lon, "home_lat_deg": home_lat, "home_lon_deg": home_lon}
+    heard: dict[str, Any] = {
+        "position_t_mono_s": 0.0,
+        "gnss_t_mono_s": 0.0,
+        "heartbeat_t_mono_s": 0.0,
+        "gnss_fix": "rtk_fixed",
+    }
+    flies: dict[str, Any] = {"autopilot": "ardupilot", "armed": True, "landed": "in_air", "alt_rel_home_m": 12.0}
+    state = VehicleState(1, 1, **(places | heard | flies | more))
+    flown = Flown(ANY_VEHICLE, CLEARANCE, parameters)
+    return judged_way(DSM, None, state, wish, flown, speed_m_s=1.0, now_s=0.0)
+
+
+def test_with_all_that_its_return_rests_on_it_may_be_flown() -> None:
+    assert judged(GoTo(9.0), TOLD).problem is None
+    px4: dict[str, float | None] = {"RTL_RETURN_ALT": 30.0, "RTL_CONE_ANG": 45.0, "RTL_MIN_DIST": 10.0}
+    assert judged(GoTo(9.0), px4, autopilot="px4").problem is None
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, "does not tell its return height (RTL_ALT)"),
+        ({"RTL_ALT": None}, "does not tell its return height (RTL_ALT)"),
+        (TOLD | {"RTL_CONE_SLOPE": 0.5}, "climbs less on its return"),
+    ],
+)
+def test_a_return_that_is_not_known_is_not_certified_but_may_be_accepted(
+    parameters: dict[str, float | None], words: str
+) -> None:
+    way = judged(GoTo(9.0), parameters)
+    assert way.problem == "return"
+    assert not way.certificate.certified
+    assert words in way.reasons[-1]
+    assert judged(Home(9.0), parameters).problem is None, "a certified way home does not need the vehicle's own"
