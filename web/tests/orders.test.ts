@@ -1,5 +1,6 @@
-import { beforeEach, describe, expect, it } from "vitest";
-import { accept, accepted } from "../src/vehicle/orders";
+import { beforeEach, describe, expect, it, vi } from "vitest";
+import { pending } from "../src/store/outcomes";
+import { accept, accepted, EMERGENCY, land, stopMotors } from "../src/vehicle/orders";
 import { fly } from "../src/store/flying";
 import type { CheckRow, PreflightDoc } from "../src/messages";
 import { flyState } from "./flight_samples";
@@ -37,5 +38,18 @@ describe("what the operator accepts", () => {
     expect([...accepted.value]).toEqual(["gnss"]);
     accept("others", true);
     expect([...accepted.value]).toEqual(["gnss", "others"]);
+  });
+});
+
+describe("an emergency stop", () => {
+  it("is held up by no order that is not answered", () => {
+    vi.stubGlobal("fetch", () => new Promise<Response>(() => undefined));
+    void land();
+    expect(pending.value.size).toBe(1);
+    expect(pending.value.has(EMERGENCY)).toBe(false);
+    void stopMotors();
+    expect(pending.value.has(EMERGENCY)).toBe(true);
+    expect(pending.value.size).toBe(2);
+    vi.unstubAllGlobals();
   });
 });
