@@ -200,7 +200,8 @@ def test_while_the_link_has_failed_nothing_is_offered_that_it_would_do(
     expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
     expect(connection).to_contain_text("Link failed")
     expect(connection).not_to_contain_text("%")
-    expect(connection.get_by_test_id("connection-row")).to_contain_text("not known now")
+    connection.get_by_role("button", name="Connection").click()
+    expect(connection.get_by_test_id("connection-row").first).to_contain_text("not known now")
     expect(connection.get_by_test_id("signing-state")).to_have_text("not known now")
     for command in ("next-upload", "arm", "hold-position", "return-home"):
         expect(page.get_by_test_id(command)).to_be_disabled()
