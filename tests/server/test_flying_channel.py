@@ -72,7 +72,7 @@ def test_health_is_told_once_a_second_when_it_changes_and_ends_with_the_vehicle(
                 changes = {"position_t_mono_s": bench.now_s, "battery_t_mono_s": bench.now_s, "battery_share": share}
                 bench.channel.on_state(replace(STATE, **changes))
         batteries = [next(row.value for row in message.rows if row.code == "battery") for message in heard()]
-        assert batteries == ["90%", "80%"]
+        assert batteries == ["90 %", "80 %"]
         bench.now_s += 30.0
         bench.channel.tick()
         assert any("Not heard for 30 s" in row.value for row in heard()[-1].rows)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError
+from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.messages import CommandRecord, FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
 from telemetry.topics.requests import (
@@ -155,9 +156,11 @@ def test_speeds_are_set_again_and_a_replaced_mission_is_not_resumed() -> None:
             await until(lambda: bench.flight.phase == "flying" and (bench.flight.target or 0) >= 3)
             await bench.handle(Pause(ME))
             await phase(bench, "paused")
-            assert simulator.vehicle.autopilot.speed_m_s is None
+            pilot = simulator.vehicle.autopilot
+            assert isinstance(pilot, Autopilot)
+            assert pilot.speed_m_s is None
             await bench.handle(Resume(ME))
-            await until(lambda: simulator.vehicle.autopilot.speed_m_s == 2.5)
+            await until(lambda: pilot.speed_m_s == 2.5)
             await bench.handle(Pause(ME))
             await phase(bench, "paused")
             assert bench.vehicle is not None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from telemetry.simulation.scenarios.stage.curves import Chart
-from telemetry.topics.obstacles import Sensor
+from telemetry.topics.obstacles import AlertSource
 from telemetry.topics.vehicle import RadarKind
 
 Report = Callable[[str, float | None], None]
@@ -91,7 +91,7 @@ class MapFigures:
 class AlertSeen:
     t_s: float
     """Since take-off was commanded."""
-    sensor: Sensor
+    sensor: AlertSource
     distance_m: float | None
 
 
