@@ -227,7 +227,7 @@ def test_a_click_beyond_the_limit_is_told(demo: Station) -> None:
     workspace = demo.server.app.state.parts.workspace
     demo.socket.send(SetSelection(selection=SelectionDoc(tool="add_poi"), change=1).model_dump_json())
     demo.until(lambda m: isinstance(m, SelectionMessage) and m.selection.tool == "add_poi")
-    demo.server.on_loop(workspace.pointing.on_terrain(poi.lat_deg, poi.lon_deg, known=True))
+    demo.server.on_loop(workspace.pointing.on_terrain(poi.lat_deg + 1e-5, poi.lon_deg, known=True))
     notice = demo.until(lambda m: isinstance(m, NoticeMessage))
     assert "5000" in notice.error.what
     assert len(demo.state.document.pois) == 5000
