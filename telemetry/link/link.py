@@ -35,6 +35,9 @@ from telemetry.topics.traffic import TrafficSettings
 TICK_S = 0.05
 
 
+_NOT_YET_AGAIN = "The link has restarted and has not heard the vehicle yet: nothing brakes by itself."
+
+
 @dataclass(frozen=True, slots=True)
 class Expected:
     """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
@@ -146,6 +149,14 @@ class Link:
         """What may be in the air is a vehicle that is lost, not none: it stays in sight, and whoever looks is told."""
         expected = self._waited_for
         return expected if expected is not None and expected.may_fly else None
+
+    @property
+    def _avoidance_expected(self) -> AvoidanceStatus:
+        """Without a vehicle: off, unless it was on for one that may be in the air and is not heard yet."""
+        lost = self._lost_from_sight
+        if lost is None or lost.avoid_by is None:
+            return AvoidanceStatus()
+        return AvoidanceStatus(enabled=True, state="lost", text=_NOT_YET_AGAIN, by=lost.avoid_by)
 
     @property
     def avoids_by(self) -> AvoidBy | None:
@@ -305,7 +316,7 @@ class Link:
         self._tell()
 
     def _tell_avoidance(self) -> None:
-        status = AvoidanceStatus() if self.session is None else self.session.pilot.avoidance.status
+        status = self._avoidance_expected if self.session is None else self.session.pilot.avoidance.status
         before, self._told_avoidance = self._told_avoidance, status
         if status == before:
             return

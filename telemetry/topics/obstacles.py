@@ -329,9 +329,10 @@ class AvoidanceStatus:
     state: Literal[
         "off", "blind", "lost", "watching", "holding", "climbing", "offset", "manoeuvre", "released", "ceiling"
     ] = "off"
-    """blind: it is on, but no sensor sees ahead; lost: the server's word while the link node does not answer; holding:
-    braked, because frames or poses are too old; ceiling: it may not climb any further and holds; offset: goes on in
-    GUIDED, higher than planned; released: the pilot has taken over, it stays off for this flight."""
+    """blind: it is on, but no sensor sees ahead; lost: the server's word while the link node does not answer, and a
+    restarted one's own until it hears its vehicle; holding: braked, because frames or poses are too old; ceiling: it
+    may not climb any further and holds; offset: goes on in GUIDED, higher than planned; released: the pilot has taken
+    over, it stays off for this flight."""
     text: str = ""
     height_offset_m: float = 0.0
     largest_speed_m_s: float | None = None

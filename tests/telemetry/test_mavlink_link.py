@@ -21,6 +21,7 @@ from telemetry.errors import (
     RefusedError,
 )
 from telemetry.topics.messages import Candidate, CommandRecord, LinkStatus
+from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.requests import (
     Adopt,
     Arm,
@@ -122,14 +123,20 @@ def test_a_vehicle_that_may_fly_is_lost_from_sight_until_the_restarted_link_hear
         address = f"udpin:127.0.0.1:{free_port()}"
         before = Candidate("old", address, "127.0.0.1:9", 1, 1, "ardupilot", 2)
         async with console() as bench:
-            bench.link.expect(before, may_fly=True, avoid_by=None)
+            bench.link.expect(before, may_fly=True, avoid_by="sidestep")
             await bench.handle(Connect(ME, address, True))
             await until(lambda: bench.status.state == "lost")
+            # Whoever reads that it is off believes that somebody switched it off.
+            await until(lambda: bench.of(AvoidanceStatus)[-1:] != [])
+            told = bench.of(AvoidanceStatus)[-1]
+            assert (told.enabled, told.state, told.by) == (True, "lost", "sidestep")
+            assert "nothing brakes by itself" in told.text
             assert bench.status.adopted == before
             with pytest.raises(NoVehicleError, match="not heard the vehicle again"):
                 await bench.handle(Arm(ME))
             bench.link.give_up_expected()
             await until(lambda: (bench.status.state, bench.status.adopted) == ("none", None))
+            await until(lambda: not bench.of(AvoidanceStatus)[-1].enabled)
             with pytest.raises(NoVehicleError, match="No vehicle"):
                 await bench.handle(Arm(ME))
 

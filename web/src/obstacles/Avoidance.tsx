@@ -118,7 +118,7 @@ function Switch({ isOn, by, ask }: { isOn: boolean; by: AvoidBy; ask: () => void
 
 function Speed() {
   const status = obstacles.live.value.avoidance;
-  if (status.largest_speed_m_s === null) return null;
+  if (status.largest_speed_m_s === null || failed.value === "server") return null;
   const tooFast = isTooFast(status, vehicle.value?.ground_speed_m_s ?? null);
   return (
     <span
