@@ -169,10 +169,12 @@ function whoIsInCharge(): string {
 /** The next step of the flight, at the bottom of the left panel. */
 export function NextAction() {
   const step = presentStep();
-  const cut = step.id === "take_control" ? null : whyUnheard.value;
-  const why = cut ?? ("why" in step && step.id !== "wait" ? step.why : "");
+  const unheard = whyUnheard.value;
+  // Control can be taken while nothing comes to the vehicle.
+  const cut = step.id === "take_control" ? null : unheard;
+  const why = unheard ?? ("why" in step && step.id !== "wait" ? step.why : "");
   const hint = flight.live.value?.hint ?? "";
-  const observer = step.id === "take_control" && lease.value.holder;
+  const observer = step.id === "take_control" && lease.value.holder && failed.value !== "server";
   return (
     <footer class="primary-action" data-testid="next-action" data-step={step.id}>
       <Outcome place={NEXT} />
@@ -180,7 +182,7 @@ export function NextAction() {
         <LastFlight />
       </Changes>
       <TransferBar />
-      {hint && cut === null && <p class="muted action-hint">{hint}</p>}
+      {hint && unheard === null && <p class="muted action-hint">{hint}</p>}
       {why && <p class="muted action-hint">{why}</p>}
       {observer && <p class="muted action-hint">{whoIsInCharge()}</p>}
       {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}
