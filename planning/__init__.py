@@ -27,13 +27,13 @@ from mapping import lazily
 from mapping.version import __version__
 
 if TYPE_CHECKING:
+    from planning.basics.plan_model import MissionParams, Poi, SurfaceParams
     from planning.certificate.clearance import certify
     from planning.certificate.model import Certificate, ClearanceParams
     from planning.errors import PlanningError
     from planning.formats.detect import read_flight
     from planning.missions.flown import flown_line
     from planning.missions.vehicle_profile import load_profile, path_params
-    from planning.model import MissionParams, Poi, SurfaceParams
     from planning.plan import Plan, plan_mission
     from planning.report.exports import FILES, export_file
     from planning.request import PlanRequest, survey_request

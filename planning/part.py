@@ -10,12 +10,12 @@ import numpy as np
 from affine import Affine
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import FlownLine, Mission
 from planning.certificate.clearance import certify
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.fence.model import RallyPoint
 from planning.formats.commands import has_position
 from planning.missions.flown import flown_line
-from planning.model import FlownLine, Mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import LARGE_PX, SCALE_TOLERANCE, Dsm, SurfaceModel
 from planning.terrain.holes import HoleReport, fill_holes

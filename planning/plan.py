@@ -12,6 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.basics.plan_model import (
+    FlownLine,
+    Home,
+    Mission,
+    MissionParams,
+    SampledPath,
+    Surfaces,
+    Timing,
+    VehicleProfile,
+)
 from planning.certificate.clearance import certify
 from planning.certificate.home_stand import DROP_M
 from planning.certificate.model import BetterHome, Certificate
@@ -24,7 +34,6 @@ from planning.missions.feasibility import Feasibility, feasibility_of, photos_ro
 from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
-from planning.model import FlownLine, Home, Mission, MissionParams, SampledPath, Surfaces, Timing, VehicleProfile
 from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
 from planning.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import MIN_SEGMENT_M, sampled_path

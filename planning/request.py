@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from planning import limits
+from planning.basics import limits
+from planning.basics.plan_model import MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
 from planning.certificate.model import ClearanceParams
 from planning.errors import ParameterError
 from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Way
 from planning.missions.vehicle_profile import path_params
 from planning.missions.vehicle_terms import budget_of
-from planning.model import MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
 from planning.route.camera import LOOKS_DOWN_DEG
 from planning.route.survey import SurveyPlan
 from planning.terrain.dsm import SurfaceModel

@@ -10,13 +10,13 @@ from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import Polyline
 from mapping.perceiving.ground import ground_grid
 from mapping.voxels.map import VoxelMap
+from planning.basics.plan_model import Poi, VehicleProfile
 from planning.evading.manoeuvres import Seen, around, over
 from planning.evading.seen import Columns, burn, conflicts
 from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
 from planning.ground.demo_hillside import small_hill
-from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.safe_surface.surface import block_max

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from hatch_build import moved_imports
+from planning.basics.plan_model import Poi
 from planning.ground.demo_hillside import small_hill
-from planning.model import Poi
 from planning.terrain.geotiff import write_dsm
 from server.settings import default_console_dir
 from telemetry.bus.node_lock import running_nodes

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from planning.basics.plan_model import finite_or_none
 from planning.certificate.model import Certificate
 from planning.margins.words import budget_json, tube_json
-from planning.model import finite_or_none
 
 WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")
 

@@ -20,6 +20,7 @@ from pyproj import Proj
 
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
+from planning.basics.plan_model import FlownLine
 from planning.certificate.as_json import certificate_json
 from planning.certificate.fenced import fence_reason, fence_verdict, rally_reasons
 from planning.certificate.heights import height_range
@@ -41,7 +42,6 @@ from planning.certificate.returns import NEAR_M, SLOPE
 from planning.certificate.unjudged import unjudged_reasons
 from planning.certificate.ways_home import distance_flown, near_return, places_along, return_height
 from planning.errors import MissionError, ParameterError
-from planning.model import FlownLine
 from planning.terrain.cells.cells import Layout
 from planning.terrain.dsm import SCALE_TOLERANCE, Dsm, SurfaceModel, true_cells
 

@@ -5,7 +5,7 @@ Whatever is in none of the tables is unknown and cannot be judged either.
 
 from __future__ import annotations
 
-from planning.mav_cmd import MavCmd
+from planning.basics.mav_cmd import MavCmd
 
 STRAIGHT = frozenset({MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_UNLIM, MavCmd.NAV_LOITER_TIME})
 """Fly straight to the place and pass or hold there: waypoint, loiter unlimited, loiter for a time."""

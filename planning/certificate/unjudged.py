@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from planning.basics.plan_model import FlownLine, Unjudged
 from planning.certificate.model import Reason
-from planning.model import FlownLine, Unjudged
 
 MOST_RANGES = 3
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import FlownLine
 from planning.certificate.model import ClearanceParams
 from planning.certificate.pyramid import MaxPyramid
 from planning.certificate.returns import return_altitude, return_altitudes
-from planning.model import FlownLine
 from planning.terrain.cells.cells import Layout
 
 RETURN_STEP_M = 0.5

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.mav_cmd import AMSL_FRAMES, HOME_FRAMES, MavCmd
+from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.errors import MissionError
 from planning.flight_time.corner_speeds import corner_leg_times
 from planning.flight_time.scurve import Axes, leg, overlap_s
-from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, MavCmd
-from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 
 VERTICAL_ACCEL_M_S2 = 1.0

@@ -11,12 +11,12 @@ from pyproj import CRS
 
 from mapping.geometry.arrays import F64, I64
 from mapping.geometry.polyline import along_m
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import FlownLine, Mission, VehicleProfile
 from planning.certificate.unjudged import unjudged_words
 from planning.errors import MissionError
 from planning.flight_time.predict import WAYPOINT_RADIUS_M, PredictedTime, predict_duration
-from planning.mav_cmd import MavCmd
 from planning.missions.flown import flown_line
-from planning.model import FlownLine, Mission, VehicleProfile
 from planning.terrain.dsm import Dsm
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Home, MissionItem
 from planning.formats.safe_text import clean_name
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Home, MissionItem
 from planning.terrain.vertical_datum import is_amsl
 
 POSITIONED = frozenset(

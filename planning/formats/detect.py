@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from planning.basics.plan_model import Mission
 from planning.errors import FormatError
 from planning.formats.kml_mission import read_kml_mission
 from planning.formats.qgc_plan import read_plan
 from planning.formats.safe_text import clean_name, decode_text
 from planning.formats.wpl import read_wpl
-from planning.model import Mission
 
 
 def read_mission(name: str, data: bytes) -> Mission:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from planning.basics.mav_cmd import FENCES, MavCmd
+from planning.basics.plan_model import Firmware
 from planning.errors import FormatError
 from planning.fence.model import Fence, RallyPoint
 from planning.formats.detect import is_kml
@@ -34,8 +36,6 @@ from planning.formats.kml_reader import read_placemarks
 from planning.formats.qgc_plan_reader import FIRMWARE_TYPE, QUADROTOR
 from planning.formats.safe_text import clean_name, decode_text, load_json, said_once
 from planning.formats.wpl import read_lists, write_lists
-from planning.mav_cmd import FENCES, MavCmd
-from planning.model import Firmware
 
 WRITTEN = (".plan", ".waypoints", ".txt", ".kml", ".geojson", ".json")
 

@@ -6,10 +6,10 @@ import json
 from typing import Any
 
 from mapping.version import __version__
+from planning.basics.plan_model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
 from planning.errors import FormatError
 from planning.formats.commands import has_position, home_altitude_note
 from planning.formats.safe_text import check_lat_lon, clean_name, finite
-from planning.model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
 from planning.terrain.dsm import Dsm
 
 Json = dict[str, Any]

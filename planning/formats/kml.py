@@ -10,11 +10,11 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
+from planning.basics.plan_model import Home, Mission, Poi, SampledPath
 from planning.errors import FormatError
 from planning.formats.commands import home_altitude_note
 from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.safe_text import clean_name, finite
-from planning.model import Home, Mission, Poi, SampledPath
 from planning.terrain.dsm import Dsm
 from planning.terrain.vertical_datum import is_amsl
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element
 
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import FormatError
 from planning.formats.commands import home_or_first_place
 from planning.formats.kml import read_kml_track
 from planning.formats.kml_reader import first, read_placemarks, read_xml, tag, text_of
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, finite
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Home, Mission, MissionItem
 
 NO_PARAMS = (0.0, 0.0, 0.0, 0.0)
 WAYLINES = ".wpml"

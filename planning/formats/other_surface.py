@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 
+from planning.basics.plan_model import Mission
 from planning.formats.safe_text import clean_name
-from planning.model import Mission
 from planning.terrain.dsm import SurfaceModel
 
 _DIGEST = re.compile(r"[0-9a-f]{64}")

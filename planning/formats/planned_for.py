@@ -6,11 +6,11 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from planning.basics.plan_model import PlannedFor
 from planning.errors import FormatError, PlanningError
 from planning.formats.safe_text import finite, load_json
 from planning.margins.following_error import WAY_NAMES
 from planning.missions.vehicle_profile import check_profile, profile_from_table
-from planning.model import PlannedFor
 
 _KEYS = ("profile", "way", "required_clearance_m", "max_height_above_ground_m")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 
+from planning.basics.plan_model import Poi
 from planning.errors import FormatError
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
-from planning.model import Poi
 
 COLUMNS = ("lat_deg", "lon_deg", "name", "loiter_s")
 ALIASES = {

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Mission, MissionItem, Poi
 from planning.errors import FormatError
 from planning.formats import geojson
 from planning.formats.commands import FLOWN_TO, has_position
@@ -15,8 +17,6 @@ from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.poi_csv import read_pois_csv
 from planning.formats.safe_text import check_count, clean_name, decode_text, load_json, said_once
 from planning.formats.swapped import looks_swapped
-from planning.mav_cmd import MavCmd
-from planning.model import Mission, MissionItem, Poi
 from planning.terrain.dsm import SurfaceModel
 
 __all__ = ["PoiFile", "Polygon", "looks_swapped", "read_pois", "warn_swapped"]

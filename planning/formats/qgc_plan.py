@@ -6,13 +6,13 @@ import json
 import math
 
 from mapping.version import __version__
+from planning.basics.mav_cmd import MavFrame
+from planning.basics.plan_model import Mission, MissionItem, Poi, finite_or_none
 from planning.formats.commands import POSITIONED, home_altitude_note, millimetres_up, plain_frame
 from planning.formats.fence_plan import fence_json, heights_json, rally_json
 from planning.formats.planned_for import planned_for_json
 from planning.formats.qgc_plan_reader import ALTITUDE_MODE, DEFAULT_SPEED_M_S, FIRMWARE_TYPE, QUADROTOR, read_plan
 from planning.formats.safe_text import clean_name
-from planning.mav_cmd import MavFrame
-from planning.model import Mission, MissionItem, Poi, finite_or_none
 
 __all__ = ["read_plan", "write_plan"]
 

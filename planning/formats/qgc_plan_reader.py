@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from planning.basics.mav_cmd import MavFrame
+from planning.basics.plan_model import Firmware, Home, Mission, MissionItem, Poi
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
 from planning.formats.fence_plan import read_fence_json, read_rally_json
@@ -12,8 +14,6 @@ from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
 from planning.formats.swapped import swapped_against_home
-from planning.mav_cmd import MavFrame
-from planning.model import Firmware, Home, Mission, MissionItem, Poi
 
 Json = dict[str, Any]
 

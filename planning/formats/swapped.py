@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from planning.basics.plan_model import Home, MissionItem
 from planning.formats.commands import has_position
-from planning.model import Home, MissionItem
 from planning.terrain.dsm import SurfaceModel
 
 NEAR_DEG = 0.5

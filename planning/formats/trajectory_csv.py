@@ -10,9 +10,9 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
+from planning.basics.plan_model import Home, SampledPath, Timing
 from planning.errors import FormatError
 from planning.formats.safe_text import check_lat_lon, clean_name, decode_text, finite
-from planning.model import Home, SampledPath, Timing
 from planning.terrain.vertical_datum import is_amsl
 
 if TYPE_CHECKING:

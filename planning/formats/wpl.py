@@ -7,14 +7,14 @@ import re
 from collections.abc import Iterable, Iterator
 
 from mapping.version import __version__
+from planning.basics.mav_cmd import FENCES, MavCmd, MavFrame
+from planning.basics.plan_model import Home, Mission, MissionItem, PlannedFor
 from planning.errors import FormatError
 from planning.formats.commands import POSITIONED, home_altitude_note, home_or_first_place, millimetres_up, plain_frame
 from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import planned_for_line, read_planned_for
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
 from planning.formats.swapped import swapped_against_home
-from planning.mav_cmd import FENCES, MavCmd, MavFrame
-from planning.model import Home, Mission, MissionItem, PlannedFor
 
 HEADER = "QGC WPL 110"
 _NOTE = re.compile(r"#\s*([a-z_]+):\s*(.*)")

@@ -13,7 +13,7 @@ from pyproj import CRS, Transformer
 from scipy import ndimage
 
 from mapping.geometry.arrays import F64
-from planning.model import Poi
+from planning.basics.plan_model import Poi
 from planning.terrain.dsm import Dsm
 
 _HILL_PX = 120

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import FlownLine
 from planning.certificate.clearance import certify
 from planning.certificate.model import Certificate
 from planning.certificate.nearest import nearest_distances
@@ -41,7 +42,6 @@ from planning.guided.model import (
     Wish,
 )
 from planning.guided.shapes import circle, simplified
-from planning.model import FlownLine
 from planning.terrain.dsm import Dsm, SurfaceModel, true_cells
 
 LIFTS_M = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0)

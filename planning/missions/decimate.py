@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.arrays import F64, I64
+from planning.basics.plan_model import SampledPath
 from planning.errors import CapacityError, ParameterError
 from planning.missions.band import HEIGHT_UNIT_M, SLACK, Bends, Corridor, bends, corridor
-from planning.model import SampledPath
 
 WAYPOINT_COST = 1 << 16
 """One waypoint outweighs any sum of height levels, which only break ties downwards."""

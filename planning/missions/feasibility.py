@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from planning.mav_cmd import MavCmd
-from planning.model import Mission, VehicleProfile
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Mission, VehicleProfile
 
 RowState = Literal["holds", "fails", "unknown"]
 

@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.mav_cmd import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES, MavCmd
+from planning.basics.plan_model import FlownLine, Mission, MissionItem, Unjudged
 from planning.certificate.commands import BENT, OTHER_UNJUDGED, STRAIGHT, TAKEOFFS, UNKNOWN, stays
 from planning.errors import MissionError
-from planning.mav_cmd import AMSL_FRAMES, HOME_FRAMES, TERRAIN_FRAMES, MavCmd
-from planning.model import FlownLine, Mission, MissionItem, Unjudged
 from planning.terrain.dsm import Dsm
 from planning.terrain.vertical_datum import is_amsl
 

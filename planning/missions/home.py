@@ -7,13 +7,13 @@ import math
 import numpy as np
 from pyproj import Geod
 
+from planning.basics.mav_cmd import MavFrame
+from planning.basics.plan_model import Home, MissionParams, SampledPath
 from planning.certificate.home_stand import better_home, ground_at
 from planning.certificate.model import BetterHome, ClearanceParams
 from planning.certificate.reasons import direction
 from planning.errors import DatumError, MissionError, PoiError
-from planning.mav_cmd import MavFrame
 from planning.missions.mission_items import Heights
-from planning.model import Home, MissionParams, SampledPath
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.vertical_datum import is_amsl
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
 from planning.errors import CapacityError
 from planning.flight_time.predict import predict_duration
-from planning.mav_cmd import MavCmd
 from planning.missions.decimate import Decimated, decimate_to_fit
 from planning.missions.home import check_start, item_heights
 from planning.missions.mission_items import (
@@ -30,7 +31,6 @@ from planning.missions.mission_items import (
     waypoint,
 )
 from planning.missions.vehicle_profile import path_params
-from planning.model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
 from planning.route.slopes import slope_limits
 from planning.terrain.dsm import Dsm
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Firmware, Home, MissionItem, MissionParams
 from planning.errors import MissionError, ParameterError
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Firmware, Home, MissionItem, MissionParams
 from planning.terrain.dsm import Dsm
 
 GROUND_SPEED = 1.0

@@ -10,9 +10,9 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from planning import limits
+from planning.basics import limits
+from planning.basics.plan_model import Camera, PathParams, VehicleProfile
 from planning.errors import FormatError, ParameterError
-from planning.model import Camera, PathParams, VehicleProfile
 
 SHIPPED = Path(__file__).parent / "profiles"
 DEFAULT_PROFILE = "generic-quad"

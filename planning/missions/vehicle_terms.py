@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from planning.basics.plan_model import VehicleProfile
 from planning.margins.budget import ClearanceBudget, Term
 from planning.margins.downwash import felt_below_m, induced_speed_m_s
 from planning.margins.following_error import Way, following_error_m, following_source
-from planning.model import VehicleProfile
 
 BOUND_RMS = 3.0
 """An accuracy is told as RMS of the check points; three times that bounds 99.7 % of normally distributed errors."""

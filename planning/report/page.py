@@ -13,13 +13,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from mapping.version import __version__
+from planning.basics.plan_model import FlownLine, Mission, SampledPath, SurfaceParams, Timing, VehicleProfile
 from planning.certificate.model import Certificate, LegClearance
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
 from planning.margins.budget import SUM_RULE
 from planning.margins.words import is_by_hand, tube_words
 from planning.missions.feasibility import Feasibility, verdict_words
-from planning.model import FlownLine, Mission, SampledPath, SurfaceParams, Timing, VehicleProfile
 from planning.report.figures.curves import altitude_profile, clearance_trend, speed_chart, time_chart
 from planning.report.figures.plan_view import plan_view
 from planning.report.words import COMMAND_NAMES, assumption_rows, duration, metres, metres_up

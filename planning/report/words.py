@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from planning.basics.mav_cmd import MavCmd
 from planning.formats.safe_text import clean_name
-from planning.mav_cmd import MavCmd
 
 COMMAND_NAMES: dict[int, str] = {
     MavCmd.NAV_WAYPOINT: "waypoint",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from planning.basics.plan_model import Camera
 from planning.errors import ParameterError
-from planning.model import Camera
 
 LOOKS_DOWN_DEG = -90.0
 """Gimbal pitch of a survey's camera."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import PathParams
 from planning.errors import ParameterError
-from planning.model import PathParams
 
 
 @dataclass(frozen=True, slots=True)

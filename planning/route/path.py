@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mapping.geometry.arrays import F64, I64
+from planning.basics.plan_model import PathParams, SampledPath
 from planning.errors import ParameterError, PoiError
-from planning.model import PathParams, SampledPath
 from planning.route.slopes import limited_heights
 from planning.terrain.dsm import Dsm
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.limits import LONGEST_LOITER_S
+from planning.basics.plan_model import Poi
 from planning.errors import PoiError
-from planning.limits import LONGEST_LOITER_S
-from planning.model import Poi
 from planning.terrain.dsm import Dsm, SurfaceModel
 
 MIN_APART_M = 0.1

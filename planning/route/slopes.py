@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import PathParams
 from planning.errors import ParameterError
-from planning.model import PathParams
 
 
 def slope_limits(params: PathParams) -> tuple[float, float]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.polygons import area_m2, crossing_edges, extents
+from planning.basics.plan_model import Camera, Poi
 from planning.errors import ParameterError, PoiError
-from planning.model import Camera, Poi
 from planning.route.camera import footprint_m, height_from_gsd_m
 from planning.route.camera import gsd_cm as gsd_at_height_cm
 from planning.terrain.dsm import SurfaceModel

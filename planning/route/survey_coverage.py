@@ -10,7 +10,7 @@ import numpy as np
 from skimage.draw import polygon2mask
 
 from mapping.geometry.arrays import F32, F64, I64
-from planning.model import Camera, FlownLine, MissionParams
+from planning.basics.plan_model import Camera, FlownLine, MissionParams
 from planning.route.camera import LOOKS_DOWN_DEG, footprint_m
 from planning.route.survey import SurveyPlan
 from planning.terrain.dsm import Dsm

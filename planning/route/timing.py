@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import PathParams, SampledPath, Timing
 from planning.errors import ParameterError
-from planning.model import PathParams, SampledPath, Timing
 from planning.route.lspb import lspb
 from planning.route.slopes import speed_caps
 

@@ -11,8 +11,8 @@ from affine import Affine
 from numba import njit, prange
 
 from mapping.geometry.arrays import F32, F64
+from planning.basics.plan_model import SurfaceParams, Surfaces
 from planning.errors import ParameterError
-from planning.model import SurfaceParams, Surfaces
 from planning.safe_surface.element import ball, coarsest_block, finest_block, rounding_lift_m
 from planning.safe_surface.kernel import dilate_grid
 from planning.safe_surface.smooth import gaussian_grid, reach_px

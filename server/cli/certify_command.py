@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from planning import limits
+from planning.basics import limits
+from planning.basics.plan_model import Mission, VehicleProfile
 from planning.certificate.clearance import certificate_json
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration
@@ -19,7 +20,6 @@ from planning.formats.other_surface import other_surface
 from planning.formats.poi_files import warn_swapped
 from planning.margins.words import uncovered_words
 from planning.missions.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
-from planning.model import Mission, VehicleProfile
 from planning.part import certify_part
 from planning.plan import CERTIFICATE_STEP
 from planning.report.summary import certificate_summary, dsm_summary

@@ -10,12 +10,12 @@ from typing import Annotated, Any, Literal
 import typer
 from typer import Argument
 
+from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError, ParameterError
 from planning.fence.model import Fence, RallyPoint, fence_words
 from planning.formats.fence_files import read_fence, write_fence
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from planning.formats.safe_text import clean_name
-from planning.model import Firmware, MissionItem
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, read_small, write_files

@@ -10,11 +10,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from typer import Argument, Option
 
+from planning.basics.limits import LONGEST_LOITER_S
+from planning.basics.plan_model import Poi
 from planning.errors import ParameterError, PoiError
 from planning.formats.poi_files import read_pois, warn_swapped
 from planning.formats.safe_text import clean_name
-from planning.limits import LONGEST_LOITER_S
-from planning.model import Poi
 from planning.request import PlanRequest
 from planning.route.poi import check_pois
 from planning.route.visiting_order import shortest_order

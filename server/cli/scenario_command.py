@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from planning.basics.limits import LARGEST_SEED
 from planning.errors import ParameterError
-from planning.limits import LARGEST_SEED
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, check_new

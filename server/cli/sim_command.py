@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from planning.limits import LARGEST_SEED
+from planning.basics.limits import LARGEST_SEED
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import say

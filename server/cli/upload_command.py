@@ -7,8 +7,8 @@ from pathlib import Path
 
 import typer
 
+from planning.basics.plan_model import Mission
 from planning.formats.detect import read_mission
-from planning.model import Mission
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.fence_given import fence_stays

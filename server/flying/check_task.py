@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapping.perceiving.braking import Braking
+from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.margins.words import rounded_down, rounded_up
 from planning.missions.vehicle_profile import parse_profile
-from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from server.library.documents import clearance_of, demands_from_doc, places_of, seen_in

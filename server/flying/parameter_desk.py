@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from planning.basics.plan_model import Firmware
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
-from planning.model import Firmware
 from server.errors import ConflictError, NotReadyError
 from server.flying.descriptions import keep_descriptions, kept_descriptions
 from server.heard.channel import Channel

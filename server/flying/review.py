@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from planning.basics.plan_model import Mission
 from planning.following.below import below_required
 from planning.following.figures import Judged, judge
 from planning.formats.other_surface import other_surface
-from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from server.flying.review_curves import (
     curves,

@@ -13,13 +13,13 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import apart_m
+from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.errors import PlanningError
 from planning.following.reference import Reference, level_model, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, parse_profile
-from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 from telemetry.flight.guided.remaining_mission import RETURNS
 from telemetry.recording.flight_log import FlightLog

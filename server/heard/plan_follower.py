@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import VehicleProfile, finite_or_none
 from planning.following.below import Demanded
 from planning.following.lag import planned_s
 from planning.following.live import Following, follow_on
@@ -16,7 +17,6 @@ from planning.following.reference import Reference, reference_line
 from planning.following.surface import SurfaceDistance
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
-from planning.model import VehicleProfile, finite_or_none
 from planning.terrain.dsm import Dsm
 from server.heard.vehicle_place import Placer, home_distance_bearing
 from server.library.documents import clearance_of

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 
+from planning.basics.plan_model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
 from planning.certificate.model import ClearanceParams
 from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words
 from planning.formats.poi_files import PoiFile
 from planning.missions.vehicle_profile import path_params
-from planning.model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
 from planning.request import PlanRequest, survey_request
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import Dsm

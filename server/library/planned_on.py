@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from planning.basics.plan_model import Home, Mission
 from planning.formats.other_surface import other_surface, surface_digest
 from planning.formats.safe_text import clean_name
-from planning.model import Home, Mission
 from planning.terrain.dsm import SurfaceModel
 from server.schemas import PlanDoc, PlannedOnDoc, TerrainDoc
 

@@ -21,8 +21,8 @@ from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
+    from planning.basics.plan_model import Mission
     from planning.evading.seen import Columns
-    from planning.model import Mission
     from planning.terrain.dsm import Dsm
     from telemetry.perception.mission_line import FlightLine
 

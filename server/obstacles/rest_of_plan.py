@@ -18,7 +18,7 @@ from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from planning.model import Mission
+    from planning.basics.plan_model import Mission
     from telemetry.perception.mission_line import FlightLine
 
 Part = Literal["ahead", "home"]
@@ -62,7 +62,7 @@ def rest_of_plan(part: Part, underway: Underway | None, *, terrain_id: str) -> d
 
 def _survey_fields(flown: PlanDoc, part: Part) -> dict[str, Any]:
     """What a survey brings beside its lines: their height, and on the mission ahead the photos."""
-    from planning.model import Camera
+    from planning.basics.plan_model import Camera
     from planning.route.camera import LOOKS_DOWN_DEG, footprint_m, height_from_gsd_m
 
     if flown.source != "survey" or flown.profile.camera is None:

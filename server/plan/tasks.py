@@ -15,9 +15,9 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
 from planning import __version__
+from planning.basics.plan_model import Poi, VehicleProfile, finite_or_none
 from planning.evading.seen import columns_from_voxels
 from planning.ground.demo_hillside import small_hill
-from planning.model import Poi, VehicleProfile, finite_or_none
 from planning.plan import Plan, plan_mission, plan_trade
 from planning.report.exports import export_file
 from planning.report.summary import plan_summary

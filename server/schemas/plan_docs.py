@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
+from planning.basics.limits import FEWEST_ITEMS, LONGEST_LOITER_S
+from planning.basics.plan_model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.fence.model import LARGEST_M, MOST_CORNERS
-from planning.limits import FEWEST_ITEMS, LONGEST_LOITER_S
-from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.route.camera import LOOKS_DOWN_DEG
 from server.schemas.strict_model import Asked, Latitude, Longitude, Metres, Name, Strict
 
@@ -88,7 +88,7 @@ USUAL_CAMERA = CameraDoc(
 
 
 class ProfileDoc(Strict):
-    """A vehicle profile; the same fields as ``planning.model.VehicleProfile``."""
+    """A vehicle profile; the same fields as ``planning.basics.plan_model.VehicleProfile``."""
 
     name: Name
     firmware: Literal["ardupilot", "px4"] = _VEHICLE.firmware

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from planning.limits import LARGEST_SEED
+from planning.basics.limits import LARGEST_SEED
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict
 

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from planning.basics.plan_model import Mission, finite_or_none
 from planning.certificate.clearance import certificate_json
 from planning.certificate.model import Certificate
 from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
-from planning.model import Mission, finite_or_none
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
 from telemetry.flight.guided.targets import guided_plan

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from mapping.geometry.frames import offset_m
-from planning.model import ANY_VEHICLE, VehicleProfile
+from planning.basics.plan_model import ANY_VEHICLE, VehicleProfile
 from telemetry.topics.vehicle import Autopilot, GnssFix, VehicleState
 
 Code = Literal["ready", "estimator", "gnss", "vibration", "battery", "wind"]

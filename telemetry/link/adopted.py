@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.errors import RefusedError, SilentError
 from telemetry.link.exchanges import Exchanges
 from telemetry.link.heartbeat import heartbeat

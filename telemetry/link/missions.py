@@ -13,8 +13,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
 from mapping.geometry.frames import apart_m
+from planning.basics.mav_cmd import MavCmd
 from planning.formats.commands import FLOWN_TO
-from planning.mav_cmd import MavCmd
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle

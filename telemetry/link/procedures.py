@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
 from telemetry.flight.guided.feed import Feed
 from telemetry.link.adopted import AdoptedVehicle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from planning.mav_cmd import MavCmd
+from planning.basics.mav_cmd import MavCmd
 from telemetry.errors import RefusedError, SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints

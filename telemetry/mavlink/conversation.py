@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.mavlink.actions import Message
 from telemetry.topics.messages import PlaceList
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from planning.basics.mav_cmd import FENCES, MavCmd
+from planning.basics.plan_model import Firmware, Home, Mission, MissionItem
 from planning.formats.commands import POSITIONED
-from planning.mav_cmd import FENCES, MavCmd
-from planning.model import Firmware, Home, Mission, MissionItem
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Message
 from telemetry.topics.messages import Item, OnboardMission

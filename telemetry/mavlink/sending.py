@@ -6,7 +6,7 @@ from typing import Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.errors import SilentError, TelemetryError
 from telemetry.mavlink.actions import Action, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import Endpoints, ItemList, RoundTrip

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send, ended
 from telemetry.mavlink.conversation import GROUND_STATION, MISSION, BootClock, Endpoints, ItemList

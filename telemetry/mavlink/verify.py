@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Firmware
 from planning.formats.commands import plain_frame
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Firmware
 from telemetry.mavlink.items import DEG_E7, PLACED
 from telemetry.topics.messages import Item, Rounded
 

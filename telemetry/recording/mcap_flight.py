@@ -7,9 +7,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from planning.basics.plan_model import Mission
 from planning.errors import FormatError
 from planning.formats.wpl import read_wpl
-from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from telemetry.errors import RecordingError
 from telemetry.mavlink.reduce import reduce

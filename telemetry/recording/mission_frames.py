@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Firmware, Home, Mission, MissionItem
 from planning.formats.commands import POSITIONED, home_or_first_place, plain_frame
-from planning.mav_cmd import MavCmd
-from planning.model import Firmware, Home, Mission, MissionItem
 
 _MISSION, _ACCEPTED = 0, 0
 _GUIDED_CURRENT = (2, 3)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.model import Mission
+from planning.basics.plan_model import Mission
 from planning.terrain.dsm import Dsm
 from telemetry.recording.frame_facts import SentTarget, TruePosition
 from telemetry.topics.checklist import ChecklistRecord

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import Home, Mission
+from planning.basics.plan_model import Home, Mission
 from telemetry.errors import RecordingError
 from telemetry.mavlink.reduce import reduce
 from telemetry.recording.frame_facts import FrameFacts, decode_frame

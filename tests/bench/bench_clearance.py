@@ -17,11 +17,11 @@ from affine import Affine
 from pyproj import CRS
 from scipy.spatial import KDTree
 
+from planning.basics.plan_model import FlownLine
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.model import ClearanceParams
 from planning.certificate.ways_home import places_along
-from planning.model import FlownLine
 from planning.terrain.cells.squares import squares
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm

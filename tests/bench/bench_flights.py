@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from planning.basics.plan_model import Poi, VehicleProfile
 from planning.errors import PlanningError
 from planning.following.figures import TrackFigures, judge
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.model import Poi, VehicleProfile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -16,8 +16,8 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.plan_model import SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm, demo_pois
-from planning.model import SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

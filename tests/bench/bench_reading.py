@@ -17,8 +17,8 @@ import rasterio
 from affine import Affine
 from rasterio.windows import Window
 
+from planning.basics.plan_model import Poi, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import small_hill
-from planning.model import Poi, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import SurfaceModel

@@ -10,7 +10,7 @@ import fastapi.routing
 import pytest
 
 import server.web
-from planning.model import Camera, VehicleProfile
+from planning.basics.plan_model import Camera, VehicleProfile
 from server.errors import HTTP_CODES, STATUS
 from server.schemas.stream import ClientMessage, ServerMessage
 from telemetry.bus.encoding import EACH_ARRIVES

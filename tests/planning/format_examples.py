@@ -13,7 +13,7 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.model import Home, Mission, MissionItem, Poi, SampledPath, Timing
+from planning.basics.plan_model import Home, Mission, MissionItem, Poi, SampledPath, Timing
 from planning.terrain.dsm import Dsm
 
 HOSTILE = "<script>alert(1)</script>&\"'\u202e\x00\x1b]]>, line\nbreak"

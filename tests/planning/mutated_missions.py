@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from planning.basics.plan_model import FlownLine, Home, Mission, MissionItem
 from planning.certificate.model import ClearanceParams
-from planning.model import FlownLine, Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from tests.planning.test_clearance import NORTH, WEST, dsm_of
 from tests.reference import clearance as oracle

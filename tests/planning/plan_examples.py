@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm
-from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm
 

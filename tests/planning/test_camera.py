@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import Camera
 from planning.errors import ParameterError
-from planning.model import Camera
 from planning.route.camera import footprint_m, gsd_cm, height_from_gsd_m
 
 CAMERA = Camera(6000, 4000, 20.0, 23.5, 15.6)

@@ -11,11 +11,11 @@ import pytest
 from affine import Affine
 from pyproj import CRS, Geod
 
+from planning.basics.plan_model import FlownLine, Unjudged, VehicleProfile
 from planning.certificate.clearance import certificate_json, certify
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError, ParameterError
 from planning.missions.vehicle_terms import budget_of
-from planning.model import FlownLine, Unjudged, VehicleProfile
 from planning.terrain.dsm import Dsm
 
 WEST, NORTH = 500_000.0, 5_000_100.0

@@ -13,13 +13,13 @@ from affine import Affine
 from pyproj import CRS, Proj
 from scipy import ndimage
 
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.certificate.clearance import certify
 from planning.certificate.model import ClearanceParams
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
 from planning.certificate.ways_home import places_along
 from planning.missions.flown import flown_line
-from planning.model import Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from tests.reference import clearance as oracle
 

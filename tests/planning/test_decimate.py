@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import PathParams, SampledPath
 from planning.errors import CapacityError, ParameterError
 from planning.missions.band import HEIGHT_UNIT_M, Bends, bends, corridor
 from planning.missions.decimate import decimate, decimate_to_fit, fewest_bends
-from planning.model import PathParams, SampledPath
 from planning.route.slopes import limited_heights, slope_limits
 from tests.reference.decimate import fewest
 

@@ -9,8 +9,8 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Camera
 from planning.formats import kml, qgc_plan, trajectory_csv, wpl
-from planning.model import Camera
 from planning.plan import Plan, plan_mission
 from planning.report.exports import FILES, export_file, report_input
 from planning.terrain.dsm import Dsm

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.missions.feasibility import (
     commanded_speed_m_s,
     feasibility_json,
@@ -13,7 +14,6 @@ from planning.missions.feasibility import (
     photos_row,
     verdict_words,
 )
-from planning.model import Home, Mission, MissionItem, VehicleProfile
 
 QUAD = VehicleProfile("quad", endurance_s=1000.0, reserve_share=0.25)
 NAN = float("nan")

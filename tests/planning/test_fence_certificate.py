@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
 from planning.certificate.clearance import certify
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.fence.model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from planning.formats import qgc_plan
 from planning.missions.flown import flown_line
-from planning.model import Mission
 from planning.part import certify_part
 from planning.plan import plan_mission
 from planning.terrain.dsm import Dsm

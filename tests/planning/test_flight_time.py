@@ -9,9 +9,9 @@ from affine import Affine
 from pymavlink import mavutil
 from pyproj import CRS
 
+from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.errors import MissionError
 from planning.flight_time.predict import predict_duration
-from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 
 # The parameters that the recorded flight set; the rest were the autopilot's defaults, and so are the profile's.

@@ -9,10 +9,10 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.plan_model import Firmware, FlownLine, Home, Mission, MissionItem
 from planning.certificate.unjudged import unjudged_words
 from planning.errors import MissionError
 from planning.missions.flown import flown_line
-from planning.model import Firmware, FlownLine, Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 
 NAN = math.nan

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import FormatError
 from planning.formats.detect import read_mission
 from planning.formats.qgc_plan import read_plan, write_plan
-from planning.model import Home, Mission, MissionItem
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path
 
 

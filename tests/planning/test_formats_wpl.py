@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import FormatError
 from planning.formats.detect import read_mission
 from planning.formats.wpl import read_wpl, write_wpl
-from planning.model import Home, Mission, MissionItem
 from tests.planning.format_examples import make_dsm, make_mission, make_path
 
 lat = st.floats(-89, 89, width=64)

@@ -7,9 +7,9 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.plan_model import MissionParams
 from planning.errors import DatumError, MissionError, PoiError
 from planning.missions.home import home_from_dsm, item_heights
-from planning.model import MissionParams
 from planning.terrain.dsm import Dsm
 
 elevation = np.full((50, 50), 321.5, dtype=np.float32)

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import FlownLine, Poi, VehicleProfile
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.home_search import SPARE_M, nearest_standing
 from planning.certificate.model import ClearanceParams
-from planning.model import FlownLine, Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import PathParams
 from planning.errors import ParameterError
-from planning.model import PathParams
 from planning.route.lspb import lspb
 from tests.reference.lspb import integrated, printed_law
 

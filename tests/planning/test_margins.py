@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import VehicleProfile
 from planning.margins.budget import TERM_NAMES, ClearanceBudget, Term
 from planning.margins.downwash import far_wake, felt_below_m, induced_speed_m_s
 from planning.margins.following_error import FIRMWARE_NAMES, MEASURED, WAY_NAMES, Firmware, Way, following_error_m
 from planning.margins.words import budget_json, tube_words, uncovered_words
 from planning.missions.vehicle_profile import load_profile
 from planning.missions.vehicle_terms import budget_of
-from planning.model import VehicleProfile
 
 PAPER = load_profile("f450-paper")
 QUAD = VehicleProfile("quad")

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
+from planning.basics.plan_model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
 from planning.errors import CapacityError, DatumError, MissionError
 from planning.missions.home import home_from_dsm
 from planning.missions.mission import EXCESSES_M, BuiltMission, build_mission, decimation_trade
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.model import Home, Mission, MissionParams, Poi, SampledPath, VehicleProfile
 from planning.route.path import sampled_path
 from planning.terrain.dsm import Dsm
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
+from planning.basics.plan_model import Home, MissionParams
 from planning.errors import MissionError, ParameterError
 from planning.missions.mission_items import (
     Heights,
@@ -22,7 +23,6 @@ from planning.missions.mission_items import (
     unset,
     waypoint,
 )
-from planning.model import Home, MissionParams
 from planning.terrain.dsm import Dsm
 
 RELATIVE = Heights(3, 100.0)

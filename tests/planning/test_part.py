@@ -9,7 +9,7 @@ from pyproj import CRS
 
 from mapping.geometry.arrays import F64
 from planning import part, plan
-from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm, SurfaceModel

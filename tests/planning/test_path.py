@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
+from planning.basics.plan_model import PathParams
 from planning.errors import ParameterError, PoiError
-from planning.model import PathParams
 from planning.route.path import sample_segments, sampled_path
 from planning.route.slopes import slope_limits
 from planning.terrain.dsm import Dsm

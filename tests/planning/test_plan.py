@@ -13,10 +13,10 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from pyproj import CRS
 
+from planning.basics.plan_model import Mission, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.errors import CapacityError, DatumError, MissionError, ParameterError, PoiError
 from planning.formats import qgc_plan, wpl
 from planning.missions.flown import flown_line
-from planning.model import Mission, MissionParams, PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.plan import Plan, plan_mission, plan_trade, read_back
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -10,8 +10,8 @@ import pytest
 from affine import Affine
 
 from planning import part
+from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.errors import PoiError
-from planning.model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.part import certify_part
 from planning.plan import Plan, plan_mission
 from planning.report.exports import export_file

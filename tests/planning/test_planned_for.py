@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from planning.basics.plan_model import Mission, PlannedFor
 from planning.formats.planned_for import planned_for_line
 from planning.formats.qgc_plan import read_plan, write_plan
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.missions.vehicle_profile import load_profile
-from planning.model import Mission, PlannedFor
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path
 
 PLANNED = PlannedFor(replace(load_profile("mapper-rtk"), following_m=0.3, name="naïve # drone"), "guided", 2.5, 120.0)

@@ -5,9 +5,9 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.limits import LONGEST_LOITER_S
+from planning.basics.plan_model import Poi
 from planning.errors import PoiError
-from planning.limits import LONGEST_LOITER_S
-from planning.model import Poi
 from planning.route.poi import check_pois
 from planning.terrain.dsm import Dsm
 

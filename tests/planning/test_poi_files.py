@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import Poi
 from planning.errors import FormatError
 from planning.formats import safe_text
 from planning.formats.geojson import write_geojson
@@ -13,7 +14,6 @@ from planning.formats.kml import write_kml
 from planning.formats.poi_files import looks_swapped, read_pois, warn_swapped
 from planning.formats.qgc_plan import write_plan
 from planning.formats.wpl import write_wpl
-from planning.model import Poi
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, write_pois_csv
 
 TWO = (Poi(47.1, 8.2, "a", 3.0), Poi(47.2, 8.3, "b", 0.0))

@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import FlownLine, SurfaceParams, VehicleProfile
 from planning.certificate.model import Certificate, LegClearance, Reason, WorstPoint
 from planning.missions.feasibility import feasibility_of
-from planning.model import FlownLine, SurfaceParams, VehicleProfile
 from planning.report.page import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
 from planning.route.survey_coverage import SurveyCoverage

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from scipy import ndimage
 
+from planning.basics.plan_model import SurfaceParams
 from planning.errors import ParameterError
-from planning.model import SurfaceParams
 from planning.safe_surface.surface import block_max, dilate, safe_surface, safe_surface_at
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes

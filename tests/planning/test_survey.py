@@ -8,8 +8,8 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.plan_model import Camera
 from planning.errors import ParameterError, PoiError
-from planning.model import Camera
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import Dsm
 

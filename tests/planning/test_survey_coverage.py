@@ -10,9 +10,9 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from planning.basics.plan_model import Camera, FlownLine, MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.model import Camera, FlownLine, MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.report.summary import plan_summary
 from planning.request import PlanRequest, survey_request

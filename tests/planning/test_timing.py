@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import PathParams, SampledPath
 from planning.errors import ParameterError
-from planning.model import PathParams, SampledPath
 from planning.route.lspb import lspb
 from planning.route.timing import path_timing
 

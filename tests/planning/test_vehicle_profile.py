@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import Camera, VehicleProfile
 from planning.errors import FormatError, ParameterError
 from planning.missions.vehicle_profile import (
     check_profile,
@@ -16,7 +17,6 @@ from planning.missions.vehicle_profile import (
     path_params,
     shipped_profiles,
 )
-from planning.model import Camera, VehicleProfile
 
 CAMERA = Camera(6000, 4000, 20.0, 23.5, 15.6)
 

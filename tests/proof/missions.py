@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from pyproj import CRS, Transformer
 
+from planning.basics.plan_model import Poi, SurfaceParams, VehicleProfile
 from planning.errors import PlanningError
 from planning.formats import wpl
-from planning.model import Poi, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

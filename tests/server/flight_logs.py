@@ -9,7 +9,7 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from planning.model import Home, Mission, MissionItem
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.terrain.dsm import Dsm
 from telemetry.recording.recorded_flight import FlightLog, HomePosition, track_of
 from telemetry.topics.messages import VehicleText

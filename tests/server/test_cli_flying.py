@@ -16,10 +16,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from planning.basics.limits import LARGEST_SEED
+from planning.basics.plan_model import Mission, PlannedFor
 from planning.formats.wpl import write_wpl
-from planning.limits import LARGEST_SEED
 from planning.missions.vehicle_profile import load_profile
-from planning.model import Mission, PlannedFor
 from planning.terrain.geotiff import read_dsm, write_dsm
 from server.cli.flights.fly_command import keep_recording
 from server.cli.shared.upload_words import report_lines

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from planning.limits import LARGEST_SEED
+from planning.basics.limits import LARGEST_SEED
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.simulation.scenarios.catalogue import NAMES
 from telemetry.simulation.scenarios.stage.curves import Chart, series

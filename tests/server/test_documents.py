@@ -6,11 +6,11 @@ from dataclasses import asdict, fields, replace
 
 import pytest
 
+from planning.basics.plan_model import Poi, VehicleProfile
 from planning.formats.poi_files import PoiFile, read_pois
 from planning.formats.wpl import write_wpl
 from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, shipped_profiles
-from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from server.library.documents import (
     doc_from_profile,

@@ -11,8 +11,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import VehicleProfile
 from planning.formats.wpl import read_wpl
-from planning.model import VehicleProfile
 from planning.terrain.dsm import Dsm
 from server.library.documents import doc_from_profile
 from server.obstacles import coming_down

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Poi, VehicleProfile
 from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
 from planning.missions.vehicle_terms import budget_of
-from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Poi, VehicleProfile
 from planning.formats.commands import has_position
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.missions.vehicle_profile import dump_profile
-from planning.model import Poi, VehicleProfile
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Home, PlannedFor
 from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile, load_profile
-from planning.model import Home, PlannedFor
 from server.cli.review_command import figure_lines, summary
 from server.flying.review import recording_of, review
 from server.flying.review_curves import STRETCHES, thinned

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from planning.basics.plan_model import Home, Mission
 from planning.following.reference import level_model
-from planning.model import Home, Mission
 from planning.terrain.dsm import Dsm
 from server.heard.vehicle_place import Placer
 from server.plan.picture import Picture

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import SampledPath, Surfaces
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.missions.vehicle_profile import load_profile
-from planning.model import SampledPath, Surfaces
 from planning.plan import Plan, plan_mission
 from planning.request import PlanRequest
 from planning.safe_surface.surface import safe_surface_at

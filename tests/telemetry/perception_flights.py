@@ -10,8 +10,8 @@ import numpy as np
 
 from mapping.geometry.frames import LocalFrame
 from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SlamPose, packed
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.formats.wpl import write_wpl
-from planning.model import Home, Mission, MissionItem
 from telemetry.topics.messages import PlanRecord
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import PLAN

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.formats.wpl import write_wpl
-from planning.model import Home, Mission, MissionItem
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.topics.messages import (
     CommandRecord,

@@ -15,8 +15,8 @@ from unittest.mock import patch
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from planning.basics.plan_model import Firmware, Mission
 from planning.formats.wpl import read_wpl
-from planning.model import Firmware, Mission
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.targets import guided_plan
 from telemetry.link.answering import Answering, OperatorRight

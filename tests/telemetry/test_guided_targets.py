@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import MissionError
 from planning.formats.trajectory_csv import Trajectory
 from planning.formats.wpl import read_wpl
-from planning.model import Home, Mission, MissionItem
 from telemetry.flight.guided.targets import guided_plan, with_timing
 
 HOME = Home(-37.0, 175.0, 100.0, "NZVD2016")

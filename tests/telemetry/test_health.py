@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import VehicleProfile
+from planning.basics.plan_model import VehicleProfile
 from telemetry.flight.health import Health, HealthRow, way_home_s
 from telemetry.mavlink.reduce import reduce
 from telemetry.topics.vehicle import VehicleState

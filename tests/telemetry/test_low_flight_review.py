@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import pytest
 
-from planning.model import Firmware, Home, Mission, MissionItem
+from planning.basics.plan_model import Firmware, Home, Mission, MissionItem
 from telemetry.flight.low_flight.findings import ORDER, Finding
 from telemetry.flight.low_flight.low_plan import LowPlan, low_plan
 from telemetry.flight.low_flight.review import review_settings

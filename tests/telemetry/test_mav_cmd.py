@@ -7,7 +7,7 @@ from enum import IntEnum
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.mav_cmd import MavCmd, MavFrame
+from planning.basics.mav_cmd import MavCmd, MavFrame
 
 
 @pytest.mark.parametrize("ours", [MavCmd, MavFrame])

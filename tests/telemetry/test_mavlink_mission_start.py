@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from planning.mav_cmd import MavCmd
+from planning.basics.mav_cmd import MavCmd
 from telemetry.errors import SilentError
 from telemetry.simulation.simulator.protocol.mavlink import Endpoint
 from telemetry.topics.requests import StartAuto

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from mapping.geometry.frames import apart_m
-from planning.model import VehicleProfile
+from planning.basics.plan_model import VehicleProfile
 from telemetry.flight.preflight import checks
 from telemetry.topics.messages import FlightStatus
 from tests.telemetry.replayed_link import ReplayedLink, received, replayed

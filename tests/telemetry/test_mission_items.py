@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from planning.model import Home, Mission, MissionItem
+from planning.basics.plan_model import Home, Mission, MissionItem
 from telemetry.errors import TransferError
 from telemetry.mavlink.items import (
     home_message,

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.certificate.clearance import certify
 from planning.certificate.model import ClearanceParams
 from planning.fence.model import Fence, RallyPoint, circle
 from planning.missions.flown import flown_line
-from planning.model import Home, Mission, MissionItem, VehicleProfile
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
 from telemetry.flight.preflight.checks import Row

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import Mission
 from planning.formats.wpl import read_wpl
-from planning.model import Mission
 from telemetry.mavlink.items import item_message, items_from_mission
 from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES
 from telemetry.simulation.simulator.neu_frame import NeuFrame

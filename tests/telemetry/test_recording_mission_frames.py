@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import Home
+from planning.basics.plan_model import Home
 from telemetry.recording.mission_frames import MissionFrames, mission_of
 
 VEHICLE, GCS = (1, 1), (255, 190)

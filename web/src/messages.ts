@@ -786,7 +786,7 @@ export interface CameraDoc {
   sensor_height_mm: number;
 }
 
-/** A vehicle profile; the same fields as ``planning.model.VehicleProfile``. */
+/** A vehicle profile; the same fields as ``planning.basics.plan_model.VehicleProfile``. */
 export interface ProfileDoc {
   name: string;
   firmware: "ardupilot" | "px4";

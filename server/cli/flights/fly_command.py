@@ -19,9 +19,9 @@ from typing import Annotated, Literal
 import typer
 from typer import Option
 
+from planning.basics.plan_model import Mission
 from planning.formats.detect import read_mission
 from planning.formats.other_surface import other_surface
-from planning.model import Mission
 from planning.part import mission_places
 from planning.terrain.dsm import Dsm
 from server.cli.review_command import tell

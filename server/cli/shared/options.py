@@ -11,9 +11,9 @@ from typing import Annotated, ClassVar, Literal
 
 from typer import Argument, Option
 
+from planning.basics.plan_model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.errors import FormatError, ParameterError
 from planning.missions.vehicle_profile import DEFAULT_PROFILE, shipped_profiles
-from planning.model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 
 _SURFACE, _PATH, _MISSION, _VEHICLE = SurfaceParams(), PathParams(), MissionParams(), VehicleProfile("")
 _SHIPPED = f"A shipped profile ({', '.join(shipped_profiles())}) or a TOML file"

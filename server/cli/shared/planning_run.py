@@ -9,8 +9,8 @@ from typing import Any
 
 import typer
 
+from planning.basics.plan_model import MissionParams, SurfaceParams, VehicleProfile
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.model import MissionParams, SurfaceParams, VehicleProfile
 from planning.plan import plan_mission
 from planning.report.exports import FILES, export_file
 from planning.report.summary import plan_summary

@@ -9,8 +9,8 @@ import numpy as np
 from affine import Affine
 
 from mapping.geometry.arrays import F64, U8
+from planning.basics.plan_model import Home, Mission
 from planning.following.reference import level_model
-from planning.model import Home, Mission
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.payload import HeightGrid, TerrainScene
 

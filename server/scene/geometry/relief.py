@@ -16,7 +16,7 @@ from scipy import ndimage
 from scipy.spatial import Delaunay, KDTree
 
 from mapping.geometry.arrays import F64, I64, Bools
-from planning.model import SampledPath, Surfaces
+from planning.basics.plan_model import SampledPath, Surfaces
 from planning.safe_surface.surface import safe_surface_at
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.payload import Relief

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
 from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.feed import Feed

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.modes import mode_numbers
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mapping.geometry.frames import apart_m
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.certificate.commands import TAKEOFFS
 from planning.errors import MissionError
-from planning.mav_cmd import MavCmd
-from planning.model import Home, Mission, MissionItem
 from telemetry.flight.guided.targets import guided_plan
 from telemetry.mavlink.flight_keeper import item_of
 from telemetry.topics.messages import GuidedTarget, Item, OnboardMission

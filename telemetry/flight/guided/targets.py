@@ -11,12 +11,12 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import offset_m
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Mission, MissionItem
 from planning.certificate.commands import BENT, OTHER_UNJUDGED, TAKEOFFS
 from planning.errors import MissionError
 from planning.formats.commands import plain_frame
 from planning.formats.trajectory_csv import Trajectory
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Mission, MissionItem
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.topics.messages import GuidedTarget
 

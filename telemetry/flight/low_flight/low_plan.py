@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 from mapping.geometry.frames import apart_m
+from planning.basics.mav_cmd import AMSL_FRAMES, TERRAIN_FRAMES
+from planning.basics.plan_model import Mission
 from planning.certificate.commands import STRAIGHT, TAKEOFFS
-from planning.mav_cmd import AMSL_FRAMES, TERRAIN_FRAMES
 from planning.missions.feasibility import commanded_speed_m_s
-from planning.model import Mission
 
 SPHERE_ERROR = 1.006
 """Distances on the sphere are off by at most that."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 
+from planning.basics.plan_model import Firmware
 from planning.certificate.returns import NEAR_M, SLOPE
-from planning.model import Firmware
 from telemetry.flight.low_flight.findings import ORDER, Finding, Settings, unread
 from telemetry.flight.low_flight.low_plan import LowPlan
 from telemetry.flight.low_flight.table import (

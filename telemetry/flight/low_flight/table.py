@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planning.model import Firmware
+from planning.basics.plan_model import Firmware
 from telemetry.flight.low_flight.findings import State
 
 LAND = "lands where it is: into whatever is below on this route"

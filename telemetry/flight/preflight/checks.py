@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from planning.basics.plan_model import Home, Mission, VehicleProfile
 from planning.certificate.model import Certificate, ClearanceParams, HomeStand
 from planning.formats.commands import has_position
 from planning.margins.words import rounded_down, rounded_up
 from planning.missions.flown import AMSL_FRAMES
-from planning.model import Home, Mission, VehicleProfile
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.preflight.parameters import ReturnSettings
 from telemetry.topics.messages import OnboardMission

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError
 from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
-from planning.model import Firmware, MissionItem
 from telemetry.flight.preflight.checks import Row
 from telemetry.mavlink.items import mission_items, wire_items
 from telemetry.mavlink.verify import compare

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Firmware
 from planning.certificate.commands import STRAIGHT
 from planning.certificate.returns import NEAR_M, SLOPE
-from planning.mav_cmd import MavCmd
-from planning.model import Firmware
 from telemetry.flight.guided.targets import GROUND_SPEEDS
 from telemetry.topics.messages import OnboardMission
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.basics.plan_model import Firmware, Home, Mission, VehicleProfile
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_stand import ground_at
@@ -17,7 +18,6 @@ from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.missions.flown import AMSL_FRAMES, flown_line
-from planning.model import Firmware, Home, Mission, VehicleProfile
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from planning.terrain.vertical_datum import is_amsl

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from planning.basics.plan_model import Mission, VehicleProfile
 from planning.certificate.model import ClearanceParams
 from planning.missions.flown import flown_line
-from planning.model import Mission, VehicleProfile
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from telemetry.errors import ConnectionFailedError, NotAllowedError, NoVehicleError, TransferError

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.certificate.commands import TAKEOFFS
 from planning.formats.commands import has_position
-from planning.mav_cmd import MavCmd
 from planning.missions.flown import HOME_FRAMES
 from planning.missions.mission_items import MIN_TAKEOFF_M, TRUNCATION_GUARD_M
-from planning.model import Home, Mission, MissionItem
 
 
 def rereference(mission: Mission, shift_m: float, *, home: Home | None = None) -> Mission:

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Mission, MissionItem
 from planning.certificate.clearance import certify
 from planning.certificate.commands import STRAIGHT, stays
 from planning.certificate.model import Certificate, ClearanceParams
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
 from planning.formats.commands import has_position
-from planning.mav_cmd import MavCmd, MavFrame
 from planning.missions.flown import AMSL_FRAMES, flown_line
 from planning.missions.mission_items import MIN_TAKEOFF_M
-from planning.model import Mission, MissionItem
 from planning.terrain.dsm import Dsm, true_cells
 from telemetry.errors import NotAllowedError
 

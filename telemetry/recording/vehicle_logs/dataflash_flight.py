@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from planning.basics.plan_model import MissionItem
 from planning.formats.commands import plain_frame
-from planning.model import MissionItem
 from telemetry.mavlink.modes import mode_name
 from telemetry.mavlink.reduce import GNSS_FIXES
 from telemetry.recording.frame_facts import FrameFacts, TruePosition

@@ -8,9 +8,9 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import length_m
+from planning.basics.plan_model import Mission, PathParams, Poi, SurfaceParams
 from planning.errors import ParameterError
 from planning.missions.vehicle_profile import load_profile
-from planning.model import Mission, PathParams, Poi, SurfaceParams
 from planning.plan import plan_mission
 from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from planning.mav_cmd import MavCmd, MavFrame
-from planning.model import Home, Mission, MissionItem
+from planning.basics.mav_cmd import MavCmd, MavFrame
+from planning.basics.plan_model import Home, Mission, MissionItem
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.requests import Operator, StartGuided

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from planning.basics.plan_model import Mission
 from planning.formats.wpl import write_wpl
-from planning.model import Mission
 from planning.terrain.dsm import Dsm
 from telemetry.simulation.scenarios.stage.course import Course
 from telemetry.simulation.scenarios.stage.virtual_link import T0_UTC_S

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from planning.mav_cmd import MavCmd, MavFrame
+from planning.basics.mav_cmd import MavCmd, MavFrame
 from telemetry.simulation.simulator.autopilot.mission_steps import Step, StepKind
 
 KEPT_FRAMES: dict[int, int] = {

@@ -6,7 +6,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from planning.mav_cmd import FENCE_CIRCLES, FENCE_POLYGONS, FENCES, MavCmd, MavFrame
+from planning.basics.mav_cmd import FENCE_CIRCLES, FENCE_POLYGONS, FENCES, MavCmd, MavFrame
 from telemetry.simulation.simulator.autopilot.mission_steps import Step
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
 from telemetry.simulation.simulator.protocol.item_protocol import ItemInt

@@ -1,4 +1,4 @@
-"""What the numbers of a plan may be; what they are when nobody says stands in ``planning.model``, each once."""
+"""What the numbers of a plan may be; what they are when nobody says stands in ``plan_model``, each once."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class MissionItem:
     """One MAVLink mission item. Params may be NaN ("not given")."""
 
     command: int
-    """MAV_CMD: `planning.mav_cmd`"""
+    """MAV_CMD: `planning.basics.mav_cmd`"""
     frame: int
     """MAV_FRAME: 0 AMSL, 2 none, 3 relative to home, 10 above terrain."""
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
