@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from planning.formats.detect import read_flight
     from planning.missions.flown import flown_line
     from planning.missions.vehicle_profile import load_profile, path_params
-    from planning.plan import Plan, plan_mission
+    from planning.planner.plan import Plan, plan_mission
+    from planning.planner.request import PlanRequest, survey_request
     from planning.report.exports import FILES, export_file
-    from planning.request import PlanRequest, survey_request
     from planning.route.survey import survey_lines
     from planning.terrain.dsm import Dsm
     from planning.terrain.geotiff import read_dsm

@@ -17,8 +17,8 @@ from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
 from planning.ground.demo_hillside import small_hill
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.safe_surface.surface import block_max
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes

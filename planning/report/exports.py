@@ -11,10 +11,10 @@ import numpy as np
 
 from planning.certificate.clearance import certificate_json
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
-from planning.plan import Plan, plan_trade
+from planning.planner.plan import Plan, plan_trade
+from planning.planner.request import effective_profile
 from planning.report.page import ReportInput, TradeRow, render_report
 from planning.report.summary import plan_summary
-from planning.request import effective_profile
 from planning.route.camera import gsd_cm
 from planning.terrain.dsm import SurfaceModel
 

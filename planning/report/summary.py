@@ -11,7 +11,7 @@ from planning.basics.plan_model import finite_or_none
 from planning.certificate.clearance import certificate_json
 from planning.certificate.model import Certificate
 from planning.missions.feasibility import feasibility_json
-from planning.plan import Plan
+from planning.planner.plan import Plan
 from planning.route.survey_coverage import SurveyCoverage
 from planning.terrain.dsm import Dsm, SurfaceModel
 

@@ -20,8 +20,8 @@ from planning.formats.other_surface import other_surface
 from planning.formats.poi_files import warn_swapped
 from planning.margins.words import uncovered_words
 from planning.missions.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
-from planning.part import certify_part
-from planning.plan import CERTIFICATE_STEP
+from planning.planner.part import certify_part
+from planning.planner.plan import CERTIFICATE_STEP
 from planning.report.summary import certificate_summary, dsm_summary
 from planning.terrain.dsm import Dsm
 from server.cli.shared import options as o

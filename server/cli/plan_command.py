@@ -15,7 +15,7 @@ from planning.basics.plan_model import Poi
 from planning.errors import ParameterError, PoiError
 from planning.formats.poi_files import read_pois, warn_swapped
 from planning.formats.safe_text import clean_name
-from planning.request import PlanRequest
+from planning.planner.request import PlanRequest
 from planning.route.poi import check_pois
 from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import SurfaceModel

@@ -13,7 +13,7 @@ from typer import Argument, Option
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import Mission
 from planning.formats.detect import read_mission
-from planning.part import mission_places
+from planning.planner.part import mission_places
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command

@@ -12,7 +12,7 @@ from typer import Argument, Option
 from planning.errors import ParameterError, PoiError
 from planning.formats.poi_files import read_pois
 from planning.formats.safe_text import clean_name
-from planning.request import PlanRequest, survey_request
+from planning.planner.request import PlanRequest, survey_request
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o

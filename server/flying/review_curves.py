@@ -15,7 +15,7 @@ from planning.following.figures import Judged, TrackFigures
 from planning.following.lag import planned_alt_dsm_m
 from planning.following.reference import Reference
 from planning.following.track import Track
-from planning.request import clearance_of_planned
+from planning.planner.request import clearance_of_planned
 from server.flying.review_flight import Flight
 from server.schemas.review_docs import Histogram, ReviewEvent, ReviewFigures, ReviewSeries
 from telemetry.recording.flight_log import FlightLog

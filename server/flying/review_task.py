@@ -14,7 +14,7 @@ import numpy as np
 
 from planning.following.reference import Reference
 from planning.following.track import Track
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from planning.terrain.dsm import Dsm
 from server.heard.flown_track import EVERY_S
 from server.library.documents import request_from_doc

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from planning.formats import trajectory_csv, wpl
 from planning.missions.vehicle_profile import dump_profile
-from planning.request import effective_profile
+from planning.planner.request import effective_profile
 from server.library.documents import places_of
 from server.plan.tasks import last_plan
 from server.schemas import PlanDoc

@@ -9,7 +9,7 @@ from planning.certificate.model import ClearanceParams
 from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words
 from planning.formats.poi_files import PoiFile
 from planning.missions.vehicle_profile import path_params
-from planning.request import PlanRequest, survey_request
+from planning.planner.request import PlanRequest, survey_request
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.terrain.dsm import Dsm
 from server.library.fences import fence_from_doc, with_fence

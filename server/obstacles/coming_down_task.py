@@ -53,7 +53,7 @@ def plan_rest(situation: Situation, *, report: Progress) -> RestPlanned:
 
 def _planned(situation: Situation, report: Progress) -> RestPlanned:
     from planning.certificate.clearance import certify
-    from planning.plan import plan_mission
+    from planning.planner.plan import plan_mission
     from server.library.documents import clearance_of, request_from_doc, seen_in
     from server.library.seen_columns import load_planned_terrain
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64, I64
 from mapping.geometry.polyline import along_m
-from planning.plan import Plan
+from planning.planner.plan import Plan
 from server.schemas import Chart
 
 _MAX_POINTS = 1600

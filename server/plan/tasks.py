@@ -18,10 +18,10 @@ from planning import __version__
 from planning.basics.plan_model import Poi, VehicleProfile, finite_or_none
 from planning.evading.seen import columns_from_voxels
 from planning.ground.demo_hillside import small_hill
-from planning.plan import Plan, plan_mission, plan_trade
+from planning.planner.plan import Plan, plan_mission, plan_trade
+from planning.planner.request import PlanRequest
 from planning.report.exports import export_file
 from planning.report.summary import plan_summary
-from planning.request import PlanRequest
 from planning.route.camera import gsd_cm
 from planning.route.visiting_order import shortest_order
 from planning.terrain.dsm import Dsm

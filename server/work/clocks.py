@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from planning.plan import CERTIFICATE_STEP, PATH_STEP, SURFACE_STEP
+from planning.planner.plan import CERTIFICATE_STEP, PATH_STEP, SURFACE_STEP
 from server.work.jobs import Progress
 
 READ_STEP = "Reading the surface model"

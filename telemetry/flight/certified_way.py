@@ -16,7 +16,7 @@ from planning.fence.model import NO_FENCE, Fence, RallyPoint
 from planning.guided.model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
-from planning.part import FLIGHT_MARGIN_M, needed_part, rally_places
+from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError

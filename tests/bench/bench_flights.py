@@ -22,8 +22,8 @@ from planning.following.reference import reference_line
 from planning.following.surface import SurfaceDistance
 from planning.following.track import Track
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.plan import Plan, plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm
 from telemetry.errors import TelemetryError

@@ -18,8 +18,8 @@ from pyproj import CRS
 
 from planning.basics.plan_model import SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm, demo_pois
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm
 

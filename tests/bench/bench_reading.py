@@ -19,8 +19,8 @@ from rasterio.windows import Window
 
 from planning.basics.plan_model import Poi, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import small_hill
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm
 from server.library.terrains import FOLDER, store_terrain

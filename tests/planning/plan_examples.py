@@ -8,7 +8,7 @@ import numpy as np
 
 from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm
-from planning.request import PlanRequest
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 
 QUAD = VehicleProfile("quad", rtl_height_m=60.0, position_error_m=0.5)

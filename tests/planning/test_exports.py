@@ -11,7 +11,7 @@ import pytest
 
 from planning.basics.plan_model import Camera
 from planning.formats import kml, qgc_plan, trajectory_csv, wpl
-from planning.plan import Plan, plan_mission
+from planning.planner.plan import Plan, plan_mission
 from planning.report.exports import FILES, export_file, report_input
 from planning.terrain.dsm import Dsm
 from tests.planning.format_examples import HOSTILE, geojson_by_role

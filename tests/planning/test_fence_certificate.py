@@ -15,8 +15,8 @@ from planning.certificate.model import Certificate, ClearanceParams
 from planning.fence.model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from planning.formats import qgc_plan
 from planning.missions.flown import flown_line
-from planning.part import certify_part
-from planning.plan import plan_mission
+from planning.planner.part import certify_part
+from planning.planner.plan import plan_mission
 from planning.terrain.dsm import Dsm
 from tests.planning.plan_examples import request_over, small_dsm
 from tests.planning.test_flown import HOME, RTL, TAKE_OFF, at, flat_dsm, item

@@ -16,8 +16,8 @@ from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.home_search import SPARE_M, nearest_standing
 from planning.certificate.model import ClearanceParams
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm
 from tests.planning.test_clearance import NORTH, WEST, codes, dsm_of, line_of

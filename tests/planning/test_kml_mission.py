@@ -15,7 +15,7 @@ from planning.formats.detect import read_flight, read_mission
 from planning.formats.kml import write_kml
 from planning.formats.safe_text import said_once
 from planning.missions.flown import flown_line
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from tests.planning.plan_examples import request_over, small_dsm
 
 HEAD = '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:wpml="http://www.dji.com/wpmz/1.0.2"><Document>'

@@ -9,7 +9,7 @@ import pytest
 
 from planning.formats import qgc_plan, wpl
 from planning.formats.other_surface import other_surface
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from planning.report.exports import export_file
 from tests.planning.plan_examples import request_over, small_dsm
 

@@ -8,10 +8,10 @@ from affine import Affine
 from pyproj import CRS
 
 from mapping.geometry.arrays import F64
-from planning import part, plan
 from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
-from planning.plan import Plan, plan_mission
-from planning.request import PlanRequest
+from planning.planner import part, plan
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm, SurfaceModel
 
 

@@ -17,8 +17,8 @@ from planning.basics.plan_model import Mission, MissionParams, PathParams, Poi, 
 from planning.errors import CapacityError, DatumError, MissionError, ParameterError, PoiError
 from planning.formats import qgc_plan, wpl
 from planning.missions.flown import flown_line
-from planning.plan import Plan, plan_mission, plan_trade, read_back
-from planning.request import PlanRequest
+from planning.planner.plan import Plan, plan_mission, plan_trade, read_back
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from tests.planning.plan_examples import QUAD, pois_at, request_over, small_dsm
 from tests.reference import clearance as oracle
@@ -141,7 +141,7 @@ def one_metre_east(fields: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("change", [one_centimetre_down, swapped, one_metre_east])
 def test_a_writer_that_is_wrong_is_caught(dsm: Dsm, monkeypatch: pytest.MonkeyPatch, change: object) -> None:
-    monkeypatch.setattr("planning.plan.wpl.write_wpl", wpl_with(change))
+    monkeypatch.setattr("planning.planner.plan.wpl.write_wpl", wpl_with(change))
     with pytest.raises(MissionError) as caught:
         plan_mission(dsm, request_over(dsm, TRIANGLE))
     assert "not describe the flight" in caught.value.what or "lat" in caught.value.what.lower()
@@ -155,7 +155,7 @@ def test_a_plan_writer_that_loses_its_last_waypoint_is_caught(
         del document["mission"]["items"][-2]
         return json.dumps(document)
 
-    monkeypatch.setattr("planning.plan.qgc_plan.write_plan", write)
+    monkeypatch.setattr("planning.planner.plan.qgc_plan.write_plan", write)
     with pytest.raises(MissionError, match=r"mission\.plan"):
         read_back(plan.mission, dsm)
 
@@ -164,8 +164,8 @@ def test_writers_that_both_lose_a_centimetre_are_caught(dsm: Dsm, plan: Plan, mo
     def lowered(mission: Mission) -> Mission:
         return replace(mission, items=tuple(replace(i, alt_m=i.alt_m - 0.01) if i.alt_m else i for i in mission.items))
 
-    monkeypatch.setattr("planning.plan.wpl.write_wpl", lambda mission: WRITE_WPL(lowered(mission)))
-    monkeypatch.setattr("planning.plan.qgc_plan.write_plan", lambda mission: WRITE_PLAN(lowered(mission)))
+    monkeypatch.setattr("planning.planner.plan.wpl.write_wpl", lambda mission: WRITE_WPL(lowered(mission)))
+    monkeypatch.setattr("planning.planner.plan.qgc_plan.write_plan", lambda mission: WRITE_PLAN(lowered(mission)))
     with pytest.raises(MissionError, match=r"mission\.waypoints"):
         read_back(plan.mission, dsm)
 

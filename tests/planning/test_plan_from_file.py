@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from affine import Affine
 
-from planning import part
 from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.errors import PoiError
-from planning.part import certify_part
-from planning.plan import Plan, plan_mission
+from planning.planner import part
+from planning.planner.part import certify_part
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from planning.report.exports import export_file
-from planning.request import PlanRequest
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm
 from planning.terrain.rasters import dsm_file

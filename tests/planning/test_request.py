@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planning.basics.limits import LARGEST
 from planning.basics.plan_model import MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.errors import ParameterError
-from planning.request import PlanRequest, check_demands, check_request, check_size
+from planning.planner.request import PlanRequest, check_demands, check_request, check_size
 from tests.planning.format_examples import make_dsm
 
 SOUND = PlanRequest(pois=(), profile=VehicleProfile("quad"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyproj import CRS
 
-from planning.plan import Plan, plan_mission
+from planning.planner.plan import Plan, plan_mission
 from planning.report.summary import certificate_summary, crs_name, dsm_summary, plan_summary, unknown_share
 from planning.terrain.dsm import Dsm
 from tests.planning.plan_examples import request_over, small_dsm

@@ -13,9 +13,9 @@ from pyproj import CRS
 from planning.basics.plan_model import Camera, FlownLine, MissionParams, PathParams, SurfaceParams, VehicleProfile
 from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest, survey_request
 from planning.report.summary import plan_summary
-from planning.request import PlanRequest, survey_request
 from planning.route.survey import SurveyPlan, survey_lines
 from planning.route.survey_coverage import SurveyCoverage, photo_places, survey_coverage
 from planning.terrain.dsm import Dsm

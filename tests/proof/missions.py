@@ -10,8 +10,8 @@ from pyproj import CRS, Transformer
 from planning.basics.plan_model import Poi, SurfaceParams, VehicleProfile
 from planning.errors import PlanningError
 from planning.formats import wpl
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm
 from tests.proof.models import Model

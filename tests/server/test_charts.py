@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from planning.basics.plan_model import VehicleProfile
 from planning.ground.demo_hillside import demo_dsm, demo_pois
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from server.plan.profile_chart import chart, thinned
 
 

@@ -10,7 +10,7 @@ import pytest
 from planning.formats.qgc_plan import read_plan
 from planning.ground.demo_hillside import demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from planning.terrain.geotiff import read_dsm
 from server.library.documents import doc_from_profile, request_from_doc
 from server.schemas import PlaceDoc, PlanDoc, SurveyDoc

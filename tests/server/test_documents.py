@@ -11,7 +11,7 @@ from planning.formats.poi_files import PoiFile, read_pois
 from planning.formats.wpl import write_wpl
 from planning.ground.demo_hillside import demo_dsm, demo_pois, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, shipped_profiles
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from server.library.documents import (
     doc_from_profile,
     doc_of_points,

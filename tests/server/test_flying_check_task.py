@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from planning.certificate.model import Certificate, HomeStand
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
 from server.flying import check_task
 from server.library.documents import demands_from_doc
 from server.schemas import PlanDoc

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from typer.core import TyperGroup
 
 from planning.errors import ParameterError
-from planning.request import PlanRequest, check_request
+from planning.planner.request import PlanRequest, check_request
 from server.cli import app
 from server.library.documents import request_from_doc
 from server.schemas import plan_docs, study_docs, traversability_docs

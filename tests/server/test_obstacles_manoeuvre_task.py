@@ -14,8 +14,8 @@ from planning.basics.plan_model import Poi, VehicleProfile
 from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
 from planning.missions.vehicle_terms import budget_of
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from server.library.terrains import store_terrain
 from server.obstacles.manoeuvre_situation import Situation

@@ -12,8 +12,8 @@ from planning.basics.plan_model import Poi, VehicleProfile
 from planning.formats.commands import has_position
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.missions.vehicle_profile import dump_profile
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from server.errors import NotReadyError
 from server.obstacles.rest_of_plan import Part, Underway, rest_of_plan

@@ -13,8 +13,8 @@ from mapping.geometry.arrays import F64
 from planning.basics.plan_model import SampledPath, Surfaces
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.missions.vehicle_profile import load_profile
-from planning.plan import Plan, plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from planning.safe_surface.surface import safe_surface_at
 from planning.terrain.dsm import Dsm
 from server.plan.tasks import plan_scene

@@ -11,8 +11,8 @@ import pytest
 from mapping.geometry.arrays import F64
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.missions.vehicle_profile import load_profile
-from planning.plan import Plan, plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from telemetry.simulation.simulator.demo_world import demo_world, write_demo_world
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World

@@ -15,8 +15,8 @@ from mapping.perceiving.frame_result import Settings
 from mapping.perceiving.radar_perception import RadarPerception
 from planning.ground.demo_hillside import demo_dsm, demo_pois
 from planning.missions.vehicle_profile import load_profile
-from planning.plan import Plan, plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest
 from telemetry.perception.known_ground import ground_around
 from telemetry.simulation.scenarios.stage.paper_fields import notice
 from telemetry.simulation.simulator.demo_world import demo_world

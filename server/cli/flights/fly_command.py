@@ -22,7 +22,7 @@ from typer import Option
 from planning.basics.plan_model import Mission
 from planning.formats.detect import read_mission
 from planning.formats.other_surface import other_surface
-from planning.part import mission_places
+from planning.planner.part import mission_places
 from planning.terrain.dsm import Dsm
 from server.cli.review_command import tell
 from server.cli.shared import options as o

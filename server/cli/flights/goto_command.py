@@ -20,7 +20,7 @@ from planning.fence.model import RallyPoint
 from planning.formats.fence_items import fence_of, rally_of
 from planning.guided.model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.request import PlanRequest, check_demands
+from planning.planner.request import PlanRequest, check_demands
 from planning.terrain.dsm import Dsm
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command

@@ -13,8 +13,8 @@ from typer import Argument
 from planning.errors import ParameterError
 from planning.formats.detect import read_mission
 from planning.missions.feasibility import commanded_speed_m_s
-from planning.part import certify_part
-from planning.plan import CERTIFICATE_STEP
+from planning.planner.part import certify_part
+from planning.planner.plan import CERTIFICATE_STEP
 from server.cli.params.session import parameter_session
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command

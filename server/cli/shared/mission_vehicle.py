@@ -8,7 +8,7 @@ from planning.basics.plan_model import Mission, PathParams, PlannedFor, VehicleP
 from planning.margins.following_error import WAY_NAMES, Way
 from planning.missions.feasibility import commanded_speed_m_s
 from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, path_params
-from planning.request import PlanRequest, check_demands
+from planning.planner.request import PlanRequest, check_demands
 from server.cli.shared.options import ClearanceOptions, VehicleOptions, of_vehicle
 from server.cli.shared.output import harmless, say_notes
 

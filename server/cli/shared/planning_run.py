@@ -11,11 +11,11 @@ import typer
 
 from planning.basics.plan_model import MissionParams, SurfaceParams, VehicleProfile
 from planning.missions.vehicle_profile import load_profile, path_params
-from planning.plan import plan_mission
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest, check_request
 from planning.report.exports import FILES, export_file
 from planning.report.summary import plan_summary
 from planning.report.words import duration, metres
-from planning.request import PlanRequest, check_request
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared.command import DONE, FAILED
 from server.cli.shared.files_in_out import check_directory, write_files

@@ -9,7 +9,7 @@ from typing import Any
 
 from mapping.geometry.arrays import F64
 from planning.errors import RasterFormatError
-from planning.part import FLIGHT_MARGIN_M, needed_part
+from planning.planner.part import FLIGHT_MARGIN_M, needed_part
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm_reported
 from planning.terrain.spikes import Spike, find_spikes

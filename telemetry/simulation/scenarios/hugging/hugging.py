@@ -11,8 +11,8 @@ from mapping.geometry.polyline import length_m
 from planning.basics.plan_model import Mission, PathParams, Poi, SurfaceParams
 from planning.errors import ParameterError
 from planning.missions.vehicle_profile import load_profile
-from planning.plan import plan_mission
-from planning.request import PlanRequest
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 

@@ -16,7 +16,7 @@ from planning.certificate.model import Certificate, ClearanceParams
 from planning.fence.model import RallyPoint
 from planning.formats.commands import has_position
 from planning.missions.flown import flown_line
-from planning.request import PlanRequest
+from planning.planner.request import PlanRequest
 from planning.terrain.dsm import LARGE_PX, SCALE_TOLERANCE, Dsm, SurfaceModel
 from planning.terrain.holes import HoleReport, fill_holes
 

@@ -34,8 +34,8 @@ from planning.missions.feasibility import Feasibility, feasibility_of, photos_ro
 from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
-from planning.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
-from planning.request import PlanRequest, check_request, check_size, effective_profile
+from planning.planner.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
+from planning.planner.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import MIN_SEGMENT_M, sampled_path
 from planning.route.poi import check_pois
 from planning.route.survey_coverage import SurveyCoverage, survey_coverage
