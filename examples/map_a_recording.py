@@ -12,9 +12,9 @@ import numpy as np
 
 from mapping import LocalFrame
 from mapping.sensor_frames import RadarFrame
+from telemetry.perception.rebuilding.export import exported
+from telemetry.perception.rebuilding.rebuild import OtherMap, rebuild
 from telemetry.perception.sensor_kinds import KINDS
-from telemetry.rebuilding.export import exported
-from telemetry.rebuilding.rebuild import OtherMap, rebuild
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.topics.messages import Topic
 from telemetry.topics.vehicle import VehicleState

@@ -17,8 +17,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from planning import __version__
-from planning.confinement import what_holds
 from planning.errors import DescribedError
+from planning.terrain.rasters.confinement import what_holds
 from server.api import (
     account_routes,
     audit_routes,

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
 
 from planning import __version__
-from planning.confinement import what_holds
+from planning.terrain.rasters.confinement import what_holds
 from server.api.access import Need, identity_of, needs, parts_of
 from server.api.session_routes import inline_policy, render
 from server.errors import NotFoundError, SignInError

@@ -14,10 +14,10 @@ from planning.errors import DescribedError
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import answer, end_progress, progress, say_notes
+from telemetry.perception.rebuilding.export import KINDS as FORMATS
+from telemetry.perception.rebuilding.export import ExportError, Kind, exported
+from telemetry.perception.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 from telemetry.perception.sensor_kinds import KINDS, check_memory
-from telemetry.rebuilding.export import KINDS as FORMATS
-from telemetry.rebuilding.export import ExportError, Kind, exported
-from telemetry.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 
 
 class MapFileError(DescribedError):

@@ -119,7 +119,7 @@ def sliced(voxels: Voxels, at: F64, axis: F64, *, thickness_m: float, reach_m: f
 
 def map_file(voxels: Voxels, name: MapName, kind: MapFormat, *, report: Progress) -> bytes:
     """Like the files of ``hedgehop map``; for a worker. Raises ExportError for a map that the format cannot hold."""
-    from telemetry.rebuilding.export import exported
+    from telemetry.perception.rebuilding.export import exported
     from telemetry.topics import deltas
 
     report("Writing the map", None)

@@ -23,7 +23,7 @@ import sys
 import time
 from typing import NoReturn
 
-from telemetry.liveness import Liveness
+from telemetry.bus.liveness import Liveness
 
 CHANNEL = "HEDGEHOP_GUARDIAN"
 """Environment variable: the number of the server's end of the socket pair."""

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-from planning.confinement import plain_environment
+from planning.terrain.rasters.confinement import plain_environment
 from server.errors import BusyError, JobCancelledError, WorkerDiedError
 
 Progress = Callable[[str, float | None], None]

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from planning.confinement import plain_environment
+from planning.terrain.rasters.confinement import plain_environment
 from telemetry.bus.node_lock import NodeFacts, running_node
 
 LOG_BYTES = 2_000_000

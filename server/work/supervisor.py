@@ -13,9 +13,9 @@ from typing import Any, Literal
 from planning import __version__
 from server.work.node_process import NodeProcess, bound_log
 from telemetry import nodes
+from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes, silence_counts
 from telemetry.bus.sockets import private_directory
-from telemetry.liveness import HUNG_S, STARVED_S, Liveness, Silence
 
 log = logging.getLogger(__name__)
 

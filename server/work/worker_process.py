@@ -12,8 +12,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from planning.confinement import confine
 from planning.errors import DescribedError
+from planning.terrain.rasters.confinement import confine
 from server.errors import WorkerDiedError
 
 Report = Callable[[str, float | None], None]

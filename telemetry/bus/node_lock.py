@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Self
 
 from planning import __version__
+from telemetry.bus.liveness import SILENT_S
 from telemetry.errors import BusError
-from telemetry.liveness import SILENT_S
 
 _SUFFIX = ".lock"
 _PATIENCE_S = 1.0

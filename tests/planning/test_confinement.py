@@ -13,11 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from planning import confinement
-from planning.confinement import Holds, plain_environment, what_holds
 from planning.errors import RasterError
 from planning.terrain.geotiff import read_dsm
-from planning.terrain.rasters import sandbox
+from planning.terrain.rasters import confinement, sandbox
+from planning.terrain.rasters.confinement import Holds, plain_environment, what_holds
 from tests.planning.geotiff_samples import hill, write_raster
 
 _TRIES = """
@@ -81,7 +80,7 @@ def tried(tmp_path: Path, port: int, confine: str) -> dict[str, object]:
         folder.mkdir()
     (outside / "secret").write_text("x")
     (inside / "given").write_text("x")
-    program = f"{_TRIES}\nfrom planning.confinement import *\nfrom pathlib import Path\n{confine}\n"
+    program = f"{_TRIES}\nfrom planning.terrain.rasters.confinement import *\nfrom pathlib import Path\n{confine}\n"
     program += "print(json.dumps({name: outcome(attempt) for name, attempt in tries.items()}))"
     command = [sys.executable, "-c", program, str(port), str(outside), str(inside)]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

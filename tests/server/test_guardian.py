@@ -16,7 +16,7 @@ import pytest
 
 from server.work import guardian
 from server.work.guardian import CHANNEL, LINK_OPEN, LINK_USED, PAUSES_S, Guardian
-from telemetry.liveness import HUNG_S
+from telemetry.bus.liveness import HUNG_S
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 90.0

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from planning.confinement import what_holds
 from planning.errors import PoiError
+from planning.terrain.rasters.confinement import what_holds
 from server.errors import BusyError, JobCancelledError, WorkerDiedError
 from server.work.jobs import Lane
 

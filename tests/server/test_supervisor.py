@@ -14,8 +14,8 @@ from server.work import node_process, supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus import Bus
+from telemetry.bus.liveness import HUNG_S, STARVED_S
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
-from telemetry.liveness import HUNG_S, STARVED_S
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 90.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from telemetry.liveness import HUNG_S
+from telemetry.bus.liveness import HUNG_S
 from tests.soak.faults import Done
 from tests.soak.flight import BACK_S, Flown
 

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from telemetry import liveness
-from telemetry.bus import node_lock
+from telemetry.bus import liveness, node_lock
+from telemetry.bus.liveness import BUSY_S, HUNG_S, SILENT_S, START_S, STARVED_S, Liveness
 from telemetry.bus.node_lock import NodeFacts, NodeLock
-from telemetry.liveness import BUSY_S, HUNG_S, SILENT_S, START_S, STARVED_S, Liveness
 
 PROVED_S = 1000.0
 

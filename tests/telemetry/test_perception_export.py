@@ -11,7 +11,7 @@ import pytest
 
 from mapping.geometry.frames import LocalFrame
 from planning.terrain.geotiff import read_dsm
-from telemetry.rebuilding.export import ExportError, clusters, exported, outline
+from telemetry.perception.rebuilding.export import ExportError, clusters, exported, outline
 from telemetry.topics.deltas import FoldedMap, in_parts
 from telemetry.topics.obstacles import MapDelta, MapOrigin
 from tests.reference.octomap_bt import map_from_bt

@@ -15,8 +15,8 @@ import pytest
 from typer.testing import CliRunner
 
 from server.cli import app
+from telemetry.perception.rebuilding.rebuild import rebuild
 from telemetry.perception.sensor_kinds import KINDS
-from telemetry.rebuilding.rebuild import rebuild
 from telemetry.topics.deltas import FoldedMap
 from telemetry.topics.looks import CloudLook, points_enu_m
 from telemetry.topics.messages import Topic

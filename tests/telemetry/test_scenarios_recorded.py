@@ -15,8 +15,8 @@ from server.flying import review_task
 from server.flying.review import recording_of
 from telemetry.errors import RecordingError
 from telemetry.perception.map_changes import ChangeTeller
+from telemetry.perception.rebuilding.rebuild import OtherMap, rebuild
 from telemetry.perception.sensor_kinds import KINDS
-from telemetry.rebuilding.rebuild import OtherMap, rebuild
 from telemetry.recording.carried_ground import carried_ground, packed
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.mcap_files.mend import mend

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from planning.confinement import plain_environment
 from planning.errors import NoElevationError, RasterError, RasterFormatError, RasterTooLargeError
+from planning.terrain.rasters.confinement import plain_environment
 from planning.terrain.rasters.header import RasterLimits
 
 Json = dict[str, Any]

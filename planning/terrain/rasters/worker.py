@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
-from planning.confinement import confine, confine_files
+from planning.terrain.rasters.confinement import confine, confine_files
 
 Json = dict[str, Any]
 
