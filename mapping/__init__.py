@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mapping.perceiving.roi import search_sector, sector_points
     from mapping.radar.chain import POSITION2GO_SETTINGS, ChainSettings, RadarChain
     from mapping.radar.detections import Detections
-    from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+    from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
     from mapping.tracking.tracker import Tracker
     from mapping.tracking.tracker_params import TrackerParams, TrackState
     from mapping.traversability import Traversability, traversability_map

@@ -28,8 +28,8 @@ from mapping.version import __version__
 
 if TYPE_CHECKING:
     from planning.basics.plan_model import MissionParams, Poi, SurfaceParams
+    from planning.certificate.certificate_model import Certificate, ClearanceParams
     from planning.certificate.clearance import certify
-    from planning.certificate.model import Certificate, ClearanceParams
     from planning.errors import PlanningError
     from planning.formats.detect import read_flight
     from planning.missions.flown import flown_line

@@ -15,7 +15,7 @@ from planning.evading.manoeuvres import Seen, around, over
 from planning.evading.seen import Columns, burn, conflicts
 from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.ground.demo_hillside import small_hill
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest

@@ -14,7 +14,7 @@ from mapping.geometry.poses import Pose
 from mapping.perceiving.ground import GroundGrid
 from mapping.perceiving.ground_beams import BeamShape
 from mapping.perceiving.radar_near import Column, Weighted, columns, stronger_aside, weighted
-from mapping.radar.params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
+from mapping.radar.radar_params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
 from mapping.radar.targets import Gate, Polar
 
 BESIDE_RAD = math.radians(3.0)

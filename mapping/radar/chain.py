@@ -17,7 +17,7 @@ from mapping.radar import cfar, doa, fft
 from mapping.radar.cfar import Cfar
 from mapping.radar.detections import Detections, between_cells, detections
 from mapping.radar.fft import Window, envelope, own_peaks
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 from mapping.radar.targets import Gate, Polar, in_gate
 
 TI_RANGE, TI_DOPPLER = Cfar(guard=4, training=8), Cfar(guard=2, training=4)

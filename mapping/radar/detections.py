@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping.geometry.arrays import C64, F32, F64, I64, Bools
 from mapping.radar import doa
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 
 CLEAR = 20.0
 """Times the noise's mean that a direction besides the strongest must have: noise alone comes to it once in e**20."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
 from mapping.geometry.arrays import C64, F64, I64
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 
 
 @dataclass(frozen=True, slots=True)

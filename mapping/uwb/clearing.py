@@ -14,9 +14,9 @@ from mapping.errors import ParameterError
 from mapping.geometry.arrays import F32, F64, Bools
 from mapping.traversability import Traversability
 from mapping.uwb.fusion import fuse, view_is_clear
-from mapping.uwb.params import UwbGeometry, UwbParams
 from mapping.uwb.sensor_model import bin_evidence
 from mapping.uwb.thresholds import Learning, Thresholds
+from mapping.uwb.uwb_params import UwbGeometry, UwbParams
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F64, I8, I64, Bools
-from mapping.uwb.params import UwbGeometry, UwbParams
 from mapping.uwb.thresholds import Thresholds
+from mapping.uwb.uwb_params import UwbGeometry, UwbParams
 
 UNTOLD, DETECTED, FREE_BEFORE, FREE_BEHIND = 0, 1, 2, 3
 """Regions along range: nothing is said; r1, r2 and r3 of the paper."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from mapping.geometry.arrays import F64, I64
-from planning.fence.model import NO_FENCE, Fence, RallyPoint
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Firmware, Way
 from planning.terrain import SMALL_HOLE_M2
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planning.basics.plan_model import finite_or_none
-from planning.certificate.model import Certificate
+from planning.certificate.certificate_model import Certificate
 from planning.margins.words import budget_json, tube_json
 
 WORST_KEYS = ("lat_deg", "lon_deg", "alt_rel_home_m", "leg")

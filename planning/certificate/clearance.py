@@ -22,11 +22,18 @@ from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.basics.plan_model import FlownLine
 from planning.certificate.as_json import certificate_json
+from planning.certificate.certificate_model import (
+    Certificate,
+    ClearanceParams,
+    HomeStand,
+    LegClearance,
+    Reason,
+    WorstPoint,
+)
 from planning.certificate.fenced import fence_reason, fence_verdict, rally_reasons
 from planning.certificate.heights import height_range
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
 from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
-from planning.certificate.model import Certificate, ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from planning.basics.plan_model import FlownLine
+from planning.certificate.certificate_model import ClearanceParams, Reason
 from planning.certificate.home_stand import ground_at
-from planning.certificate.model import ClearanceParams, Reason
 from planning.certificate.pyramid import MaxPyramid
 from planning.certificate.ways_home import near_return, return_height
 from planning.fence.judge import FencedFlight, FenceVerdict, judge_fence

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from planning.basics.plan_model import FlownLine
+from planning.certificate.certificate_model import SET_DOWN_M, BetterHome, ClearanceParams, HomeStand
 from planning.certificate.home_ground import HomeGround, home_ground
 from planning.certificate.home_search import Standing, ground_around, nearest_standing
-from planning.certificate.model import SET_DOWN_M, BetterHome, ClearanceParams, HomeStand
 from planning.terrain.dsm import SurfaceModel
 
 DROP_M = 0.3

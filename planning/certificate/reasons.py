@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from planning.certificate.certificate_model import ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_search import FARTHEST_M
-from planning.certificate.model import ClearanceParams, HomeStand, LegClearance, Reason, WorstPoint
 from planning.margins.words import is_by_hand, rounded_down, rounded_up
 from planning.terrain.dsm import Dsm
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from planning.basics.plan_model import FlownLine, Unjudged
-from planning.certificate.model import Reason
+from planning.certificate.certificate_model import Reason
 
 MOST_RANGES = 3
 

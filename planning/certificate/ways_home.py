@@ -6,7 +6,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import FlownLine
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.pyramid import MaxPyramid
 from planning.certificate.returns import return_altitude, return_altitudes
 from planning.terrain.cells.cells import Layout

@@ -17,7 +17,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
 from planning.fence.distance import Nearest, to_circle, to_polygon
-from planning.fence.model import Fence, FenceCircle, FencePolygon, LatLon
+from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 
 CIRCLE_SHARE = 0.007
 """Of a radius: metres on a sphere differ from true ones by up to 0.6 %."""

@@ -13,7 +13,7 @@ from planning.following.lag import lag_s, planned_s
 from planning.following.nearest import Deviations, follow_track
 from planning.following.passing import LOWER_M, REACHED_M, Passing
 from planning.following.reference import Reference
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.following.track import Track, Window, judged_window
 
 AT_HOME_M = 3.0

@@ -10,7 +10,7 @@ from pathlib import PurePath
 from planning.basics.mav_cmd import FENCES, MavCmd
 from planning.basics.plan_model import Firmware
 from planning.errors import FormatError
-from planning.fence.model import Fence, RallyPoint
+from planning.fence.fence_model import Fence, RallyPoint
 from planning.formats.detect import is_kml
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from planning.formats.fence_plan import (

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from planning.basics.mav_cmd import AMSL_FRAMES, FENCE_CIRCLES, FENCE_POLYGONS, HOME_FRAMES, MavCmd, MavFrame
 from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError
-from planning.fence.model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, fence, place, polygon
+from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, fence, place, polygon
 from planning.formats.safe_text import check_lat_lon
 
 _INCLUSIONS = (MavCmd.NAV_FENCE_POLYGON_VERTEX_INCLUSION, MavCmd.NAV_FENCE_CIRCLE_INCLUSION)

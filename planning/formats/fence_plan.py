@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from planning.errors import FormatError
-from planning.fence.model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, fence, polygon
+from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, fence, polygon
 from planning.formats.fence_items import rally_point
 from planning.formats.safe_text import check_count, check_lat_lon, clean_name, finite
 

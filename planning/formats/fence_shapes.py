@@ -14,7 +14,7 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 from planning.errors import FormatError
-from planning.fence.model import Fence, LatLon, RallyPoint, circle, fence, polygon
+from planning.fence.fence_model import Fence, LatLon, RallyPoint, circle, fence, polygon
 from planning.formats import geojson
 from planning.formats.fence_items import rally_point
 from planning.formats.fence_plan import height_or_none

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mapping.geometry.arrays import F64
 from mapping.traversability import MOST_CELLS, Traversability, TraversabilityParams, traversability_map
 from mapping.uwb.clearing import Cleared, UwbPose, clear
-from mapping.uwb.params import UwbGeometry, UwbParams
+from mapping.uwb.uwb_params import UwbGeometry, UwbParams
 from planning.errors import ParameterError
 from planning.ground.landing_sites import LandingSites, landing_sites
 from planning.safe_surface.surface import block_max

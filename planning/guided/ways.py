@@ -16,13 +16,13 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import FlownLine
+from planning.certificate.certificate_model import Certificate
 from planning.certificate.clearance import certify
-from planning.certificate.model import Certificate
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
 from planning.errors import MissionError, ParameterError
-from planning.guided.model import (
+from planning.guided.guided_model import (
     HEIGHTS_M,
     LAPS,
     RADII_M,

@@ -9,8 +9,8 @@ from pyproj import Geod
 
 from planning.basics.mav_cmd import MavFrame
 from planning.basics.plan_model import Home, MissionParams, SampledPath
+from planning.certificate.certificate_model import BetterHome, ClearanceParams
 from planning.certificate.home_stand import better_home, ground_at
-from planning.certificate.model import BetterHome, ClearanceParams
 from planning.certificate.reasons import direction
 from planning.errors import DatumError, MissionError, PoiError
 from planning.missions.mission_items import Heights

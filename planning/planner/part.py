@@ -11,9 +11,9 @@ from affine import Affine
 
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import FlownLine, Mission
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
-from planning.certificate.model import Certificate, ClearanceParams
-from planning.fence.model import RallyPoint
+from planning.fence.fence_model import RallyPoint
 from planning.formats.commands import has_position
 from planning.missions.flown import flown_line
 from planning.planner.request import PlanRequest

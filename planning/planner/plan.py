@@ -22,9 +22,9 @@ from planning.basics.plan_model import (
     Timing,
     VehicleProfile,
 )
+from planning.certificate.certificate_model import BetterHome, Certificate
 from planning.certificate.clearance import certify
 from planning.certificate.home_stand import DROP_M
-from planning.certificate.model import BetterHome, Certificate
 from planning.errors import MissionError
 from planning.flight_time.predict import PredictedTime, predict_duration
 from planning.formats import qgc_plan, wpl

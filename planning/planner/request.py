@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from planning.basics import limits
 from planning.basics.plan_model import MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from planning.errors import ParameterError
-from planning.fence.model import NO_FENCE, Fence, RallyPoint
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Way
 from planning.missions.vehicle_profile import path_params
 from planning.missions.vehicle_terms import budget_of

@@ -13,7 +13,7 @@ from planning.certificate.clearance import certificate_json
 from planning.formats import geojson, kml, qgc_plan, trajectory_csv, wpl
 from planning.planner.plan import Plan, plan_trade
 from planning.planner.request import effective_profile
-from planning.report.page import ReportInput, TradeRow, render_report
+from planning.report.report_page import ReportInput, TradeRow, render_report
 from planning.report.summary import plan_summary
 from planning.route.camera import gsd_cm
 from planning.terrain.dsm import SurfaceModel

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from planning.basics.plan_model import finite_or_none
+from planning.certificate.certificate_model import Certificate
 from planning.certificate.clearance import certificate_json
-from planning.certificate.model import Certificate
 from planning.missions.feasibility import feasibility_json
 from planning.planner.plan import Plan
 from planning.route.survey_coverage import SurveyCoverage

@@ -12,7 +12,7 @@ from typer import Argument
 
 from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError, ParameterError
-from planning.fence.model import Fence, RallyPoint, fence_words
+from planning.fence.fence_model import Fence, RallyPoint, fence_words
 from planning.formats.fence_files import read_fence, write_fence
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from planning.formats.safe_text import clean_name

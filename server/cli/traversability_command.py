@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import typer
 from typer import Option
 
-from mapping.uwb.params import Rule, UwbParams, in_words
+from mapping.uwb.uwb_params import Rule, UwbParams, in_words
 from planning.errors import ParameterError
 from planning.ground.landing_sites import CAUTION, LandingSites
 from planning.ground.traversable import FINEST_M, cleared_ground, sites_near, traversable_ground

@@ -16,7 +16,7 @@ import numpy as np
 from mapping.perceiving.braking import Braking
 from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
-from planning.certificate.model import Certificate, ClearanceParams
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.margins.words import rounded_down, rounded_up
@@ -32,7 +32,7 @@ from telemetry.topics.messages import Item, OnboardMission, PlacesOnboard, PlanR
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from telemetry.flight.guided.targets import GuidedPlan
+    from telemetry.flight.guided.script_targets import GuidedPlan
     from telemetry.flight.preflight.parameters import Speeds
     from telemetry.flight.preflight.preflight import Preflight
 
@@ -136,7 +136,7 @@ def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
 
 def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:
     """The mission as the navigation script hands it over, with the paper's timing. Raises MissionError."""
-    from telemetry.flight.guided.targets import guided_plan, with_timing
+    from telemetry.flight.guided.script_targets import guided_plan, with_timing
 
     report("Preparing the navigation script", None)
     plan = guided_plan(read_wpl(record.mission_wpl))

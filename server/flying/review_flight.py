@@ -16,7 +16,7 @@ from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.errors import PlanningError
 from planning.following.reference import Reference, level_model, reference_line
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import DEFAULT_PROFILE, load_profile, parse_profile

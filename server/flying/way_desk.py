@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass, replace
 
 from mapping.geometry.frames import apart_m
-from planning.guided.model import RETURNS
+from planning.guided.guided_model import RETURNS
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay

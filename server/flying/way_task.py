@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planning.errors import ParameterError
-from planning.fence.model import RallyPoint
-from planning.guided.model import Back, GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
+from planning.fence.fence_model import RallyPoint
+from planning.guided.guided_model import Back, GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, WayBody
 from server.work.jobs import Progress
@@ -51,7 +51,7 @@ class WayJudged:
 
 def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     """Raises NotAllowedError, MissionError, ParameterError and PlanningError."""
-    from planning.fence.model import within_both
+    from planning.fence.fence_model import within_both
     from planning.formats.fence_items import fence_of, rally_of
     from server.library.documents import demands_from_doc
     from server.library.fences import fence_from_doc

@@ -22,7 +22,7 @@ from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from telemetry.flight.guided.targets import GuidedPlan
+    from telemetry.flight.guided.script_targets import GuidedPlan
 
 
 class FlightWork:

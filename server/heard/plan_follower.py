@@ -14,7 +14,7 @@ from planning.following.below import Demanded
 from planning.following.lag import planned_s
 from planning.following.live import Following, follow_on
 from planning.following.reference import Reference, reference_line
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
 from planning.terrain.dsm import Dsm

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 
 from planning.basics.plan_model import Camera, MissionParams, Poi, SurfaceParams, VehicleProfile
-from planning.certificate.model import ClearanceParams
-from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words
+from planning.certificate.certificate_model import ClearanceParams
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words
 from planning.formats.poi_files import PoiFile
 from planning.missions.vehicle_profile import path_params
 from planning.planner.request import PlanRequest, survey_request

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planning.fence.model import NO_FENCE, Fence, LatLon, RallyPoint, circle, fence, polygon
+from planning.fence.fence_model import NO_FENCE, Fence, LatLon, RallyPoint, circle, fence, polygon
 from planning.formats.fence_files import write_fence
 from planning.formats.fence_items import rally_point
 from server.errors import NotReadyError

@@ -124,7 +124,7 @@ def _forward(dsm: Dsm, state: VehicleState) -> F64:
 
 def _targets(mission: Mission, situation: Situation) -> tuple[GuidedTarget, ...]:
     """From where the vehicle was on, with the numbers that the mission on board has for them."""
-    from telemetry.flight.guided.targets import guided_plan
+    from telemetry.flight.guided.script_targets import guided_plan
     from telemetry.perception.mission_line import mission_line
 
     line, state = mission_line(situation.record, situation.origin), situation.state

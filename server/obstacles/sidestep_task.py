@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
+from planning.evading.evasion import AvoidanceParams, NoWay
 from planning.evading.keep_clear import Seen, Surface
-from planning.evading.model import AvoidanceParams, NoWay
 from planning.evading.sidestep import Mover, Proposed, Sidestep, sidestep
 from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
 from server.schemas import ManoeuvreDoc

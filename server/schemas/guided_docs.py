@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from planning.guided.model import HEIGHTS_M, LAPS, RADII_M, Problem
+from planning.guided.guided_model import HEIGHTS_M, LAPS, RADII_M, Problem
 from server.schemas.plan_docs import PlaceDoc
 from server.schemas.result_docs import ReasonDoc
 from server.schemas.strict_model import Asked, Strict

@@ -8,7 +8,7 @@ from pydantic import Field, StringConstraints
 
 from planning.basics.limits import FEWEST_ITEMS, LONGEST_LOITER_S
 from planning.basics.plan_model import MissionParams, PathParams, SurfaceParams, VehicleProfile
-from planning.fence.model import LARGEST_M, MOST_CORNERS
+from planning.fence.fence_model import LARGEST_M, MOST_CORNERS
 from planning.route.camera import LOOKS_DOWN_DEG
 from server.schemas.strict_model import Asked, Latitude, Longitude, Metres, Name, Strict
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mapping.uwb.params import Rule, UwbGeometry, UwbParams, of_rule
+from mapping.uwb.uwb_params import Rule, UwbGeometry, UwbParams, of_rule
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Asked, Strict
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
 from mapping.radar.detections import Detections
-from mapping.radar.params import POSITION2GO
+from mapping.radar.radar_params import POSITION2GO
 from telemetry.sensors.adc.adc_file import AnyFrame
 from telemetry.sensors.adc.oda import open_oda
 from telemetry.sensors.optitrack import Forward, read_optitrack

@@ -8,7 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mapping.radar.detections import Detections
-    from mapping.radar.params import FmcwParams
+    from mapping.radar.radar_params import FmcwParams
     from telemetry.sensors.adc.adc_file import AdcFile
 
 

@@ -7,8 +7,8 @@ import math
 from server.schemas import ChartDoc, ScenarioFigureDoc, ScenarioPartDoc, SeriesDoc
 from server.work.jobs import Progress
 from telemetry.simulation.scenarios.catalogue import run_scenario
-from telemetry.simulation.scenarios.stage.curves import Chart, ends
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, ends
 
 
 def fly(name: str, seed: int, *, report: Progress) -> tuple[list[ScenarioPartDoc], bool]:

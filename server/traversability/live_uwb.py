@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from mapping.sensor_frames import UwbScan
-from mapping.uwb.params import UwbParams, in_words
+from mapping.uwb.uwb_params import UwbParams, in_words
 from planning.errors import DescribedError
 from server.errors import reported
 from server.library import Library

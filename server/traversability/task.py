@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry.arrays import F32, U8
-from mapping.uwb.params import UwbParams, in_words
+from mapping.uwb.uwb_params import UwbParams, in_words
 from planning.ground.traversable import cleared_ground, traversable_ground
 from planning.terrain.geotiff import write_dsm
 from server.errors import NotReadyError

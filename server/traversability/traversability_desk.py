@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from mapping.uwb.params import UwbParams
+from mapping.uwb.uwb_params import UwbParams
 from planning.ground.landing_sites import CAUTION
 from server.errors import BusyError, JobCancelledError, NotFoundError, NotReadyError, error_doc
 from server.library import Library

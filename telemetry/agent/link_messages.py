@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mapping.errors import ParameterError
 from mapping.geometry.arrays import F32
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from telemetry.errors import SensorLinkError
 
 PROTOCOL_VERSION = 1

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.live_radar import LiveRadar, LiveStatus, reading_of
 from telemetry.sensors.position2go.answers import CLIPPED

@@ -11,9 +11,9 @@ import numpy as np
 
 from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Firmware, VehicleProfile
-from planning.certificate.model import ClearanceParams, Reason
-from planning.fence.model import NO_FENCE, Fence, RallyPoint
-from planning.guided.model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
+from planning.certificate.certificate_model import ClearanceParams, Reason
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
+from planning.guided.guided_model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
@@ -21,7 +21,7 @@ from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import is_fresh
-from telemetry.flight.guided.targets import bearing_rad
+from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.flight.preflight.checks import STEEP_ENOUGH, accuracy_m, gnss_row
 from telemetry.flight.preflight.parameters import return_settings
 from telemetry.flight.preflight.preflight import actual_home

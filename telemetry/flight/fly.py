@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from planning.basics.plan_model import Mission, finite_or_none
+from planning.certificate.certificate_model import Certificate
 from planning.certificate.clearance import certificate_json
-from planning.certificate.model import Certificate
 from planning.formats.wpl import write_wpl
 from planning.missions.vehicle_profile import dump_profile
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
-from telemetry.flight.guided.targets import guided_plan
+from telemetry.flight.guided.script_targets import guided_plan
 from telemetry.flight.preflight.preflight import Preflight
 from telemetry.flight.preflight.prepare import FlyOptions, Prepared, Report, connect, prepare
 from telemetry.flight.watch import Asks, Subscribes, Watch, watching

@@ -16,10 +16,10 @@ from telemetry.link.onboard import OnBoard
 from telemetry.link.quality import RoundTripClock, SequenceQuality
 from telemetry.link.streams import StreamRequests
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.autopilot_orders import Order, Orders
 from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing
 from telemetry.mavlink.commands import CommandRun
 from telemetry.mavlink.conversation import BootClock
-from telemetry.mavlink.orders import Order, Orders
 from telemetry.mavlink.parameters.values import BYTEWISE
 from telemetry.mavlink.reduce import reduce
 from telemetry.mavlink.texts import Texts

@@ -16,9 +16,9 @@ from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance
 from telemetry.link.missions import JoinMission, ReadMission, check_same_mission, set_speeds, start_mission
 from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, guided_way
+from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
-from telemetry.mavlink.orders import HOLD_MODES, MISSION_MODES
 from telemetry.topics.messages import OnboardMission
 from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState

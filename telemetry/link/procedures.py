@@ -16,7 +16,7 @@ from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
 from telemetry.flight.guided.feed import Feed
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.mavlink.orders import Order
+from telemetry.mavlink.autopilot_orders import Order
 from telemetry.topics.vehicle import VehicleState
 
 Accepted = Callable[[], None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from planning.basics.mav_cmd import MavCmd
-from telemetry.mavlink.orders import LAND_MODES, MISSION_MODES, RETURN_MODES
+from telemetry.mavlink.autopilot_orders import LAND_MODES, MISSION_MODES, RETURN_MODES
 from telemetry.topics.messages import FlightPhase, FlightStatus, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 

@@ -13,7 +13,7 @@ from mapping.geometry.arrays import F32
 from mapping.geometry.frames import LocalFrame
 from mapping.geometry.poses import Pose, PoseTrack
 from mapping.sensor_frames import UwbScan, rows
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.reader import open_recording

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from planning.errors import FormatError
 from planning.ground.traversable import UwbScans
 

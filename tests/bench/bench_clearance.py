@@ -18,9 +18,9 @@ from pyproj import CRS
 from scipy.spatial import KDTree
 
 from planning.basics.plan_model import FlownLine
+from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
-from planning.certificate.model import ClearanceParams
 from planning.certificate.ways_home import places_along
 from planning.terrain.cells.squares import squares
 from planning.terrain.dsm import Dsm

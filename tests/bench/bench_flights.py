@@ -19,7 +19,7 @@ from planning.basics.plan_model import Poi, VehicleProfile
 from planning.errors import PlanningError
 from planning.following.figures import TrackFigures, judge
 from planning.following.reference import reference_line
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.following.track import Track
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.plan import Plan, plan_mission

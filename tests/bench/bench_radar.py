@@ -14,7 +14,7 @@ import numpy as np
 from mapping.radar import fft
 from mapping.radar.cfar import Cfar, Stage, doppler_stage, range_stage
 from mapping.radar.chain import POSITION2GO_SETTINGS, RadarChain
-from mapping.radar.params import AWR1843, POSITION2GO
+from mapping.radar.radar_params import AWR1843, POSITION2GO
 from mapping.tracking.tracker import Tracker
 from tests.mapping.radar.cfar_maps import ca_along_doppler, caso_along_range
 from tests.mapping.radar.echoes import Echo, frame, noise

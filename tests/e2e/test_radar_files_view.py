@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from mapping.radar.params import AWR1843, POSITION2GO
+from mapping.radar.radar_params import AWR1843, POSITION2GO
 from telemetry.sensors.ti_mmwave.ti_config import fmcw_params
 from tests.e2e.stations import Station
 from tests.e2e.steps import LONG_MS, choose, visit

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from mapping.errors import ParameterError
 from mapping.traversability import Traversability, traversability_map
 from mapping.uwb.clearing import UwbClearing, UwbPose, clear
-from mapping.uwb.params import UwbGeometry, UwbParams, in_words, of_rule
 from mapping.uwb.sensor_model import DETECTED, FREE_BEFORE, FREE_BEHIND, UNTOLD, bin_evidence, occupied
 from mapping.uwb.thresholds import Learning, Thresholds
+from mapping.uwb.uwb_params import UwbGeometry, UwbParams, in_words, of_rule
 from tests.reference import uwb as slow
 
 GEOMETRY = UwbGeometry(bins=40)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from planning.basics.plan_model import FlownLine, Home, Mission, MissionItem
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from planning.terrain.dsm import Dsm
 from tests.planning.test_clearance import NORTH, WEST, dsm_of
 from tests.reference import clearance as oracle

@@ -12,8 +12,8 @@ from affine import Affine
 from pyproj import CRS, Geod
 
 from planning.basics.plan_model import FlownLine, Unjudged, VehicleProfile
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certificate_json, certify
-from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError, ParameterError
 from planning.missions.vehicle_terms import budget_of
 from planning.terrain.dsm import Dsm

@@ -14,8 +14,8 @@ from pyproj import CRS, Proj
 from scipy import ndimage
 
 from planning.basics.plan_model import Home, Mission, MissionItem
+from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.clearance import certify
-from planning.certificate.model import ClearanceParams
 from planning.certificate.pyramid import max_pyramid
 from planning.certificate.returns import return_altitude
 from planning.certificate.ways_home import places_along

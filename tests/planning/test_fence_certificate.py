@@ -10,9 +10,9 @@ import pytest
 
 from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
-from planning.certificate.model import Certificate, ClearanceParams
-from planning.fence.model import NO_FENCE, Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from planning.formats import qgc_plan
 from planning.missions.flown import flown_line
 from planning.planner.part import certify_part

@@ -10,7 +10,7 @@ import pytest
 from pymavlink import mavutil
 
 from planning.errors import FormatError
-from planning.fence.model import Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import Fence, RallyPoint, circle, polygon
 from planning.formats.detect import read_mission
 from planning.formats.fence_files import FenceFile, read_fence, write_fence
 from planning.formats.fence_items import rally_items

@@ -10,8 +10,8 @@ import pytest
 
 from mapping.geometry.frames import LocalFrame
 from planning.errors import FormatError
+from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, circle, fence, polygon
 from planning.fence.judge import FencedFlight, FenceVerdict, judge_fence
-from planning.fence.model import Fence, FenceCircle, FencePolygon, circle, fence, polygon
 from tests.reference.fence import nearest_m, plane_about, swept_places, xy_of
 
 HOME = (-37.1244507, 175.6892878)

@@ -14,7 +14,7 @@ from planning.basics.plan_model import Mission, VehicleProfile
 from planning.following.figures import judge
 from planning.following.nearest import follow
 from planning.following.reference import level_model, reference_line
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.following.track import Track
 from planning.formats.detect import read_mission
 from planning.terrain.dsm import Dsm

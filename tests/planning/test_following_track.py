@@ -16,7 +16,7 @@ from planning.following.figures import judge
 from planning.following.lag import late_s, planned_alt_dsm_m, planned_s
 from planning.following.live import Following, follow_on
 from planning.following.nearest import follow
-from planning.following.surface import SurfaceDistance
+from planning.following.surface_distance import SurfaceDistance
 from planning.following.track import Track
 from planning.terrain.dsm import Dsm
 from tests.planning.following_lines import flown, line

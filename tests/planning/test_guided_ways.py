@@ -13,10 +13,23 @@ from hypothesis import strategies as st
 from pyproj import CRS
 
 from mapping.geometry.arrays import F64
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from planning.errors import MissionError, ParameterError
-from planning.fence.model import Fence, RallyPoint, circle
-from planning.guided.model import Back, Demand, GoTo, GuidedWay, Here, Home, LatLon, Look, Orbit, Rally, TakeOff, Wish
+from planning.fence.fence_model import Fence, RallyPoint, circle
+from planning.guided.guided_model import (
+    Back,
+    Demand,
+    GoTo,
+    GuidedWay,
+    Here,
+    Home,
+    LatLon,
+    Look,
+    Orbit,
+    Rally,
+    TakeOff,
+    Wish,
+)
 from planning.guided.shapes import BESIDE_M, simplified
 from planning.guided.ways import guided_way
 from planning.terrain.dsm import Dsm

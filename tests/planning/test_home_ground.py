@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.basics.plan_model import FlownLine, Poi, VehicleProfile
+from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import home_ground
 from planning.certificate.home_search import SPARE_M, nearest_standing
-from planning.certificate.model import ClearanceParams
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm

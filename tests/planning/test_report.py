@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from planning.basics.plan_model import FlownLine, SurfaceParams, VehicleProfile
-from planning.certificate.model import Certificate, LegClearance, Reason, WorstPoint
+from planning.certificate.certificate_model import Certificate, LegClearance, Reason, WorstPoint
 from planning.missions.feasibility import feasibility_of
-from planning.report.page import ReportInput, TradeRow, render_report
+from planning.report.report_page import ReportInput, TradeRow, render_report
 from planning.report.words import assumption_rows, duration, metres, metres_up
 from planning.route.survey_coverage import SurveyCoverage
 from tests.planning.format_examples import HOSTILE, make_dsm, make_mission, make_path, make_timing

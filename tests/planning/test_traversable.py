@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pyproj import CRS
 
 from mapping.errors import CapacityError
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from planning.errors import ParameterError
 from planning.ground import traversable
 from planning.ground.traversable import UwbScans, cleared_ground, sites_near, traversable_ground

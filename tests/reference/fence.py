@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from pyproj import Transformer
 
-from planning.fence.model import Fence, FencePolygon
+from planning.fence.fence_model import Fence, FencePolygon
 
 Places = np.ndarray
 

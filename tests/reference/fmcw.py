@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from mapping.radar.params import LIGHT_M_S, FmcwParams
+from mapping.radar.radar_params import LIGHT_M_S, FmcwParams
 
 Place = tuple[float, float, float]
 """Right, forward, up; metres."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 
 LIGHT_M_S = 299_792_458.0
 

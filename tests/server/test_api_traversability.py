@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from mapping.uwb.params import UwbParams
+from mapping.uwb.uwb_params import UwbParams
 from server.schemas import JobDoc, TraversabilityState
 from tests.server.running import Running
 

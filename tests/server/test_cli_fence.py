@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from planning.fence.model import Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import Fence, RallyPoint, circle, polygon
 from planning.formats.fence_files import read_fence, write_fence
 from planning.formats.qgc_plan import read_plan
 from planning.terrain.geotiff import write_dsm

@@ -10,7 +10,7 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
-from planning.fence.model import Fence, circle
+from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_files import write_fence
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm

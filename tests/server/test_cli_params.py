@@ -14,7 +14,7 @@ from pymavlink import mavutil
 
 from planning.formats.wpl import write_wpl
 from planning.terrain.geotiff import write_dsm
-from server.cli.params.session import ParameterSession
+from server.cli.params.params_session import ParameterSession
 from telemetry.bus.link_client import LinkClient
 from telemetry.link.audit import AUDIT_FILE
 from telemetry.parameters.files import read_parameter_file

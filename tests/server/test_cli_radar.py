@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from telemetry.agent.client import RadarReading
 from telemetry.agent.sources import recorded_readings
 from telemetry.sensors.ti_mmwave.ti_config import fmcw_params

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mapping.errors import RadarDataError
-from mapping.radar.params import POSITION2GO
+from mapping.radar.radar_params import POSITION2GO
 from telemetry.sensors.adc.oda import open_oda
 from telemetry.sensors.optitrack import read_optitrack
 from telemetry.simulation.simulator.neu_frame import NeuFrame

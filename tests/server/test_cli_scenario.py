@@ -12,7 +12,6 @@ from PIL import Image
 from planning.basics.limits import LARGEST_SEED
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.simulation.scenarios.catalogue import NAMES
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.result import (
     AlertSeen,
     Figure,
@@ -22,6 +21,7 @@ from telemetry.simulation.scenarios.stage.result import (
     ScenarioResult,
     measured,
 )
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from tests.server.cli_runs import hedgehop
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from planning.certificate.model import Certificate, HomeStand
+from planning.certificate.certificate_model import Certificate, HomeStand
 from planning.planner.plan import plan_mission
 from server.flying import check_task
 from server.library.documents import demands_from_doc

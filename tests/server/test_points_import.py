@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from planning.errors import FormatError
-from planning.fence.model import Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import Fence, RallyPoint, circle, polygon
 from planning.formats.fence_files import write_fence
 from planning.formats.qgc_plan import write_plan
 from server.library.documents import with_points

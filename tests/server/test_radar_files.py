@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mapping.radar.params import AWR1843, POSITION2GO
+from mapping.radar.radar_params import AWR1843, POSITION2GO
 from server.door.guard import UPLOADS
 from server.schemas import RadarFileDoc, RadarFrame, RadarOpened
 from server.schemas.study_docs import RadarMap

@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from mapping.radar.params import POSITION2GO
+from mapping.radar.radar_params import POSITION2GO
 from server.door.guard import IMPORT_LIMIT_BYTES
 from server.schemas import JobDoc, JobMessage, RadarFileDoc, RadarTracksDoc
 from tests.server.cli_runs import hedgehop

@@ -14,8 +14,8 @@ from server.schemas import ScenarioDoc, ScenarioPartDoc, ScenarioResultDoc, Scen
 from server.studies.scenario_task import part_doc
 from server.work.jobs import Progress
 from telemetry.simulation.scenarios.catalogue import NAMES
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.result import Figure, measured
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from tests.server.running import Running, running
 from tests.server.station import ok
 

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from mapping.uwb.params import of_rule
+from mapping.uwb.uwb_params import of_rule
 from planning.errors import FormatError
 from planning.ground.traversable import UwbScans
 from planning.terrain.geotiff import write_dsm

@@ -12,7 +12,7 @@ import pytest
 
 from mapping.errors import CapacityError
 from mapping.uwb.clearing import Cleared
-from mapping.uwb.params import UwbGeometry, of_rule
+from mapping.uwb.uwb_params import UwbGeometry, of_rule
 from planning.errors import FormatError
 from planning.ground.traversable import UwbScans, traversable_ground
 from planning.terrain.geotiff import read_dsm

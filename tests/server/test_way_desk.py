@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from planning.errors import ParameterError
-from planning.fence.model import Fence, circle
+from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.way_desk import WayDesk, flown_places

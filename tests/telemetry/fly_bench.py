@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from planning.basics.plan_model import VehicleProfile
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from telemetry.flight.fly import FlyOptions, FlyResult, fly
 from telemetry.flight.preflight.prepare import Prepared
 from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, Topic, UploadReport

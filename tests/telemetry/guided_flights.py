@@ -13,7 +13,7 @@ from mapping.geometry.arrays import F64
 from planning.formats.wpl import read_wpl
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.guided import GuidedScript
-from telemetry.flight.guided.targets import guided_plan
+from telemetry.flight.guided.script_targets import guided_plan
 from telemetry.mavlink.actions import Action, Send
 from telemetry.mavlink.reduce import reduce
 from telemetry.simulation.simulator.airframe.gnss import GnssKind

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapping.radar.params import POSITION2GO
+from mapping.radar.radar_params import POSITION2GO
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled
 from tests.mapping.radar.echoes import noise
 from tests.telemetry.pseudo_terminals import PseudoTerminals, plugged_in

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from planning.basics.plan_model import Firmware, Mission
 from planning.formats.wpl import read_wpl
 from telemetry.errors import NotAllowedError
-from telemetry.flight.guided.targets import guided_plan
+from telemetry.flight.guided.script_targets import guided_plan
 from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.line import Line
 from telemetry.link.link import TICK_S, Link

@@ -19,7 +19,7 @@ from mapping.geometry.poses import Pose
 from mapping.tracking.blobs import Blobs
 from mapping.tracking.tracker import Tracker
 from planning.evading.velocity_obstacles import Obstacles, approaches
-from telemetry.flight.avoidance.passing import scene_of, velocity_past
+from telemetry.flight.avoidance.passing_tracks import scene_of, velocity_past
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import TrackerSettings, VelocitySettings
 from telemetry.topics.tracks import Track, TracksStatus

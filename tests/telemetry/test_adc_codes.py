@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import I64, U16
 from mapping.radar.chain import RadarChain
-from mapping.radar.params import AWR1843, POSITION2GO
+from mapping.radar.radar_params import AWR1843, POSITION2GO
 from telemetry.sensors.adc.codes import SampleCode, histogram, told
 from telemetry.sensors.adc.read_adc import open_adc
 from tests.mapping.radar.echoes import SMALL as SMALL_RADAR

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import C64
 from mapping.radar.chain import RadarChain
-from mapping.radar.params import AWR1843, POSITION2GO
+from mapping.radar.radar_params import AWR1843, POSITION2GO
 from telemetry.sensors.adc.adc_file import AdcFile
 from telemetry.sensors.adc.dca1000 import open_dca1000
 from telemetry.sensors.adc.oda import open_oda

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from planning.evading.velocity_obstacles import Limits, Obstacles
-from telemetry.flight.avoidance.passing import Scene, is_last_moment
+from telemetry.flight.avoidance.passing_tracks import Scene, is_last_moment
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import VelocitySettings
 from telemetry.topics.tracks import Track, TracksStatus

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from planning.basics.plan_model import ANY_VEHICLE
-from planning.guided.model import GoTo, GuidedWay, Home, Wish
+from planning.guided.guided_model import GoTo, GuidedWay, Home, Wish
 from telemetry.flight.certified_way import Flown, judged_way
 from telemetry.topics.vehicle import VehicleState
 from tests.planning.test_guided_ways import CLEARANCE, HOME, at, flat, model

@@ -14,8 +14,8 @@ from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.guided import THERE, GuidedScript
 from telemetry.mavlink.actions import Action
+from telemetry.mavlink.autopilot_orders import FORCE, Orders
 from telemetry.mavlink.modes import mode_numbers
-from telemetry.mavlink.orders import FORCE, Orders
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.requests import FlyWay, Operator
 from telemetry.topics.vehicle import VehicleState

@@ -13,7 +13,7 @@ from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import MissionError
 from planning.formats.trajectory_csv import Trajectory
 from planning.formats.wpl import read_wpl
-from telemetry.flight.guided.targets import guided_plan, with_timing
+from telemetry.flight.guided.script_targets import guided_plan, with_timing
 
 HOME = Home(-37.0, 175.0, 100.0, "NZVD2016")
 NAN = math.nan

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from planning.fence.model import Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import Fence, RallyPoint, circle, polygon
 from planning.formats.fence_files import read_fence, write_fence
 from tests.server.cli_runs import hedgehop
 from tests.telemetry.simulator_process import child, simulated_vehicle

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapping.radar.params import POSITION2GO
+from mapping.radar.radar_params import POSITION2GO
 from telemetry.agent.client import NoticeReading, RadarReading
 from telemetry.agent.position2go import Position2Go
 from telemetry.errors import SensorError

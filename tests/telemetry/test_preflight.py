@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
+from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.clearance import certify
-from planning.certificate.model import ClearanceParams
-from planning.fence.model import Fence, RallyPoint, circle
+from planning.fence.fence_model import Fence, RallyPoint, circle
 from planning.missions.flown import flown_line
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError

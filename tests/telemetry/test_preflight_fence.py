@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from planning.basics.plan_model import Firmware
-from planning.fence.model import NO_FENCE, Fence, RallyPoint, circle, polygon
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import at_fence, fence_row, flown_within, sent_places
 from telemetry.topics.messages import PlacesOnboard

@@ -11,10 +11,10 @@ import pytest
 from telemetry.simulation.scenarios.hugging.encounter_charts import cross_track_m, encounter_charts, following
 from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.long_flight import Look, growth_chart
-from telemetry.simulation.scenarios.stage.curves import Chart, Series
 from telemetry.simulation.scenarios.stage.map_against_world import NEAR_M, MapComparison
 from telemetry.simulation.scenarios.stage.map_charts import map_charts, skyline
 from telemetry.simulation.scenarios.stage.paper_fields import field
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series
 from telemetry.simulation.scenarios.stage.scenes import VALLEY
 from telemetry.simulation.scenarios.stage.seen_flight import Flown, Told
 from telemetry.simulation.scenarios.stage.world_objects import box, cylinder, tree, world_document

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mapping.uwb.clearing import Cleared
-from mapping.uwb.params import UwbParams
+from mapping.uwb.uwb_params import UwbParams
 from planning.errors import ParameterError
 from planning.ground.traversable import cleared_ground, traversable_ground
 from planning.terrain.geotiff import read_dsm
@@ -37,8 +37,8 @@ from telemetry.simulation.scenarios.foliage.foliage_figures import (
 from telemetry.simulation.scenarios.foliage.foliage_roc import Roc, curve, echoes_m2, roc_chart
 from telemetry.simulation.scenarios.foliage.foliage_rural import connected, route
 from telemetry.simulation.scenarios.foliage.foliage_trials import TRIAL_1, TRIAL_2, trial_site
-from telemetry.simulation.scenarios.stage.curves import MOST_POINTS
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, measured
+from telemetry.simulation.scenarios.stage.scenario_curves import MOST_POINTS
 from telemetry.simulation.simulator.sensors.uwb import UwbModel
 
 # On one worker: two would each drive for themselves.

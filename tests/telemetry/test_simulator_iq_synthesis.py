@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled, strongest
 from tests.reference.iq_samples import Scatterer, samples
 

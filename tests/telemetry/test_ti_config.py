@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapping.errors import RadarDataError
-from mapping.radar.params import AWR1843
+from mapping.radar.radar_params import AWR1843
 from telemetry.flight.avoidance.regions import OLD_S
 from telemetry.sensors.ti_mmwave.cfg_commands import parse_commands, read_commands
 from telemetry.sensors.ti_mmwave.config import config_of, read_config

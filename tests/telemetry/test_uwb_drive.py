@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from planning.ground.traversable import UwbScans
 from telemetry.errors import RecordingError
 from telemetry.perception import uwb_drive

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from planning.errors import FormatError
 from planning.ground.traversable import UwbScans
 from telemetry.sensors import uwb_log

@@ -9,7 +9,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import along_m
 from planning.basics.plan_model import FlownLine, Poi, SampledPath, Timing
-from planning.certificate.model import Certificate
+from planning.certificate.certificate_model import Certificate
 from planning.formats.safe_text import clean_name
 from planning.margins.words import rounded_up
 from planning.report.figures.chart import Chart, Mark, Series, render_chart

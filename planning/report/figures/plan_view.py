@@ -12,7 +12,7 @@ from PIL import Image
 
 from mapping.geometry.arrays import F64, U8
 from planning.basics.plan_model import FlownLine, Poi
-from planning.certificate.model import Certificate
+from planning.certificate.certificate_model import Certificate
 from planning.report.figures.chart import label, round_step
 from planning.report.figures.curves import BAD, PATH, short_name
 from planning.report.words import metres

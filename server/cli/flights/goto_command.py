@@ -16,9 +16,9 @@ import typer
 from typer import Argument, Option
 
 from planning.errors import ParameterError
-from planning.fence.model import RallyPoint
+from planning.fence.fence_model import RallyPoint
 from planning.formats.fence_items import fence_of, rally_of
-from planning.guided.model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
+from planning.guided.guided_model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.request import PlanRequest, check_demands
 from planning.terrain.dsm import Dsm

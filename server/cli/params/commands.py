@@ -13,8 +13,8 @@ import typer
 from typer import Argument, Option
 
 from planning.errors import FormatError, ParameterError
-from server.cli.params.descriptions import descriptions
-from server.cli.params.session import ParameterSession, parameter_session
+from server.cli.params.kept_descriptions import descriptions
+from server.cli.params.params_session import ParameterSession, parameter_session
 from server.cli.params.tables import (
     Descriptions,
     comparison_json,

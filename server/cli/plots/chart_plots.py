@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from telemetry.simulation.scenarios.stage.curves import Chart, Series, ends
 from telemetry.simulation.scenarios.stage.result import ScenarioResult
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, ends
 
 _COLOURS = ("#1f6f8b", "#e4572e", "#2e6b34", "#7d3fd1", "#8a6d1d")
 _PRINTED = "#333333"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from planning.basics.plan_model import Mission
-from planning.fence.model import Fence, RallyPoint, fence_words
+from planning.fence.fence_model import Fence, RallyPoint, fence_words
 from planning.formats.fence_files import read_fence
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.output import say_notes

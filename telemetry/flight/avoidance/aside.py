@@ -15,7 +15,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import offset_m
 from planning.evading.velocity_obstacles import Proposal
-from telemetry.flight.avoidance.passing import (
+from telemetry.flight.avoidance.passing_tracks import (
     Scene,
     is_last_moment,
     is_wanted,

@@ -20,8 +20,8 @@ from telemetry.flight.guided.handover import Handover, away_m, is_fresh
 from telemetry.flight.guided.leading import Leading
 from telemetry.flight.guided.orders import GuidedOrders, Place
 from telemetry.flight.guided.pending_command import PendingCommand, Then
+from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.flight.guided.script_watches import ModeWatch, Punctuality, Standstill
-from telemetry.flight.guided.targets import bearing_rad
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget

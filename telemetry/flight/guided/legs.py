@@ -8,7 +8,7 @@ from dataclasses import replace
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.helm import Helm, here_of
 from telemetry.flight.guided.orders import Place
-from telemetry.flight.guided.targets import bearing_rad
+from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.mavlink.actions import Action
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState

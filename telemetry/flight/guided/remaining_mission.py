@@ -11,7 +11,7 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.certificate.commands import TAKEOFFS
 from planning.errors import MissionError
-from telemetry.flight.guided.targets import guided_plan
+from telemetry.flight.guided.script_targets import guided_plan
 from telemetry.mavlink.flight_keeper import item_of
 from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState

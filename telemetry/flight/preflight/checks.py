@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from planning.basics.plan_model import Home, Mission, VehicleProfile
-from planning.certificate.model import Certificate, ClearanceParams, HomeStand
+from planning.certificate.certificate_model import Certificate, ClearanceParams, HomeStand
 from planning.formats.commands import has_position
 from planning.margins.words import rounded_down, rounded_up
 from planning.missions.flown import AMSL_FRAMES

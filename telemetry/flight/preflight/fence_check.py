@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError
-from planning.fence.model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from telemetry.flight.preflight.checks import Row
 from telemetry.mavlink.items import mission_items, wire_items

@@ -10,7 +10,7 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Firmware
 from planning.certificate.commands import STRAIGHT
 from planning.certificate.returns import NEAR_M, SLOPE
-from telemetry.flight.guided.targets import GROUND_SPEEDS
+from telemetry.flight.guided.script_targets import GROUND_SPEEDS
 from telemetry.topics.messages import OnboardMission
 
 NAMES: dict[Firmware, tuple[str, ...]] = {

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.basics.plan_model import Firmware, Home, Mission, VehicleProfile
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_stand import ground_at
-from planning.certificate.model import Certificate, ClearanceParams
 from planning.errors import MissionError
-from planning.fence.model import NO_FENCE, Fence, RallyPoint
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.missions.flown import AMSL_FRAMES, flown_line

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from planning.basics.plan_model import Mission, VehicleProfile
-from planning.certificate.model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams
 from planning.missions.flown import flown_line
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes

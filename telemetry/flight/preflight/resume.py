@@ -9,9 +9,9 @@ import numpy as np
 
 from planning.basics.mav_cmd import MavCmd, MavFrame
 from planning.basics.plan_model import Mission, MissionItem
+from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
 from planning.certificate.commands import STRAIGHT, stays
-from planning.certificate.model import Certificate, ClearanceParams
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
 from planning.formats.commands import has_position

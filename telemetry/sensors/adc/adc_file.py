@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import C64
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 
 
 @dataclass(frozen=True, slots=True)

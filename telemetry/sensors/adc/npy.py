@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mapping.errors import RadarDataError
 from mapping.geometry.arrays import C64, I64
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, dimensions, refuse_clipped, refuse_empty
 from telemetry.sensors.adc.codes import Code, SampleCode, histogram, told
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mapping.errors import RadarDataError
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame, AnyFrame, refuse_clipped, refuse_empty
 
 RATE_HZ = 15.7

@@ -9,7 +9,7 @@ from typing import Literal
 from mapping.errors import RadarDataError
 from mapping.radar.chain import AWR1843_SETTINGS, POSITION2GO_SETTINGS, RadarChain, Spectra
 from mapping.radar.detections import Detections
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from telemetry.sensors.adc.adc_file import AdcFile, AdcFrame
 from telemetry.sensors.adc.codes import SampleCode
 from telemetry.sensors.adc.dca1000 import open_dca1000

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import C64, U32
-from mapping.radar.params import POSITION2GO, FmcwParams
+from mapping.radar.radar_params import POSITION2GO, FmcwParams
 from telemetry.errors import SensorError
 
 BASE, SWEEP = 0x52424153, 0x52464D43

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import serial
 
-from mapping.radar.params import FmcwParams
+from mapping.radar.radar_params import FmcwParams
 from telemetry.errors import SensorError
 from telemetry.sensors.position2go import answers
 from telemetry.sensors.position2go.answers import Frame, WrongAnswerError, frame_of, params_of

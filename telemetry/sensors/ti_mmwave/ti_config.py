@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mapping.errors import RadarDataError
-from mapping.radar.params import LIGHT_M_S, FmcwParams
+from mapping.radar.radar_params import LIGHT_M_S, FmcwParams
 from telemetry.sensors.ti_mmwave.cfg_commands import Command
 
 USABLE_RANGE = 0.8

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from telemetry.simulation.scenarios.stage import scenes
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import radar_figures, vision_figures
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
 from telemetry.topics.obstacles import Sensor

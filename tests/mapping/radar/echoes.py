@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import C64, C128
-from mapping.radar.params import AWR1843, LIGHT_M_S, FmcwParams
+from mapping.radar.radar_params import AWR1843, LIGHT_M_S, FmcwParams
 
 SMALL = replace(AWR1843, chirps=16, samples=64, slope_hz_per_s=4 * AWR1843.slope_hz_per_s)
 """An AWR1843 with short frames, to 32 m in cells of 0.5 m."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mapping.errors import RadarDataError
 from mapping.radar.chain import POSITION2GO_SETTINGS, ChainSettings, RadarChain
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from mapping.radar.targets import Gate
 from tests.mapping.radar.echoes import SMALL, Echo, frame, noise
 from tests.reference.fmcw import Place, echo

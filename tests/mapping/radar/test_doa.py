@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mapping.errors import ParameterError
 from mapping.radar import doa
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from tests.reference.fmcw import bearing_eq2, phase_eq3, transform
 
 ROWS = doa.rows_of(AWR1843)

@@ -10,7 +10,7 @@ from mapping.geometry.arrays import C128
 from mapping.radar import doa
 from mapping.radar.chain import ChainSettings, RadarChain, Spectra
 from mapping.radar.detections import Detections
-from mapping.radar.params import AWR1843
+from mapping.radar.radar_params import AWR1843
 
 NAMES = ["simple_frame_1", "doppler_example", "doppler_example_1"]
 

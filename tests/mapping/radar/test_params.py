@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapping.errors import ParameterError
-from mapping.radar.params import AWR1843, LIGHT_M_S, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, LIGHT_M_S, POSITION2GO, FmcwParams
 from tests.reference.fmcw import phase_eq3, range_eq1
 
 

@@ -19,7 +19,6 @@ from telemetry.simulation.scenarios.arena.arena_course import (
     approaches,
 )
 from telemetry.simulation.scenarios.arena.arena_flight import ArenaFlown, arena_settings, fly
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.result import (
     AlertSeen,
     Figure,
@@ -27,6 +26,7 @@ from telemetry.simulation.scenarios.stage.result import (
     ScenarioRequest,
     ScenarioResult,
 )
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.track_settings import with_figures
 

@@ -10,8 +10,8 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from telemetry.simulation.scenarios.arena.against_truth import Pole, Seen, TruthComparison, rms
 from telemetry.simulation.scenarios.arena.arena_radar import Position2GoModel
-from telemetry.simulation.scenarios.stage.curves import Chart, Series, series
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, measured
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, series
 
 STEP_DEG, STEP_M = 5.0, 1.0
 """Over so much a mean of errors is taken."""

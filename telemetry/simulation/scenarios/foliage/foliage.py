@@ -11,8 +11,8 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS
 
-from mapping.uwb.params import UwbParams
 from mapping.uwb.thresholds import Thresholds
+from mapping.uwb.uwb_params import UwbParams
 from planning.errors import ParameterError
 from planning.ground.traversable import UwbScans
 from planning.terrain.dsm import Dsm

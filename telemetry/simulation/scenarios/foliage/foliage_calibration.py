@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.uwb.params import UwbParams
 from mapping.uwb.sensor_model import bin_ranges, power_scaler
 from mapping.uwb.thresholds import Learning, Thresholds
+from mapping.uwb.uwb_params import UwbParams
 from telemetry.simulation.simulator.sensors.uwb import UwbModel, UwbRadar
 from telemetry.simulation.simulator.sensors.uwb_scene import TABLE_II, Foliage, Target, screen, uwb_scene
 

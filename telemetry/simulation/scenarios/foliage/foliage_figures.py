@@ -11,7 +11,7 @@ import numpy as np
 from mapping.geometry.arrays import F32, U8, Bools
 from mapping.traversability import Traversability, traversability_map
 from mapping.uwb.clearing import Cleared, UwbClearing, UwbPose, clear
-from mapping.uwb.params import UwbParams
+from mapping.uwb.uwb_params import UwbParams
 from telemetry.simulation.scenarios.foliage.foliage_trials import CELL_M, PLACED, Site, disc_cells, elevation
 from telemetry.simulation.simulator.sensors.uwb import UwbRadar
 from telemetry.simulation.simulator.sensors.uwb_scene import Target, uwb_scene

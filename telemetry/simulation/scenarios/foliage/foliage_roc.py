@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.uwb.params import UwbParams
+from mapping.uwb.uwb_params import UwbParams
 from telemetry.simulation.scenarios.foliage.foliage_drive import lawn_drive
 from telemetry.simulation.scenarios.foliage.foliage_figures import (
     PAPERS_RULE,
@@ -18,7 +18,7 @@ from telemetry.simulation.scenarios.foliage.foliage_figures import (
     placed_cells,
 )
 from telemetry.simulation.scenarios.foliage.foliage_trials import TRIAL_1, TRIAL_2, trial_site
-from telemetry.simulation.scenarios.stage.curves import Chart, series
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from telemetry.simulation.simulator.sensors.uwb import ECHO_M2_PER_M, LAYERS, transmission
 from telemetry.simulation.simulator.sensors.uwb_scene import TABLE_II
 

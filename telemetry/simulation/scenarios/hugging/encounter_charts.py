@@ -10,8 +10,8 @@ from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import Polyline, along_m
 from telemetry.simulation.scenarios.hugging.encounters import HIGH, MOST_FALSE_PER_KM, Encounters, Passed, objects_of
 from telemetry.simulation.scenarios.hugging.hugging import Hugging
-from telemetry.simulation.scenarios.stage.curves import Chart, Series, not_empty, series
 from telemetry.simulation.scenarios.stage.result import Figure
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, not_empty, series
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
 from telemetry.simulation.simulator.scene import World
 

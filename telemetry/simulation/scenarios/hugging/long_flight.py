@@ -14,7 +14,6 @@ from telemetry.simulation.scenarios.hugging.encounters import encounters
 from telemetry.simulation.scenarios.hugging.hugging import hugging, random_route
 from telemetry.simulation.scenarios.hugging.strewn import strewn
 from telemetry.simulation.scenarios.hugging.terrain_hugging import APART_M, etna
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import radar_figures
 from telemetry.simulation.scenarios.stage.result import (
     Figure,
@@ -23,6 +22,7 @@ from telemetry.simulation.scenarios.stage.result import (
     ScenarioResult,
 )
 from telemetry.simulation.scenarios.stage.running import FlightRecording, surveyed
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from telemetry.simulation.scenarios.stage.setup import Setup, Tell
 from telemetry.simulation.scenarios.stage.virtual_flight import fly
 from telemetry.simulation.scenarios.stage.world_objects import world_document

@@ -12,8 +12,8 @@ from mapping.radar.chain import RadarChain
 from mapping.radar.detections import Detections
 from mapping.radar.fft import Window
 from planning.errors import ParameterError
-from telemetry.simulation.scenarios.stage.curves import Chart, Series, series
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult, measured
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, series
 from telemetry.simulation.simulator.sensors.iq import noise
 from telemetry.simulation.simulator.sensors.iq_model import AWR1843_IQ, POSITION2GO_IQ, IqModel
 from telemetry.simulation.simulator.sensors.iq_synthesis import Returns, sampled

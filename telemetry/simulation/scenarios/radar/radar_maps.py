@@ -14,7 +14,6 @@ from mapping.perceiving.alerts import AlertParams
 from mapping.radar.targets import Gate, Variant, in_gate, polar, to_enu
 from mapping.sensor_frames import rows
 from telemetry.simulation.scenarios.stage import scenes
-from telemetry.simulation.scenarios.stage.curves import Chart, series
 from telemetry.simulation.scenarios.stage.map_against_world import (
     clusters_of,
     radar_compared,
@@ -25,6 +24,7 @@ from telemetry.simulation.scenarios.stage.map_against_world import (
 from telemetry.simulation.scenarios.stage.map_charts import map_charts
 from telemetry.simulation.scenarios.stage.result import Figure, MapFigures, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
 from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
 from telemetry.simulation.simulator.sensors.body import of_truth
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel

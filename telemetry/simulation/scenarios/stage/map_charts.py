@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from telemetry.simulation.scenarios.stage.curves import Chart, Series, not_empty, series
 from telemetry.simulation.scenarios.stage.map_against_world import MapComparison
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, not_empty, series
 from telemetry.simulation.scenarios.stage.seen_flight import Flown
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.scene.primitives import BOX, ELLIPSOID

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from telemetry.simulation.scenarios.stage.curves import Chart
+from telemetry.simulation.scenarios.stage.scenario_curves import Chart
 from telemetry.topics.obstacles import AlertSource
 from telemetry.topics.vehicle import RadarKind
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from mapping.radar.params import LIGHT_M_S
+from mapping.radar.radar_params import LIGHT_M_S
 from telemetry.simulation.simulator.scene.motion import Motion
 
 WAVELENGTH_M = LIGHT_M_S / 77.5e9

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from mapping.radar.chain import AWR1843_SETTINGS, POSITION2GO_SETTINGS, ChainSettings
 from mapping.radar.fft import window
-from mapping.radar.params import AWR1843, POSITION2GO, FmcwParams
+from mapping.radar.radar_params import AWR1843, POSITION2GO, FmcwParams
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 
 

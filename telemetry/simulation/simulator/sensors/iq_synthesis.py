@@ -12,7 +12,7 @@ from scipy.fft import ifft
 from scipy.special import i0
 
 from mapping.geometry.arrays import C64, C128, F32, F64
-from mapping.radar.params import LIGHT_M_S, FmcwParams
+from mapping.radar.radar_params import LIGHT_M_S, FmcwParams
 
 _TAPS, _OVERSAMPLING = 6, 2
 _BETA = 2.34 * _TAPS

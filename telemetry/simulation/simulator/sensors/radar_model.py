@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.radar.params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
+from mapping.radar.radar_params import OBJECT_SPEED_CELL_M_S, OBJECT_SPEED_CELLS
 
 
 @dataclass(frozen=True, slots=True)

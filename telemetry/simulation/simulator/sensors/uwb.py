@@ -13,7 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64, U8, Bools
-from mapping.uwb.params import UwbGeometry
+from mapping.uwb.uwb_params import UwbGeometry
 from telemetry.simulation.simulator.sensors.uwb_scene import UwbScene, chords
 
 EXTINCTION, EXTINCTION_POWER = 0.096, 2.24

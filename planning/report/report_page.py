@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from mapping.version import __version__
 from planning.basics.plan_model import FlownLine, Mission, SampledPath, SurfaceParams, Timing, VehicleProfile
-from planning.certificate.model import Certificate, LegClearance
+from planning.certificate.certificate_model import Certificate, LegClearance
 from planning.formats.commands import home_altitude_note
 from planning.formats.safe_text import clean_name
 from planning.margins.budget import SUM_RULE

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mapping.geometry.arrays import F64
-from planning.certificate.model import Certificate, ClearanceParams
-from planning.fence.model import NO_FENCE, Fence, RallyPoint
+from planning.certificate.certificate_model import Certificate, ClearanceParams
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 
 LatLon = tuple[float, float]
 Problem = Literal["way", "return"]

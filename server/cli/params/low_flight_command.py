@@ -15,7 +15,7 @@ from planning.formats.detect import read_mission
 from planning.missions.feasibility import commanded_speed_m_s
 from planning.planner.part import certify_part
 from planning.planner.plan import CERTIFICATE_STEP
-from server.cli.params.session import parameter_session
+from server.cli.params.params_session import parameter_session
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.files_in_out import read_small
