@@ -64,7 +64,7 @@ _NAMES = {
     ".perceiving.roi": ("search_sector", "sector_points"),
     ".radar.chain": ("POSITION2GO_SETTINGS", "ChainSettings", "RadarChain"),
     ".radar.detections": ("Detections",),
-    ".radar.params": ("AWR1843", "POSITION2GO", "FmcwParams"),
+    ".radar.radar_params": ("AWR1843", "POSITION2GO", "FmcwParams"),
     ".tracking.tracker": ("Tracker",),
     ".tracking.tracker_params": ("TrackState", "TrackerParams"),
     ".traversability": ("Traversability", "traversability_map"),

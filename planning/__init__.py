@@ -66,16 +66,16 @@ __all__ = [
 ]
 
 _NAMES = {
+    ".basics.plan_model": ("MissionParams", "Poi", "SurfaceParams"),
+    ".certificate.certificate_model": ("Certificate", "ClearanceParams"),
     ".certificate.clearance": ("certify",),
     ".errors": ("PlanningError",),
     ".formats.detect": ("read_flight",),
     ".missions.flown": ("flown_line",),
     ".missions.vehicle_profile": ("load_profile", "path_params"),
-    ".certificate.model": ("Certificate", "ClearanceParams"),
-    ".model": ("MissionParams", "Poi", "SurfaceParams"),
-    ".plan": ("Plan", "plan_mission"),
+    ".planner.plan": ("Plan", "plan_mission"),
+    ".planner.request": ("PlanRequest", "survey_request"),
     ".report.exports": ("FILES", "export_file"),
-    ".request": ("PlanRequest", "survey_request"),
     ".route.survey": ("survey_lines",),
     ".terrain.dsm": ("Dsm",),
     ".terrain.geotiff": ("read_dsm",),

@@ -98,7 +98,7 @@ class _ParamsCommands(_Lazy):
         "save": (".params.commands.save", examples.PARAMS_SAVE),
         "load": (".params.commands.load", examples.PARAMS_LOAD),
         "compare": (".params.commands.compare", examples.PARAMS_COMPARE),
-        "review": (".params.review_command.review", examples.PARAMS_REVIEW),
+        "review": (".params.low_flight_command.review", examples.PARAMS_REVIEW),
     }
 
 
