@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { nextStep, type Facts } from "../src/fly/next_step";
+import { nextStep, wordsBeside, type Facts } from "../src/fly/next_step";
 import { uploadObstacle } from "../src/vehicle/orders";
 import type { CheckRow, FlightStatus, OnboardDoc, PreflightDoc, TransferStatus } from "../src/messages";
 import { flyState, linkStatus, vehicleState } from "./flight_samples";
@@ -120,5 +120,29 @@ describe("an upload", () => {
     for (const verdict of ["none", "error", "not_certified", "computing"] as const) {
       expect(uploadObstacle(verdict)).toBeTruthy();
     }
+  });
+});
+
+describe("the words beside the next step", () => {
+  const known = { unheard: null, hint: "2 places left", holder: "Anna is in charge.", isServerHeard: true };
+  const cut = "The server is silent: use the pilot's transmitter";
+
+  it("are the flight's hint, why the step waits, and to an observer who is in charge", () => {
+    expect(wordsBeside({ id: "pause" }, known)).toEqual(["2 places left"]);
+    expect(wordsBeside({ id: "check", why: "Check again" }, { ...known, hint: "" })).toEqual(["Check again"]);
+    expect(wordsBeside({ id: "take_control" }, known)).toEqual(["2 places left", "Anna is in charge."]);
+  });
+
+  it("are for an observer, too, only why nothing is heard when the server is gone", () => {
+    const gone = { ...known, unheard: cut, isServerHeard: false };
+    expect(wordsBeside({ id: "take_control" }, gone)).toEqual([cut]);
+    expect(wordsBeside({ id: "pause" }, gone)).toEqual([cut]);
+  });
+
+  it("still say who is in charge when only the link has failed", () => {
+    expect(wordsBeside({ id: "take_control" }, { ...known, unheard: cut })).toEqual([
+      cut,
+      "Anna is in charge.",
+    ]);
   });
 });

@@ -35,7 +35,7 @@ import {
 } from "../vehicle/orders";
 import { TransferBar } from "../vehicle/TransferBar";
 import { now_ms } from "../store/clock";
-import { nextStep, type Step } from "./next_step";
+import { nextStep, wordsBeside, type Step } from "./next_step";
 
 function startLabel(): string {
   const from = resumeFrom.value;
@@ -160,8 +160,9 @@ const presentStep = (): Step =>
     obstacle: uploadRefusal(),
   });
 
-function whoIsInCharge(): string {
+function whoIsInCharge(): string | null {
   const { holder, silent, waits } = lease.value;
+  if (!holder) return null;
   if (waits) return `${holder} has been asked for control.`;
   return silent ? `${holder} is in charge, and nothing is heard of them.` : `${holder} is in charge.`;
 }
@@ -172,9 +173,12 @@ export function NextAction() {
   const unheard = whyUnheard.value;
   // Control can be taken while nothing comes to the vehicle.
   const cut = step.id === "take_control" ? null : unheard;
-  const why = unheard ?? ("why" in step && step.id !== "wait" ? step.why : "");
-  const hint = flight.live.value?.hint ?? "";
-  const observer = step.id === "take_control" && lease.value.holder && failed.value !== "server";
+  const words = wordsBeside(step, {
+    unheard,
+    hint: flight.live.value?.hint ?? "",
+    holder: whoIsInCharge(),
+    isServerHeard: failed.value !== "server",
+  });
   return (
     <footer class="primary-action" data-testid="next-action" data-step={step.id}>
       <Outcome place={NEXT} />
@@ -182,9 +186,11 @@ export function NextAction() {
         <LastFlight />
       </Changes>
       <TransferBar />
-      {hint && unheard === null && <p class="muted action-hint">{hint}</p>}
-      {why && <p class="muted action-hint">{why}</p>}
-      {observer && <p class="muted action-hint">{whoIsInCharge()}</p>}
+      {words.map((sentence) => (
+        <p key={sentence} class="muted action-hint">
+          {sentence}
+        </p>
+      ))}
       {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}
       <Changes>
         <Primary step={step} isCut={cut !== null} />

@@ -84,3 +84,23 @@ export function nextStep(facts: Facts): Step {
   }
   return inFlight(facts) ?? onGround(facts);
 }
+
+/** What may be said beside the next step. */
+export interface Known {
+  /** Why nothing comes to the vehicle (`whyUnheard`). */
+  readonly unheard: string | null;
+  readonly hint: string;
+  /** Who is in charge, if another page is. */
+  readonly holder: string | null;
+  readonly isServerHeard: boolean;
+}
+
+/** The words beside the next step: of a flight that this page cannot hear it says nothing but why. */
+export function wordsBeside(step: Step, { unheard, hint, holder, isServerHeard }: Known): string[] {
+  const reason = "why" in step && step.id !== "wait" ? step.why : "";
+  return [
+    unheard === null ? hint : "",
+    unheard ?? reason ?? "",
+    step.id === "take_control" && isServerHeard ? (holder ?? "") : "",
+  ].filter((words) => words !== "");
+}
