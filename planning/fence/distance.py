@@ -15,7 +15,7 @@ from mapping.geometry.arrays import F64
 
 
 @dataclass(frozen=True, slots=True)
-class Nearest:
+class NearestOfTriangles:
     """Of one triangle after the other."""
 
     distance_m: F64
@@ -28,7 +28,7 @@ class Nearest:
         return k, float(self.distance_m[k])
 
 
-def to_polygon(triangles_m: F64, corners_m: F64, *, inclusion: bool) -> Nearest:
+def to_polygon(triangles_m: F64, corners_m: F64, *, inclusion: bool) -> NearestOfTriangles:
     """From (K, 3, 2) triangles to what a simple polygon with (N, 2) corners forbids."""
     count = len(triangles_m)
     best_m, place_m = np.full(count, np.inf), triangles_m[:, 0].copy()
@@ -45,22 +45,22 @@ def to_polygon(triangles_m: F64, corners_m: F64, *, inclusion: bool) -> Nearest:
         places = triangles_m[:, vertex]
         forbidden = inside_polygon(places, corners_m) != inclusion
         best_m[forbidden], place_m[forbidden] = 0.0, places[forbidden]
-    return Nearest(best_m, place_m)
+    return NearestOfTriangles(best_m, place_m)
 
 
-def to_circle(triangles_m: F64, centre_m: F64, radius_m: float, *, inclusion: bool) -> Nearest:
+def to_circle(triangles_m: F64, centre_m: F64, radius_m: float, *, inclusion: bool) -> NearestOfTriangles:
     """As `to_polygon`, of a circle."""
     rows = np.arange(len(triangles_m))
     if inclusion:
         away_m = np.linalg.norm(triangles_m - centre_m, axis=2)
         farthest = np.argmax(away_m, axis=1)
-        return Nearest(np.maximum(0.0, radius_m - away_m[rows, farthest]), triangles_m[rows, farthest])
+        return NearestOfTriangles(np.maximum(0.0, radius_m - away_m[rows, farthest]), triangles_m[rows, farthest])
     nearest = [_foot(triangles_m[:, k], triangles_m[:, (k + 1) % 3], centre_m) for k in range(3)]
     away_m = np.stack([np.linalg.norm(foot - centre_m, axis=1) for foot in nearest])
     side = np.argmin(away_m, axis=0)
     place_m, within = np.stack(nearest)[side, rows], _holds(triangles_m, centre_m)
     place_m[within] = centre_m
-    return Nearest(np.where(within, 0.0, np.maximum(0.0, away_m[side, rows] - radius_m)), place_m)
+    return NearestOfTriangles(np.where(within, 0.0, np.maximum(0.0, away_m[side, rows] - radius_m)), place_m)
 
 
 def inside_polygon(places_m: F64, corners_m: F64) -> np.ndarray:

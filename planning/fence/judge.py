@@ -16,7 +16,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
-from planning.fence.distance import Nearest, to_circle, to_polygon
+from planning.fence.distance import NearestOfTriangles, to_circle, to_polygon
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 
 CIRCLE_SHARE = 0.007
@@ -156,7 +156,7 @@ def _named(fence: Fence) -> list[tuple[str, FencePolygon | FenceCircle]]:
     ]
 
 
-def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: _Plane, flown_m: float) -> Nearest:
+def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: _Plane, flown_m: float) -> NearestOfTriangles:
     """``flown_m``: the longest straight way of the flight."""
     if isinstance(shape, FenceCircle):
         share = -CIRCLE_SHARE if shape.inclusion else CIRCLE_SHARE
@@ -167,7 +167,7 @@ def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: _Plane, f
         corners_m = frame.xy_m(shape.corners_lat_lon_deg)
         found = to_polygon(triangles, corners_m, inclusion=shape.inclusion)
         bend_m = frame.bend_m(flown_m) + frame.bend_m(_longest_m(corners_m[None]))
-    return Nearest(np.maximum(0.0, found.distance_m - bend_m), found.place_m)
+    return NearestOfTriangles(np.maximum(0.0, found.distance_m - bend_m), found.place_m)
 
 
 def _longest_m(polygons_m: F64) -> float:

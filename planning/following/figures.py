@@ -32,7 +32,7 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Nearest:
+class NearestToSurface:
     """Where a track came nearest to the surface model."""
 
     distance_m: float
@@ -69,9 +69,9 @@ class TrackFigures:
     height: Spread
     height_lowest_m: float
     height_highest_m: float
-    nearest: Nearest | None
+    nearest: NearestToSurface | None
     min_vertical_m: float | None
-    nearest_on_way_home: Nearest | None
+    nearest_on_way_home: NearestToSurface | None
     came_home: bool
     """Whether the way home led to home."""
     unknown_positions: int
@@ -190,7 +190,7 @@ def _came_home(reference: Reference, track: Track, window: Window) -> bool:
     return bool(((track.t_s > window.end_s) & (away_m <= AT_HOME_M)).any())
 
 
-def _nearest(track: Track, found: Deviations, chosen: Bools, distance_m: F64 | None) -> Nearest | None:
+def _nearest(track: Track, found: Deviations, chosen: Bools, distance_m: F64 | None) -> NearestToSurface | None:
     if distance_m is None:
         return None
     among = np.where(chosen & np.isfinite(distance_m), distance_m, np.inf)
@@ -198,7 +198,7 @@ def _nearest(track: Track, found: Deviations, chosen: Bools, distance_m: F64 | N
         return None
     at = int(np.argmin(among))
     x, y, z = (float(v) for v in track.xyz_m[at])
-    return Nearest(float(distance_m[at]), float(track.t_s[at]), float(found.s_m[at]), (x, y, z))
+    return NearestToSurface(float(distance_m[at]), float(track.t_s[at]), float(found.s_m[at]), (x, y, z))
 
 
 def _smallest(values_m: F64 | None, chosen: Bools) -> float | None:

@@ -61,7 +61,7 @@ class Orbit:
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
+class ToHome:
     """Over home at ``height_m`` above it, then down."""
 
     height_m: float
@@ -84,8 +84,8 @@ class Back:
     """(lat_deg, lon_deg, alt_rel_home_m), the first at the take-off, the last near the vehicle."""
 
 
-Wish = TakeOff | GoTo | Look | Orbit | Home | Rally | Back
-RETURNS = (Home, Rally, Back)
+Wish = TakeOff | GoTo | Look | Orbit | ToHome | Rally | Back
+RETURNS = (ToHome, Rally, Back)
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,13 +32,13 @@ from planning.guided.guided_model import (
     GoTo,
     GuidedWay,
     Here,
-    Home,
     LatLon,
     Look,
     Orbit,
     Problem,
     Rally,
     TakeOff,
+    ToHome,
     Wish,
 )
 from planning.guided.shapes import circle, simplified
@@ -164,7 +164,7 @@ def _shape(dsm: Dsm, wish: Wish, at_m: F64, home_xy_m: LatLon, home_m: float) ->
         return _Shape(np.array([[*home_xy_m, home_m + wish.alt_rel_home_m]]))
     if isinstance(wish, Look):
         return _Shape(at_m[None])
-    if isinstance(wish, Home):
+    if isinstance(wish, ToHome):
         return _Shape(np.array([[*home_xy_m, home_m + wish.height_m]]), direct=False)
     if isinstance(wish, Back):
         flown = np.array(wish.flown, np.float64).reshape(-1, 3)

@@ -36,7 +36,7 @@ class RadarFiles(RootModel[list[RadarFileDoc]]):
     """Newest first."""
 
 
-class Asked(RadarReading):
+class NewestQuestion(RadarReading):
     """By a page, of which only the newest question counts."""
 
     page: PageName
@@ -109,14 +109,14 @@ async def delete(file_id: str, request: Request) -> None:
 
 
 @router.get("/files/{file_id}/open", response_model=RadarOpened)
-async def open_file(file_id: str, request: Request, asked: Annotated[Asked, Query()]) -> Response:
+async def open_file(file_id: str, request: Request, asked: Annotated[NewestQuestion, Query()]) -> Response:
     """Reads it through: how many frames, of which radar; 409 when the page has asked for something else meanwhile."""
     return answer(await parts_of(request).radar.open(asked.page, file_id, asked.how))
 
 
 @router.get("/files/{file_id}/frames/{number}", response_model=RadarFrame)
 async def frame(
-    file_id: str, number: Annotated[int, Path(ge=0)], request: Request, asked: Annotated[Asked, Query()]
+    file_id: str, number: Annotated[int, Path(ge=0)], request: Request, asked: Annotated[NewestQuestion, Query()]
 ) -> Response:
     """Range-Doppler map, range-azimuth map and detections of one frame."""
     return answer(await parts_of(request).radar.frame(asked.page, file_id, asked.how, number))

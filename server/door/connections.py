@@ -43,7 +43,7 @@ def connections_max() -> int:
     return CONNECTIONS_MAX if soft == resource.RLIM_INFINITY else max(16, min(CONNECTIONS_MAX, soft - FILES_OF_OURS))
 
 
-class Connections:
+class OpenConnections:
     """All that are open: those that have asked for something, and those that wait, the one that waits longest first."""
 
     def __init__(self, most: int, most_from_one_place: int) -> None:
@@ -101,13 +101,13 @@ class Connections:
             self._told_s, self._sent_away = now_s, 0
 
 
-def usual_connections() -> Connections:
+def usual_connections() -> OpenConnections:
     """As many as the system lets us have."""
     most = connections_max()
-    return Connections(most, min(FROM_ONE_PLACE_MAX, 3 * most // 4))
+    return OpenConnections(most, min(FROM_ONE_PLACE_MAX, 3 * most // 4))
 
 
-def limited_protocol(connections: Connections, *, header_s: float = HEADER_S) -> type[H11Protocol]:
+def limited_protocol(connections: OpenConnections, *, header_s: float = HEADER_S) -> type[H11Protocol]:
     """uvicorn's own protocol, whose connections are counted and have to ask within ``header_s``."""
 
     class LimitedProtocol(H11Protocol):

@@ -12,12 +12,12 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from server.door.connections import HEADER_S, Connections
+from server.door.connections import HEADER_S, OpenConnections
 from server.door.tries import place_of
 
 
 def behind_tls(
-    protocol: type[H11Protocol], context: ssl.SSLContext, connections: Connections, *, handshake_s: float = HEADER_S
+    protocol: type[H11Protocol], context: ssl.SSLContext, connections: OpenConnections, *, handshake_s: float = HEADER_S
 ) -> type[asyncio.Protocol]:
     """``protocol`` over TLS; ``connections`` counts and cuts off who is still shaking hands as well."""
 

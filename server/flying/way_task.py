@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from planning.errors import ParameterError
 from planning.fence.fence_model import RallyPoint
-from planning.guided.guided_model import Back, GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
+from planning.guided.guided_model import Back, GoTo, GuidedWay, Look, Orbit, Rally, TakeOff, ToHome, Wish
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, WayBody
 from server.work.jobs import Progress
@@ -111,7 +111,7 @@ def wish_of(body: WayBody, flown: tuple[tuple[float, float, float], ...]) -> Wis
         case "take_off":
             return TakeOff(body.height_m)
         case "home":
-            return Home(body.height_m)
+            return ToHome(body.height_m)
         case "rally":
             return Rally(_ANY_RALLY, body.height_m)
         case "back":

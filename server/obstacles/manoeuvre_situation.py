@@ -67,7 +67,7 @@ class Prepared:
 
 
 @dataclass(frozen=True, slots=True)
-class Ahead:
+class MissionAhead:
     """What is left of the mission."""
 
     line: FlightLine

@@ -14,7 +14,7 @@ from mapping.geometry.frames import LocalFrame
 from planning.missions.vehicle_profile import parse_profile
 from server.library.documents import clearance_of
 from server.library.terrains import ground_notice
-from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
+from server.obstacles.manoeuvre_situation import MissionAhead, Prepared, Situation, cruise_m_s, handle_of, impossible
 from server.scene.mirror import Voxels
 from server.schemas import ManoeuvreDoc
 from server.work.jobs import Progress
@@ -112,7 +112,7 @@ def _surface(notice: GroundNotice, origin: MapOrigin) -> GroundGrid:
     return ground_around(notice, origin)
 
 
-def _ahead(line: FlightLine, position: F64, situation: Situation) -> Ahead:
+def _ahead(line: FlightLine, position: F64, situation: Situation) -> MissionAhead:
     """The rest of the mission from the place of the leg that is flown which is nearest to the vehicle."""
     points = line.points_enu + np.array([0.0, 0.0, situation.height_offset_m])
     target = situation.flight.target or 0
@@ -120,12 +120,12 @@ def _ahead(line: FlightLine, position: F64, situation: Situation) -> Ahead:
     a, d = points[leg], points[leg + 1] - points[leg]
     share = float(np.clip((position - a) @ d / max(float(d @ d), 1e-9), 0.0, 1.0))
     if share == 0.0 and math.dist(position[:2], a[:2]) > BESIDE_M:
-        return Ahead(line, np.vstack([position, points[leg:]]), leg - 1)
-    return Ahead(line, np.vstack([a + share * d, points[leg + 1 :]]), leg)
+        return MissionAhead(line, np.vstack([position, points[leg:]]), leg - 1)
+    return MissionAhead(line, np.vstack([a + share * d, points[leg + 1 :]]), leg)
 
 
 def _prepared(
-    way: Manoeuvre | NoWay, alert: ObstacleAlert, situation: Situation, ahead: Ahead, frame: LocalFrame
+    way: Manoeuvre | NoWay, alert: ObstacleAlert, situation: Situation, ahead: MissionAhead, frame: LocalFrame
 ) -> Prepared:
     from planning.evading.evasion import NoWay
 

@@ -12,7 +12,7 @@ from mapping.geometry.frames import LocalFrame
 from planning.evading.evasion import AvoidanceParams, NoWay
 from planning.evading.keep_clear import Seen, Surface
 from planning.evading.sidestep import Mover, Proposed, Sidestep, sidestep
-from server.obstacles.manoeuvre_situation import Ahead, Prepared, Situation, cruise_m_s, handle_of, impossible
+from server.obstacles.manoeuvre_situation import MissionAhead, Prepared, Situation, cruise_m_s, handle_of, impossible
 from server.schemas import ManoeuvreDoc
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import ObstacleAlert
@@ -30,7 +30,7 @@ class Around:
 
 
 def sidestepped(
-    situation: Situation, approach: ObstacleAlert, position_enu_m: F64, ahead: Ahead | None, around: Around
+    situation: Situation, approach: ObstacleAlert, position_enu_m: F64, ahead: MissionAhead | None, around: Around
 ) -> Prepared:
     tracks = situation.tracks
     if tracks is None:
@@ -75,7 +75,7 @@ def _prepared(
     tracks: TracksStatus,
     situation: Situation,
     approach: ObstacleAlert,
-    ahead: Ahead | None,
+    ahead: MissionAhead | None,
     frame: LocalFrame,
 ) -> Prepared:
     item = None

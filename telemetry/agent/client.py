@@ -75,7 +75,7 @@ class AgentCounts:
     points_not_finite: int = 0
     points_out_of_reach: int = 0
     """Of clouds, left out on board: no numbers, or farther than the wire format reaches."""
-    report: wire.Report | None = None
+    report: wire.ArrivalReport | None = None
     """The ground station's newest."""
     refused_why: str = ""
     """Why the ground station last refused something."""
@@ -201,7 +201,7 @@ class Agent:
                     self._connected, self.counts.trouble = True, ""
                 case wire.Pong(asked_s, server_s):
                     self._clock.on_answer(asked_s=asked_s, remote_s=server_s, now_s=time.monotonic())
-                case wire.Report():
+                case wire.ArrivalReport():
                     self.counts.report = message
                     self.counts.refused_why = message.text or self.counts.refused_why
         raise ConnectionClosed(connection.protocol.close_rcvd, connection.protocol.close_sent)

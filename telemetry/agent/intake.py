@@ -75,12 +75,12 @@ class Intake:
         self.received += 1
         return Taken(frame=frame)
 
-    def report(self, now_mono_s: float) -> wire.Report:
+    def report(self, now_mono_s: float) -> wire.ArrivalReport:
         while self._sizes and self._sizes[0][0] < now_mono_s - RATE_OVER_S:
             self._sizes.popleft()
         rate = sum(size for _, size in self._sizes) / RATE_OVER_S
         why, self._why = self._why, ""
-        return wire.Report(self.received, self.lost, self.late, self.refused, rate, why)
+        return wire.ArrivalReport(self.received, self.lost, self.late, self.refused, rate, why)
 
     def _refuse(self, why: str) -> Taken:
         self.refused, self._why = self.refused + 1, why

@@ -104,7 +104,7 @@ class Pong(msgspec.Struct, frozen=True, tag="pong", forbid_unknown_fields=True):
     server_s: float
 
 
-class Report(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=True):
+class ArrivalReport(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=True):
     """What arrived, once a second."""
 
     received: int
@@ -116,7 +116,7 @@ class Report(msgspec.Struct, frozen=True, tag="report", forbid_unknown_fields=Tr
 
 
 FromAgent = Hello | Ping | RadarMessage | Cloud | Slam | Uwb | Notice
-FromServer = Welcome | Pong | Report
+FromServer = Welcome | Pong | ArrivalReport
 _from_agent = msgspec.msgpack.Decoder(FromAgent)
 _from_server = msgspec.msgpack.Decoder(FromServer)
 _encoder = msgspec.msgpack.Encoder()

@@ -52,7 +52,7 @@ class TiStatus(LiveStatus):
         )
 
 
-class Comparison:
+class ConfigurationComparison:
     """Once: whether frames come from a radar with the configuration that was given."""
 
     def __init__(self, config: TiConfig | None) -> None:
@@ -81,7 +81,7 @@ class TiRadar(LiveRadar):
         self._config, self._ports = config, ports
         self._stream = TiStream(velocity_cell_m_s=config.velocity_cell_m_s)
         self.status = TiStatus(stream=self._stream.counts)
-        self._comparison = Comparison(config)
+        self._comparison = ConfigurationComparison(config)
         super().__init__(self.status, tell=tell, now=now, wait=wait)
 
     def _session(self) -> Iterator[RadarReading | NoticeReading]:
@@ -138,7 +138,7 @@ def captured_readings(
     status.stream = stream.counts
     period_s = config.frame_period_s if config else USUAL_PERIOD_S
     least_snr_db = config.least_snr_db if config else LEAST_SNR_DB
-    after_s, comparison = -period_s, Comparison(config)
+    after_s, comparison = -period_s, ConfigurationComparison(config)
     for frame in _captured_frames(path, stream):
         after_s += min(frame.periods * period_s, max(period_s, LONGEST_PAUSE_S))
         if what := comparison.first_difference(frame):

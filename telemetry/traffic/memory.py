@@ -66,7 +66,7 @@ class Heard:
 
 
 @dataclass(slots=True)
-class Memory:
+class TrafficMemory:
     aircraft: dict[str, Heard] = field(default_factory=dict[str, Heard])
     _refused: dict[str, float] = field(default_factory=dict[str, float])
     """Those that were not kept, and when they were last heard."""

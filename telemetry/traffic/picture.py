@@ -10,7 +10,7 @@ from telemetry.topics.traffic import Aircraft, TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import VehicleState
 from telemetry.traffic.decoding import is_traffic, reports
 from telemetry.traffic.judging import judged, shown
-from telemetry.traffic.memory import Memory
+from telemetry.traffic.memory import TrafficMemory
 from telemetry.traffic.own import Own
 from telemetry.traffic.report import Position, Report
 from telemetry.traffic.warning import Warnings
@@ -20,7 +20,7 @@ MOST_TOLD, MOST_OWN_NUMBERS = 64, 8
 _NO_POSITION = "Where the vehicle itself is, is not known: no traffic is held against it. Look out."
 
 
-class Told(NamedTuple):
+class TrafficTold(NamedTuple):
     status: TrafficStatus
     alerts: list[ObstacleAlert]
 
@@ -30,7 +30,7 @@ class TrafficPicture:
 
     def __init__(self, settings: TrafficSettings | None = None) -> None:
         self._settings = settings or TrafficSettings()
-        self._memory, self._warnings = Memory(), Warnings()
+        self._memory, self._warnings = TrafficMemory(), Warnings()
         self._own_names: dict[str, None] = {}
         """Under which the vehicle itself says it is told of."""
         self._has_heard = False
@@ -50,7 +50,7 @@ class TrafficPicture:
             is_own = report.is_own or (is_autopilot and report.source == "utm")
             self._take(report, own, now_s, is_own=is_own)
 
-    def on_tick(self, state: VehicleState, now_s: float, t_utc_s: float) -> Told | None:
+    def on_tick(self, state: VehicleState, now_s: float, t_utc_s: float) -> TrafficTold | None:
         """At most once in ``EVERY_S``; None in between, and before anything was heard."""
         if not self._has_heard or now_s - self._told_s < EVERY_S:
             return None
@@ -78,7 +78,7 @@ class TrafficPicture:
             crowded_out=self._memory.crowded_out,
             settings=self._settings,
         )
-        return Told(status, alerts)
+        return TrafficTold(status, alerts)
 
     def _take(self, report: Report, own: Own | None, now_s: float, *, is_own: bool) -> None:
         self._has_heard = True

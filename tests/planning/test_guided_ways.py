@@ -22,12 +22,12 @@ from planning.guided.guided_model import (
     GoTo,
     GuidedWay,
     Here,
-    Home,
     LatLon,
     Look,
     Orbit,
     Rally,
     TakeOff,
+    ToHome,
     Wish,
 )
 from planning.guided.shapes import BESIDE_M, simplified
@@ -227,7 +227,7 @@ def test_ways_home_are_offered_although_the_own_return_is_too_low() -> None:
     z[:, 80:82] = 130.0
     low = replace(DEMAND, clearance=replace(CLEARANCE, rtl_height_m=15.0))
     start = here(model(z), 100.0, 60.0)
-    home = asked(z, Home(5.0), start=start, demand=low)
+    home = asked(z, ToHome(5.0), start=start, demand=low)
     assert home.problem is None
     assert max(up for *_, up in home.places) == pytest.approx(33.0, abs=0.1)
     assert home.places[-1][:2] == pytest.approx(start.home_lat_lon_deg)
@@ -313,7 +313,7 @@ def test_whatever_is_certified_keeps_its_distance_by_brute_force(seed: int) -> N
     place = at(dsm, *random.uniform(12.0, SIDE_M - 12.0, 2))
     start = here(dsm, *random.uniform(15.0, SIDE_M - 15.0, 2), up_m=random.uniform(3.0, 30.0))
     height_m = random.uniform(0.5, 20.0)
-    wish = [GoTo(height_m, place), Orbit(place, random.uniform(3.0, 9.0), height_m), Home(height_m)][seed % 3]
+    wish = [GoTo(height_m, place), Orbit(place, random.uniform(3.0, 9.0), height_m), ToHome(height_m)][seed % 3]
     try:
         way = asked(z, wish, start=start)
     except MissionError:

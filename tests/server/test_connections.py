@@ -17,7 +17,7 @@ import pytest
 
 from server import app
 from server.door import connections, guard
-from server.door.connections import Connections, connections_max, limited_protocol, raise_file_limit
+from server.door.connections import OpenConnections, connections_max, limited_protocol, raise_file_limit
 from server.work.logs import Repeats
 from tests.server.running import PASSWORD, Running, running
 
@@ -49,7 +49,7 @@ def is_cut_off(line: socket.socket) -> bool:
 @pytest.fixture
 def narrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Running]:
     """Twelve connections in all, eight from one address, which is ours."""
-    monkeypatch.setattr(app, "usual_connections", lambda: Connections(12, 8))
+    monkeypatch.setattr(app, "usual_connections", lambda: OpenConnections(12, 8))
     with running(tmp_path, password=PASSWORD) as station:
         yield station
 
@@ -150,7 +150,7 @@ def test_closed_websockets_are_not_counted() -> None:
             self.aborted = True
 
     async def whole() -> None:
-        held, lines = Connections(4, 4), [Line() for _ in range(5)]
+        held, lines = OpenConnections(4, 4), [Line() for _ in range(5)]
         for line in lines[:4]:
             held.admit(line, "here")
             held.asks(line)

@@ -24,11 +24,11 @@ from server.door.sensor_token import FILE, sensor_token
 from telemetry.agent.client import Agent, CloudReading, RadarReading
 from telemetry.agent.link_messages import (
     SUBPROTOCOL,
+    ArrivalReport,
     Hello,
     Ping,
     Pong,
     RadarMessage,
-    Report,
     Slam,
     Uwb,
     Welcome,
@@ -160,7 +160,7 @@ def test_what_is_not_understood_is_counted_with_its_reason_and_the_connection_st
         socket.send(wrong)
         socket.send(encode(Ping(5.0)))
         seen = [decode_from_server(_received(socket))]
-        while not (isinstance(report := seen[-1], Report) and report.refused):
+        while not (isinstance(report := seen[-1], ArrivalReport) and report.refused):
             seen.append(decode_from_server(_received(socket)))
         assert any(isinstance(message, Pong) for message in seen)
     assert (report.received, report.refused) == (0, 1)
@@ -174,7 +174,9 @@ def test_an_agent_goes_on_without_what_it_does_not_understand(server: Running, t
     def with_more(message: Any) -> bytes:
         data = encode_before(message)
         return (
-            msgspec.msgpack.encode(msgspec.msgpack.decode(data) | {"more": 1}) if isinstance(message, Report) else data
+            msgspec.msgpack.encode(msgspec.msgpack.decode(data) | {"more": 1})
+            if isinstance(message, ArrivalReport)
+            else data
         )
 
     async def run() -> Agent:

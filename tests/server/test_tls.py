@@ -30,7 +30,7 @@ from server.app import AnnouncingServer
 from server.door import certificates, tls
 from server.door.alarms import Alarms
 from server.door.certificates import AUTHORITY_LASTS, CertificateFiles, Names, names_of_machine, now_utc
-from server.door.connections import FROM_ONE_PLACE_MAX, Connections
+from server.door.connections import FROM_ONE_PLACE_MAX, OpenConnections
 from server.door.handshake import behind_tls
 from server.door.tls import Tls
 from server.errors import CertificateError, StartError
@@ -326,7 +326,7 @@ def test_one_who_dawdles_over_the_handshake_is_cut_off_and_one_who_asks_at_once_
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         files.renew(now_utc())
         context.load_cert_chain(files.server)
-        made = behind_tls(cast(Any, Echo), context, Connections(4, 4), handshake_s=1.0)
+        made = behind_tls(cast(Any, Echo), context, OpenConnections(4, 4), handshake_s=1.0)
         server = await asyncio.get_running_loop().create_server(made, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
         reader, dawdling = await asyncio.open_connection("127.0.0.1", port)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from planning.basics.plan_model import ANY_VEHICLE
-from planning.guided.guided_model import GoTo, GuidedWay, Home, Wish
+from planning.guided.guided_model import GoTo, GuidedWay, ToHome, Wish
 from telemetry.flight.certified_way import Flown, judged_way
 from telemetry.topics.vehicle import VehicleState
 from tests.planning.test_guided_ways import CLEARANCE, HOME, at, flat, model
@@ -52,4 +52,4 @@ def test_a_return_that_is_not_known_is_not_certified_but_may_be_accepted(
     assert way.problem == "return"
     assert not way.certificate.certified
     assert words in way.reasons[-1]
-    assert judged(Home(9.0), parameters).problem is None, "a certified way home does not need the vehicle's own"
+    assert judged(ToHome(9.0), parameters).problem is None, "a certified way home does not need the vehicle's own"

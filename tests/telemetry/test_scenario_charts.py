@@ -16,7 +16,7 @@ from telemetry.simulation.scenarios.stage.map_charts import map_charts, skyline
 from telemetry.simulation.scenarios.stage.paper_fields import field
 from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series
 from telemetry.simulation.scenarios.stage.scenes import VALLEY
-from telemetry.simulation.scenarios.stage.seen_flight import Flown, Told
+from telemetry.simulation.scenarios.stage.seen_flight import SeenAlert, SeenFlight
 from telemetry.simulation.scenarios.stage.world_objects import box, cylinder, tree, world_document
 from telemetry.simulation.simulator.scene import World
 from telemetry.topics.obstacles import Obstacle, ObstacleAlert, PerceptionSettings
@@ -27,12 +27,12 @@ def world(*objects: dict[str, object]) -> World:
     return World.parse(world_document("drawn", list(objects)), frame=VALLEY, dsm=field(VALLEY, ()))
 
 
-def told(t_s: float, away_m: float, north_m: float) -> Told:
+def told(t_s: float, away_m: float, north_m: float) -> SeenAlert:
     """Of what stands ``away_m`` ahead, at ``north_m``."""
     where = (0.0, north_m, 5.0)
     obstacle = Obstacle("roi", away_m, 0.0, 0.0, 0.0, None, where, None, None, None, 3, (1.0, 1.0, 1.0))
     alert = ObstacleAlert(f"a{north_m}", "radar", "obstacle", "begins", t_s, t_s, t_s, "!", obstacle)
-    return Told(alert, np.array(where))
+    return SeenAlert(alert, np.array(where))
 
 
 def by_name(chart: Chart) -> dict[str, Series]:
@@ -72,7 +72,7 @@ def test_objects_stand_along_the_way_beside_what_stopping_needs() -> None:
 
 def test_nobody_who_has_not_flown_is_drawn() -> None:
     there, hovering = world(), flown_past(to_m=0.0)
-    for flown in (hovering, Flown(began_s=0.0, vehicle_radius_m=0.5)):
+    for flown in (hovering, SeenFlight(began_s=0.0, vehicle_radius_m=0.5)):
         found = encounters(hovering, there, PerceptionSettings())
         assert encounter_charts(flown, there, found) == ()
         assert following(flown, plan())[1] == ()

@@ -30,7 +30,7 @@ from telemetry.simulation.scenarios.stage.result import (
     tally_json,
 )
 from telemetry.simulation.scenarios.stage.scenes import VALLEY
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.scenarios.stage.world_objects import Object, cylinder, world_document
 from telemetry.simulation.simulator.scene import World
 from telemetry.topics.obstacles import PerceptionSettings
@@ -68,9 +68,9 @@ def test_objects_of_ones_own_are_the_only_ones(tmp_path: Path) -> None:
     assert objects_of(strewn_with(3, world_file(tmp_path / "none.json"))) == {}
 
 
-def flown_past(*, to_m: float = 60.0) -> Flown:
+def flown_past(*, to_m: float = 60.0) -> SeenFlight:
     """North at 3 m/s, never told of anything."""
-    flown = Flown(began_s=0.0, vehicle_radius_m=0.5, way_m=to_m)
+    flown = SeenFlight(began_s=0.0, vehicle_radius_m=0.5, way_m=to_m)
     flown.perceivers["radar"] = cast(Perceiver, None)
     for k, north_m in enumerate(np.arange(0.0, to_m + 0.1, 0.3)):
         t_s = 0.1 * k

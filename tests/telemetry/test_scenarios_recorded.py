@@ -24,7 +24,7 @@ from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.simulation.scenarios.stage import scenes
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.topics.deltas import FoldedMap
 from telemetry.topics.messages import Topic
@@ -36,7 +36,7 @@ SENSORS: tuple[Sensor, ...] = ("radar", "vision")
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Flown, Path]:
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, SeenFlight, Path]:
     path = tmp_path_factory.mktemp("recorded") / "wood.mcap"
     wanted = ScenarioRequest(5, record=path)
     setup = setup_of(scenes.wood(5), wanted, "wood", settings=SETTINGS, most_armed_s=25.0)
@@ -44,7 +44,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Flown, Path]
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
-def test_the_map_is_built_again_to_the_last_voxel(flown: tuple[Setup, Flown, Path], sensor: Sensor) -> None:
+def test_the_map_is_built_again_to_the_last_voxel(flown: tuple[Setup, SeenFlight, Path], sensor: Sensor) -> None:
     _, flight, path = flown
     perceiver = flight.perceivers[sensor]
     teller = ChangeTeller(sensor, 0.0)
@@ -60,7 +60,7 @@ def test_the_map_is_built_again_to_the_last_voxel(flown: tuple[Setup, Flown, Pat
 
 
 def test_the_cameras_map_of_the_whole_flight_is_built_again_and_was_recorded(
-    flown: tuple[Setup, Flown, Path],
+    flown: tuple[Setup, SeenFlight, Path],
 ) -> None:
     _, flight, path = flown
     perceiver = flight.perceivers["vision"]
@@ -81,7 +81,7 @@ def test_the_cameras_map_of_the_whole_flight_is_built_again_and_was_recorded(
     assert 20 < len(shown) <= 4 * (shown[-1] - shown[0] + 1), "each sensor's newest frame, twice a second"
 
 
-def test_the_ground_is_the_one_that_was_known(flown: tuple[Setup, Flown, Path]) -> None:
+def test_the_ground_is_the_one_that_was_known(flown: tuple[Setup, SeenFlight, Path]) -> None:
     setup, _, path = flown
     log = read_flight_log(path)
     assert log.faults == ()
@@ -91,7 +91,7 @@ def test_the_ground_is_the_one_that_was_known(flown: tuple[Setup, Flown, Path]) 
 
 
 def test_a_recording_that_was_cut_off_and_mended_still_carries_it(
-    flown: tuple[Setup, Flown, Path], tmp_path: Path
+    flown: tuple[Setup, SeenFlight, Path], tmp_path: Path
 ) -> None:
     setup, _, path = flown
     data, killed = path.read_bytes(), tmp_path / "killed.mcap"
@@ -106,7 +106,7 @@ def test_a_recording_that_was_cut_off_and_mended_still_carries_it(
 
 
 def test_a_ground_that_is_damaged_is_said_and_the_flight_still_read(
-    flown: tuple[Setup, Flown, Path], tmp_path: Path
+    flown: tuple[Setup, SeenFlight, Path], tmp_path: Path
 ) -> None:
     setup, _, path = flown
     data, damaged = path.read_bytes(), tmp_path / "damaged.mcap"
@@ -121,7 +121,7 @@ def test_a_ground_that_is_damaged_is_said_and_the_flight_still_read(
         rebuild(damaged, KINDS["radar"])
 
 
-def test_review_is_over_its_own_ground_and_draws_it(flown: tuple[Setup, Flown, Path]) -> None:
+def test_review_is_over_its_own_ground_and_draws_it(flown: tuple[Setup, SeenFlight, Path]) -> None:
     setup, _, path = flown
 
     def nobody(step: str, share: float | None) -> None:
@@ -144,7 +144,7 @@ def test_review_is_over_its_own_ground_and_draws_it(flown: tuple[Setup, Flown, P
     assert not any("another surface model" in note or "no surface model" in note for note in reviewed.doc.notes)
 
 
-def test_the_command_line_judges_it_over_its_own_ground(flown: tuple[Setup, Flown, Path]) -> None:
+def test_the_command_line_judges_it_over_its_own_ground(flown: tuple[Setup, SeenFlight, Path]) -> None:
     _, _, path = flown
     result = CliRunner().invoke(app, ["review", str(path), "--json"])
     assert not any("no surface model" in note for note in json.loads(result.stdout)["notes"])

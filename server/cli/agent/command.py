@@ -19,7 +19,7 @@ from server.cli.shared.command import command
 from server.cli.shared.output import print_json, say
 from server.errors import BadRequestError
 from telemetry.agent.client import Agent, AgentCounts, Reading, sensor_url
-from telemetry.agent.link_messages import REACH_M, Report
+from telemetry.agent.link_messages import REACH_M, ArrivalReport
 
 TOKEN_VARIABLE = "HEDGEHOP_SENSOR_TOKEN"
 TELL_EVERY_S = 5.0
@@ -148,7 +148,7 @@ def _details(counts: AgentCounts, source: Source) -> Iterator[str]:
 
 
 def _answer(counts: AgentCounts, source: Source, *, as_json: bool) -> None:
-    report = counts.report or Report(0, 0, 0, 0, 0.0, "")
+    report = counts.report or ArrivalReport(0, 0, 0, 0, 0.0, "")
     if as_json:
         print_json(_summary(counts, report, source))
         return
@@ -160,7 +160,7 @@ def _answer(counts: AgentCounts, source: Source, *, as_json: bool) -> None:
         say(line)
 
 
-def _summary(counts: AgentCounts, report: Report, source: Source) -> dict[str, Any]:
+def _summary(counts: AgentCounts, report: ArrivalReport, source: Source) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "sent": counts.sent,
         "skipped": counts.skipped,

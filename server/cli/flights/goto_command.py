@@ -18,7 +18,7 @@ from typer import Argument, Option
 from planning.errors import ParameterError
 from planning.fence.fence_model import RallyPoint
 from planning.formats.fence_items import fence_of, rally_of
-from planning.guided.guided_model import GoTo, GuidedWay, Home, Look, Orbit, Rally, TakeOff, Wish
+from planning.guided.guided_model import GoTo, GuidedWay, Look, Orbit, Rally, TakeOff, ToHome, Wish
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.request import PlanRequest, check_demands
 from planning.terrain.dsm import Dsm
@@ -123,7 +123,7 @@ def _wish(action: Action, place: tuple[float, float] | None, wanted: GotoOptions
     if action == "take-off":
         return TakeOff(wanted.height_m)
     if action == "home":
-        return Home(wanted.height_m)
+        return ToHome(wanted.height_m)
     if action == "rally":
         return Rally(RallyPoint(0.0, 0.0, 0.0), wanted.height_m)
     if place is None:
@@ -220,7 +220,7 @@ class _Flier:
 
     async def _followed(self, station: Station, watch: Watch, asked_utc_s: float) -> FlightStatus:
         """To its end. A lost link is waited out: the vehicle holds by itself meanwhile."""
-        is_return = isinstance(self._wish, Home | Rally)
+        is_return = isinstance(self._wish, ToHome | Rally)
         while True:
             ended = await watch.until(
                 lambda seen: _ended(seen.flight, asked_utc_s, lands=is_return or None), timeout_s=LOOK_S

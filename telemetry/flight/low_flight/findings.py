@@ -47,7 +47,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class VehicleSettings:
     """As read; what the vehicle does not have is missing or None."""
 
     values: Mapping[str, float | None]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from planning.basics.plan_model import Firmware
 from planning.certificate.returns import NEAR_M, SLOPE
-from telemetry.flight.low_flight.findings import ORDER, Finding, Settings, unread
+from telemetry.flight.low_flight.findings import ORDER, Finding, VehicleSettings, unread
 from telemetry.flight.low_flight.low_plan import LowPlan
 from telemetry.flight.low_flight.table import (
     ACTIONS,
@@ -24,20 +24,20 @@ from telemetry.flight.preflight.parameters import NEAR_HALF_DEG, return_settings
 MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 """MAV_TYPE: quadrotor, coaxial, hexa-, octo-, tri-, dodeca- and decarotor."""
 LESS_CLIMB = "Close to home the vehicle climbs less on its return than certificates take for granted."
-Rule = Callable[[Settings, LowPlan | None], Iterator[Finding]]
+Rule = Callable[[VehicleSettings, LowPlan | None], Iterator[Finding]]
 
 
 def review_settings(
     values: Mapping[str, float | None], firmware: Firmware, plan: LowPlan | None = None
 ) -> tuple[Finding, ...]:
     """``values``: as read of the vehicle. Without a plan only what holds for every low flight is judged."""
-    settings = Settings(values)
+    settings = VehicleSettings(values)
     found = [_action(settings, action) for action in ACTIONS[firmware]]
     found += [_return_height(settings, firmware, plan), *(f for rule in RULES[firmware] for f in rule(settings, plan))]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: ORDER[f.state]))
 
 
-def _action(settings: Settings, action: Action) -> Finding | None:
+def _action(settings: VehicleSettings, action: Action) -> Finding | None:
     held = settings.held(action.name)
     if held is None:
         return None if action.name in MAY_BE_MISSING else unread(action.name, "what happens then")
@@ -54,7 +54,7 @@ def _action(settings: Settings, action: Action) -> Finding | None:
     return held.finding(state, text, None if state == "good" or int(held.value) == action.better else action.better)
 
 
-def _return_height(settings: Settings, firmware: Firmware, plan: LowPlan | None) -> Finding:
+def _return_height(settings: VehicleSettings, firmware: Firmware, plan: LowPlan | None) -> Finding:
     own = return_settings(settings.values, firmware)
     if own.height_m is None:
         return unread(own.parameter, "how high it flies home")
@@ -78,7 +78,7 @@ def _return_height(settings: Settings, firmware: Firmware, plan: LowPlan | None)
     return Finding("good", own.parameter, f"{at}; {needed}.", None, value)
 
 
-def _copter_return(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_return(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     cone = settings.held("RTL_CONE_SLOPE")
     if cone is not None and not return_settings(settings.values, "ardupilot").steep_enough:
         yield cone.finding("bad", LESS_CLIMB, SLOPE)
@@ -95,12 +95,12 @@ def _copter_return(settings: Settings, plan: LowPlan | None) -> Iterator[Finding
             yield speed.finding("look", text, speed.own(plan.speed_m_s))
 
 
-def _copter_speed(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_speed(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     yield from _speed(settings, plan, "WP_SPD", ("WPNAV_SPEED", CENTI))
     yield from _radius(settings, WAYPOINT_RADIUS_M, "WP_RADIUS_M", ("WPNAV_RADIUS", CENTI))
 
 
-def _px4_speed(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _px4_speed(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     yield from _speed(settings, plan, "MPC_XY_CRUISE")
     yield from _radius(settings, WAYPOINT_RADIUS_M, "NAV_ACC_RAD")
     height = settings.held("NAV_MC_ALT_RAD")
@@ -109,7 +109,7 @@ def _px4_speed(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
         yield height.finding("bad", text, WAYPOINT_HEIGHT_M)
 
 
-def _speed(settings: Settings, plan: LowPlan | None, *names: str | tuple[str, float]) -> Iterator[Finding]:
+def _speed(settings: VehicleSettings, plan: LowPlan | None, *names: str | tuple[str, float]) -> Iterator[Finding]:
     held = settings.held(*names)
     if held is None:
         yield unread(str(names[0]), "how fast it flies to waypoints")
@@ -126,7 +126,7 @@ def _speed(settings: Settings, plan: LowPlan | None, *names: str | tuple[str, fl
         yield held.finding("good", f"It flies to waypoints at {held.metres:g} m/s, no faster than planned.")
 
 
-def _radius(settings: Settings, largest_m: float, *names: str | tuple[str, float]) -> Iterator[Finding]:
+def _radius(settings: VehicleSettings, largest_m: float, *names: str | tuple[str, float]) -> Iterator[Finding]:
     held = settings.held(*names)
     if held is None:
         yield unread(str(names[0]), "how far before a waypoint it turns")
@@ -137,7 +137,7 @@ def _radius(settings: Settings, largest_m: float, *names: str | tuple[str, float
         yield held.finding("good", f"It turns at most {held.metres:g} m before a waypoint.")
 
 
-def _copter_terrain(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_terrain(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     if plan is None or not plan.over_terrain:
         return
     spacing_m = settings.number("TERRAIN_SPACING", 100.0)
@@ -150,7 +150,7 @@ def _copter_terrain(settings: Settings, plan: LowPlan | None) -> Iterator[Findin
     yield Finding("bad", name, f"{text} Plan above home or sea level instead.")
 
 
-def _copter_battery(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_battery(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     monitor = settings.held("BATT_MONITOR")
     if monitor is None or monitor.value == 0:
         yield Finding("bad", "BATT_MONITOR", "The vehicle measures no battery: it never knows that it is low.")
@@ -159,14 +159,14 @@ def _copter_battery(settings: Settings, plan: LowPlan | None) -> Iterator[Findin
         yield Finding("bad", "BATT_LOW_VOLT", "Neither a voltage nor a charge is set as low: that failsafe never acts.")
 
 
-def _copter_ekf(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_ekf(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     held = settings.held("FS_EKF_THRESH")
     if held is not None and (held.value <= 0 or held.value > EKF_THRESHOLD + 1e-6):
         text = "A wrong position is noticed late." if held.value > 0 else "A wrong position is never noticed."
         yield held.finding("bad" if held.value <= 0 else "look", text, EKF_THRESHOLD)
 
 
-def _copter_fence(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _copter_fence(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     enabled = settings.held("FENCE_ENABLE")
     if enabled is None:
         return
@@ -191,7 +191,7 @@ def _copter_fence(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]
         yield radius.finding("bad", text, float(math.ceil(plan.farthest_m + ROOM_M)))
 
 
-def _fence_height(settings: Settings, plan: LowPlan, is_on: bool, does: str) -> Iterator[Finding]:
+def _fence_height(settings: VehicleSettings, plan: LowPlan, is_on: bool, does: str) -> Iterator[Finding]:
     """The return counts, too: it is the highest part of a low flight."""
     top = settings.held("FENCE_ALT_MAX") if is_on else None
     back_m = return_settings(settings.values, "ardupilot").height_m
@@ -204,7 +204,7 @@ def _fence_height(settings: Settings, plan: LowPlan, is_on: bool, does: str) -> 
         yield top.finding("bad", text, float(math.ceil(highest_m + ROOM_M)))
 
 
-def _fence_floor(settings: Settings, plan: LowPlan, is_on: bool, does: str) -> Iterator[Finding]:
+def _fence_floor(settings: VehicleSettings, plan: LowPlan, is_on: bool, does: str) -> Iterator[Finding]:
     floor = settings.held("FENCE_ALT_MIN") if is_on else None
     assert plan.lowest_m is not None
     if floor is not None and floor.value > plan.lowest_m:
@@ -214,7 +214,7 @@ def _fence_floor(settings: Settings, plan: LowPlan, is_on: bool, does: str) -> I
         yield floor.finding("bad", f"{text}the vehicle {does}.", float(math.floor(plan.lowest_m - ROOM_M)))
 
 
-def _px4_return(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _px4_return(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     if not return_settings(settings.values, "px4").steep_enough:
         for name, right in (("RTL_CONE_ANG", NEAR_HALF_DEG), ("RTL_MIN_DIST", NEAR_M)):
             held = settings.held(name)
@@ -229,7 +229,7 @@ def _px4_return(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
         yield cruise.finding("look", text, plan.speed_m_s)
 
 
-def _px4_fence(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _px4_fence(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     if plan is None or plan.highest_m is None:
         return
     back_m = return_settings(settings.values, "px4").height_m
@@ -241,7 +241,7 @@ def _px4_fence(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
             yield held.finding("bad", text, float(math.ceil(reached_m + ROOM_M)))
 
 
-def _px4_terrain(settings: Settings, plan: LowPlan | None) -> Iterator[Finding]:
+def _px4_terrain(settings: VehicleSettings, plan: LowPlan | None) -> Iterator[Finding]:
     if plan is not None and plan.over_terrain:
         text = "The plan has heights above terrain: PX4 does not follow terrain in missions. Plan above home instead."
         yield Finding("bad", "(mission)", text)

@@ -12,7 +12,7 @@ from telemetry.simulation.scenarios.stage.map_against_world import radar_figures
 from telemetry.simulation.scenarios.stage.result import Figure, FlightResult, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.simulator.airframe.gnss_script import GnssEvent
 from telemetry.topics.obstacles import Sensor
 
@@ -75,7 +75,7 @@ def fly_case(case: Case, wanted: ScenarioRequest, *, ahead_m: float = scenes.CAS
     )
 
 
-def _chart(case: Case, flown: Flown, ahead_m: float) -> Chart:
+def _chart(case: Case, flown: SeenFlight, ahead_m: float) -> Chart:
     """As fig. 12 shows the flight: out, over the building, and back, from the side."""
     path_m = np.array([truth.position_enu_m for truth in flown.track]).reshape(-1, 3)
     height_m = float(path_m[:, 2].max(initial=1.0))
@@ -83,7 +83,7 @@ def _chart(case: Case, flown: Flown, ahead_m: float) -> Chart:
     return Chart(f"Height along the way, {case.title} (fig. 12)", "north, m", "above home, m", lines)
 
 
-def _figures(case: Case, flown: Flown, ahead_m: float) -> tuple[Figure, ...]:
+def _figures(case: Case, flown: SeenFlight, ahead_m: float) -> tuple[Figure, ...]:
     passed = any(truth.position_enu_m[1] >= ahead_m + BEYOND_M for truth in flown.track)
     delays = [delay_s for sensor in case.able if (delay_s := flown.watches[sensor].delay_s) is not None]
     name = case.title
@@ -105,9 +105,9 @@ def _figures(case: Case, flown: Flown, ahead_m: float) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def _saw(flown: Flown, sensor: Sensor) -> bool:
+def _saw(flown: SeenFlight, sensor: Sensor) -> bool:
     return any(alert.sensor == sensor for alert in flown.alerts_seen())
 
 
-def _notes(flown: Flown) -> tuple[str, ...]:
+def _notes(flown: SeenFlight) -> tuple[str, ...]:
     return tuple(f"{t_s - flown.began_s:6.2f} s  {words}" for t_s, words in flown.said if words.startswith("avoidance"))

@@ -12,7 +12,7 @@ from telemetry.simulation.scenarios.hugging.encounters import HIGH, MOST_FALSE_P
 from telemetry.simulation.scenarios.hugging.hugging import Hugging
 from telemetry.simulation.scenarios.stage.result import Figure
 from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, not_empty, series
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.simulator.scene import World
 
 WAY = "flown, level, m"
@@ -22,7 +22,7 @@ BACK_M, ON_M = 5.0, 15.0
 """Of the line, around the place where the vehicle was before: where the line crosses itself it stays on its leg."""
 
 
-def encounter_charts(flown: Flown, world: World, found: Encounters) -> tuple[Chart, ...]:
+def encounter_charts(flown: SeenFlight, world: World, found: Encounters) -> tuple[Chart, ...]:
     path, way_m = _way(flown)
     if not len(path):
         return ()
@@ -34,14 +34,14 @@ def encounter_charts(flown: Flown, world: World, found: Encounters) -> tuple[Cha
     )
 
 
-def _way(flown: Flown) -> tuple[F64, F64]:
+def _way(flown: SeenFlight) -> tuple[F64, F64]:
     """(N, 3) places and (N,) level metres so far; nothing of who has come nowhere."""
     path = np.array([truth.position_enu_m for truth in flown.track]).reshape(-1, 3)
     way_m = along_m(path[:, :2]) if len(path) else np.empty(0)
     return (path, way_m) if len(path) and way_m[-1] > 0.0 else (np.empty((0, 3)), np.empty(0))
 
 
-def _at(flown: Flown, t_mono_s: float) -> int:
+def _at(flown: SeenFlight, t_mono_s: float) -> int:
     times = [truth.t_mono_s for truth in flown.track]
     return min(int(np.searchsorted(times, t_mono_s)), len(times) - 1)
 
@@ -108,7 +108,7 @@ def _false_alarms(length_m: float, false_m: F64) -> Chart:
     return Chart("False alarms along the way", WAY, "number", lines, x_span=(0.0, length_m), y_span=y_span)
 
 
-def following(flown: Flown, plan: Hugging) -> tuple[tuple[Figure, ...], tuple[Chart, ...]]:
+def following(flown: SeenFlight, plan: Hugging) -> tuple[tuple[Figure, ...], tuple[Chart, ...]]:
     """How well the line is flown, and how far it keeps from the surface model: what the paper prints figures of."""
     nearest = Figure(
         "smallest distance from the line to the surface model",

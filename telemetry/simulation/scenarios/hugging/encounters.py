@@ -10,7 +10,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.perceiving.braking import Braking
 from telemetry.simulation.scenarios.stage.result import Figure
-from telemetry.simulation.scenarios.stage.seen_flight import Flown, Told
+from telemetry.simulation.scenarios.stage.seen_flight import SeenAlert, SeenFlight
 from telemetry.simulation.scenarios.stage.setup import ORDER_S
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.scene.primitives import distances
@@ -50,14 +50,14 @@ class Encounters:
     """All of one flight."""
 
     passed: tuple[Passed, ...]
-    false: tuple[Told, ...]
+    false: tuple[SeenAlert, ...]
     false_per_km: float
     missed: int
     figures: tuple[Figure, ...]
     notes: tuple[str, ...]
 
 
-def encounters(flown: Flown, world: World, settings: PerceptionSettings) -> Encounters:
+def encounters(flown: SeenFlight, world: World, settings: PerceptionSettings) -> Encounters:
     passed = passings(flown, world, settings)
     false = false_alarms(flown, world)
     per_km = len(false) / (flown.way_m / 1000) if flown.way_m else math.nan
@@ -72,7 +72,7 @@ def encounters(flown: Flown, world: World, settings: PerceptionSettings) -> Enco
     return Encounters(tuple(passed), tuple(false), per_km, missed, figures, notes)
 
 
-def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[Passed]:
+def passings(flown: SeenFlight, world: World, settings: PerceptionSettings) -> list[Passed]:
     """For every object that the vehicle flew into: was it told while there was room to stop?"""
     track = np.array([truth.position_enu_m for truth in flown.track])
     times = np.array([truth.t_mono_s for truth in flown.track])
@@ -92,18 +92,18 @@ def passings(flown: Flown, world: World, settings: PerceptionSettings) -> list[P
     return out
 
 
-def _told_s(flown: Flown, rows: F64, sensor: Sensor) -> float:
+def _told_s(flown: SeenFlight, rows: F64, sensor: Sensor) -> float:
     mine = (told for told in flown.told if told.alert.sensor == sensor and _is_about(told, rows))
     return min((told.alert.done_t_mono_s for told in mine), default=math.inf)
 
 
-def false_alarms(flown: Flown, world: World) -> list[Told]:
+def false_alarms(flown: SeenFlight, world: World) -> list[SeenAlert]:
     """Obstacles that were told where none is."""
     begun = [told for told in flown.told if told.alert.phase == "begins" and told.place_enu_m is not None]
     return [told for told in begun if not _is_about(told, world.placed.rows)]
 
 
-def _is_about(told: Told, rows: F64) -> bool:
+def _is_about(told: SeenAlert, rows: F64) -> bool:
     """Whether the alert's obstacle is one of these, as seen from above: a radar knows no heights."""
     obstacle = told.alert.obstacle
     if told.alert.phase == "ends" or told.place_enu_m is None or obstacle is None:
@@ -111,7 +111,7 @@ def _is_about(told: Told, rows: F64) -> bool:
     return level_away_m(rows, told.place_enu_m) <= ITS_OWN_M + ITS_OWN_RAD * obstacle.distance_m
 
 
-def _words(passed: list[Passed], false: list[Told], flown: Flown, world: World) -> list[str]:
+def _words(passed: list[Passed], false: list[SeenAlert], flown: SeenFlight, world: World) -> list[str]:
     return [_passed_words(one) for one in passed] + [_false_words(told, flown, world) for told in false]
 
 
@@ -121,7 +121,7 @@ def _passed_words(one: Passed) -> str:
     return f"{one.name}: {told}{by}, {one.needed_m:.1f} m needed{'' if one.in_time else '  MISSED'}"
 
 
-def _false_words(told: Told, flown: Flown, world: World) -> str:
+def _false_words(told: SeenAlert, flown: SeenFlight, world: World) -> str:
     """With what an engineer asks next: how far from anything, how high over the ground."""
     alert, place = told.alert, told.place_enu_m
     assert alert.obstacle is not None

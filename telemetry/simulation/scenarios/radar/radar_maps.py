@@ -25,7 +25,7 @@ from telemetry.simulation.scenarios.stage.map_charts import map_charts
 from telemetry.simulation.scenarios.stage.result import Figure, MapFigures, ScenarioRequest, ScenarioResult
 from telemetry.simulation.scenarios.stage.running import flown_of, setup_of
 from telemetry.simulation.scenarios.stage.scenario_curves import Chart, series
-from telemetry.simulation.scenarios.stage.seen_flight import Flown, SeenRadarFrame
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight, SeenRadarFrame
 from telemetry.simulation.simulator.sensors.body import of_truth
 from telemetry.simulation.simulator.sensors.radar_model import RadarModel
 from telemetry.topics.obstacles import PerceptionSettings
@@ -79,7 +79,7 @@ def run_reflector(wanted: ScenarioRequest) -> ScenarioResult:
     return ScenarioResult(NAME, wanted.seed, (flight,))
 
 
-def returns_of(flown: Flown, reflector: F64, cross_section_m2: float) -> ReflectorReturns:
+def returns_of(flown: SeenFlight, reflector: F64, cross_section_m2: float) -> ReflectorReturns:
     """Those in the paper's gate whose range and strength fit the reflector."""
     range_m: list[float] = []
     up_m: list[float] = []

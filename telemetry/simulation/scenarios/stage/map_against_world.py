@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from mapping.geometry.arrays import F64, I64
 from telemetry.simulation.scenarios.stage.result import WITHIN_M, MapFigures
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.simulation.simulator.scene import World
 from telemetry.topics.obstacles import Sensor
@@ -140,20 +140,20 @@ class MapComparison:
         )
 
 
-def radar_figures(flown: Flown, setup: Setup) -> MapFigures:
+def radar_figures(flown: SeenFlight, setup: Setup) -> MapFigures:
     return radar_compared(flown, setup).figures
 
 
-def vision_figures(flown: Flown, setup: Setup) -> MapFigures:
+def vision_figures(flown: SeenFlight, setup: Setup) -> MapFigures:
     return vision_compared(flown, setup).figures
 
 
-def radar_compared(flown: Flown, setup: Setup) -> MapComparison:
+def radar_compared(flown: SeenFlight, setup: Setup) -> MapComparison:
     """What the global map believes in the end; known ground is not asked about."""
     return _compared("radar", flown.voxels("radar"), setup.settings.radar_resolution_m, flown, setup)
 
 
-def vision_compared(flown: Flown, setup: Setup) -> MapComparison:
+def vision_compared(flown: SeenFlight, setup: Setup) -> MapComparison:
     """Of all local maps together, as the flight went by."""
     edge = setup.settings.vision_resolution_m
     seen = np.concatenate(flown.vision) if flown.vision else np.empty((0, 3))
@@ -161,7 +161,7 @@ def vision_compared(flown: Flown, setup: Setup) -> MapComparison:
     return _compared("vision", (keys.astype(np.float64) + 0.5) * edge, edge, flown, setup)
 
 
-def _compared(sensor: Sensor, voxels: F64, edge_m: float, flown: Flown, setup: Setup) -> MapComparison:
+def _compared(sensor: Sensor, voxels: F64, edge_m: float, flown: SeenFlight, setup: Setup) -> MapComparison:
     if len(voxels) == 0:
         return MapComparison(sensor, voxels, np.empty(0), np.empty((0, 3)), np.empty(0))
     wanted = _holding(level_slice(setup.world, flown.track, most_m=REACH_M[sensor]), edge_m)

@@ -9,7 +9,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from telemetry.simulation.scenarios.stage.map_against_world import MapComparison
 from telemetry.simulation.scenarios.stage.scenario_curves import Chart, Series, not_empty, series
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.simulator.scene import World
 from telemetry.simulation.simulator.scene.primitives import BOX, ELLIPSOID
 
@@ -21,7 +21,12 @@ TOLERANCES_M = np.linspace(0.0, 5.0, 51)
 
 
 def map_charts(
-    maps: Sequence[MapComparison], flown: Flown, world: World, *, figures: tuple[str, str], begins_north_m: float | None
+    maps: Sequence[MapComparison],
+    flown: SeenFlight,
+    world: World,
+    *,
+    figures: tuple[str, str],
+    begins_north_m: float | None,
 ) -> tuple[Chart, ...]:
     """``figures``: where the paper shows a radar's map from above and from the side. ``begins_north_m``: how far ahead
     of the start what is mapped begins, where the paper prints it.
@@ -37,7 +42,7 @@ def map_charts(
     return (*places, by_distance(seen))
 
 
-def _from_above(one: MapComparison, flown: Flown, figure: str, begins_north_m: float | None) -> Chart:
+def _from_above(one: MapComparison, flown: SeenFlight, figure: str, begins_north_m: float | None) -> Chart:
     true = series("true surface at its height", *_unique(one.true_enu[:, :2]).T, drawn="points", most=MOST_VOXELS)
     printed = []
     if begins_north_m is not None:
@@ -49,7 +54,9 @@ def _from_above(one: MapComparison, flown: Flown, figure: str, begins_north_m: f
     return Chart(_title(one, "from above", figure), "east, m", "north, m", lines, is_true=True)
 
 
-def _from_the_side(one: MapComparison, flown: Flown, world: World, figure: str, begins_north_m: float | None) -> Chart:
+def _from_the_side(
+    one: MapComparison, flown: SeenFlight, world: World, figure: str, begins_north_m: float | None
+) -> Chart:
     north = np.concatenate([one.voxels_enu[:, 1], _path(flown)[:, 1]])
     along = np.arange(np.floor(north.min()) - BESIDE_M, north.max() + BESIDE_M, SKYLINE_STEP_M)
     top = skyline(world, along)
@@ -122,5 +129,5 @@ def _unique(places: F64) -> F64:
     return np.unique(places.round(3), axis=0)
 
 
-def _path(flown: Flown) -> F64:
+def _path(flown: SeenFlight) -> F64:
     return np.array([truth.position_enu_m for truth in flown.track]).reshape(-1, 3)

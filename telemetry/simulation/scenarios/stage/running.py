@@ -17,7 +17,7 @@ from telemetry.simulation.scenarios.stage.course import course_mission
 from telemetry.simulation.scenarios.stage.paper_fields import field, known
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest
 from telemetry.simulation.scenarios.stage.scenes import VALLEY, ScenarioScene
-from telemetry.simulation.scenarios.stage.seen_flight import Flown
+from telemetry.simulation.scenarios.stage.seen_flight import SeenFlight
 from telemetry.simulation.scenarios.stage.setup import Setup
 from telemetry.simulation.scenarios.stage.virtual_flight import fly
 from telemetry.simulation.scenarios.stage.virtual_link import T0_MONO_S, T0_UTC_S
@@ -53,7 +53,7 @@ def surveyed(dsm: Dsm, seed: int) -> Dsm:
     return known(dsm, np.random.default_rng([seed, 11]))
 
 
-def flown_of(setup: Setup, wanted: ScenarioRequest, *, part: str = "") -> Flown:
+def flown_of(setup: Setup, wanted: ScenarioRequest, *, part: str = "") -> SeenFlight:
     """The flight, recorded if that is wanted; ``part`` tells the files of several flights apart."""
     if wanted.record is None:
         return fly(setup)

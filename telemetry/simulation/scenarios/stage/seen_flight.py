@@ -82,7 +82,7 @@ class SeenRadarFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class SeenAlert:
     """An alert, and where its obstacle is in the world's frame."""
 
     alert: ObstacleAlert
@@ -91,7 +91,7 @@ class Told:
 
 
 @dataclass(slots=True)
-class Flown:
+class SeenFlight:
     """Times are those of the virtual monotonic clock."""
 
     began_s: float
@@ -105,7 +105,7 @@ class Flown:
     nearest_m: float = math.inf
     """Between the vehicle's centre and the nearest object."""
     hit: str | None = None
-    told: list[Told] = field(default_factory=list)
+    told: list[SeenAlert] = field(default_factory=list)
     radar: list[SeenRadarFrame] = field(default_factory=list)
     vision: list[F64] = field(default_factory=list)
     """Believed voxels of each local map, in the world's frame."""

@@ -20,7 +20,7 @@ from telemetry.simulation.scenarios.stage.course import script_request
 from telemetry.simulation.scenarios.stage.paper_fields import notice
 from telemetry.simulation.scenarios.stage.perceiving import Perceiving, Sensors
 from telemetry.simulation.scenarios.stage.pilots import MissionPilot, ScenarioPilot, ScriptPilot
-from telemetry.simulation.scenarios.stage.seen_flight import Flown, RegionWatch, SeenRadarFrame, Told
+from telemetry.simulation.scenarios.stage.seen_flight import RegionWatch, SeenAlert, SeenFlight, SeenRadarFrame
 from telemetry.simulation.scenarios.stage.setup import ORDER_S, Setup, Tell, plan_record_of, vehicle_of
 from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
 from telemetry.topics.messages import FlightStatus, Published, Topic
@@ -32,7 +32,7 @@ AVOIDANCE_EVERY = 3
 """Slices between the avoidance's own looks, about as the link's clock has it."""
 
 
-def fly(setup: Setup, tell: Tell | None = None) -> Flown:
+def fly(setup: Setup, tell: Tell | None = None) -> SeenFlight:
     """From switching on to the landing; ``tell`` hears what would be on the bus.
 
     Raises TelemetryError when the flight cannot even be begun.
@@ -56,7 +56,7 @@ class _Flight:
         self._perceiving: dict[Sensor, Perceiving] = {
             sensor: Perceiving(sensor, setup, plan, ground) for sensor in setup.sensors
         }
-        self._flown = Flown(self._wire.now_s, setup.settings.vehicle_radius_m)
+        self._flown = SeenFlight(self._wire.now_s, setup.settings.vehicle_radius_m)
         self._flown.perceivers = {name: one.perceiver for name, one in self._perceiving.items()}
         self._flown.watches = {name: RegionWatch(one.perceiver) for name, one in self._perceiving.items()}
         self._said: dict[str, str] = {}
@@ -66,7 +66,7 @@ class _Flight:
         self._avoiding: Avoiding | None = None
         self._pilot: ScenarioPilot = self._pilot_of(setup)
 
-    def run(self) -> Flown:
+    def run(self) -> SeenFlight:
         flown, wire, setup = self._flown, self._wire, self._setup
         while not self._pilot.is_over and wire.now_s - flown.began_s < setup.longest_s:
             self._step()
@@ -168,7 +168,7 @@ class _Flight:
         self._tell(perceiver.kind.status, status, t_utc_s)
         away = flown.map_to_world - perceiver.perception.offset_enu_m
         for alert in outcome.alerts:
-            flown.told.append(Told(alert, np.array(alert.obstacle.enu_m) + away if alert.obstacle else None))
+            flown.told.append(SeenAlert(alert, np.array(alert.obstacle.enu_m) + away if alert.obstacle else None))
         flown.watches[sensor].take(outcome, self._wire.now_s)
         for alert in outcome.alerts:
             self._tell(Topic.ALERT, alert, t_utc_s)

@@ -12,7 +12,7 @@ from typing import Literal
 from telemetry.simulation.simulator.airframe.dynamics import Demand
 from telemetry.simulation.simulator.autopilot.auto import Auto
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
-from telemetry.simulation.simulator.autopilot.failsafe import BatteryFailsafe, Finding, GcsFailsafe
+from telemetry.simulation.simulator.autopilot.failsafe import BatteryFailsafe, FailsafeFinding, GcsFailsafe
 from telemetry.simulation.simulator.autopilot.flight_modes import Guided, Hold, Landing, Mode, Return, Stabilize
 from telemetry.simulation.simulator.autopilot.pilot import (
     AS_REAL_BOOT_S,
@@ -311,7 +311,7 @@ class Autopilot(SimulatedPilot):
             if finding:
                 self._act(finding)
 
-    def _act(self, finding: Finding) -> None:
+    def _act(self, finding: FailsafeFinding) -> None:
         self.say(finding.severity, finding.text)
         if finding.takeover == "none":
             return

@@ -17,7 +17,7 @@ LOW_FOR_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class FailsafeFinding:
     severity: int
     """MAV_SEVERITY's scale: 0 emergency to 7 debug"""
     text: str
@@ -35,7 +35,7 @@ class GcsFailsafe:
     def heard(self, now_s: float) -> None:
         self._heard_s = now_s
 
-    def check(self, parameters: Parameters, now_s: float) -> Finding | None:
+    def check(self, parameters: Parameters, now_s: float) -> FailsafeFinding | None:
         """What has changed. A ground station never heard cannot be missed."""
         action = GCS_ACTIONS.get(int(parameters["FS_GCS_ENABLE"]))
         if self._heard_s is None or action is None:
@@ -45,7 +45,7 @@ class GcsFailsafe:
         if silent == self.active:
             return None
         self.active = silent
-        return Finding(4, "GCS Failsafe", action) if silent else Finding(4, "GCS Failsafe Cleared")
+        return FailsafeFinding(4, "GCS Failsafe", action) if silent else FailsafeFinding(4, "GCS Failsafe Cleared")
 
 
 class BatteryFailsafe:
@@ -61,7 +61,7 @@ class BatteryFailsafe:
 
     def check(
         self, parameters: Parameters, voltage_v: float, used_mah: float, *, flying: bool, now_s: float
-    ) -> Finding | None:
+    ) -> FailsafeFinding | None:
         left_mah = parameters["BATT_CAPACITY"] - used_mah
         found = None
         for level, name in ((1, "LOW"), (2, "CRT")):
@@ -71,7 +71,7 @@ class BatteryFailsafe:
                 self.level = level
                 word = "low" if level == 1 else "critical"
                 text = f"Battery 1 is {word} {voltage_v:.2f}V used {used_mah:.0f} mAh"
-                found = Finding(4, text, BATTERY_ACTIONS.get(int(parameters[f"BATT_FS_{name}_ACT"]), "none"))
+                found = FailsafeFinding(4, text, BATTERY_ACTIONS.get(int(parameters[f"BATT_FS_{name}_ACT"]), "none"))
         return found
 
     def _lasting(self, index: int, low: bool, now_s: float) -> bool:
