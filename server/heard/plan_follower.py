@@ -46,7 +46,7 @@ class Followed:
 
     @staticmethod
     def of(record: PlanRecord, dsm: Dsm) -> Followed:
-        """Takes a second or so: for a thread. Raises PlanningError."""
+        """Takes seconds on a busy machine: for a thread. Raises PlanningError."""
         mission = read_wpl(record.mission_wpl)
         profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
         over = Followed.over(reference_line(mission, dsm, profile), dsm)
@@ -54,8 +54,13 @@ class Followed:
 
     @staticmethod
     def over(reference: Reference, dsm: Dsm) -> Followed:
+        """With every kernel loaded that following it needs: the first position would load them on the event loop."""
         with _KERNELS:
             surface = SurfaceDistance(_window(dsm, reference.points_m))
+            x, y, z = map(float, reference.first_m)
+            surface.distance_m((x, y, z))
+            begun, _ = follow_on(Following(), reference, (x, y, z), 0.0)
+            follow_on(begun, reference, (x, y, z), 1.0)
         return Followed(Placer(dsm), surface, reference)
 
 

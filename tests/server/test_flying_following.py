@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +18,7 @@ from telemetry.topics.messages import FlightStatus
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
 
+ROOT = Path(__file__).resolve().parents[2]
 FLYING = FlightStatus(phase="flying")
 FLOWN = mission(ROUTE)
 
@@ -96,3 +100,30 @@ def test_the_whole_way_leads_up_along_the_line_and_home_at_the_return_height() -
     assert whole.t_s[-1] == max(reference.leave_s)
     assert Follower(replace(followed, profile=None)).whole() is None
     assert Follower(over=PLAIN).whole() is None
+
+
+_FIRST_POSITIONS = """
+from numba.core.dispatcher import Dispatcher
+from planning.certificate import nearest as certificate
+from planning.following import nearest as following
+from tests.server.test_flying_following import FLYING, at, follower
+
+def loaded():
+    kernels = [each for module in (certificate, following) for each in vars(module).values()]
+    return sum(len(each.signatures) for each in kernels if isinstance(each, Dispatcher))
+
+live = follower()
+before = loaded()
+for k in range(4):
+    live.follow(at(50.0 + 40 * k, 20.0, t_s=10.0 * k), FLYING)
+print(before, loaded())
+"""
+
+
+def test_the_first_positions_load_no_kernel_on_the_event_loop() -> None:
+    """In a process of its own: kernels that another test has loaded stay."""
+    ran = subprocess.run(
+        [sys.executable, "-c", _FIRST_POSITIONS], capture_output=True, text=True, check=True, cwd=ROOT, timeout=120
+    )
+    before, after = map(int, ran.stdout.split())
+    assert before == after > 0
