@@ -6,6 +6,7 @@ class FakeSocket {
   static all: FakeSocket[] = [];
   readyState = FakeSocket.OPEN;
   pings = 0;
+  chosen: number[] = [];
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: string }) => void) | null = null;
   onclose: ((event: { code: number }) => void) | null = null;
@@ -13,7 +14,9 @@ class FakeSocket {
     FakeSocket.all.push(this);
   }
   send(text: string): void {
-    if ((JSON.parse(text) as { type: string }).type === "ping") this.pings += 1;
+    const message = JSON.parse(text) as { type: string; vehicle: number };
+    if (message.type === "ping") this.pings += 1;
+    if (message.type === "choose_vehicle") this.chosen.push(message.vehicle);
   }
   says(message: object): void {
     this.onmessage?.({ data: JSON.stringify({ v: 1, ...message }) });
@@ -22,18 +25,20 @@ class FakeSocket {
 
 const states: LinkState[] = [];
 let socket: FakeSocket;
+let stream: Stream;
 
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setInterval", "clearInterval", "setTimeout", "clearTimeout", "performance"] });
   vi.stubGlobal("WebSocket", FakeSocket);
   FakeSocket.all = [];
   states.length = 0;
-  new Stream("ws://x/ws", {
+  stream = new Stream("ws://x/ws", {
     message: () => undefined,
     link: (state) => states.push(state),
     signIn: () => undefined,
     unreadable: () => undefined,
-  }).connect();
+  });
+  stream.connect();
   socket = FakeSocket.all[0] as FakeSocket;
   socket.onopen?.();
   socket.says({ type: "snapshot", page_id: "p/1" });
@@ -56,6 +61,33 @@ describe("a stream that breaks off", () => {
     socket.onclose?.({ code: 1006 });
     vi.advanceTimersByTime(1000);
     expect(FakeSocket.all.map((each) => each.url)).toEqual(["ws://x/ws", "ws://x/ws?page=p%2F1"]);
+  });
+});
+
+describe("a vehicle that is chosen", () => {
+  const choose = (vehicle: number) => stream.send({ type: "choose_vehicle", vehicle });
+
+  it("is shown by the next stream when this one breaks off before it answers", () => {
+    socket.says({ type: "active", vehicle: 1 });
+    choose(2);
+    expect(stream.wanted).toBe(2);
+    socket.onclose?.({ code: 1006 });
+    vi.advanceTimersByTime(1000);
+    expect(FakeSocket.all[1]?.url).toBe("ws://x/ws?page=p%2F1&vehicle=2");
+  });
+
+  it("is asked for again when it was chosen while nothing was open", () => {
+    socket.says({ type: "active", vehicle: 1 });
+    socket.onclose?.({ code: 1006 });
+    vi.advanceTimersByTime(1000);
+    const next = FakeSocket.all[1] as FakeSocket;
+    next.readyState = 0;
+    choose(3);
+    next.readyState = FakeSocket.OPEN;
+    next.says({ type: "active", vehicle: 1 });
+    next.says({ type: "active", vehicle: 3 });
+    expect(next.chosen).toEqual([3]);
+    expect(stream.wanted).toBe(3);
   });
 });
 

@@ -38,14 +38,21 @@ export class Stream {
   private state: LinkState = "connecting";
   private page: string | null = null;
   private vehicle: number | null = null;
+  /** The vehicle that was chosen and is not shown yet: a choice outlives the stream that it was made on. */
+  private chosen: number | null = null;
 
   constructor(
     private readonly url: string,
     private readonly events: SocketEvents,
   ) {}
 
+  /** The vehicle that this page shows, or is to show. */
+  get wanted(): number | null {
+    return this.chosen ?? this.vehicle;
+  }
+
   connect(): void {
-    const shown = this.vehicle === null ? "" : `&vehicle=${this.vehicle}`;
+    const shown = this.wanted === null ? "" : `&vehicle=${this.wanted}`;
     const again = this.page === null ? "" : `?page=${encodeURIComponent(this.page)}${shown}`;
     const socket = new WebSocket(`${this.url}${again}`);
     this.socket = socket;
@@ -58,8 +65,12 @@ export class Stream {
     };
   }
 
-  /** Messages of a lost link are dropped: they are pointers and view settings, stale by the time it is back. */
+  /**
+   * Messages of a lost link are dropped: they are pointers and view settings, stale by the time it is back. Only which
+   * vehicle was chosen is kept.
+   */
   send(message: ClientMessage): boolean {
+    if (message.type === "choose_vehicle") this.chosen = message.vehicle;
     if (this.socket?.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(message));
     return true;
@@ -103,9 +114,17 @@ export class Stream {
       this.attempt = 0;
       this.page = message.page_id;
     }
-    if (message.type === "active") this.vehicle = message.vehicle;
+    if (message.type === "active") this.shows(message.vehicle);
     if (message.type === "snapshot" || this.state === "silent") this.becomes("open");
     this.events.message(message);
+  }
+
+  /** Another one than was chosen: it was chosen while this stream was not open yet, or the one before it was lost. */
+  private shows(vehicle: number): void {
+    this.vehicle = vehicle;
+    const { chosen } = this;
+    this.chosen = null;
+    if (chosen !== null && chosen !== vehicle) this.send({ type: "choose_vehicle", vehicle: chosen });
   }
 
   private closed(code: number): void {

@@ -40,7 +40,7 @@ export function setSelection(fields: Partial<SelectionDoc>): void {
 /** Shows another vehicle; who is in charge of which one stays as it is. */
 export function chooseVehicle(vehicle: number): void {
   const isThere = fleet.value.some(({ number }) => number === vehicle);
-  if (isThere && vehicle !== active.value) send({ type: "choose_vehicle", vehicle });
+  if (isThere && vehicle !== (stream.wanted ?? active.value)) send({ type: "choose_vehicle", vehicle });
 }
 
 export type FrameTarget = FrameView["target"];
