@@ -13,8 +13,8 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.station_docs import FIRST_VEHICLE, AlarmDoc, VehicleDoc
-from server.schemas.strict_model import Message, Strict
+from server.schemas.station_docs import AlarmDoc, VehicleDoc
+from server.schemas.strict_model import Message
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
 from server.schemas.view_docs import SelectionDoc, ViewDoc
@@ -338,74 +338,3 @@ class Pages(Protocol):
     """Whoever tells all pages: the hub itself, or what also keeps the latest for pages that open later."""
 
     def publish(self, message: ServerMessage) -> None: ...
-
-
-Change = Annotated[int, Field(ge=0, le=2**53 - 1)]
-"""The page's own count of what it has changed for all; `AnsweredMessage` gives it back."""
-
-
-class HoverProfile(Strict):
-    """The pointer is over the altitude profile at this distance; null: it left."""
-
-    type: Literal["hover_profile"] = "hover_profile"
-    s_m: float | None
-
-
-class HoverView(Strict):
-    """The pointer is over the 3D view, in shares of its width and height from the top left."""
-
-    type: Literal["hover_view"] = "hover_view"
-    x: Annotated[float, Field(ge=0, le=1)] | None
-    y: Annotated[float, Field(ge=0, le=1)] | None
-
-
-class SetView(Strict):
-    type: Literal["set_view"] = "set_view"
-    view: ViewDoc
-    change: Change
-
-
-class SetSelection(Strict):
-    type: Literal["set_selection"] = "set_selection"
-    selection: SelectionDoc
-    change: Change
-
-
-class FrameView(Strict):
-    """Move this page's camera: to the whole terrain, the plan, from above, the worst point, or behind a vehicle.
-
-    "chase" follows the vehicle until another target is asked for.
-    """
-
-    type: Literal["frame_view"] = "frame_view"
-    target: Literal["terrain", "plan", "top", "worst", "poi", "chase"]
-    source: Source = "live"
-    vehicle: Annotated[int, Field(ge=1)] = FIRST_VEHICLE
-    """Of the source "live"."""
-
-
-class HoldCamera(Strict):
-    """A hand is on this page's camera: what follows a vehicle waits."""
-
-    type: Literal["hold_camera"] = "hold_camera"
-    held: bool
-
-
-class ChooseVehicle(Strict):
-    """This page shows and commands another vehicle; who is in charge of which one stays as it is."""
-
-    type: Literal["choose_vehicle"] = "choose_vehicle"
-    vehicle: int
-
-
-class Ping(Strict):
-    """Every second: the answer tells the page that the server works, how far away it is, and what its clock says."""
-
-    type: Literal["ping"] = "ping"
-    page_ms: Annotated[float, Field(ge=0, le=1e15)]
-
-
-ClientMessage = Annotated[
-    HoverProfile | HoverView | SetView | SetSelection | FrameView | HoldCamera | ChooseVehicle | Ping,
-    Field(discriminator="type"),
-]

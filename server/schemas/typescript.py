@@ -20,6 +20,7 @@ from server.schemas import (
     guided_docs,
     library_docs,
     obstacle_docs,
+    page_messages,
     parameter_docs,
     plan_docs,
     result_docs,
@@ -95,6 +96,7 @@ def _models() -> Iterator[type[BaseModel]]:
         traffic_docs,
         study_docs,
         stream,
+        page_messages,
     ):
         for value in vars(module).values():
             if isinstance(value, type) and issubclass(value, schemas.Strict) and value.__module__ == module.__name__:

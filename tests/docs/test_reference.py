@@ -12,7 +12,8 @@ import pytest
 import server.web
 from planning.basics.plan_model import Camera, VehicleProfile
 from server.errors import HTTP_CODES, STATUS
-from server.schemas.stream import ClientMessage, ServerMessage
+from server.schemas.page_messages import ClientMessage
+from server.schemas.stream import ServerMessage
 from telemetry.bus.encoding import EACH_ARRIVES
 from telemetry.topics.messages import MESSAGE_TYPES, REPLAY_PREFIX
 from telemetry.topics.obstacles import PerceptionSettings
