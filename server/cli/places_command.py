@@ -26,7 +26,7 @@ from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import watching
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.items import mission_items, wire_items
-from telemetry.topics.messages import Item, PlaceList, UploadReport
+from telemetry.topics.onboard_lists import Item, PlaceList, UploadReport
 from telemetry.topics.requests import DownloadPlaces, UploadPlaces
 
 Action = Literal["upload", "download", "clear"]

@@ -19,7 +19,7 @@ from server.cli.shared.upload_words import report_lines, report_summary
 from telemetry.flight.preflight.prepare import connect, transfer
 from telemetry.flight.watch import watching
 from telemetry.mavlink.address import parse_address
-from telemetry.topics.messages import UploadReport
+from telemetry.topics.onboard_lists import UploadReport
 
 
 @command

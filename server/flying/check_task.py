@@ -28,7 +28,8 @@ from server.library.seen_columns import check_home_stands_on_ground, load_planne
 from server.library.shelf import utc_now
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
 from server.work.jobs import Progress
-from telemetry.topics.messages import Item, OnboardMission, PlacesOnboard, PlanRecord
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.onboard_lists import Item, OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:

@@ -26,7 +26,8 @@ from server.workspace import Workspace
 from telemetry.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
-from telemetry.topics.messages import FlightStatus, Item, LinkStatus, PlaceList, PlanRecord, Topic, UploadReport
+from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, Topic
+from telemetry.topics.onboard_lists import Item, PlaceList, UploadReport
 from telemetry.topics.requests import (
     Download,
     DownloadPlaces,

@@ -13,7 +13,8 @@ from server.library.documents import places_of
 from server.plan.tasks import last_plan
 from server.schemas import PlanDoc
 from server.work.jobs import Progress
-from telemetry.topics.messages import Item, PlaceList, PlanRecord
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.onboard_lists import Item, PlaceList
 
 
 @dataclass(frozen=True, slots=True)

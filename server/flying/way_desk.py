@@ -35,7 +35,8 @@ from telemetry.errors import NoVehicleError
 from telemetry.flight.certified_way import way_notes, way_request
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.preflight.parameters import NAMES
-from telemetry.topics.messages import FlightStatus, PlacesOnboard
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters, SetSpeed
 from telemetry.topics.vehicle import VehicleState
 

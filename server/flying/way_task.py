@@ -12,7 +12,7 @@ from planning.guided.guided_model import Back, GoTo, GuidedWay, Look, Orbit, Ral
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, WayBody
 from server.work.jobs import Progress
-from telemetry.topics.messages import PlacesOnboard
+from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:

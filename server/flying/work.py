@@ -17,7 +17,8 @@ from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import TelemetryError
 from telemetry.flight.preflight.parameters import NAMES
-from telemetry.topics.messages import OnboardMission, PlacesOnboard, PlanRecord
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.onboard_lists import OnboardMission, PlacesOnboard
 from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters
 from telemetry.topics.vehicle import VehicleState
 

@@ -15,7 +15,8 @@ import msgspec
 from server.library.whole_files import write_atomically
 from server.schemas import FenceDoc, OnboardDoc, PlanDoc
 from telemetry.errors import MissionUnknownError
-from telemetry.topics.messages import LinkStatus, PlanRecord, Rounded
+from telemetry.topics.messages import LinkStatus, PlanRecord
+from telemetry.topics.onboard_lists import Rounded
 
 _ROUNDED_KEPT = 200
 """The page lists them; the sentence counts them all."""

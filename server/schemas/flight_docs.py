@@ -13,7 +13,7 @@ from pydantic import Field
 from server.schemas.checklist_docs import ChecklistDoc
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
-from telemetry.topics.messages import Rounded
+from telemetry.topics.onboard_lists import Rounded
 
 Source = Literal["live", "replay"]
 Address = Annotated[str, Field(min_length=3, max_length=200)]

@@ -12,7 +12,7 @@ from telemetry.bus import Bus
 from telemetry.bus.liveness import Liveness
 from telemetry.bus.node_lock import running_node, silence_counts
 from telemetry.errors import BusError, OvertakenError
-from telemetry.topics.messages import Item, OnboardMission, UploadReport
+from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.parameters import ParameterList, ParameterWritten
 from telemetry.topics.requests import (
     Connect,

@@ -21,7 +21,8 @@ from telemetry.flight.preflight.preflight import Preflight
 from telemetry.flight.preflight.prepare import FlyOptions, Prepared, Report, connect, prepare
 from telemetry.flight.watch import Asks, Subscribes, Watch, watching
 from telemetry.topics.checklist import ChecklistRecord
-from telemetry.topics.messages import FlightStatus, PlanRecord, Topic, UploadReport, VehicleText
+from telemetry.topics.messages import FlightStatus, PlanRecord, Topic, VehicleText
+from telemetry.topics.onboard_lists import UploadReport
 from telemetry.topics.requests import ReturnHome, StartAuto, StartGuided, TickPoint
 from telemetry.topics.vehicle import VehicleState
 

@@ -20,7 +20,8 @@ from telemetry.flight.guided.remaining_mission import RemainingMission, remainin
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard
 from telemetry.mavlink.flight_keeper import sequence_of
-from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import StartAuto
 from telemetry.topics.vehicle import VehicleState
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from telemetry.mavlink.actions import Message
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
 SETTLE_S = 2.0

@@ -19,7 +19,7 @@ from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, 
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 

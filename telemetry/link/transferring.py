@@ -17,7 +17,8 @@ from telemetry.mavlink.parameters.listing import ParameterListRead
 from telemetry.mavlink.parameters.reading import ParameterRead
 from telemetry.mavlink.parameters.writing import ParameterWrite
 from telemetry.mavlink.upload import MissionUpload
-from telemetry.topics.messages import ErrorInfo, Item, OnboardMission, PlaceList, TransferStatus, UploadReport
+from telemetry.topics.messages import ErrorInfo, TransferStatus
+from telemetry.topics.onboard_lists import Item, OnboardMission, PlaceList, UploadReport
 from telemetry.topics.parameters import ParameterChange, ParameterList, ParameterWritten
 from telemetry.topics.requests import Upload, UploadPlaces
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from planning.basics.plan_model import Firmware
 from telemetry.mavlink.actions import Message
-from telemetry.topics.messages import PlaceList
+from telemetry.topics.onboard_lists import PlaceList
 
 GROUND_STATION = (255, 190)
 """System and component that ground stations use."""

@@ -11,7 +11,7 @@ from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, S
 from telemetry.mavlink.conversation import GROUND_STATION, MISSION, BootClock, Endpoints, ItemList, RoundTrip
 from telemetry.mavlink.items import item_from_message
 from telemetry.mavlink.verify import digest
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 
 LIST_EVERY_S = 0.25
 BEGIN_AGAIN_S = (3.0, 8.0)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from planning.basics.mav_cmd import MavCmd
 from telemetry.mavlink.autopilot_orders import LAND_MODES, MISSION_MODES, RETURN_MODES
-from telemetry.topics.messages import FlightPhase, FlightStatus, OnboardMission
+from telemetry.topics.messages import FlightPhase, FlightStatus
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
 GOING_HOME_COMMANDS = frozenset({MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.NAV_LAND, MavCmd.DO_LAND_START})

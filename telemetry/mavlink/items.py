@@ -12,7 +12,7 @@ from planning.basics.plan_model import Firmware, Home, Mission, MissionItem
 from planning.formats.commands import POSITIONED
 from telemetry.errors import TransferError
 from telemetry.mavlink.actions import Message
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 
 PLACED = (POSITIONED - {MavCmd.DO_SET_CAM_TRIGG_DIST}) | FENCES | {MavCmd.NAV_RALLY_POINT}
 """Commands with latitude, longitude and altitude; the one that sets the distance between photos has none."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from telemetry.errors import RefusedError, TelemetryError, TransferError
 from telemetry.mavlink.conversation import MISSION, ItemList
 from telemetry.mavlink.texts import VehicleWords
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 
 (
     ACCEPTED,

@@ -23,7 +23,7 @@ from telemetry.mavlink.refusals import (
     refusal_error,
 )
 from telemetry.mavlink.texts import VehicleWords
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 
 COUNT_EVERY_S = 0.5
 GENTLE_RESEND_S = 1.0

@@ -13,7 +13,7 @@ from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.refusals import CANCELLED
 from telemetry.mavlink.sending import MissionSending
 from telemetry.mavlink.verify import compare
-from telemetry.topics.messages import Item, OnboardMission, UploadReport
+from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 
 LONGEST_S, LONGEST_PER_ITEM_S = 90.0, 4.0
 

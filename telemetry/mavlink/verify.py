@@ -13,7 +13,7 @@ from planning.basics.mav_cmd import MavCmd, MavFrame
 from planning.basics.plan_model import Firmware
 from planning.formats.commands import plain_frame
 from telemetry.mavlink.items import DEG_E7, PLACED
-from telemetry.topics.messages import Item, Rounded
+from telemetry.topics.onboard_lists import Item, Rounded
 
 WHOLE_SECONDS = frozenset({MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME, MavCmd.NAV_SPLINE_WAYPOINT})
 """Commands whose first parameter, a time, ArduPilot cuts to whole seconds."""

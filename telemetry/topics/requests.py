@@ -11,8 +11,9 @@ import time
 from dataclasses import dataclass
 from typing import Literal
 
-from telemetry.topics.messages import GuidedTarget, Item, PlaceList
+from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidBy
+from telemetry.topics.onboard_lists import Item, PlaceList
 from telemetry.topics.parameters import ParameterChange
 
 TOKEN_AHEAD_MS = 24 * 3600 * 1000

@@ -20,8 +20,9 @@ from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMess
 from server.work.jobs import Lane
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.checklist import ChecklistRecord
-from telemetry.topics.messages import Candidate, LinkStatus, OnboardMission, PlanRecord, Topic, UploadReport
+from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
 from telemetry.topics.obstacles import AvoidanceStatus
+from telemetry.topics.onboard_lists import OnboardMission, UploadReport
 from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
 

@@ -28,7 +28,7 @@ from server.flying.review import recording_of
 from server.flying.review import review as judge
 from server.schemas.review_docs import ReviewDoc
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.topics.messages import OnboardMission, Rounded, UploadReport
+from telemetry.topics.onboard_lists import OnboardMission, Rounded, UploadReport
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.flight_logs import PLAIN, mission
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle

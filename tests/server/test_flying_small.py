@@ -21,7 +21,8 @@ from server.library.terrain_of import FlownOver, covers, terrain_of
 from server.scene.layers.vehicles import Vehicles
 from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
 from server.work.bucket import Bucket
-from telemetry.topics.messages import LOST_S, Rounded
+from telemetry.topics.messages import LOST_S
+from telemetry.topics.onboard_lists import Rounded
 from telemetry.topics.vehicle import VehicleState
 
 STATE = VehicleState(1, 1, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0)

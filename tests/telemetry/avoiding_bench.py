@@ -11,8 +11,9 @@ from telemetry.flight.avoidance.avoiding import Avoiding
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
 from telemetry.mavlink.actions import Send
 from telemetry.mavlink.reduce import reduce
-from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
+from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import Obstacle, PerceptionStatus, Region, Sensor
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import Operator
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.simulator_bench import HOME, SLICE_S, Bench

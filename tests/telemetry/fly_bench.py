@@ -11,7 +11,8 @@ from planning.basics.plan_model import VehicleProfile
 from planning.certificate.certificate_model import ClearanceParams
 from telemetry.flight.fly import FlyOptions, FlyResult, fly
 from telemetry.flight.preflight.prepare import Prepared
-from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, OnboardMission, Topic, UploadReport
+from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, Topic
+from telemetry.topics.onboard_lists import OnboardMission, UploadReport
 from telemetry.topics.requests import Connect, Operator, ReadParameters, StartAuto, StartGuided, Upload
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, mission

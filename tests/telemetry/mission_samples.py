@@ -6,7 +6,7 @@ import random
 from typing import Any
 
 from telemetry.mavlink.upload import MissionUpload
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 from tests.telemetry.lossy import VEHICLE, Faults, Run
 from tests.telemetry.mission_vehicles import HOME, ArduCopter, Px4
 

@@ -33,14 +33,13 @@ from telemetry.topics.messages import (
     CommandRecord,
     ConnectionStatus,
     FlightStatus,
-    Item,
-    OnboardMission,
     PlanRecord,
     Published,
     RawFrame,
     Topic,
 )
 from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import Operator, SetAvoidance, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 

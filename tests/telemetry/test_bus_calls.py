@@ -12,7 +12,8 @@ from planning.errors import CapacityError, DescribedError
 from telemetry.bus import Bus
 from telemetry.bus.encoding import encode, error_of
 from telemetry.errors import BusError, MissionUnknownError, RefusedError, SilentError
-from telemetry.topics.messages import ErrorInfo, Item, OnboardMission
+from telemetry.topics.messages import ErrorInfo
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import (
     Arm,
     Connect,

@@ -13,7 +13,7 @@ from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.upload import MissionUpload
 from telemetry.simulation.simulator.protocol.mavlink import Endpoint
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 from tests.telemetry.lossy import VEHICLE, Faults, Run
 from tests.telemetry.mission_vehicles import Px4
 from tests.telemetry.simulator_bench import HOME

@@ -10,8 +10,8 @@ from mapping.perceiving.braking import Braking
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.eyes_check import avoidance_row
 from telemetry.flight.preflight.parameters import Speeds, flown_speeds
-from telemetry.topics.messages import Item, OnboardMission
 from telemetry.topics.obstacles import AvoidanceStatus, Eye
+from telemetry.topics.onboard_lists import Item, OnboardMission
 
 RADAR = Eye("radar", 100.0, 10.0, 4.1)
 ON = AvoidanceStatus(enabled=True, state="watching", eyes=(RADAR,))

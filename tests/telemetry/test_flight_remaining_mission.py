@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items
 

@@ -14,7 +14,8 @@ from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.link.onboard import OnBoard
 from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Failed, Progress
-from telemetry.topics.messages import Item, OnboardMission, TransferStatus, UploadReport
+from telemetry.topics.messages import TransferStatus
+from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.requests import Operator, Upload, UploadPlaces
 
 KNOWN = OnboardMission((), None, None, None, "known")

@@ -13,7 +13,8 @@ from telemetry.errors import RefusedError, SilentError
 from telemetry.link.adopted import AdoptedVehicle, Telling
 from telemetry.link.line import Line
 from telemetry.mavlink.address import parse_address
-from telemetry.topics.messages import Candidate, OnboardMission
+from telemetry.topics.messages import Candidate
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
-from telemetry.topics.messages import FlightStatus, Item, OnboardMission
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
 

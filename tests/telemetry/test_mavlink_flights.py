@@ -14,7 +14,8 @@ import pytest
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError
 from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
-from telemetry.topics.messages import CommandRecord, FlightStatus, GuidedTarget, Item, LinkStatus, UploadReport
+from telemetry.topics.messages import CommandRecord, FlightStatus, GuidedTarget, LinkStatus
+from telemetry.topics.onboard_lists import Item, UploadReport
 from telemetry.topics.requests import (
     Arm,
     Connect,

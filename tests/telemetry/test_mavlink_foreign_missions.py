@@ -10,7 +10,8 @@ from pymavlink import mavutil
 
 from telemetry.errors import MissionUnknownError
 from telemetry.simulation.simulator.run import Simulator
-from telemetry.topics.messages import Item, VehicleText
+from telemetry.topics.messages import VehicleText
+from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import Resume, ReturnHome, StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.link.onboard import SETTLE_S, OnBoard
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.frames import attitude, heard
 

@@ -15,7 +15,7 @@ from telemetry.link.missions import check_same_mission, speeds_before
 from telemetry.link.onboard import OnBoard
 from telemetry.link.piloting import Pilot
 from telemetry.mavlink.flight_keeper import FlightKeeper
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack

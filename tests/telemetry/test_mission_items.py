@@ -15,7 +15,7 @@ from telemetry.mavlink.items import (
     items_from_mission,
     mission_from_onboard,
 )
-from telemetry.topics.messages import Item, OnboardMission
+from telemetry.topics.onboard_lists import Item, OnboardMission
 
 VEHICLE = (1, 1)
 NAN = math.nan

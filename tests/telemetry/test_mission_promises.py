@@ -11,7 +11,7 @@ from telemetry.errors import SilentError, TransferError
 from telemetry.mavlink.actions import Done, Failed
 from telemetry.mavlink.items import item_from_message
 from telemetry.mavlink.verify import as_stored, digest
-from telemetry.topics.messages import UploadReport
+from telemetry.topics.onboard_lists import UploadReport
 from tests.seeds import seeds
 from tests.telemetry.lossy import Faults
 from tests.telemetry.mission_samples import HARSH, VEHICLES, WORSE, mission, upload

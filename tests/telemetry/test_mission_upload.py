@@ -12,7 +12,7 @@ from telemetry.errors import RefusedError, SilentError, TransferError
 from telemetry.mavlink.actions import Failed, Progress, Send
 from telemetry.mavlink.upload import MissionUpload
 from telemetry.mavlink.verify import as_stored, digest
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 from tests.telemetry.lossy import STATION, VEHICLE, Faults, Run
 from tests.telemetry.mission_samples import HARSH, VEHICLES, mission, upload, waypoint
 from tests.telemetry.mission_vehicles import HOME, ArduCopter, Px4, ack, text

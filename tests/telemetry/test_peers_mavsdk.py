@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from telemetry.mavlink.actions import Action, Done, Failed, Send, ended
 from telemetry.mavlink.upload import MissionUpload
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.topics.messages import Item, UploadReport
+from telemetry.topics.onboard_lists import Item, UploadReport
 from tests.telemetry.simulator_process import FAST, PATIENCE_S, ROOT, child, simulated_vehicle
 
 pytest.importorskip("mavsdk")

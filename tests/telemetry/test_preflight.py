@@ -23,7 +23,7 @@ from telemetry.flight.preflight.preflight import Preflight, actual_home, check
 from telemetry.flight.preflight.rereference import rereference
 from telemetry.flight.preflight.resume import plan_resumption, resume_item
 from telemetry.mavlink.items import items_from_mission
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, degrees, mission
 

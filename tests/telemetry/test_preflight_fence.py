@@ -10,7 +10,7 @@ from planning.basics.plan_model import Firmware
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import at_fence, fence_row, flown_within, sent_places
-from telemetry.topics.messages import PlacesOnboard
+from telemetry.topics.onboard_lists import PlacesOnboard
 
 FENCE = Fence(
     polygons=(polygon([(47.0, 8.0), (47.0, 8.01), (47.01, 8.0)], inclusion=True, where="test"),),

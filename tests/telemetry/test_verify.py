@@ -14,7 +14,7 @@ from pymavlink import mavutil
 
 from telemetry.mavlink.items import item_from_message, item_message
 from telemetry.mavlink.verify import as_stored, compare, digest
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 from tests.telemetry.lossy import VEHICLE, Codec
 from tests.telemetry.mission_samples import mission, waypoint
 from tests.telemetry.mission_vehicles import ArduCopter

@@ -12,7 +12,7 @@ from telemetry.mavlink.actions import Done, Failed
 from telemetry.mavlink.codec import Parser
 from telemetry.mavlink.items import item_from_message
 from telemetry.mavlink.verify import as_stored, digest
-from telemetry.topics.messages import UploadReport
+from telemetry.topics.onboard_lists import UploadReport
 from tests.telemetry.frames import attitude, packed
 from tests.telemetry.lossy import Faults
 from tests.telemetry.mission_samples import HARSH, VEHICLES, WORSE, mission, upload

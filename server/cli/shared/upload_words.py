@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from telemetry.topics.messages import UploadReport
+from telemetry.topics.onboard_lists import UploadReport
 
 
 def report_summary(report: UploadReport) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from planning.certificate.commands import TAKEOFFS
 from planning.errors import MissionError
 from telemetry.flight.guided.script_targets import guided_plan
 from telemetry.mavlink.flight_keeper import item_of
-from telemetry.topics.messages import GuidedTarget, Item, OnboardMission
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
 LANDS_M = 20.0

@@ -13,7 +13,7 @@ from planning.margins.words import rounded_down, rounded_up
 from planning.missions.flown import AMSL_FRAMES
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.preflight.parameters import ReturnSettings
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import GnssFix, VehicleState
 
 Code = Literal["mission", "clearance", "home", "gnss", "rtl_height", "battery", "ready", "avoidance", "fence"]

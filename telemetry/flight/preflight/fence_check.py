@@ -11,7 +11,7 @@ from planning.formats.fence_items import fence_items, fence_of, rally_items, ral
 from telemetry.flight.preflight.checks import Row
 from telemetry.mavlink.items import mission_items, wire_items
 from telemetry.mavlink.verify import compare
-from telemetry.topics.messages import Item, PlaceList, PlacesOnboard
+from telemetry.topics.onboard_lists import Item, PlaceList, PlacesOnboard
 
 Places = tuple[Fence, tuple[RallyPoint, ...]]
 NOTHING: Places = (NO_FENCE, ())

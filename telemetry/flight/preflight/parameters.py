@@ -11,7 +11,7 @@ from planning.basics.plan_model import Firmware
 from planning.certificate.commands import STRAIGHT
 from planning.certificate.returns import NEAR_M, SLOPE
 from telemetry.flight.guided.script_targets import GROUND_SPEEDS
-from telemetry.topics.messages import OnboardMission
+from telemetry.topics.onboard_lists import OnboardMission
 
 NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (

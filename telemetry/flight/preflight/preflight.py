@@ -26,7 +26,7 @@ from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import fence_row, flown_within
 from telemetry.flight.preflight.parameters import return_settings
 from telemetry.mavlink.items import mission_from_onboard
-from telemetry.topics.messages import OnboardMission, PlacesOnboard
+from telemetry.topics.onboard_lists import OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
 
 ANTENNA_M = 0.5

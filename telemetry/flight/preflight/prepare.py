@@ -22,7 +22,8 @@ from telemetry.flight.watch import Asks, Watch
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.items import items_from_mission
 from telemetry.topics.checklist import ChecklistPoint
-from telemetry.topics.messages import ErrorInfo, UploadReport
+from telemetry.topics.messages import ErrorInfo
+from telemetry.topics.onboard_lists import UploadReport
 from telemetry.topics.requests import Connect, Operator, ReadParameters, Upload
 from telemetry.topics.vehicle import VehicleState
 

@@ -9,7 +9,8 @@ from telemetry.flight.guided.guided import GuidedScript
 from telemetry.mavlink.actions import Action, Done, Failed, Message
 from telemetry.mavlink.upload import MissionUpload
 from telemetry.simulation.scenarios.stage.virtual_link import VEHICLE, Wire
-from telemetry.topics.messages import FlightStatus, Item, OnboardMission, UploadReport
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.requests import StartGuided
 from telemetry.topics.vehicle import VehicleState
 
