@@ -39,6 +39,8 @@ _TEXT_BYTES = 50
 _ONE_BURST_S = 5.0
 """Reasons that come farther apart are of another look at the vehicle."""
 _MOST_REASONS = 5
+_CHARGE_S = 10.0
+"""BATTERY_STATUS comes at least every two seconds from those that send it."""
 _RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 INT16_MAX, UINT16_MAX, INT32_MAX = 32767, 65535, 2147483647
 
@@ -156,11 +158,18 @@ def _sys_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
         # A fence that is switched off tells no more that it is kept again.
         "fence_breach": None if fence_ok is None and state.fence_ok is not None else state.fence_breach,
         "not_ready_words": () if ready else state.not_ready_words,
-        "battery_t_mono_s": t_mono_s,
         "battery_v": scaled(message.voltage_battery, 1000, UINT16_MAX),
         "battery_a": scaled(message.current_battery, 100, -1),
-        "battery_share": share(message.battery_remaining),
+        **_charge(state, message, t_mono_s),
     }
+
+
+def _charge(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
+    """A share that only one of two messages knows is as old as that one's last word, and goes when that is old."""
+    left, told_s = share(message.battery_remaining), state.battery_t_mono_s
+    if left is None and state.battery_share is not None and told_s is not None and t_mono_s - told_s < _CHARGE_S:
+        return {}
+    return {"battery_t_mono_s": t_mono_s, "battery_share": left}
 
 
 def _statustext(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
@@ -188,13 +197,12 @@ def _battery_status(state: VehicleState, message: Any, t_mono_s: float) -> Chang
     cells = [v for v in message.voltages if v != UINT16_MAX] + [v for v in message.voltages_ext if v != 0]
     # SYS_STATUS is about the same battery: what only one of the two knows must not come and go.
     volts = sum(cells) / 1000 if cells else state.battery_v
-    amperes, left = scaled(message.current_battery, 100, -1), share(message.battery_remaining)
+    amperes = scaled(message.current_battery, 100, -1)
     return {
-        "battery_t_mono_s": t_mono_s,
         "battery_v": volts,
         "battery_a": state.battery_a if amperes is None else amperes,
-        "battery_share": state.battery_share if left is None else left,
         "battery_used_mah": scaled(message.current_consumed, 1, -1),
+        **_charge(state, message, t_mono_s),
     }
 
 

@@ -151,7 +151,19 @@ def test_batteries_say_what_they_know() -> None:
     assert (state.battery_a, state.battery_share, state.battery_used_mah) == (12.34, 0.87, 450)
     unknown = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0)
     state = known(status, unknown)
-    assert (state.battery_v, state.battery_a, state.battery_share) == (None, None, None)
+    assert (state.battery_v, state.battery_a, state.battery_share) == (None, None, 0.87)
+
+
+def test_a_share_that_one_message_knows_outlives_the_other_until_it_is_old() -> None:
+    unknown = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 16100, -1, -1, 0, 0, 0, 0, 0, 0)
+    nothing = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [65535] * 10, -1, -1, -1, -1)
+    state = known(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [4000] * 4 + [65535] * 6, -1, 450, -1, 76))
+    told = []
+    for t_mono_s, message in ((6.0, unknown), (14.0, nothing), (14.9, unknown), (15.1, unknown)):
+        state = reduce(state, heard(message), t_mono_s=t_mono_s, t_utc_s=0.0)
+        assert state is not None
+        told.append((state.battery_share, state.battery_t_mono_s))
+    assert told == [(0.76, 5.0), (0.76, 5.0), (0.76, 5.0), (None, 15.1)]
 
 
 @pytest.mark.parametrize(("health", "ready"), [(mavlink.MAV_SYS_STATUS_PREARM_CHECK, True), (0, False)])
