@@ -42,7 +42,7 @@ class Aircraft:
     """One other aircraft, where it should be by now."""
 
     key: str
-    """Source and number, such as "adsb 4b1805"; two sources that tell of one aircraft tell of it twice."""
+    """Source and number, such as "adsb 4b1805"; of one that is heard by ADS-B and by remote ID, its ADS-B's."""
     source: TrafficSource
     name: str
     """Callsign or id as it was sent; its number where it sent none."""

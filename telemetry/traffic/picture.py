@@ -9,6 +9,7 @@ from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.traffic import Aircraft, TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import VehicleState
 from telemetry.traffic.decoding import is_traffic, reports
+from telemetry.traffic.joining import Joining
 from telemetry.traffic.judging import judged, shown
 from telemetry.traffic.memory import TrafficMemory
 from telemetry.traffic.own import Own
@@ -30,7 +31,7 @@ class TrafficPicture:
 
     def __init__(self, settings: TrafficSettings | None = None) -> None:
         self._settings = settings or TrafficSettings()
-        self._memory, self._warnings = TrafficMemory(), Warnings()
+        self._memory, self._joining, self._warnings = TrafficMemory(), Joining(), Warnings()
         self._own_names: dict[str, None] = {}
         """Under which the vehicle itself says it is told of."""
         self._has_heard = False
@@ -62,9 +63,10 @@ class TrafficPicture:
         around = [
             judged(each, at, own, self._settings, now_s, own_numbers=numbers) for each, at in placed if at is not None
         ]
-        others = tuple(sorted((it for it in around if it.trust != "own"), key=_urgency))
+        joined, same = self._joining.on_picture(tuple(it for it in around if it.trust != "own"))
+        others = tuple(sorted(joined, key=_urgency))
         nose_deg = None if own is None or own.nose_rad is None else math.degrees(own.nose_rad)
-        alerts = self._warnings.on_picture(others, nose_deg, now_s, t_utc_s, armed=state.armed)
+        alerts = self._warnings.on_picture(others, nose_deg, now_s, t_utc_s, armed=state.armed, same=same)
         on_show = tuple(it for it in others if shown(it, self._settings))
         status = TrafficStatus(
             state="watching" if own is not None else "no_position",

@@ -37,6 +37,10 @@ def gone_sentence(it: Aircraft) -> str:
     return f"Traffic {it.name}: not heard for {GONE_S:.0f} s. It may still be there: look out."
 
 
+def same_sentence(it: Aircraft, other: Aircraft) -> str:
+    return f"Traffic {it.name}: the same aircraft as {other.name}."
+
+
 def distance_words(distance_m: float) -> str:
     if distance_m < 995.0:
         return f"{10 * round(distance_m / 10)} m"

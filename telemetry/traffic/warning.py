@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.traffic import Aircraft
-from telemetry.traffic.sentences import ADVICE, clear_sentence, gone_sentence, traffic_sentence
+from telemetry.traffic.sentences import ADVICE, clear_sentence, gone_sentence, same_sentence, traffic_sentence
 
 CLEAR_S = 30.0
 """A warning is over when it has not been needed for so long: one that circles nearby comes back."""
@@ -30,15 +32,28 @@ class Warnings:
         self._open: dict[str, _Open] = {}
 
     def on_picture(
-        self, aircraft: tuple[Aircraft, ...], nose_deg: float | None, now_s: float, t_utc_s: float, *, armed: bool
+        self,
+        aircraft: tuple[Aircraft, ...],
+        nose_deg: float | None,
+        now_s: float,
+        t_utc_s: float,
+        *,
+        armed: bool,
+        same: Mapping[str, str] = MappingProxyType({}),
     ) -> list[ObstacleAlert]:
-        """What is to be told now. Nothing is warned of while the vehicle is disarmed."""
+        """What is to be told now. Nothing is warned of while the vehicle is disarmed. ``same``: ``Joined.same``."""
         told: list[ObstacleAlert] = []
         there = {it.key: it for it in aircraft}
 
         def tell(at: _Open, phase: Literal["begins", "goes_on", "ends"], text: str) -> None:
             told.append(ObstacleAlert(at.id, "traffic", "traffic", phase, now_s, t_utc_s, now_s, text))
 
+        for key, at in [(key, at) for key, at in self._open.items() if key in same]:
+            del self._open[key]
+            if same[key] in self._open:
+                tell(at, "ends", same_sentence(at.it, there[same[key]]))
+            else:
+                self._open[same[key]] = at
         for key, at in list(self._open.items()):
             it = there.get(key)
             if it is None or not armed:
