@@ -9,7 +9,7 @@ from mapping.version import __version__
 from planning.basics.plan_model import Home, Mission, MissionItem, Poi, SampledPath, finite_or_none
 from planning.errors import FormatError
 from planning.formats.commands import has_position, home_altitude_note
-from planning.formats.safe_text import check_lat_lon, clean_name, finite
+from planning.formats.safe_text import check_lat_lon, check_loiter, clean_name, finite
 from planning.terrain.dsm import Dsm
 
 Json = dict[str, Any]
@@ -117,5 +117,5 @@ def lat_lon(position: object, where: str) -> tuple[float, float]:
 def poi_from_feature(feature: Json, where: str) -> Poi:
     """A Point feature as POI, with its properties `name` and `loiter_s` if it has them."""
     properties = feature["properties"]
-    loiter_s = finite(properties.get("loiter_s") or 0.0, "loiter_s", where)
-    return Poi(*point(feature, where), clean_name(properties.get("name") or ""), max(0.0, loiter_s))
+    loiter_s = check_loiter(finite(properties.get("loiter_s") or 0.0, "loiter_s", where), where)
+    return Poi(*point(feature, where), clean_name(properties.get("name") or ""), loiter_s)

@@ -14,7 +14,7 @@ from planning.basics.plan_model import Home, Mission, Poi, SampledPath
 from planning.errors import FormatError
 from planning.formats.commands import home_altitude_note
 from planning.formats.kml_reader import Placemark, read_placemarks
-from planning.formats.safe_text import clean_name, finite
+from planning.formats.safe_text import check_loiter, clean_name, finite
 from planning.terrain.dsm import Dsm
 from planning.terrain.vertical_datum import is_amsl
 
@@ -131,8 +131,8 @@ def read_kml_track(data: bytes, name: str = "trajectory.kml") -> KmlTrack:
 def poi_from_placemark(mark: Placemark, where: str) -> Poi:
     """A point placemark as POI; our own ExtendedData gives name and loiter time."""
     lat, lon, _ = mark.coordinates[0]
-    loiter_s = finite(mark.data.get("loiter_s", "0"), "loiter_s", where)
-    return Poi(lat, lon, clean_name(mark.data.get("name", mark.name)), max(0.0, loiter_s))
+    loiter_s = check_loiter(finite(mark.data.get("loiter_s", "0"), "loiter_s", where), where)
+    return Poi(lat, lon, clean_name(mark.data.get("name", mark.name)), loiter_s)
 
 
 def _home_from(mark: Placemark, file: str) -> Home:

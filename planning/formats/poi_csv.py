@@ -6,7 +6,7 @@ import csv
 
 from planning.basics.plan_model import Poi
 from planning.errors import FormatError
-from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite
+from planning.formats.safe_text import check_count, check_lat_lon, check_loiter, clean_name, decode_text, finite
 
 COLUMNS = ("lat_deg", "lon_deg", "name", "loiter_s")
 ALIASES = {
@@ -75,6 +75,4 @@ def _poi(fields: list[str], columns: dict[str, int], decimal_comma: bool, where:
     lat, lon = (finite(field(c), c, where, decimal_comma=decimal_comma) for c in ("lat_deg", "lon_deg"))
     loiter = field("loiter_s")
     loiter_s = finite(loiter, "loiter_s", where, decimal_comma=decimal_comma) if loiter else 0.0
-    if loiter_s < 0:
-        raise FormatError(f"The loiter time is negative: {loiter_s:g} s.", where=where, advice="Use 0 or more.")
-    return Poi(*check_lat_lon(lat, lon, where), clean_name(field("name")), loiter_s)
+    return Poi(*check_lat_lon(lat, lon, where), clean_name(field("name")), check_loiter(loiter_s, where))

@@ -12,7 +12,16 @@ from planning.formats.commands import POSITIONED, home_or_first_place, plain_fra
 from planning.formats.fence_plan import read_fence_json, read_rally_json
 from planning.formats.other_surface import surface_digest
 from planning.formats.planned_for import read_planned_for
-from planning.formats.safe_text import check_count, check_lat_lon, clean_name, decode_text, finite, load_json, said_once
+from planning.formats.safe_text import (
+    check_count,
+    check_lat_lon,
+    check_loiter,
+    clean_name,
+    decode_text,
+    finite,
+    load_json,
+    said_once,
+)
 from planning.formats.swapped import swapped_against_home
 
 Json = dict[str, Any]
@@ -196,7 +205,7 @@ def _pois(ours: Json, file: str) -> tuple[Poi, ...]:
 
 def _poi(raw: Json, where: str) -> Poi:
     lat, lon = finite(raw.get("lat_deg"), "lat_deg", where), finite(raw.get("lon_deg"), "lon_deg", where)
-    loiter_s = finite(raw.get("loiter_s", 0.0), "loiter_s", where)
+    loiter_s = check_loiter(finite(raw.get("loiter_s", 0.0), "loiter_s", where), where)
     return Poi(*check_lat_lon(lat, lon, where), clean_name(raw.get("name", "")), loiter_s)
 
 

@@ -113,6 +113,13 @@ def check_lat_lon(lat_deg: float, lon_deg: float, where: str) -> tuple[float, fl
     )
 
 
+def check_loiter(loiter_s: float, where: str) -> float:
+    """The same time if it can be waited."""
+    if loiter_s < 0:
+        raise FormatError(f"The loiter time is negative: {loiter_s:g} s.", where=where, advice="Use 0 or more.")
+    return loiter_s
+
+
 def check_count(count: int, what: str, where: str) -> None:
     """Refuse more than ``MAX_ITEMS`` of anything."""
     if count > MAX_ITEMS:

@@ -1,6 +1,7 @@
 import io
 import json
 import zipfile
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -92,6 +93,22 @@ def test_swapped_points_are_noticed_only_where_the_swap_would_mend_them():
     assert not looks_swapped([], dsm)
     assert "swapped" in warn_swapped(swapped, dsm)[0]
     assert warn_swapped(right, dsm) == ()
+
+
+def test_a_negative_wait_is_refused_in_every_kind_of_file_with_its_place():
+    dsm = make_dsm()
+    path = make_path(dsm)
+    mission = make_mission(dsm, path)
+    mission = replace(mission, pois=(replace(mission.pois[0], loiter_s=-5.0),))
+    point = {"type": "Point", "coordinates": [8.2, 47.1]}
+    for text, where in (
+        (json.dumps({"type": "Feature", "geometry": point, "properties": {"loiter_s": -5}}), "feature 1"),
+        (write_kml(path, mission, dsm), "placemark"),
+        (write_plan(mission), r"\.pois\[0\]"),
+        ("47.1,8.2,a,-5\n", "row 1"),
+    ):
+        with pytest.raises(FormatError, match=f"{where}.*negative: -5 s"):
+            read_pois("f", text.encode())
 
 
 def test_geojson_points_lines_and_polygons():
