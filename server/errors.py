@@ -188,6 +188,8 @@ STATUS: dict[type[Exception], int] = {
 ASK_OPERATOR = "Ask an operator to do it, or for an operator's account."
 """To an observer."""
 _UNFORESEEN = "internal"
+_RAISED = frozenset({"value_error", "assertion_error"})
+"""pydantic's kinds for what a validator raised: it puts words of its own before the validator's."""
 HTTP_CODES = {400: "invalid", 404: "not_found", 405: "method_not_allowed", 408: "too_slow", 413: "too_large"}
 
 
@@ -226,7 +228,16 @@ def _invalid(error: RequestValidationError | ValidationError) -> ErrorDoc:
     place = ".".join(str(part) for part in first["loc"] if part != "body")
     more = f" ({len(faults) - 1} more such errors.)" if len(faults) > 1 else ""
     value = f" The value was {_short(first.get('input'))}." if first["type"] != "missing" else ""
-    return ErrorDoc(code="invalid", what=f"{first['msg']}.{value}{more}", where=place)
+    raised = first.get("ctx", {}).get("error") if first["type"] in _RAISED else None
+    if isinstance(raised, DescribedError):
+        where = ", ".join(part for part in (place, raised.where) if part)
+        return ErrorDoc(code="invalid", what=f"{_sentence(raised.what)}{more}", where=where, advice=raised.advice)
+    said = first["msg"] if raised is None else str(raised)
+    return ErrorDoc(code="invalid", what=f"{_sentence(said)}{value}{more}", where=place)
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith((".", "?", "!")) else f"{text}."
 
 
 def _short(value: object, limit: int = 60) -> str:
