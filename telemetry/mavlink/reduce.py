@@ -295,10 +295,11 @@ def _estimator_ok(flags: int, bad: int) -> bool:
 
 
 def _wind(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
-    from_deg = finite(message.direction)
+    """Exactly none is what ArduPilot sends whose estimator has found no wind yet."""
+    from_deg = finite(message.direction) if message.speed else None
     return {
         "wind_t_mono_s": t_mono_s,
-        "wind_speed_m_s": finite(message.speed),
+        "wind_speed_m_s": finite(message.speed) or None,
         "wind_from_rad": None if from_deg is None else heading(math.radians(from_deg)),
     }
 

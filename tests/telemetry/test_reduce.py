@@ -182,6 +182,14 @@ def text(words: str, number: int = 0, chunk: int = 0) -> Any:
     return mavlink.MAVLink_statustext_message(2, words.encode(), number, chunk)
 
 
+def test_a_wind_of_exactly_none_is_one_that_the_estimator_has_not_found() -> None:
+    blowing, none = mavlink.MAVLink_wind_message(-90.0, 3.0, 0.0), mavlink.MAVLink_wind_message(-180.0, 0.0, 0.0)
+    state = known(blowing, none)
+    assert (state.wind_speed_m_s, state.wind_from_rad, state.wind_t_mono_s) == (None, None, 5.0)
+    light = known(mavlink.MAVLink_wind_message(90.0, 0.01, 0.0))
+    assert (light.wind_speed_m_s, light.wind_from_rad) == (pytest.approx(0.01), pytest.approx(math.pi / 2))
+
+
 def test_what_is_in_the_way_of_arming_is_kept_in_the_vehicles_words_until_it_is_ready() -> None:
     long = "PreArm: Compass 1 is not calibrated, and the vehicle has been moved since"
     spoken = (text(long[:50], 7, 0), text(long[50:], 7, 1), text("PreArm: Battery low"), text("GPS 1: detected u-blox"))
