@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.flight.avoidance.pilot_watch import PilotWatch
+from telemetry.flight.avoidance.pilot_watch import ASKED_S, PilotWatch
 from telemetry.topics.vehicle import VehicleState
 
 
@@ -47,6 +47,13 @@ def test_each_order_of_a_mode_is_expected_to_show_once() -> None:
     assert watch.words == ""
     watch.on_state(state("BRAKE"), 103.5)
     assert "BRAKE" in watch.words
+
+
+def test_orders_whose_mode_never_shows_are_forgotten() -> None:
+    watch = after("AUTO")
+    for second in range(1000):
+        watch.asked("GUIDED" if second % 2 else f"MODE {second}", float(second))
+    assert watch.expected == ASKED_S + 1
 
 
 @pytest.mark.parametrize(("shown_again_s", "is_ours"), [(2.0, True), (4.0, False)])

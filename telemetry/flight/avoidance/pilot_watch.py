@@ -37,7 +37,18 @@ class PilotWatch:
 
     def asked(self, mode: str, now_s: float) -> None:
         """This ground station has commanded this mode."""
+        # Orders that no mode has shown in time, and will not.
+        for each, until_s in list(self._expected_until_s.items()):
+            if kept := [at_s for at_s in until_s if now_s <= at_s]:
+                self._expected_until_s[each] = kept
+            else:
+                del self._expected_until_s[each]
         self._expected_until_s[mode].append(now_s + ASKED_S)
+
+    @property
+    def expected(self) -> int:
+        """Orders whose mode has not shown yet."""
+        return sum(len(until_s) for until_s in self._expected_until_s.values())
 
     def on_state(self, state: VehicleState, now_s: float) -> None:
         before, self._mode = self._mode, state.mode
