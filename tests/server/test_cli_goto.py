@@ -15,7 +15,7 @@ from planning.formats.fence_files import write_fence
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm
 from tests.server.cli_runs import Run, hedgehop
-from tests.server.simulated import simulated_vehicle
+from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 
 pytestmark = pytest.mark.xdist_group("cli-flying")
 
@@ -47,8 +47,8 @@ def dsm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def link() -> Iterator[str]:
-    settings = ("--speedup", 4, "--boot-s", 1, "--parameter", "GUID_OPTIONS=64", "--parameter", "RTL_ALT=6000")
-    with simulated_vehicle(f"{at(100.5)},100", *settings) as where:
+    settings = ("--speedup", 10, "--boot-s", 1, "--parameter", "GUID_OPTIONS=64", "--parameter", "RTL_ALT=6000")
+    with simulated_vehicle(f"{at(100.5)},100", *settings, *QUICKLY_DOWN) as where:
         yield where
 
 
