@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 from planning.basics.plan_model import Firmware
@@ -22,7 +22,7 @@ from telemetry.mavlink.commands import CommandRun
 from telemetry.mavlink.conversation import BootClock
 from telemetry.mavlink.parameters.values import BYTEWISE
 from telemetry.mavlink.reduce import reduce
-from telemetry.mavlink.texts import Texts
+from telemetry.mavlink.texts import Heard, Speech
 from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 from telemetry.topics.vehicle import Autopilot, VehicleState
 
@@ -70,7 +70,7 @@ class AdoptedVehicle:
         self._streams = StreamRequests(self.target, candidate.autopilot, slow=slow, now_s=now_s)
         self._quality, self._round_trip = SequenceQuality(), RoundTripClock()
         self.believing, self._doubted = Believing(flies=flies), False
-        self._boot, self._texts = BootClock(), Texts()
+        self._boot, self._speech = BootClock(), Speech(self.target)
         self._next_state: asyncio.Future[None] | None = None
 
     @property
@@ -154,8 +154,7 @@ class AdoptedVehicle:
         self.exchanges.on_tick()
         for message in (*self._streams.on_tick(now_s), *self._round_trip.on_tick(now_s)):
             self.send(message)
-        for severity, text in self._texts.on_tick(now_s):
-            self._telling.text(severity, text)
+        self._on_heard(self._speech.on_tick(now_s), now_s)
 
     async def obey(self, order: Order) -> None:
         """Sends a command until it is answered. Raises RefusedError with the vehicle's own words, SilentError."""
@@ -196,8 +195,17 @@ class AdoptedVehicle:
             self._restarted(now_s)
         if self.onboard.on_message(message, now_s):
             self._telling.unsure()
-        for severity, text in self._texts.on_message(message, now_s):
+        self._on_heard(self._speech.on_message(message, now_s), now_s)
+
+    def _on_heard(self, heard: Heard, now_s: float) -> None:
+        for severity, text in heard.texts:
             self._telling.text(severity, text)
+        if heard.reasons is not None:
+            self._on_state(replace(self.state, not_ready_words=heard.reasons, not_ready_t_mono_s=now_s), now_s)
+        for request in self._speech.take_requests():
+            self.send(request)
+        if not self.state.armed and self._speech.take_wish():
+            self.send(self.orders.check_before_arming())
 
     def _tell_doubt(self, now_s: float) -> None:
         """Once for each time: a real crash disarms in the air, too."""
@@ -223,7 +231,7 @@ class AdoptedVehicle:
             self._telling.unsure()
 
     def _restarted(self, now_s: float) -> None:
-        self._boot = BootClock()
+        self._boot, self._speech = BootClock(), Speech(self.target)
         self._streams.restart(now_s)
         self.onboard.forget()
         self._telling.unsure()

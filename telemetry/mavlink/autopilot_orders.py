@@ -50,6 +50,10 @@ class Orders:
         message = self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE)
         return Order(message, seen=lambda state: not state.armed)
 
+    def check_before_arming(self) -> Message:
+        """PX4 answers with a report by events of what keeps it from arming."""
+        return self._long(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+
     def mode(self, name: str) -> Order:
         numbers = mode_numbers(self.autopilot, name)
         if numbers is None:

@@ -11,6 +11,7 @@ import re
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.texts.event_messages import KNOWN_MESSAGES
 
 V1, V2 = mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2
 _MARKER = re.compile(b"[%c%c]" % (V1, V2))
@@ -88,9 +89,9 @@ def _frame_length(data: bytes, start: int, header: int) -> int | None:
     """None: this header is of no message that is known here, so the start byte was not one."""
     length = header + data[start + 1] + _CHECKSUM_BYTES
     if header == _HEADER[V1]:
-        return length if data[start + 5] in mavlink.mavlink_map else None
+        return length if data[start + 5] in KNOWN_MESSAGES else None
     flags = data[start + 2]
-    if flags & ~_SIGNED or int.from_bytes(data[start + 7 : start + 10], "little") not in mavlink.mavlink_map:
+    if flags & ~_SIGNED or int.from_bytes(data[start + 7 : start + 10], "little") not in KNOWN_MESSAGES:
         return None
     return length + (_SIGNATURE_BYTES if flags & _SIGNED else 0)
 

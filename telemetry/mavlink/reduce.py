@@ -14,6 +14,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.modes import mode_name
+from telemetry.mavlink.texts.status_texts import said_key
 from telemetry.topics.vehicle import Autopilot, FenceBreach, GnssFix, Landed, VehicleState
 
 Changes = dict[str, Any]
@@ -188,7 +189,7 @@ def _statustext(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
 
 def _with_reason(words: tuple[str, ...], text: str) -> tuple[str, ...]:
     reason = text if len(text) % _TEXT_BYTES == 0 else text.rstrip()  # a whole part may go on with the next
-    return (*(word for word in words if word != reason), reason)[-_MOST_REASONS:]
+    return (*(word for word in words if said_key(word) != said_key(reason)), reason)[-_MOST_REASONS:]
 
 
 def _battery_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:

@@ -8,11 +8,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.mavlink.texts import Texts
+from telemetry.mavlink.texts.speech import EVENT_KINDS, Speech
 from telemetry.recording.mission_frames import MissionFrames
 from telemetry.recording.tlog import frame_address
 from telemetry.topics.messages import VehicleText
 
+SAYING = EVENT_KINDS | {"STATUSTEXT"}
 _NO_POSITION = 0b111
 """Of POSITION_TARGET_TYPEMASK: none of x, y, z is to be used."""
 
@@ -48,7 +49,7 @@ class FrameFacts:
         self.targets: list[SentTarget] = []
         self.truth: list[TruePosition] = []
         self._texts: list[VehicleText] = []
-        self._parts, self._last_text_s = Texts(), 0.0
+        self._speech, self._last_text_s = Speech(self.vehicle), 0.0
 
     def on_message(self, message: Any, t_utc_s: float) -> None:
         """``message``: any pymavlink message object; those of other vehicles are left out."""
@@ -62,19 +63,19 @@ class FrameFacts:
 
     def texts(self) -> list[VehicleText]:
         """All texts, those of which the last part never came too."""
-        self._add_texts(self._parts.on_tick(math.inf), self._last_text_s)
+        self._add_texts(self._speech.on_tick(math.inf).texts, self._last_text_s)
         return self._texts
 
     def _from_vehicle(self, message: Any, kind: str, t_utc_s: float) -> None:
-        self._add_texts(self._parts.on_tick(t_utc_s), t_utc_s)
+        self._add_texts(self._speech.on_tick(t_utc_s).texts, t_utc_s)
         if kind == "MISSION_ITEM_REACHED":
             self.reached.append((t_utc_s, message.seq))
-        elif kind == "STATUSTEXT":
-            self._add_texts(self._parts.on_message(message, t_utc_s), t_utc_s)
+        elif kind in SAYING:
+            self._add_texts(self._speech.on_message(message, t_utc_s).texts, t_utc_s)
         elif kind == "SIM_STATE" and (place := _true_place(message)) is not None:
             self.truth.append(TruePosition(t_utc_s, *place, message.alt))
 
-    def _add_texts(self, texts: list[tuple[int, str]], t_utc_s: float) -> None:
+    def _add_texts(self, texts: tuple[tuple[int, str], ...], t_utc_s: float) -> None:
         self._last_text_s = t_utc_s
         self._texts += [VehicleText(t_utc_s, severity, text) for severity, text in texts]
 

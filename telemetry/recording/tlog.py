@@ -15,6 +15,8 @@ from typing import NamedTuple
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.mavlink.texts.event_messages import KNOWN_MESSAGES
+
 Data = bytes | mmap.mmap
 TIME_BYTES = 8
 _V1, _V2 = mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2
@@ -23,7 +25,7 @@ _SIGNATURE_BYTES = 13
 CUT_SHORT = "The file ends in the middle of a message."
 _LATEST_US = 4_102_444_800_000_000
 """The year 2100; clocks that were never set begin at 1970, so there is no earliest time."""
-_CRC_EXTRA = {number: message.crc_extra for number, message in mavlink.mavlink_map.items()}
+_CRC_EXTRA = {number: message.crc_extra for number, message in KNOWN_MESSAGES.items()}
 
 
 class LogFrame(NamedTuple):

@@ -47,12 +47,19 @@ class CommandsOnWire(Protocol):
     def position_target(self, message: Any) -> None: ...
 
 
+class EventsOnWire(Protocol):
+    def on_text(self, text: Text) -> list[MAVLink_message]: ...
+    def on_request(self, message: Any) -> list[MAVLink_message]: ...
+    def on_slice(self) -> list[MAVLink_message]: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
     missions: Missions
     parameters: ParametersOnWire
     streams: StreamsOnWire
     commands: CommandsOnWire
+    events: EventsOnWire | None = None
 
 
 @dataclass(frozen=True, slots=True)

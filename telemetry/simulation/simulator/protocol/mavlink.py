@@ -72,6 +72,7 @@ class Endpoint:
         parts = dialect.parts(vehicle)
         self._missions, self._parameters = parts.missions, parts.parameters
         self._streams, self._commands = parts.streams, parts.commands
+        self._events = parts.events
         self._own_logs = OwnLogs(vehicle, dialect.mode_numbers, dialect.firmware, are_kept=dialect.keeps_logs)
         self._logs = LogProtocol(vehicle, self._own_logs)
         self._peers: dict[Hashable, _Peer] = {}
@@ -126,6 +127,8 @@ class Endpoint:
         out += [reply for due_s, reply in self._news if due_s <= wall_s]
         self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]
         out += self._tell()
+        if self._events is not None:
+            out += [reply for message in self._events.on_slice() for reply in self._to_all(message)]
         now_s = self.vehicle.now_s
         if _due(self._heartbeat, now_s, wall_s) or wall_s - self._heartbeat.sent_wall_s > HEARTBEAT_S:
             out += self._beat(wall_s)
@@ -154,6 +157,8 @@ class Endpoint:
         elif kind == "MISSION_SET_CURRENT":
             self._pilot.set_current(message.seq)
             return [self._streams.mission_current()]
+        elif kind == "REQUEST_EVENT" and self._events is not None:
+            return self._events.on_request(message)
         elif kind == "TIMESYNC" and message.tc1 == 0:
             return [wire.MAVLink_timesync_message(int(self.vehicle.now_s * 1e9), message.ts1)]
         return []
@@ -228,6 +233,7 @@ class Endpoint:
                 self._own_logs.on_text(event.text)
                 self._texts += 1
                 messages = self._dialect.text(event, self._texts)
+                messages += self._events.on_text(event) if self._events is not None else []
             out += [reply for message in messages for reply in self._to_all(message)]
         return out
 

@@ -67,6 +67,8 @@ class Px4Pilot(Px4Flying):
         """To which it falls back when its motors are off."""
         self._armed_s = self._ramp_s = self._touched_s = self._landed_s = self._gcs_s = -math.inf
         self._gcs_lost = self._ready_said = False
+        self.checks_asked = 0
+        """How often somebody wanted to know what keeps it from arming."""
         self.is_in_air = False
         """Its take-off has been detected, its landing not yet."""
 
@@ -79,6 +81,16 @@ class Px4Pilot(Px4Flying):
     @property
     def ready_to_arm(self) -> bool:
         return self._why_not_arm() is None
+
+    @property
+    def failing_checks(self) -> tuple[str, ...]:
+        """The names of the events that say what keeps it from arming."""
+        failing = [] if self.position_ok else ["check_modes_global_pos"]
+        if not self.armed and self.mode.name in ("LAND", "RTL", *BY_HAND):
+            failing.append("check_modes_cannot_takeoff")
+        if not self.mission.steps:
+            failing.append("check_modes_mission")
+        return tuple(failing)
 
     @property
     def stage(self) -> Stage:
@@ -192,6 +204,7 @@ class Px4Pilot(Px4Flying):
         self._gcs_s = self.now_s
 
     def repeat_prearm(self) -> None:
+        self.checks_asked += 1
         if (reason := self._why_not_arm()) is not None:
             self.say(3, f"Preflight Fail: {reason}")
 

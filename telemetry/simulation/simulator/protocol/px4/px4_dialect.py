@@ -12,6 +12,7 @@ from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
 from telemetry.simulation.simulator.protocol.dialect import Dialect, Parts
 from telemetry.simulation.simulator.protocol.px4.px4_commands import Px4Commands
+from telemetry.simulation.simulator.protocol.px4.px4_events import Px4Events
 from telemetry.simulation.simulator.protocol.px4.px4_missions import Px4Missions
 from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.protocol.px4.px4_parameters_on_wire import Px4ParametersOnWire
@@ -26,7 +27,8 @@ def _parts(vehicle: SimulatedVehicle) -> Parts:
     pilot = vehicle.autopilot
     assert isinstance(pilot, Px4Pilot)
     streams = Px4Streams(vehicle, pilot)
-    return Parts(Px4Missions(pilot), Px4ParametersOnWire(vehicle.parameters), streams, Px4Commands(pilot))
+    parameters, commands = Px4ParametersOnWire(vehicle.parameters), Px4Commands(pilot)
+    return Parts(Px4Missions(pilot), parameters, streams, commands, Px4Events(pilot))
 
 
 def _text(text: Text, number: int) -> list[MAVLink_message]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.texts.event_reader import VehicleEvent
+from telemetry.mavlink.texts.event_words import words_of
 
 PART_BYTES = 50
 PATIENCE_S = 1.0
@@ -10,6 +12,8 @@ PATIENCE_S = 1.0
 WARNING = 4
 """MAV_SEVERITY; what is less urgent is no reason for a refusal."""
 MOST = 5
+PREFLIGHT = "Preflight Fail: "
+"""How PX4's texts begin what its events say without."""
 
 
 class Texts:
@@ -46,8 +50,13 @@ def clean(text: str) -> str:
     return text.strip("\0").strip()
 
 
+def said_key(text: str) -> str:
+    """The same for what PX4 says twice, by an event and by a text."""
+    return clean(text).removeprefix(PREFLIGHT).rstrip(".").casefold()
+
+
 class VehicleWords:
-    """The warnings heard since ``clear``; texts in several parts are put together."""
+    """The warnings heard since ``clear``, of texts and events; texts in several parts are put together."""
 
     def __init__(self) -> None:
         self._parts: dict[int, dict[int, str]] = {}
@@ -58,12 +67,20 @@ class VehicleWords:
         self._texts.clear()
 
     def on_message(self, message: Message) -> None:
+        if message.get_type() == "EVENT":
+            self._on_event(VehicleEvent.of(message))
+            return
         if message.get_type() != "STATUSTEXT" or message.severity > WARNING:
             return
         if message.id == 0:
             self._add(message.text)
         else:
             self._parts.setdefault(message.id, {})[message.chunk_seq] = message.text
+
+    def _on_event(self, event: VehicleEvent) -> None:
+        words = words_of(event) if event.severity <= WARNING else None
+        if words is not None and said_key(words) not in map(said_key, self.texts):
+            self._add(words)
 
     def _add(self, text: str) -> None:
         text = clean(text)
