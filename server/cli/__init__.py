@@ -71,6 +71,7 @@ class _Commands(_Lazy):
         "sim": (".sim_command.sim", examples.SIM),
         "review": (".review_command.review", examples.REVIEW),
         "scenario": (".scenario_command.scenario", examples.SCENARIO),
+        "cloud": (".cloud_command.cloud", examples.CLOUD),
         "map": (".map_command.build_map", examples.MAP),
         "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
         "agent": (".agent.command.agent", examples.AGENT),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from pyproj import CRS, Proj, Transformer
@@ -35,7 +36,18 @@ class Georeference:
     """What was assumed."""
 
 
-def interpret(header: RasterHeader, *, crs: str | None, vertical_datum: str | None, where: str) -> Georeference:
+class SaysWhere(Protocol):
+    """What a file's header tells of its place."""
+
+    @property
+    def crs_wkt(self) -> str | None: ...
+    @property
+    def unit(self) -> str | None: ...
+    @property
+    def vertical_datum(self) -> str | None: ...
+
+
+def interpret(header: SaysWhere, *, crs: str | None, vertical_datum: str | None, where: str) -> Georeference:
     """What the file says, overridden by what the user declares. MissingCrsError when nobody says anything."""
     source, notes = _source_crs(header, crs, where)
     vertical = _vertical_part(source)
@@ -50,7 +62,7 @@ def interpret(header: RasterHeader, *, crs: str | None, vertical_datum: str | No
     return Georeference(_horizontal_part(source), vertical_datum or in_file, metres, (*notes, *unit_notes))
 
 
-def _source_crs(header: RasterHeader, crs: str | None, where: str) -> tuple[CRS, tuple[str, ...]]:
+def _source_crs(header: SaysWhere, crs: str | None, where: str) -> tuple[CRS, tuple[str, ...]]:
     in_file = CRS.from_wkt(header.crs_wkt) if header.crs_wkt else None
     if crs is None and (in_file is None or in_file.is_engineering):
         raise MissingCrsError(
@@ -104,7 +116,7 @@ def _datum_name(crs: CRS, vertical: CRS | None) -> str | None:
     return "ellipsoid" if len(crs.axis_info) == 3 else None
 
 
-def _height_unit(header: RasterHeader, crs: CRS, vertical: CRS | None) -> tuple[float, tuple[str, ...]]:
+def _height_unit(header: SaysWhere, crs: CRS, vertical: CRS | None) -> tuple[float, tuple[str, ...]]:
     axes = vertical.axis_info if vertical is not None else crs.axis_info[2:]
     tag = (header.unit or "").strip().lower()
     if axes:

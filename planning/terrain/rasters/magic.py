@@ -6,13 +6,14 @@ from planning.errors import RasterFormatError
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _ASCII_GRID_KEYS = (b"ncols", b"nrows", b"xllcorner", b"xllcenter", b"yllcorner", b"yllcenter", b"cellsize", b"dx ")
+_CLOUD, _OF_A_CLOUD = b"LASF", "Make a surface model of it: hedgehop cloud FILE --out dsm.tif"
 _OTHERS = {
     b"<VRTDataset": "a GDAL virtual raster (VRT)",
     b"PK\x03\x04": "a ZIP archive",
     b"\x1f\x8b": "a gzip file",
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
-    b"LASF": "a LAS point cloud",
+    _CLOUD: "a LAS point cloud",
     b"\x89HDF": "an HDF5 file",
     b"<?xml": "an XML file",
     b"%PDF": "a PDF document",
@@ -36,7 +37,7 @@ def driver_of(path: Path) -> str:
     raise RasterFormatError(
         f"This is {_kind(head)}, not a GeoTIFF or an ESRI ASCII grid.",
         where=path.name,
-        advice="Export the surface model as GeoTIFF.",
+        advice=_OF_A_CLOUD if head.startswith(_CLOUD) else "Export the surface model as GeoTIFF.",
     )
 
 

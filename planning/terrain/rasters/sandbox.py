@@ -25,6 +25,7 @@ _PACKAGE = __name__.rpartition(".")[0]
 _ROOT = Path(__file__).resolve().parents[__name__.count(".")]
 _COMMAND = [sys.executable, "-P", "-m", f"{_PACKAGE}.worker"]
 _LONGEST_MESSAGE = 2**20
+_SMALLER = "Rewrite it as a tiled GeoTIFF, or crop it to the area of the flight."
 _ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
 # GDAL reads these before Python can set them through rasterio.Env: drivers register on import.
 _GDAL = {
@@ -39,6 +40,7 @@ _GDAL = {
     "PROJ_NETWORK": "OFF",
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
+    "RAYON_NUM_THREADS": "2",  # of compressed point clouds
 }
 
 
@@ -65,11 +67,12 @@ def run_job(
     where: str,
     on_header: Callable[[Json], Json] | None = None,
     progress: Progress | None = None,
+    smaller: str = _SMALLER,
 ) -> Json:
     """Send one job to a new worker and return its answer; the worker never outlives the call.
 
     ``on_header`` judges the header and returns the rest of the order; it may raise, as may ``progress``:
-    both end the worker. Raises RasterError when the worker fails, dies or is late.
+    both end the worker. Raises RasterError when the worker fails, dies or is late; ``smaller`` says what to do then.
     """
     with (directory / "stderr").open("w+b") as stderr:
         worker = _start(directory, stderr)
@@ -91,10 +94,10 @@ def run_job(
                     error = _ERRORS.get(message["kind"], RasterError)
                     raise error(message["what"], where=where, advice=message["advice"])
             worker.wait()
-            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where)
+            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where, smaller=smaller)
         except BrokenPipeError as error:
             worker.wait()
-            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where) from error
+            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where, smaller=smaller) from error
         finally:
             clock.stop()
             _end(worker)
@@ -147,20 +150,22 @@ def _end(worker: subprocess.Popen[bytes]) -> None:
     worker.wait()
 
 
-def _death(returncode: int, *, late_after_s: float | None, where: str) -> RasterError:
+def _death(returncode: int, *, late_after_s: float | None, where: str, smaller: str) -> RasterError:
     if late_after_s is not None:
         return RasterTooLargeError(
             f"Decoding took more than {late_after_s:.0f} s and was stopped.",
             where=where,
-            advice="Rewrite it as a tiled GeoTIFF, or crop it to the area of the flight.",
+            advice=smaller,
         )
     if returncode == -signal.SIGXCPU:
-        return RasterTooLargeError("Decoding used too much processor time and was stopped.", where=where)
+        return RasterTooLargeError(
+            "Decoding used too much processor time and was stopped.", where=where, advice=smaller
+        )
     cause = signal.Signals(-returncode).name if returncode < 0 else f"exit code {returncode}"
     return RasterFormatError(
         f"The decoder died of it ({cause}): the file is corrupt or hostile, or memory ran out.",
         where=where,
-        advice="Export it again as a tiled GeoTIFF.",
+        advice=f"Export it again. {smaller}",
     )
 
 

@@ -1,4 +1,4 @@
-"""The child process that decodes one raster file: a job comes in on stdin, messages go out on stdout, as JSON lines.
+"""The child process that decodes one raster or cloud: a job comes in on stdin, messages leave on stdout, as JSON lines.
 
 Started by ``planning.terrain.rasters.sandbox`` with GDAL's settings already in the environment. It imports
 little, so that it starts fast and its memory limit means something.
@@ -7,6 +7,7 @@ little, so that it starts fast and its memory limit means something.
 from __future__ import annotations
 
 import errno
+import importlib
 import json
 import os
 import resource
@@ -21,6 +22,8 @@ from planning.terrain.rasters.confinement import confine, confine_files
 
 Json = dict[str, Any]
 
+_TERRAIN = (__package__ or "").rpartition(".")[0]
+
 
 def main() -> None:
     """Carry out one job, then exit; every failure becomes one "error" message."""
@@ -30,10 +33,11 @@ def main() -> None:
     job = _receive()
     _confine(job)
     try:
-        from planning.terrain.rasters import decode  # after the limits: GDAL registers its drivers on import
+        # After the limits: GDAL registers its drivers on import.
+        decoder = importlib.import_module(f"{_TERRAIN}.{job.get('decoder', 'rasters')}.decode")
 
         confine_files(readable=_readable(job), writable=[Path(path) for path in job["writable"]])
-        decode.JOBS[job["job"]](job, send, partial(_ask, send))
+        decoder.JOBS[job["job"]](job, send, partial(_ask, send))
     except Exception as error:
         send("error", **_explain(error, job["job"]))
 
@@ -87,7 +91,7 @@ def _explain(error: Exception, job: str) -> Json:
         return {
             "kind": "too_large",
             "what": f"Decoding needs more memory than allowed ({cause}).",
-            "advice": "Rewrite it as a tiled GeoTIFF.",
+            "advice": "Thin the cloud out, or crop it." if job == "read_cloud" else "Rewrite it as a tiled GeoTIFF.",
         }
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return {
@@ -101,9 +105,10 @@ def _explain(error: Exception, job: str) -> Json:
             "what": f"It cannot be written ({cause}).",
             "advice": "Check the folder and its rights.",
         }
+    kind = "cloud" if job == "read_cloud" else "raster"
     return {
         "kind": "format",
-        "what": f"It cannot be decoded; it is corrupt, cut short or no raster ({cause}).",
+        "what": f"It cannot be decoded; it is corrupt, cut short or no {kind} ({cause}).",
         "advice": "Copy or export it again.",
     }
 

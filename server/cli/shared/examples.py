@@ -150,6 +150,11 @@ RADAR_TRACKS = _examples(
     ("Two poles, drawn as the paper draws them", "hedgehop radar tracks radar.csv optitrack.csv --pole 0.4,-2.5 "
      "--pole -0.3,-4.5 --plots figures"),
 )  # fmt: skip
+CLOUD = _examples(
+    ("Cells as the density has it", "hedgehop cloud survey.laz --out dsm.tif"),
+    ("A robot's cloud, in metres around a place", "hedgehop cloud scan.pcd --out dsm.tif --cell-m 0.25 "
+     "--crs '+proj=tmerc +lat_0=37.7290 +lon_0=14.9926 +units=m'"),
+)  # fmt: skip
 TRAVERSABILITY = _examples(
     ("Where a rover can drive, as rasters", "hedgehop traversability dsm.tif --out ground"),
     ("Foliage cleared by a radar, landing sites near a point", "hedgehop traversability dsm.tif --uwb drive.npz "

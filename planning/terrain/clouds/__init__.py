@@ -1,0 +1,1 @@
+"""Point clouds made into surface models: decoding in the confined child process, everything else here."""

@@ -1,0 +1,125 @@
+"""What the child process does with a point cloud: its header, its bounds, and the highest point of each cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mapping.geometry.arrays import F32, F64, U8
+from planning.errors import NoElevationError, RasterError, RasterFormatError
+from planning.terrain.clouds.grid import Bounds, CloudGrid, Sorter, cell_for, grid_for
+from planning.terrain.clouds.header import CloudHeader
+from planning.terrain.clouds.tables import Table, pcd_table, ply_table
+
+if TYPE_CHECKING:
+    from planning.terrain.clouds.las import LasFile
+
+Json = dict[str, Any]
+Send = Callable[..., None]
+Ask = Callable[[Json], Json]
+
+
+def read_cloud(job: Json, send: Send, ask: Ask) -> None:
+    """Heights as raw float32 rows in ``job["target"]`` and, of ground points alone, in ``job["ground"]``; NaN unknown.
+
+    What is asked for: "cell_m" or null, metres of the file's units "xy_m" and "z_m", "max_px", "keep_noise".
+    """
+    try:
+        cloud = _opened(Path(job["source"]), job["format"])
+        order = ask(_header(cloud).as_json())
+        if cloud.rows == 0:
+            raise NoElevationError("It has no points.", advice="Export it again.")
+        sorter = _sorted(cloud, job, order, send)
+    except RasterError as error:
+        send("error", kind=_kind(error), what=error.what, advice=error.advice)
+        return
+    grid = sorter.grid
+    send(
+        "done", west_m=grid.west_m, north_m=grid.north_m, cell_m=grid.cell_m, shape=grid.shape, taken=sorter.taken,
+        ground=sorter.ground, noise=sorter.noise, not_numbers=sorter.not_numbers, step_m=_step_m(cloud, grid),
+    )  # fmt: skip
+
+
+JOBS: dict[str, Callable[[Json, Send, Ask], None]] = {"read_cloud": read_cloud}
+
+
+def _opened(path: Path, kind: str) -> LasFile | Table:
+    if kind == "las":
+        from planning.terrain.clouds.las import open_las  # tables need nothing of it
+
+        return open_las(path)
+    return ply_table(path) if kind == "ply" else pcd_table(path)
+
+
+def _header(cloud: LasFile | Table) -> CloudHeader:
+    if isinstance(cloud, Table):
+        return CloudHeader(cloud.rows, None, None, None, classified=cloud.classified, notes=cloud.notes)
+    return CloudHeader(cloud.rows, cloud.crs_wkt, cloud.unit, None, classified=True)
+
+
+def _sorted(cloud: LasFile | Table, job: Json, order: Json, send: Send) -> Sorter:
+    bounds = _bounds(cloud, order, send)
+    grid = grid_for(bounds, order["cell_m"] or cell_for(bounds, cloud.rows), max_px=order["max_px"])
+    classified = not isinstance(cloud, Table) or cloud.classified
+    heights = _empty(job["target"], grid)
+    sorter = Sorter(grid, heights, _empty(job["ground"], grid) if classified else None, order["keep_noise"])
+    done = 0
+    for xyz_m, classes in _in_metres(cloud, order):
+        sorter.add(xyz_m, classes)
+        done += len(xyz_m)
+        send("progress", stage="sort", share=done / cloud.rows)
+    if sorter.outside:
+        raise RasterFormatError(
+            f"{sorter.outside:,} of its points lie outside of the bounds that its header gives.",
+            advice="Have the header put right (lasinfo -repair, pdal translate), or export it again.",
+        )
+    if sorter.taken == 0:
+        raise NoElevationError("It has no point with a place and a height.", advice="Export it again.")
+    for grown in (sorter.highest_m, sorter.ground_m):
+        if grown is not None:
+            grown[np.isneginf(grown)] = np.nan
+            grown.flush()  # pyright: ignore[reportAttributeAccessIssue]
+    return sorter
+
+
+def _bounds(cloud: LasFile | Table, order: Json, send: Send) -> Bounds:
+    """As the header gives them; of files that give none, looked for."""
+    if not isinstance(cloud, Table):
+        west, south, east, north = (value * order["xy_m"] for value in cloud.bounds)
+        return west, south, east, north
+    least, most, done = np.full(2, np.inf), np.full(2, -np.inf), 0
+    for xyz_m, _ in _in_metres(cloud, order):
+        xy_m = xyz_m[np.isfinite(xyz_m).all(axis=1), :2]
+        if len(xy_m):
+            least, most = np.minimum(least, xy_m.min(axis=0)), np.maximum(most, xy_m.max(axis=0))
+        done += len(xyz_m)
+        send("progress", stage="bounds", share=done / cloud.rows)
+    if not np.isfinite(least).all():
+        raise NoElevationError("It has no point with a place and a height.", advice="Export it again.")
+    return float(least[0]), float(least[1]), float(most[0]), float(most[1])
+
+
+def _in_metres(cloud: LasFile | Table, order: Json) -> Iterator[tuple[F64, U8 | None]]:
+    factors = np.array([order["xy_m"], order["xy_m"], order["z_m"]])
+    for xyz, classes in cloud.chunks():
+        yield xyz * factors, classes
+
+
+def _empty(path: str, grid: CloudGrid) -> F32:
+    cells = np.memmap(path, dtype=np.float32, mode="w+", shape=grid.shape)
+    cells[:] = -np.inf
+    return cells
+
+
+def _step_m(cloud: LasFile | Table, grid: CloudGrid) -> float:
+    """How far apart neighbouring coordinates lie where 32 bits keep them; 0 where they are kept finely."""
+    if not isinstance(cloud, Table) or not cloud.coarse:
+        return 0.0
+    return float(np.spacing(np.float32(max(abs(grid.west_m), abs(grid.north_m)))))
+
+
+def _kind(error: RasterError) -> str:
+    return {"raster_too_large": "too_large", "raster_no_elevation": "no_elevation"}.get(error.code, "format")
