@@ -37,6 +37,14 @@ def test_a_stream_comes_at_the_rate_asked_for_and_stops_again() -> None:
     assert len(bench.of("GLOBAL_POSITION_INT")) == seen
 
 
+def test_the_fastest_stream_comes_with_every_time_step() -> None:
+    bench = Bench()
+    bench.advance(1)
+    bench.stream(33, 50)
+    bench.advance(10)
+    assert 499 <= len(bench.of("GLOBAL_POSITION_INT")) <= 501
+
+
 def test_each_ground_station_has_its_own_streams() -> None:
     bench = Bench()
     bench.advance(1)

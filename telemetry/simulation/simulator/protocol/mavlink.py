@@ -29,6 +29,8 @@ NEWS_S = 0.15
 on the real ArduCopter."""
 FASTEST_WALL_S = 0.02
 """However fast simulated time runs, no stream sends more often than 50 times a second."""
+ROUNDING_S = 1e-6
+"""Sums of time steps that should reach a stream's interval miss it by less."""
 GROUPS: dict[int, tuple[int, ...]] = {
     wire.MAV_DATA_STREAM_EXTENDED_STATUS: (1, 24, 42, 62, 87),
     wire.MAV_DATA_STREAM_POSITION: (33, 32),
@@ -251,7 +253,7 @@ REQUESTS = {
 
 def _due(stream: _Stream, now_s: float, wall_s: float) -> bool:
     """Whether the stream's time has come; then its next one is set."""
-    if now_s < stream.due_s or wall_s - stream.sent_wall_s < FASTEST_WALL_S:
+    if now_s < stream.due_s - ROUNDING_S or wall_s - stream.sent_wall_s < FASTEST_WALL_S - ROUNDING_S:
         return False
     stream.due_s = max(stream.due_s + stream.interval_s, now_s)
     return True
