@@ -63,6 +63,15 @@ def to_circle(triangles_m: F64, centre_m: F64, radius_m: float, *, inclusion: bo
     return NearestOfTriangles(np.where(within, 0.0, np.maximum(0.0, away_m[side, rows] - radius_m)), place_m)
 
 
+def one_to_polygon(triangle_m: F64, corners_m: F64, *, inclusion: bool) -> float:
+    """As `to_polygon` of one (3, 2) triangle, over all edges at once: for who asks many times a second."""
+    ends_m = np.roll(corners_m, -1, axis=0)
+    if (_is_inside(triangle_m[0], corners_m, ends_m) != inclusion) or _holds(triangle_m[None], corners_m).any():
+        return 0.0
+    sides = zip(triangle_m, np.roll(triangle_m, -1, axis=0), strict=True)
+    return min(float(_between(corners_m, ends_m, p, q)[0].min()) for p, q in sides)
+
+
 def inside_polygon(places_m: F64, corners_m: F64) -> np.ndarray:
     """(K,) whether each of (K, 2) places lies inside, by counting the edges to its east."""
     x, y = places_m.T
@@ -75,6 +84,14 @@ def inside_polygon(places_m: F64, corners_m: F64) -> np.ndarray:
         crossing_x = ax[k] + (y - ay[k]) * (bx[k] - ax[k]) / (by[k] - ay[k])
         inside ^= straddles & (x < crossing_x)
     return inside
+
+
+def _is_inside(place_m: F64, corners_m: F64, ends_m: F64) -> bool:
+    x, y = place_m
+    straddles = (corners_m[:, 1] <= y) != (ends_m[:, 1] <= y)
+    a, b = corners_m[straddles], ends_m[straddles]
+    crossing_x = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool(np.count_nonzero(x < crossing_x) % 2)
 
 
 def _between(a: F64, b: F64, p: F64, q: F64) -> tuple[F64, F64]:

@@ -74,7 +74,7 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
     distance_m, shape, part, place_m, far = math.inf, "", "line", np.zeros(2), ""
     parts = _parts(flight, frame)
     longest_m = max(_longest_m(triangles) for _, triangles in parts)
-    for name, each in _named(fence):
+    for name, each in named_shapes(fence):
         if frame.reach_m(each) > FARTHEST_M:
             far = name
         for kind, triangles in parts:
@@ -148,7 +148,8 @@ def _parts(flight: FencedFlight, frame: _Plane) -> list[tuple[Part, F64]]:
     return parts
 
 
-def _named(fence: Fence) -> list[tuple[str, FencePolygon | FenceCircle]]:
+def named_shapes(fence: Fence) -> list[tuple[str, FencePolygon | FenceCircle]]:
+    """ "exclusion polygon 2", as counted in the file"""
     return [
         (f"{'inclusion' if each.inclusion else 'exclusion'} {kind} {number}", each)
         for kind, shapes in (("polygon", fence.polygons), ("circle", fence.circles))

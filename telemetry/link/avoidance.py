@@ -34,7 +34,9 @@ class Avoidance:
         on_end: Callable[[], None],
     ) -> None:
         self._vehicle = vehicle
-        self._avoiding = Avoiding(vehicle.target, remaining=remaining, on_engage=on_engage, on_end=on_end)
+        self._avoiding = Avoiding(
+            vehicle.target, remaining=remaining, fence=vehicle.onboard.fence, on_engage=on_engage, on_end=on_end
+        )
 
     @property
     def is_engaged(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.mavlink.actions import Message
 from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
@@ -17,10 +18,11 @@ PLAN_RECEIVED = "Flight plan received"
 
 
 class OnBoard:
-    """``state`` as in ``LinkStatus.mission_state``; ``mission`` is what the last read-back found."""
+    """``state`` as in ``LinkStatus.mission_state``; ``mission`` and ``fence`` are what the last read-backs found."""
 
     def __init__(self) -> None:
         self.mission: OnboardMission | None = None
+        self.fence = FenceAboard()
         self._transferring = False
         self._settled_s = self._counted_s = 0.0
         self._seen: tuple[int | None, int | None] | None = None
@@ -49,6 +51,7 @@ class OnBoard:
     def forget(self) -> None:
         """The vehicle restarted, or is another one."""
         self.mission, self._seen = None, None
+        self.fence.forget("has not been read back since the vehicle was silent or restarted")
 
     def on_message(self, message: Message, now_s: float) -> bool:
         """True when this message shows that somebody else has replaced the mission: it is unknown from now on."""

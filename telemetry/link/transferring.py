@@ -94,8 +94,12 @@ class Transfers:
             now_s=time.monotonic(),
             about=about,
         )
+        if request.kind == "fence":
+            vehicle.onboard.fence.forget("has not been read back since it was sent")
         report = await self._run(machine, "upload", len(request.items))
         assert isinstance(report, UploadReport)
+        if request.kind == "fence":
+            vehicle.onboard.fence.read_back(report.onboard.items)
         return report
 
     async def download_places(self, kind: PlaceList) -> tuple[Item, ...]:
@@ -104,6 +108,8 @@ class Transfers:
         machine = MissionDownload(firmware=vehicle.firmware, target=vehicle.target, now_s=time.monotonic(), about=about)
         onboard = await self._run(machine, "download", 0)
         assert isinstance(onboard, OnboardMission)
+        if kind == "fence":
+            vehicle.onboard.fence.read_back(onboard.items)
         return onboard.items
 
     async def read_back(self) -> OnboardMission:
@@ -118,6 +124,7 @@ class Transfers:
         machine = ParameterRead(names, target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
         values = await vehicle.exchanges.run(machine)
         assert isinstance(values, dict)
+        vehicle.onboard.fence.take(values)
         return values
 
     async def list_parameters(self) -> ParameterList:
@@ -125,6 +132,7 @@ class Transfers:
         machine = ParameterListRead(target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
         found = await vehicle.exchanges.run(machine)
         assert isinstance(found, ParameterList)
+        vehicle.onboard.fence.take({each.name: each.value for each in found.parameters})
         return found
 
     async def write_parameters(
@@ -138,6 +146,7 @@ class Transfers:
         async with self._writing:
             written = await vehicle.exchanges.run(machine)
         assert isinstance(written, tuple)
+        vehicle.onboard.fence.take({each.name: each.after for each in written})
         return written
 
     def _ends(self, known: OnboardMission | None) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from mapping.geometry.frames import LocalFrame
 from planning.errors import FormatError
+from planning.fence.distance import one_to_polygon, to_polygon
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, circle, fence, polygon
 from planning.fence.judge import FencedFlight, FenceVerdict, judge_fence
 from tests.reference.fence import nearest_m, plane_about, swept_places, xy_of
@@ -213,3 +214,19 @@ def _star(rng: np.random.Generator, centre: np.ndarray, size_m: float, *, inclus
     radii = size_m * rng.uniform(0.4, 1.0, count)
     corners = [(centre[0] + r * math.cos(a), centre[1] + r * math.sin(a)) for a, r in zip(angles, radii, strict=True)]
     return polygon(at(*corners), inclusion=inclusion, where="test")
+
+
+def test_one_triangle_over_all_edges_at_once_is_as_near_as_edge_by_edge() -> None:
+    rng = np.random.default_rng(7)
+    zeros = 0
+    for _ in range(300):
+        count = int(rng.integers(3, 40))
+        angles = np.sort(rng.uniform(0.0, 2.0 * math.pi, count))
+        corners_m = (rng.uniform(5.0, 60.0, count) * np.array([np.sin(angles), np.cos(angles)])).T
+        triangle_m = rng.uniform(-80.0, 80.0, 2) + rng.uniform(-25.0, 25.0, (3, 2))
+        triangle_m[2] = triangle_m[int(rng.integers(1, 3))]  # half of them are legs of no width
+        for inclusion in (False, True):
+            expected_m = float(to_polygon(triangle_m[None], corners_m, inclusion=inclusion).distance_m[0])
+            assert one_to_polygon(triangle_m, corners_m, inclusion=inclusion) == pytest.approx(expected_m, abs=1e-9)
+            zeros += expected_m == 0.0
+    assert 100 < zeros < 500

@@ -78,6 +78,8 @@ def order(it: Detour, event: Event) -> list[Action] | None:
             return it.come_down(WAY, STATE, NOW_S)
         case "blocked":
             return it.stop_short(NOW_S)
+        case "beyond fence":
+            return it.stop_at_fence("It would leave it.", NOW_S)
         case "silent":
             return it.hold_if_silent(VehicleState(1, 1), NOW_S)
         case "paused":

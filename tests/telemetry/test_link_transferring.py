@@ -1,9 +1,11 @@
 """Transfers of the link: a read-back that nobody asked for makes way, and the upload that follows is told of."""
 
+# pyright: reportPrivateUsage=false
 from __future__ import annotations
 
 import asyncio
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -87,3 +89,30 @@ async def _answers() -> None:
     assert onboard.mission == REPORT.onboard
     onboard.mission = KNOWN
     assert onboard.on_message(cast(Any, request), math.inf), "after it they are of another station's transfer"
+
+
+def test_the_fence_on_board_is_known_from_its_read_back_and_unknown_while_another_is_sent() -> None:
+    asyncio.run(_fence_known())
+
+
+async def _fence_known() -> None:
+    transfers, exchanges, _ = bench()
+    fence = transfers._vehicle.onboard.fence
+    assert fence.unknown
+    reading = asyncio.create_task(transfers.download_places("fence"))
+    await asyncio.sleep(0)
+    exchanges.ends.popitem()[1].set_result(replace(KNOWN, items=FENCE.items))
+    await reading
+    assert fence.unknown == ""
+    assert fence.why_not((47.0, 8.0), ((47.0, 8.0),) * 3) == ""  # in the middle of its inclusion
+    fence.margin_m = 60.0
+    there = (47.0004, 8.0)
+    assert "leave inclusion circle 1" in fence.why_not((47.0, 8.0), ((47.0, 8.0), (47.0006, 8.0), (47.0006, 8.0)))
+    assert "come within 5.2 m" in fence.why_not((47.0, 8.0), ((47.0, 8.0), there, there))
+    sending = asyncio.create_task(transfers.upload_places(replace(FENCE, items=())))
+    await asyncio.sleep(0)
+    assert "since it was sent" in fence.unknown
+    exchanges.ends.popitem()[1].set_result(REPORT)
+    await sending
+    assert fence.unknown == ""
+    assert fence.why_not((47.0, 8.0), ((47.0, 8.0), there, there)) == ""

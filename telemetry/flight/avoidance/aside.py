@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.geometry.frames import offset_m
+from mapping.geometry.frames import moved_deg, offset_m
+from mapping.perceiving.braking import Braking
 from planning.evading.velocity_obstacles import Proposal
+from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.passing_tracks import (
     Scene,
     is_last_moment,
@@ -43,13 +45,17 @@ STANDS_M_S, STUCK_S, GIVEN_UP_S = 0.2, 4.0, 20.0
 SPEED_STEP_M_S = 0.25
 """Speeds are ordered in steps: every order waits for its answer."""
 AGAIN_M, AGAIN_S = 0.25, 0.5
+SAID_S = 3.0
+"""So long it says that the fence was in the way."""
 
 
 class Aside:
     """``wants`` says whether the way ahead leads into something; ``begin`` and ``look`` fly past it."""
 
-    def __init__(self, helm: Helm) -> None:
-        self._helm = helm
+    def __init__(self, helm: Helm, fence: FenceAboard) -> None:
+        self._helm, self._fence = helm, fence
+        self._fenced, self._fenced_s = "", -math.inf
+        """Why it did not begin, and when that was."""
         self._tracks: TracksStatus | None = None
         self._room_m: tuple[float, ...] = ()
         self.settings = PerceptionSettings()
@@ -81,7 +87,7 @@ class Aside:
             return "Objects are not followed at the moment: it climbs instead of stepping aside."
         if not self.knows_ground():
             return "No surface model is known here: it climbs instead of stepping aside."
-        return ""
+        return f"{self._fenced} It does not step aside." if now_s - self._fenced_s <= SAID_S else ""
 
     def knows_ground(self) -> bool:
         return self._tracks is not None and bool(self._tracks.room_m)
@@ -103,7 +109,11 @@ class Aside:
         found = velocity_past(scene, wanted, velocity_of(state))
         if found is None or is_wanted(found, wanted):
             return False
-        return math.hypot(*found.velocity_enu_m_s) >= STANDS_M_S or is_last_moment(scene, velocity_of(state))
+        if math.hypot(*found.velocity_enu_m_s) < STANDS_M_S:
+            return is_last_moment(scene, velocity_of(state))
+        if fenced := self._beyond_fence(state, _lead(found)):
+            self._fenced, self._fenced_s = fenced, now_s
+        return not fenced
 
     def _is_new(self) -> bool:
         assert self._tracks is not None
@@ -152,8 +162,12 @@ class Aside:
             self._free_since_s = None
         elif self._free_since_s is None:
             self._free_since_s = now_s
+        offset = carrot[:2] - at[:2] if is_free else _lead(found)
+        if fenced := self._beyond_fence(state, offset):
+            return self._stand(state, f"{fenced} It holds. Resume goes on, or return home.", now_s)
         self.why, self._stands_since_s = "", None
-        return self._go(state, found, carrot, aside_m, is_free=is_free, now_s=now_s)
+        on_line = is_free and aside_m <= BACK_M
+        return self._go(state, offset, float(carrot[2]), found, on_line=on_line, now_s=now_s)
 
     def give_up(self, now_s: float) -> None:
         """For a while it does not begin again: those who climb over what is ahead have their turn."""
@@ -173,18 +187,24 @@ class Aside:
             return self._helm.stop(now_s)
         return self._helm.stop_in_guided(state, now_s, radius_m=LEAST_LEAD_M) if is_new else []
 
+    def _beyond_fence(self, state: VehicleState, offset: F64) -> str:
+        """Why the turn from where it flies now to a place would breach the fence; empty: it keeps inside."""
+        assert state.lat_deg is not None
+        assert state.lon_deg is not None
+        here, velocity = (state.lat_deg, state.lon_deg), velocity_of(state)
+        speed_m_s = math.hypot(*velocity)
+        stops = _with_speed(velocity, Braking().distance_m(speed_m_s))
+        places = [moved_deg(here, float(east_m), float(north_m)) for east_m, north_m in (stops, offset)]
+        return self._fence.why_not(here, (here, *places))
+
     def _go(
-        self, state: VehicleState, found: Proposal, carrot: F64, aside_m: float, *, is_free: bool, now_s: float
+        self, state: VehicleState, offset: F64, carrot_m: float, found: Proposal, *, on_line: bool, now_s: float
     ) -> list[Action]:
         if state.mode != GUIDED:
             return self._helm.change_mode(GUIDED, now_s)
-        velocity = np.array(found.velocity_enu_m_s)
-        speed_m_s = math.hypot(*velocity)
-        at = self._at(state)
-        offset = carrot[:2] - at[:2] if is_free else velocity * max(LEAD_S, LEAST_LEAD_M / speed_m_s)
-        up_m = max(float(carrot[2]), state.alt_rel_home_m or 0.0, self._sent[2] if self._sent else -math.inf)
-        if is_free and aside_m <= BACK_M:
-            up_m = max(float(carrot[2]), state.alt_rel_home_m or 0.0)
+        speed_m_s, at = math.hypot(*found.velocity_enu_m_s), self._at(state)
+        sent_m = self._sent[2] if self._sent and not on_line else -math.inf
+        up_m = max(carrot_m, state.alt_rel_home_m or 0.0, sent_m)
         steps = max(1, math.ceil(speed_m_s / SPEED_STEP_M_S - 1e-6))
         actions = self._helm.set_speed(steps * SPEED_STEP_M_S, now_s)
         place = (float(at[0] + offset[0]), float(at[1] + offset[1]), up_m)
@@ -237,6 +257,12 @@ def _towards(state: VehicleState, target: GuidedTarget) -> F64:
     assert state.lat_deg is not None
     assert state.lon_deg is not None
     return np.array(offset_m((state.lat_deg, state.lon_deg), target.lat_deg, target.lon_deg))
+
+
+def _lead(found: Proposal) -> F64:
+    """(2,) To the place that is ordered."""
+    velocity = np.array(found.velocity_enu_m_s)
+    return velocity * max(LEAD_S, LEAST_LEAD_M / math.hypot(*velocity))
 
 
 def _with_speed(direction: F64, speed_m_s: float) -> F64:

@@ -14,6 +14,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.avoiding_words import Now, status_of
 from telemetry.flight.avoidance.coming_down import joined
 from telemetry.flight.avoidance.detour import Detour, DetourParams
+from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.pilot_watch import PilotWatch
 from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, largest_speed
 from telemetry.flight.guided.helm import GUIDED, STOP_MODES, Helm
@@ -39,8 +40,8 @@ class Avoiding:
     """Of one ArduPilot multirotor. All methods return what is to be sent to it, at once and in this order.
 
     ``remaining``: what is left of the flight, None when nothing is flown that could be gone on with. ``now_s`` is the
-    clock of ``t_mono_s`` in states and perception. ``on_engage`` is called when it takes the vehicle over, ``on_end``
-    when all is flown and the way home is commanded.
+    clock of ``t_mono_s`` in states and perception. ``fence``: what is known of the one on board. ``on_engage`` is
+    called when it takes the vehicle over, ``on_end`` when all is flown and the way home is commanded.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Avoiding:
         remaining: Callable[[VehicleState], RemainingMission | None],
         settings: PerceptionSettings | None = None,
         params: DetourParams | None = None,
+        fence: FenceAboard | None = None,
         own: tuple[int, int] = GROUND_STATION,
         on_engage: Callable[[], None] = lambda: None,
         on_end: Callable[[], None] = lambda: None,
@@ -60,7 +62,9 @@ class Avoiding:
         self._watch = PilotWatch()
         self.regions = Regions(settings)
         self._helm = Helm(target, self._watch.asked, own=own)
-        self.detour = Detour(self._helm, self.regions, self._params)
+        self.fence = fence or FenceAboard()
+        self.fence.margin_m = settings.vehicle_radius_m + settings.position_error_m
+        self.detour = Detour(self._helm, self.regions, self._params, self.fence)
         self._state: VehicleState | None = None
         self.enabled = False
         self.by: AvoidBy = "climb"
@@ -140,6 +144,8 @@ class Avoiding:
         self._check_way(request)
         if state is None or not _is_flying(state):
             raise NotAllowedError("The vehicle is not in the air.", advice="A way around is flown in flight.")
+        if why := self.fence.why_not_along(state, request.targets):
+            raise NotAllowedError(why, advice="Fly another way, or return.")
         if self.released:
             raise NotAllowedError(self.released, advice="The pilot flies the vehicle.")
         if state.mode not in FLOWN_FROM:
@@ -161,7 +167,10 @@ class Avoiding:
             raise NotAllowedError("No flight goes on higher than planned.", advice="Nothing is to be done.")
         if self.regions.occupied(now_s) or not self.regions.fresh(now_s):
             raise NotAllowedError("The way ahead is not seen to be clear.", advice="It is planned again.")
-        return detour.come_down(joined(request.targets, state), state, now_s)
+        targets = joined(request.targets, state)
+        if why := self.fence.why_not_along(state, targets):
+            raise NotAllowedError(f"The lower line is not flown. {why}", advice="It stays higher.")
+        return detour.come_down(targets, state, now_s)
 
     def _check_way(self, request: FlyManoeuvre) -> None:
         _check_targets(request.targets)
@@ -192,6 +201,7 @@ class Avoiding:
         self._params = self._params.following(settings)
         self.detour.set_params(self._params)
         self.regions.settings = self.detour.aside.settings = settings
+        self.fence.margin_m = settings.vehicle_radius_m + settings.position_error_m
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         """Any of the vehicle, and those by which others fly it by hand."""

@@ -78,9 +78,14 @@ def _text(now: Now, regions: Regions, detour: Detour) -> str:
     slowest = regions.slowest(now.t_s)
     if slowest is None:
         if regions.eyes(now.t_s):
-            return ""
+            return _fence_words(detour)
         return "No sensor sees ahead: nothing brakes by itself."
-    return _speed_words(now, *slowest)
+    return _speed_words(now, *slowest) or _fence_words(detour)
+
+
+def _fence_words(detour: Detour) -> str:
+    unknown = detour.fence.unknown
+    return f"The fence on board {unknown}: no way of avoidance is held against it." if unknown else ""
 
 
 def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:
@@ -99,7 +104,8 @@ def _engaged_text(regions: Regions, detour: Detour, now_s: float) -> str:
     if detour.phase == "aside":
         return detour.aside.why or "Steps aside past what is on its way, then goes on along the mission."
     if detour.phase == "ceiling":
-        return "Still not clear at the highest allowed height: it holds. Return home or take over."
+        where = "below the ceiling of its fence" if detour.is_below_fence else "at the highest allowed height"
+        return f"Still not clear {where}: it holds. Return home or take over."
     if detour.phase in ("going", "ending"):
         if detour.is_manoeuvre:
             return "On the way past it."

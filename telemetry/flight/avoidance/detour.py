@@ -9,6 +9,7 @@ from typing import Literal
 from telemetry.flight.avoidance.aside import Aside
 from telemetry.flight.avoidance.backing import Backing, Trail
 from telemetry.flight.avoidance.climb import Climb
+from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.phases import (
     TABLE,
     Along,
@@ -57,10 +58,11 @@ class Detour:
     An order that the present phase does not know changes nothing.
     """
 
-    def __init__(self, helm: Helm, regions: Regions, params: DetourParams) -> None:
+    def __init__(self, helm: Helm, regions: Regions, params: DetourParams, fence: FenceAboard | None = None) -> None:
         self._helm, self._regions, self._params = helm, regions, params
+        self.fence = fence or FenceAboard()
         self.trail = Trail()
-        self.aside = Aside(helm)
+        self.aside = Aside(helm, self.fence)
         self.forget()
 
     def forget(self) -> None:
@@ -99,6 +101,11 @@ class Detour:
         if self._legs is not None and not self.is_manoeuvre:
             return self._legs.target
         return self.remaining.targets[0] if self.remaining.targets else None
+
+    @property
+    def is_below_fence(self) -> bool:
+        """It is the fence that ends its climb, sooner than the highest that is allowed above the plan."""
+        return self._plan_m is not None and self.fence.highest_m < self._plan_m + self._params.ceiling_m
 
     @property
     def goes_higher(self) -> bool:
@@ -183,6 +190,10 @@ class Detour:
     def stop_short(self, now_s: float) -> list[Action]:
         """The prepared way is not clear: it holds, and whoever ordered it decides."""
         return self._stay("blocked", "Something stands on the way past: it holds. Fly another way, or return.", now_s)
+
+    def stop_at_fence(self, why: str, now_s: float) -> list[Action]:
+        """It goes nowhere from here by itself."""
+        return self._stay("beyond fence", f"{why} It holds: return home, or take over.", now_s)
 
     def stop_aside(self, now_s: float) -> list[Action]:
         """Nobody wants it to step aside any more: beside its line it holds, and goes back there at an order only."""
@@ -336,7 +347,18 @@ class Detour:
         return self._helm.change_mode(GUIDED, now_s)
 
     def _go(self, state: VehicleState, now_s: float) -> list[Action]:
-        return [] if self._legs is None else self._legs.go(state, now_s)
+        if self._legs is None:
+            return []
+        if why := self._why_not_on(self._legs, state):
+            return self.stop_at_fence(why, now_s)
+        return self._legs.go(state, now_s)
+
+    def _why_not_on(self, legs: Legs, state: VehicleState) -> str:
+        """The mission's own line is certified; from where the vehicle is to it, and so high, it is not."""
+        if legs.is_over:
+            return ""
+        highest_m = max(target.alt_rel_home_m for target in legs.left)
+        return self.fence.why_not_along(state, legs.left[:1]) or self.fence.why_not_at(highest_m)
 
     def _back_off(self, state: VehicleState, now_s: float) -> list[Action]:
         self._backing = Backing(self._helm, self.trail, state, self._trusted.back_m(now_s))
@@ -360,7 +382,7 @@ class Detour:
             speed_m_s=params.climb_m_s,
             latency_s=params.latency_s,
             least_m=self.variant.least_m,
-            ceiling_m=self._plan_m + params.ceiling_m if self.variant.climbs_over else 0.0,
+            ceiling_m=min(self._plan_m + params.ceiling_m, self.fence.highest_m) if self.variant.climbs_over else 0.0,
         )
         self.why = ""
         return [*climb.set_speed(now_s), *self.look(state, now_s)]
@@ -394,8 +416,7 @@ class Detour:
 
     def _hand_over(self, state: VehicleState, now_s: float) -> list[Action]:
         """On along the legs, from the line or from where it is."""
-        assert self._legs is not None
-        return self._legs.go(state, now_s) or self.look(state, now_s)
+        return self._go(state, now_s) or self.look(state, now_s)
 
     def _follow_legs(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._legs is not None

@@ -11,7 +11,8 @@ Where it stands too near to see what is in the way, it first goes back on the wa
     climbing   unsure -> holding, clear -> levelling, highest -> ceiling, occupied -> climbing
     levelling  unsure -> holding, seen again -> climbing, level -> going
     going      way flown -> going, flown for good -> holding, flown -> ending, under way -> going,
-               silent -> holding, blocked -> holding, step aside -> aside, lower line -> going
+               silent -> holding, blocked -> holding, beyond fence -> holding, step aside -> aside,
+               lower line -> going
     holding    unheard -> holding, sure again -> taking, resumed -> stopping
     ceiling    clear at last -> levelling
     ending     returns -> idle
@@ -62,6 +63,7 @@ Event = Literal[
     "switched off",
     "lower line",
     "blocked",
+    "beyond fence",
     "silent",
     "paused",
     "resumed",
@@ -88,6 +90,7 @@ TABLE: dict[Phase, dict[Event, Phase]] = {
         "under way": "going",
         "silent": "holding",
         "blocked": "holding",
+        "beyond fence": "holding",
         "step aside": "aside",
         "lower line": "going",
     },

@@ -17,7 +17,7 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (
         *("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
         *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
-        *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION"),
+        *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX"),
     ),
     "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "GF_ACTION"),
 }

@@ -1,0 +1,128 @@
+"""The fence on board, as the last read-back told it: no way of avoidance's own leads beyond it.
+
+Distances are horizontal and as the autopilot counts them: in metres on a sphere around the vehicle, edges straight in
+latitude and longitude, circles taken as much worse as the certificate takes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import offset_m
+from planning.errors import FormatError
+from planning.fence.distance import one_to_polygon, to_circle
+from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
+from planning.fence.judge import CIRCLE_SHARE, named_shapes
+from planning.formats.fence_items import fence_of
+from telemetry.mavlink.items import mission_items
+from telemetry.topics.messages import GuidedTarget, Item
+from telemetry.topics.vehicle import VehicleState
+
+CEILING_BIT = 1
+"""Of FENCE_TYPE: the highest height."""
+CEILING_PARAMETERS = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ALT_MAX")
+SAME_M = 0.01
+"""Who is nearer than the margin already may go on so near."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    name: str
+    lat_lon_deg: F64
+    """(N, 2) corners, or (1, 2) the centre of a circle."""
+    inclusion: bool
+    radius_m: float | None
+
+    def distance_m(self, triangle_deg: Sequence[LatLon]) -> float:
+        """From a triangle to what is forbidden; 0 within it."""
+        origin = triangle_deg[0]
+        triangle_m = np.array([offset_m(origin, *place) for place in triangle_deg])
+        places_m = np.column_stack(offset_m(origin, *self.lat_lon_deg.T))
+        if self.radius_m is None:
+            return one_to_polygon(triangle_m, places_m, inclusion=self.inclusion)
+        found = to_circle(triangle_m[None], places_m[0], self.radius_m, inclusion=self.inclusion)
+        return float(found.distance_m[0])
+
+
+class FenceAboard:
+    """``margin_m``: how far the vehicle's outermost point may be from where it is said to be."""
+
+    def __init__(self) -> None:
+        self.margin_m = 0.0
+        self.unknown = "has not been read back"
+        """Why nobody knows the fence; empty once it is known."""
+        self._shapes: tuple[_Shape, ...] = ()
+        self._parameters: dict[str, float | None] = {}
+
+    def read_back(self, items: tuple[Item, ...]) -> None:
+        try:
+            fence = fence_of(mission_items(items), "the fence on board", [])
+        except FormatError as error:
+            self.forget(f"is not understood: {error.where}: {error.what}".rstrip("."))
+            return
+        self.unknown, self._shapes = "", _shapes(fence)
+
+    def forget(self, why: str) -> None:
+        self.unknown, self._shapes = why, ()
+
+    def take(self, parameters: Mapping[str, float | None]) -> None:
+        """Any that were read or written: its ceiling is among them."""
+        self._parameters |= {name: parameters[name] for name in CEILING_PARAMETERS if name in parameters}
+
+    @property
+    def highest_m(self) -> float:
+        """Above home, with the margin; inf where no ceiling is known to act."""
+        enabled, kinds, top_m = (self._parameters.get(name) for name in CEILING_PARAMETERS)
+        acts = bool(enabled) and kinds is not None and bool(int(kinds) & CEILING_BIT)
+        return top_m - self.margin_m if acts and top_m is not None else math.inf
+
+    def why_not_along(self, state: VehicleState, places: Sequence[GuidedTarget]) -> str:
+        """Why a way from where the vehicle is would breach it, leg by leg; empty: it keeps inside."""
+        here = _here(state)
+        if here is None or not places:
+            return ""
+        way = [here, *((place.lat_deg, place.lon_deg) for place in places)]
+        too_high = self.why_not_at(max(place.alt_rel_home_m for place in places))
+        return too_high or next(filter(None, (self.why_not(here, (a, b, b)) for a, b in pairwise(way))), "")
+
+    def why_not_at(self, alt_rel_home_m: float) -> str:
+        if alt_rel_home_m <= self.highest_m + SAME_M:
+            return ""
+        return f"It would lead to {alt_rel_home_m:.1f} m; the fence on board allows {self.highest_m:.1f} m above home."
+
+    def why_not(self, here: LatLon, triangle: Sequence[LatLon]) -> str:
+        """``triangle``: everything between three places, the way there included; ``here``: the vehicle."""
+        for shape in self._shapes:
+            away_m = shape.distance_m(triangle)
+            if away_m >= self.margin_m:
+                continue
+            here_m = shape.distance_m((here, here, here))
+            if here_m <= 0.0:
+                return f"The vehicle is beyond {shape.name} of the fence on board."
+            if away_m <= 0.0:
+                return f"It would {'leave' if shape.inclusion else 'enter'} {shape.name} of the fence on board."
+            if away_m < here_m - SAME_M:
+                what = f"It would come within {away_m:.1f} m of {shape.name} of the fence on board"
+                return f"{what}; {self.margin_m:.1f} m are kept."
+        return ""
+
+
+def _shapes(fence: Fence) -> tuple[_Shape, ...]:
+    return tuple(_shape(name, each) for name, each in named_shapes(fence))
+
+
+def _shape(name: str, each: FencePolygon | FenceCircle) -> _Shape:
+    if isinstance(each, FencePolygon):
+        return _Shape(name, np.array(each.corners_lat_lon_deg), each.inclusion, None)
+    share = -CIRCLE_SHARE if each.inclusion else CIRCLE_SHARE
+    return _Shape(name, np.array([each.centre_lat_lon_deg]), each.inclusion, each.radius_m * (1.0 + share))
+
+
+def _here(state: VehicleState) -> LatLon | None:
+    return None if state.lat_deg is None or state.lon_deg is None else (state.lat_deg, state.lon_deg)
