@@ -133,9 +133,8 @@ class ItemProtocol:
         return [as_float(item) if message.get_type() == "MISSION_REQUEST" else item]
 
     def _on_clear(self, message: Any, target: Target, peer: Hashable, now_s: float) -> list[MAVLink_message]:
-        if not self._store.may_clear():
+        if self._upload or not self._store.may_clear():
             return [self._ack(target, wire.MAV_MISSION_ERROR)]
-        self._upload = None
         self._store.begin(0)
         return [self._ack(target, wire.MAV_MISSION_ACCEPTED)]
 

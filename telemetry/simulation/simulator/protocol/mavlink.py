@@ -41,7 +41,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
 """REQUEST_DATA_STREAM's groups."""
 MISSION_MESSAGES = {
     "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_REQUEST_LIST", "MISSION_REQUEST",
-    "MISSION_REQUEST_INT", "MISSION_CLEAR_ALL", "MISSION_WRITE_PARTIAL_LIST",
+    "MISSION_REQUEST_INT", "MISSION_CLEAR_ALL", "MISSION_WRITE_PARTIAL_LIST", "MISSION_ACK",
 }  # fmt: skip
 
 
@@ -157,8 +157,10 @@ class Endpoint:
         elif kind == "REQUEST_DATA_STREAM":
             self._on_data_stream(message, peer)
         elif kind == "MISSION_SET_CURRENT":
-            self._pilot.set_current(message.seq)
-            return [self._streams.mission_current()]
+            return [self._streams.mission_current()] if self._pilot.set_current(message.seq) == "accepted" else []
+        elif kind == "PING" and (message.target_system, message.target_component) == (0, 0):
+            sender = message.get_srcSystem(), message.get_srcComponent()
+            return [wire.MAVLink_ping_message(message.time_usec, message.seq, *sender)]
         elif kind == "REQUEST_EVENT" and self._events is not None:
             return self._events.on_request(message)
         elif kind == "TIMESYNC" and message.tc1 == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from typing import Any
 
@@ -46,8 +47,8 @@ class ParameterProtocol:
         return [(peer, self._value(self._names[index], index))] if index < len(self._names) else []
 
     def on_set(self, message: Any) -> list[Any]:
-        """What everybody hears of it: the value that is kept."""
-        if message.param_id not in self._parameters:
+        """What everybody hears of it: the value that is kept. A value that is no number is not answered."""
+        if message.param_id not in self._parameters or not math.isfinite(message.param_value):
             return []
         self._parameters.set(message.param_id, message.param_value)
         return [self._value(message.param_id, UNNUMBERED)]

@@ -1,7 +1,7 @@
 """The mission protocol as PX4 speaks it, for all its lists one after the other: a machine without sockets or clock.
 
 It asks with MISSION_REQUEST_INT, again every quarter of a second, and gives up after five. What it holds is read in
-order only: another request ends the reading.
+order only: another request ends the reading. While it takes or gives a list it clears none.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from telemetry.simulation.simulator.protocol.px4.px4_items import FenceItems, Mi
 REQUEST_AGAIN_S, GIVE_UP_S = 0.25, 5.0
 ERROR, NO_SPACE = wire.MAV_MISSION_ERROR, wire.MAV_MISSION_NO_SPACE
 ALL = 255
+ADDRESSED = (0, wire.MAV_COMP_ID_AUTOPILOT1, wire.MAV_COMP_ID_MISSIONPLANNER)
+"""Components as whose missions it takes what is sent to it."""
 Items = MissionItems | FenceItems | RallyItems
 
 
@@ -55,15 +57,17 @@ class Px4Missions:
     def on_message(self, message: Any, peer: Hashable, now_s: float) -> list[Reply]:
         target = (message.get_srcSystem(), message.get_srcComponent())
         kind = message.get_type()
+        if message.target_component not in ADDRESSED:
+            return []
         if kind in ("MISSION_ITEM_INT", "MISSION_ITEM"):
             return [(peer, answer) for answer in self._on_item(as_int(message), target, now_s)]
         if kind in ("MISSION_REQUEST_INT", "MISSION_REQUEST"):
             return [(peer, answer) for answer in self._on_request(message, target, now_s)]
         if kind == "MISSION_ACK":
-            self._busy = None if isinstance(self._busy, _Giving) else self._busy
+            self._on_ack(message, target)
             return []
         if kind == "MISSION_CLEAR_ALL":
-            return [(peer, self._clear(message.mission_type, target))]
+            return [(peer, answer) for answer in self._on_clear(message, target)]
         items = self._lists.get(message.mission_type)
         if items is None:
             return [(peer, _ack(target, wire.MAV_MISSION_UNSUPPORTED, message.mission_type))]
@@ -126,6 +130,20 @@ class Px4Missions:
         is_current = busy.items.mission_type == 0 and seq == self._pilot.mission.current
         item = back(busy.items.kept[seq], target, seq, current=is_current)
         return [as_float(item) if message.get_type() == "MISSION_REQUEST" else item]
+
+    def _on_ack(self, message: Any, target: Target) -> None:
+        """Ends the giving of a list whatever it says, the taking of one if it cancels."""
+        busy = self._busy
+        if busy is None or (busy.target, busy.items.mission_type) != (target, message.mission_type):
+            return
+        if isinstance(busy, _Giving) or message.type == wire.MAV_MISSION_OPERATION_CANCELLED:
+            self._busy = None
+
+    def _on_clear(self, message: Any, target: Target) -> list[MAVLink_message]:
+        if self._busy is not None:
+            self._pilot.say(2, "WPM: IGN CLEAR_ALL: Busy")
+            return []
+        return [self._clear(message.mission_type, target)]
 
     def _clear(self, mission_type: int, target: Target) -> MAVLink_message:
         for number, items in self._lists.items():
