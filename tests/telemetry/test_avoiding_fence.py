@@ -9,7 +9,7 @@ import pytest
 
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
-from telemetry.topics.messages import Item
+from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import FlyManoeuvre, FlyRest
 from tests.telemetry.avoiding_bench import HOME, ME, NORTH_PER_DEG, Craft, Wall, craft, remaining_at, state, targets
 from tests.telemetry.test_avoiding_aside import craft as followed

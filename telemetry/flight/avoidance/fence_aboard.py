@@ -21,7 +21,8 @@ from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 from planning.fence.judge import CIRCLE_SHARE, named_shapes
 from planning.formats.fence_items import fence_of
 from telemetry.mavlink.items import mission_items
-from telemetry.topics.messages import GuidedTarget, Item
+from telemetry.topics.messages import GuidedTarget
+from telemetry.topics.onboard_lists import Item
 from telemetry.topics.vehicle import VehicleState
 
 CEILING_BIT = 1
