@@ -77,3 +77,4 @@ class Dialect:
     """MAV_RESULT for the rate of a message that it does not have."""
     unknown_message: int = 4
     keeps_logs: bool = True
+    log_folder: str = "/APM/LOGS"

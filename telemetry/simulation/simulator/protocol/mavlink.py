@@ -17,6 +17,7 @@ from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.own_log import OwnLogs
 from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, read_order, whole
 from telemetry.simulation.simulator.protocol.dialects import DIALECTS
+from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
 from telemetry.simulation.simulator.protocol.passing_traffic import passing
@@ -77,6 +78,7 @@ class Endpoint:
         self._events = parts.events
         self._own_logs = OwnLogs(vehicle, dialect.mode_numbers, dialect.firmware, are_kept=dialect.keeps_logs)
         self._logs = LogProtocol(vehicle, self._own_logs)
+        self._files = FileProtocol(self._own_logs, dialect.log_folder)
         self._peers: dict[Hashable, _Peer] = {}
         self._news: list[tuple[float, Reply]] = []
         """That the other ground stations have not heard yet, and when they will."""
@@ -102,6 +104,7 @@ class Endpoint:
         self._peers.pop(peer, None)
         self._parameters.forget(peer)
         self._logs.forget(peer)
+        self._files.forget(peer)
 
     def on_message(self, message: Any, peer: Hashable, wall_s: float) -> list[Reply]:
         """Answers, in the order in which they go out."""
@@ -119,6 +122,8 @@ class Endpoint:
         if kind.startswith("LOG_REQUEST_"):
             self._logs.on_message(message, peer)
             return self._tell()
+        if kind == "FILE_TRANSFER_PROTOCOL":
+            return self._files.on_message(message, peer)
         replies = self._answer(kind, message, peer)
         return [(peer, reply) for reply in replies] + self._tell()
 
@@ -126,6 +131,7 @@ class Endpoint:
         """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
         self._own_logs.on_slice()
         out = self._missions.on_tick(wall_s) + self._parameters.on_tick(wall_s) + self._logs.on_tick(wall_s)
+        out += self._files.on_tick(wall_s)
         out += [reply for due_s, reply in self._news if due_s <= wall_s]
         self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]
         out += self._tell()

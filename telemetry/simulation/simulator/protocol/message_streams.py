@@ -16,7 +16,8 @@ from telemetry.simulation.simulator.protocol.mission_protocol import MissionProt
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 CAPABILITIES = (
-    wire.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    wire.MAV_PROTOCOL_CAPABILITY_FTP
+    | wire.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     | wire.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     | wire.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | wire.MAV_PROTOCOL_CAPABILITY_COMMAND_INT

@@ -53,4 +53,5 @@ PX4 = Dialect(
     unknown_stream=FAILED,
     unknown_message=DENIED,
     keeps_logs=False,
+    log_folder="/fs/microsd/log",
 )

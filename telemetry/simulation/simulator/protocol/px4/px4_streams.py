@@ -15,7 +15,8 @@ from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 CAPABILITIES = (
-    wire.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    wire.MAV_PROTOCOL_CAPABILITY_FTP
+    | wire.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | wire.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | wire.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     | wire.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED

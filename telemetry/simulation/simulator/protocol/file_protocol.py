@@ -1,0 +1,164 @@
+"""The vehicle's files for ground stations, by MAVLink FTP as ArduPilot speaks it: its logs, to be read only."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Any
+
+from telemetry.mavlink.logs.ftp.payload import MOST_DATA, NUMBERS, FtpPayload, Nak, Opcode, read_payload
+from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.protocol.item_protocol import Reply
+
+EVERY_S, BLOCKS = 0.02, 20
+BURST = 100
+"""Messages of one burst; then the station asks for the next."""
+MOST_SESSIONS = 4
+
+
+@dataclass(slots=True)
+class _Burst:
+    seq: int
+    offset: int
+    size: int
+    """Of each message."""
+    left: int = BURST
+
+
+@dataclass(slots=True)
+class _Session:
+    peer: Hashable
+    to: tuple[int, int]
+    content: bytes
+    burst: _Burst | None = None
+
+
+class FileProtocol:
+    def __init__(self, own: OwnLogs, folder: str) -> None:
+        """``folder``: where the logs lie."""
+        self._own, self._folder = own, folder
+        self._sessions: dict[int, _Session] = {}
+        self._last: dict[Hashable, tuple[FtpPayload, FtpPayload]] = {}
+        """The last question of each peer and its answer, which may have been lost."""
+        self._sent_s = 0.0
+
+    def on_message(self, message: Any, peer: Hashable) -> list[Reply]:
+        asked = read_payload(message)
+        if asked is None:
+            return []
+        to = (message.get_srcSystem(), message.get_srcComponent())
+        last = self._last.get(peer)
+        if last is not None and last[0] == asked:
+            return [(peer, last[1].message(to))]
+        answer = self._answer(asked, peer, to)
+        if answer is None:
+            return []
+        self._last[peer] = (asked, answer)
+        return [(peer, answer.message(to))]
+
+    def on_tick(self, wall_s: float) -> list[Reply]:
+        """The next messages of the bursts that were asked for."""
+        if wall_s - self._sent_s < EVERY_S:
+            return []
+        self._sent_s = wall_s
+        out: list[Reply] = []
+        for number, session in self._sessions.items():
+            for _ in range(BLOCKS):
+                if session.burst is not None:
+                    out.append((session.peer, self._next_of_burst(number, session, session.burst).message(session.to)))
+        return out
+
+    def forget(self, peer: Hashable) -> None:
+        self._sessions = {number: session for number, session in self._sessions.items() if session.peer != peer}
+        self._last.pop(peer, None)
+
+    def _answer(self, asked: FtpPayload, peer: Hashable, to: tuple[int, int]) -> FtpPayload | None:
+        """None: a burst begins."""
+        match asked.opcode:
+            case Opcode.LIST_DIRECTORY:
+                return self._list(asked)
+            case Opcode.OPEN_TO_READ:
+                return self._open(asked, peer, to)
+            case Opcode.RESET_SESSIONS:
+                self._sessions.clear()
+                return _ack(asked)
+            case Opcode.TERMINATE_SESSION | Opcode.READ_FILE | Opcode.BURST_READ_FILE:
+                session = self._sessions.get(asked.session)
+                return self._of_session(asked, session) if session else _nak(asked, Nak.INVALID_SESSION)
+            case _:
+                return _nak(asked, Nak.UNKNOWN_COMMAND)
+
+    def _of_session(self, asked: FtpPayload, session: _Session) -> FtpPayload | None:
+        if asked.opcode == Opcode.TERMINATE_SESSION:
+            del self._sessions[asked.session]
+            return _ack(asked)
+        size = min(asked.size or MOST_DATA, MOST_DATA)
+        if asked.opcode == Opcode.BURST_READ_FILE:
+            session.burst = _Burst((asked.seq + 1) % NUMBERS, asked.offset, size)
+            return None
+        data = session.content[asked.offset : asked.offset + size]
+        return _ack(asked, data) if data else _nak(asked, Nak.END_OF_FILE)
+
+    def _next_of_burst(self, number: int, session: _Session, burst: _Burst) -> FtpPayload:
+        data = session.content[burst.offset : burst.offset + burst.size]
+        answers = Opcode.BURST_READ_FILE
+        if not data:
+            session.burst = None
+            end = bytes((Nak.END_OF_FILE,))
+            return FtpPayload(burst.seq, Opcode.NAK, number, burst.offset, 1, end, answers)
+        burst.left -= 1
+        out = FtpPayload(burst.seq, Opcode.ACK, number, burst.offset, len(data), data, answers, not burst.left)
+        burst.seq, burst.offset = (burst.seq + 1) % NUMBERS, burst.offset + len(data)
+        if not burst.left:
+            session.burst = None
+        return out
+
+    def _open(self, asked: FtpPayload, peer: Hashable, to: tuple[int, int]) -> FtpPayload:
+        content = self._files().get(_path(asked))
+        free = next((number for number in range(MOST_SESSIONS) if number not in self._sessions), None)
+        if content is None:
+            return _nak(asked, Nak.FILE_NOT_FOUND)
+        if free is None:
+            return _nak(asked, Nak.NO_SESSIONS_AVAILABLE)
+        self._sessions[free] = _Session(peer, to, bytes(content))
+        return _ack(asked, len(content).to_bytes(4, "little"), session=free)
+
+    def _list(self, asked: FtpPayload) -> FtpPayload:
+        entries = self._entries(_path(asked))
+        if entries is None:
+            return _nak(asked, Nak.FILE_NOT_FOUND)
+        data = b""
+        for entry in entries[asked.offset :]:
+            if len(data) + len(entry) > MOST_DATA:
+                break
+            data += entry
+        return _ack(asked, data) if data else _nak(asked, Nak.END_OF_FILE)
+
+    def _entries(self, folder: str) -> list[bytes] | None:
+        """None: there is no such folder."""
+        if folder == self._folder:
+            sizes = {path.rpartition("/")[2]: len(content) for path, content in self._files().items()}
+            return [f"F{name}\t{size}\0".encode() for name, size in sizes.items()]
+        above = f"{folder.rstrip('/')}/"
+        if not self._folder.startswith(above):
+            return None
+        return [f"D{self._folder.removeprefix(above).partition('/')[0]}\0".encode()]
+
+    def _files(self) -> dict[str, bytearray]:
+        return {f"{self._folder}/{number:08d}.BIN": log.content for number, log in enumerate(self._own.logs, start=1)}
+
+
+def _path(asked: FtpPayload) -> str:
+    path = asked.data.split(b"\0")[0].decode(errors="replace")
+    return "/" + path.strip("/")
+
+
+def _ack(asked: FtpPayload, data: bytes = b"", *, session: int | None = None) -> FtpPayload:
+    number = asked.session if session is None else session
+    seq = (asked.seq + 1) % NUMBERS
+    return FtpPayload(seq, Opcode.ACK, number, asked.offset, len(data), data, asked.opcode)
+
+
+def _nak(asked: FtpPayload, why: Nak) -> FtpPayload:
+    seq = (asked.seq + 1) % NUMBERS
+    return FtpPayload(seq, Opcode.NAK, asked.session, asked.offset, 1, bytes((why,)), asked.opcode)

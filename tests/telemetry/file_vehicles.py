@@ -1,0 +1,29 @@
+"""Vehicles that serve files by MAVLink FTP on the test's clock: the simulated vehicle's own end of it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+from telemetry.simulation.simulator.own_log import OwnLog, OwnLogs
+from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
+
+FOLDER = "/APM/LOGS"
+
+
+class FileVehicle:
+    def __init__(self, logs: list[bytes]) -> None:
+        own = SimpleNamespace(logs=[OwnLog(1_700_000_000.0, bytearray(log)) for log in logs])
+        self.files = FileProtocol(cast(OwnLogs, own), FOLDER)
+
+    def on_message(self, message: Any, now_s: float) -> list[Any]:
+        if message.get_type() != "FILE_TRANSFER_PROTOCOL":  # a frame can be spoilt into another one
+            return []
+        return [reply for _, reply in self.files.on_message(message, "station")]
+
+    def on_tick(self, now_s: float) -> list[Any]:
+        return [reply for _, reply in self.files.on_tick(now_s)]
+
+
+def path(number: int) -> str:
+    return f"{FOLDER}/{number:08d}.BIN"
