@@ -42,7 +42,7 @@ START_S = 90.0
 """Modes, arming and take-off, one after the other."""
 DOWNLOAD_S = 180.0
 UPLOAD_S, UPLOAD_PER_ITEM_S = 240.0, 5.0
-LOGS_S = 330.0
+LOGS_S = 510.0
 """Their list, or one stretch of one."""
 LIST_S, WRITE_S, WRITE_PER_CHANGE_S = 630.0, 30.0, 20.0
 APPEARS_S = 0.5

@@ -117,6 +117,10 @@ class AdoptedVehicle:
         self.send(heartbeat())
         self.on_tick()
 
+    def tell(self, severity: int, text: str) -> None:
+        """Words of the link's own about the vehicle."""
+        self._telling.text(severity, text)
+
     def send(self, message: Message) -> None:
         self._telling.ordered(message)
         frame = self.line.send(message, self.candidate.peer)

@@ -4,49 +4,116 @@ from __future__ import annotations
 
 import asyncio
 
-from telemetry.errors import NotAllowedError
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.errors import NotAllowedError, RefusedError, SilentError, TelemetryError, TransferError
 from telemetry.link.adopted import AdoptedVehicle
+from telemetry.mavlink.logs.ftp.listing import FtpList
+from telemetry.mavlink.logs.ftp.log_files import FOLDERS, file_of_each
+from telemetry.mavlink.logs.ftp.questions import Numbers
+from telemetry.mavlink.logs.ftp.reading import FtpRead
 from telemetry.mavlink.logs.listing import LogListRead
 from telemetry.mavlink.logs.on_the_ground import refuse_in_flight
 from telemetry.mavlink.logs.reading import LogRead
 from telemetry.topics.requests import ReadVehicleLog
 from telemetry.topics.vehicle_logs import MOST_BYTES, VehicleLog
 
+INFO = 6
+
 
 class LogReading:
-    """One at a time: a vehicle sends one log, to one station. A mission that is transferred goes before."""
+    """One at a time: a vehicle sends one log, to one station. A mission that is transferred goes before.
+
+    By MAVLink FTP where the vehicle has it and the log's file is certain, else by LOG_REQUEST_DATA.
+    """
 
     def __init__(self, vehicle: AdoptedVehicle) -> None:
         self._vehicle = vehicle
-        self._machine: LogListRead | LogRead | None = None
+        self._machine: LogListRead | LogRead | FtpList | FtpRead | None = None
+        self._gave_way = False
         self._reading = asyncio.Lock()
+        self._numbers = Numbers()
+        self._logs: tuple[VehicleLog, ...] = ()
+        self._paths: dict[int, str] | None = None
+        """Files of the logs by their numbers; None: not looked for since the list."""
+        self._has_told = False
 
     async def list(self) -> tuple[VehicleLog, ...]:
-        found = await self._run(LogListRead(target=self._vehicle.target))
-        assert isinstance(found, tuple)
-        return found
+        async with self._reading:
+            found = await self._run(LogListRead(target=self._vehicle.target))
+            assert isinstance(found, tuple)
+            self._logs, self._paths, self._has_told = found, None, False
+            return found
 
     async def read(self, request: ReadVehicleLog) -> bytes:
         if not 0 < request.size <= MOST_BYTES:
             what = f"{request.size} bytes of a log were asked for at once."
             raise NotAllowedError(what, advice=f"Ask for 1 to {MOST_BYTES}.")
-        machine = LogRead(
-            request.number, request.offset, request.size, is_last=request.is_last, target=self._vehicle.target
-        )
-        content = await self._run(machine)
-        assert isinstance(content, bytes)
-        return content
+        async with self._reading:
+            content = await self._read_file(request)
+            if content is None:
+                content = await self._run(
+                    LogRead(
+                        request.number,
+                        request.offset,
+                        request.size,
+                        is_last=request.is_last,
+                        target=self._vehicle.target,
+                    )
+                )
+            assert isinstance(content, bytes)
+            return content
 
     def give_way(self) -> None:
         """Something that a flight needs is about to be transferred."""
         if self._machine is not None:
+            self._gave_way = True
             self._vehicle.exchanges.perform(self._machine, self._machine.cancel())
 
-    async def _run(self, machine: LogListRead | LogRead) -> object:
-        async with self._reading:
-            refuse_in_flight(self._vehicle.state)
-            self._machine = machine
-            try:
-                return await self._vehicle.exchanges.run(machine)
-            finally:
-                self._machine = None
+    async def _read_file(self, request: ReadVehicleLog) -> bytes | None:
+        """None: it cannot be read as a file, which has been told."""
+        if not (self._vehicle.capabilities or 0) & mavlink.MAV_PROTOCOL_CAPABILITY_FTP:
+            return self._tell_instead("the vehicle offers none")
+        folder = FOLDERS.get(self._vehicle.state.autopilot)
+        if folder is None:
+            return self._tell_instead("this autopilot has no one folder of them")
+        try:
+            if self._paths is None:
+                self._paths = await self._find_files(folder)
+            path = self._paths.get(request.number)
+            if path is None:
+                return self._tell_instead("which file is which log is not certain")
+            target = self._vehicle.target
+            content = await self._run(FtpRead(path, request.offset, request.size, target=target, numbers=self._numbers))
+        except (RefusedError, SilentError, TransferError) as error:
+            if self._gave_way:
+                raise
+            self._paths = {}
+            return self._tell_instead(_within_a_sentence(error))
+        assert isinstance(content, bytes)
+        return content
+
+    async def _find_files(self, folder: str) -> dict[int, str]:
+        listing = FtpList(folder, target=self._vehicle.target, numbers=self._numbers)
+        entries = await self._run(listing)
+        assert isinstance(entries, tuple)
+        return file_of_each(self._logs, entries, folder)
+
+    def _tell_instead(self, why: str) -> None:
+        """Once for each list."""
+        if not self._has_told:
+            self._has_told = True
+            self._vehicle.tell(INFO, f"Logs are read block by block, not as files: {why}.")
+
+    async def _run(self, machine: LogListRead | LogRead | FtpList | FtpRead) -> object:
+        refuse_in_flight(self._vehicle.state)
+        self._machine, self._gave_way = machine, False
+        try:
+            return await self._vehicle.exchanges.run(machine)
+        finally:
+            self._machine = None
+
+
+def _within_a_sentence(error: TelemetryError) -> str:
+    words = error.what.rstrip(".")
+    return words[0].lower() + words[1:]
