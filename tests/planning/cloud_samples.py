@@ -26,13 +26,23 @@ def some_points(seed: int, count: int = 3000) -> tuple[F64, U8]:
 
 
 def write_las(
-    path: Path, xyz: F64, classes: U8, *, crs: str | None = UTM_EGM96, withheld: U8 | None = None, point_format: int = 6
+    path: Path,
+    xyz: F64,
+    classes: U8,
+    *,
+    crs: str | None = UTM_EGM96,
+    withheld: U8 | None = None,
+    point_format: int = 6,
+    geo_keys: dict[int, int] | None = None,
 ) -> Path:
     """LAS or, by its name, LAZ."""
     header = laspy.LasHeader(point_format=point_format, version="1.4" if point_format >= 6 else "1.2")
     header.scales, header.offsets = np.full(3, 0.001), CORNER
     if crs is not None:
         header.add_crs(CRS.from_user_input(crs))
+    if geo_keys is not None:
+        numbers = [1, 1, 0, len(geo_keys), *(word for key, value in geo_keys.items() for word in (key, 0, 1, value))]
+        header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", np.array(numbers, "<u2").tobytes()))
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = xyz.T
     cloud.classification = classes

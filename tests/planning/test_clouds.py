@@ -130,6 +130,16 @@ def test_feet_become_metres(tmp_path: Path) -> None:
     assert "to metres" in " ".join(made.notes)
 
 
+def test_datum_and_unit_of_heights_from_geotiff_keys(tmp_path: Path) -> None:
+    xyz, classes = some_points(8, 500)
+    keys = {1024: 1, 3072: 32633, 4096: 5773, 4099: 9002}
+    path = write_las(tmp_path / "a.las", xyz, classes, crs=None, point_format=1, geo_keys=keys)
+    made = read_cloud(path, CloudParams(CELL_M))
+    assert made.dsm.vertical_datum == "EGM96 height"
+    assert made.dsm.crs.to_epsg() == 32633
+    assert "use --z-scale 0.3048" in " ".join(made.notes)
+
+
 def test_the_cell_comes_of_the_density() -> None:
     assert cell_for((0.0, 0.0, 100.0, 100.0), 640_000) == 0.25
     assert cell_for((0.0, 0.0, 100.0, 100.0), 630_000) == 0.5
