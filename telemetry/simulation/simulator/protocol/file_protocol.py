@@ -37,7 +37,8 @@ class FileProtocol:
     def __init__(self, own: OwnLogs, folder: str) -> None:
         """``folder``: where the logs lie."""
         self._own, self._folder = own, folder
-        self._sessions: dict[int, _Session] = {}
+        self._sessions: dict[tuple[Hashable, int], _Session] = {}
+        """By station and the number that it opened the file with."""
         self._last: dict[Hashable, tuple[FtpPayload, FtpPayload]] = {}
         """The last question of each peer and its answer, which may have been lost."""
         self._sent_s = 0.0
@@ -62,14 +63,14 @@ class FileProtocol:
             return []
         self._sent_s = wall_s
         out: list[Reply] = []
-        for number, session in self._sessions.items():
+        for (_, number), session in self._sessions.items():
             for _ in range(BLOCKS):
                 if session.burst is not None:
                     out.append((session.peer, self._next_of_burst(number, session, session.burst).message(session.to)))
         return out
 
     def forget(self, peer: Hashable) -> None:
-        self._sessions = {number: session for number, session in self._sessions.items() if session.peer != peer}
+        self._sessions = {key: session for key, session in self._sessions.items() if key[0] != peer}
         self._last.pop(peer, None)
 
     def _answer(self, asked: FtpPayload, peer: Hashable, to: tuple[int, int]) -> FtpPayload | None:
@@ -83,14 +84,14 @@ class FileProtocol:
                 self._sessions.clear()
                 return _ack(asked)
             case Opcode.TERMINATE_SESSION | Opcode.READ_FILE | Opcode.BURST_READ_FILE:
-                session = self._sessions.get(asked.session)
-                return self._of_session(asked, session) if session else _nak(asked, Nak.INVALID_SESSION)
+                session = self._sessions.get((peer, asked.session))
+                return self._of_session(asked, peer, session) if session else _nak(asked, Nak.INVALID_SESSION)
             case _:
                 return _nak(asked, Nak.UNKNOWN_COMMAND)
 
-    def _of_session(self, asked: FtpPayload, session: _Session) -> FtpPayload | None:
+    def _of_session(self, asked: FtpPayload, peer: Hashable, session: _Session) -> FtpPayload | None:
         if asked.opcode == Opcode.TERMINATE_SESSION:
-            del self._sessions[asked.session]
+            del self._sessions[peer, asked.session]
             return _ack(asked)
         size = min(asked.size or MOST_DATA, MOST_DATA)
         if asked.opcode == Opcode.BURST_READ_FILE:
@@ -115,13 +116,12 @@ class FileProtocol:
 
     def _open(self, asked: FtpPayload, peer: Hashable, to: tuple[int, int]) -> FtpPayload:
         content = self._files().get(_path(asked))
-        free = next((number for number in range(MOST_SESSIONS) if number not in self._sessions), None)
         if content is None:
             return _nak(asked, Nak.FILE_NOT_FOUND)
-        if free is None:
+        if (peer, asked.session) in self._sessions or len(self._sessions) >= MOST_SESSIONS:
             return _nak(asked, Nak.NO_SESSIONS_AVAILABLE)
-        self._sessions[free] = _Session(peer, to, bytes(content))
-        return _ack(asked, len(content).to_bytes(4, "little"), session=free)
+        self._sessions[peer, asked.session] = _Session(peer, to, bytes(content))
+        return _ack(asked, len(content).to_bytes(4, "little"))
 
     def _list(self, asked: FtpPayload) -> FtpPayload:
         entries = self._entries(_path(asked))
@@ -153,10 +153,9 @@ def _path(asked: FtpPayload) -> str:
     return "/" + path.strip("/")
 
 
-def _ack(asked: FtpPayload, data: bytes = b"", *, session: int | None = None) -> FtpPayload:
-    number = asked.session if session is None else session
+def _ack(asked: FtpPayload, data: bytes = b"") -> FtpPayload:
     seq = (asked.seq + 1) % NUMBERS
-    return FtpPayload(seq, Opcode.ACK, number, asked.offset, len(data), data, asked.opcode)
+    return FtpPayload(seq, Opcode.ACK, asked.session, asked.offset, len(data), data, asked.opcode)
 
 
 def _nak(asked: FtpPayload, why: Nak) -> FtpPayload:
