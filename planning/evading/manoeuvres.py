@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import length_m
-from planning.evading.evasion import AvoidanceParams, Manoeuvre, NoWay
 from planning.evading.keep_clear import Room, Seen, Surface
 from planning.evading.line_ahead import LineAhead
+from planning.evading.way_past import AvoidanceParams, Manoeuvre, NoWay
 
 BEYOND_M = 20.0
 """Distances are exact up to so much beyond what must be kept."""

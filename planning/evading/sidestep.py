@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.polyline import length_m
-from planning.evading.evasion import AvoidanceParams, NoWay
 from planning.evading.keep_clear import Room, Seen, Surface
 from planning.evading.line_ahead import LineAhead
+from planning.evading.way_past import AvoidanceParams, NoWay
 
 AHEAD_M = (4.0, 8.0, 16.0, 32.0)
 """Along the line from beside the end of the sidestep to where the line is joined again."""

@@ -17,7 +17,7 @@ from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from planning.evading.evasion import NoWay
+    from planning.evading.way_past import NoWay
     from telemetry.perception.mission_line import FlightLine
 
 _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")

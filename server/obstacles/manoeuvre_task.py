@@ -23,8 +23,8 @@ from telemetry.topics.obstacles import GroundNotice, MapOrigin, ObstacleAlert
 
 if TYPE_CHECKING:
     from mapping.perceiving.ground import GroundGrid
-    from planning.evading.evasion import Manoeuvre, NoWay
     from planning.evading.keep_clear import Seen
+    from planning.evading.way_past import Manoeuvre, NoWay
     from telemetry.perception.mission_line import FlightLine
 
 BESIDE_M = 3.0
@@ -36,8 +36,8 @@ NO_MISSION = "A guided way is flown, not the mission. Hold, then ask for another
 
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
-    from planning.evading.evasion import NoWay
     from planning.evading.manoeuvres import AvoidanceParams, around, over
+    from planning.evading.way_past import NoWay
     from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
@@ -127,7 +127,7 @@ def _ahead(line: FlightLine, position: F64, situation: Situation) -> MissionAhea
 def _prepared(
     way: Manoeuvre | NoWay, alert: ObstacleAlert, situation: Situation, ahead: MissionAhead, frame: LocalFrame
 ) -> Prepared:
-    from planning.evading.evasion import NoWay
+    from planning.evading.way_past import NoWay
 
     if isinstance(way, NoWay):
         return impossible(way, alert)

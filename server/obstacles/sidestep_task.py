@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
-from planning.evading.evasion import AvoidanceParams, NoWay
 from planning.evading.keep_clear import Seen, Surface
 from planning.evading.sidestep import Mover, Proposed, Sidestep, sidestep
+from planning.evading.way_past import AvoidanceParams, NoWay
 from server.obstacles.manoeuvre_situation import MissionAhead, Prepared, Situation, cruise_m_s, handle_of, impossible
 from server.schemas import ManoeuvreDoc
 from telemetry.topics.messages import GuidedTarget

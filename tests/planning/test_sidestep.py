@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.geometry.arrays import F64
-from planning.evading.evasion import NoWay
 from planning.evading.keep_clear import Seen
 from planning.evading.sidestep import AFTER_S, Mover, Proposed, Sidestep, sidestep
+from planning.evading.way_past import NoWay
 from tests.planning.test_avoidance import slope
 from tests.reference.box_distance import polyline_boxes_m
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from mapping.geometry.arrays import F32, F64, U8
 from planning.errors import NoElevationError, RasterError, RasterFormatError
+from planning.terrain.clouds.cloud_header import CloudHeader
+from planning.terrain.clouds.cloud_tables import Table, pcd_table, ply_table
 from planning.terrain.clouds.grid import Bounds, CloudGrid, Sorter, cell_for, grid_for
-from planning.terrain.clouds.header import CloudHeader
-from planning.terrain.clouds.tables import Table, pcd_table, ply_table
 
 if TYPE_CHECKING:
     from planning.terrain.clouds.las import LasFile

@@ -14,7 +14,7 @@ from pyproj import CRS
 
 from mapping.geometry.arrays import F32
 from planning.errors import ParameterError, RasterFormatError
-from planning.terrain.clouds.header import CloudHeader, cloud_format
+from planning.terrain.clouds.cloud_header import CloudHeader, cloud_format
 from planning.terrain.dsm import Dsm
 from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.header import RasterLimits
