@@ -23,7 +23,7 @@ from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
 from server.flying.recordings import Recording, TrackSoFar
 from server.flying.simulation import Simulation
-from server.flying.vehicle_logs import VehicleLogs
+from server.flying.vehicle_log_desk import VehicleLogs
 from server.flying.way_desk import WayDesk
 from server.flying.work import FlightWork
 from server.heard.agents import Agents

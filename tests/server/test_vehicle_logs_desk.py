@@ -11,7 +11,7 @@ from typing import Any, cast
 import pytest
 
 from server.errors import ConflictError, NotFoundError
-from server.flying.vehicle_logs import VehicleLogs
+from server.flying.vehicle_log_desk import VehicleLogs
 from server.schemas import LogDownloadDoc
 from telemetry.errors import NotAllowedError
 from telemetry.topics.requests import ListVehicleLogs, Operator, ReadVehicleLog
