@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
-from telemetry.simulation.simulator.own_log import OwnLog, OwnLogs
+from telemetry.simulation.simulator.own_log import OwnLogs, SimulatedLog
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 
 FOLDER = "/APM/LOGS"
@@ -13,7 +13,7 @@ FOLDER = "/APM/LOGS"
 
 class FileVehicle:
     def __init__(self, logs: list[bytes]) -> None:
-        own = SimpleNamespace(logs=[OwnLog(1_700_000_000.0, bytearray(log)) for log in logs])
+        own = SimpleNamespace(logs=[SimulatedLog(1_700_000_000.0, bytearray(log)) for log in logs])
         self.files = FileProtocol(cast(OwnLogs, own), FOLDER)
 
     def on_message(self, message: Any, now_s: float) -> list[Any]:

@@ -31,7 +31,7 @@ _KINDS = {
 
 
 @dataclass(slots=True)
-class OwnLog:
+class SimulatedLog:
     begun_utc_s: float
     content: bytearray = field(default_factory=bytearray)
 
@@ -45,7 +45,7 @@ class OwnLogs:
         self._started_utc_s = time.time()
         self._is_open = False
         self._mode, self._written_s = "", 0.0
-        self.logs: list[OwnLog] = []
+        self.logs: list[SimulatedLog] = []
 
     def look(self) -> None:
         """After everything that may have armed or disarmed the vehicle."""
@@ -76,7 +76,7 @@ class OwnLogs:
             self._write("MSG", text.encode())
 
     def _begin(self) -> None:
-        self.logs = [*self.logs[-MOST_LOGS + 1 :], OwnLog(self._started_utc_s + self._vehicle.now_s)]
+        self.logs = [*self.logs[-MOST_LOGS + 1 :], SimulatedLog(self._started_utc_s + self._vehicle.now_s)]
         self._mode = ""
         self._format("FMT", 128, "BBnNZ", "Type,Length,Name,Format,Columns", 89)
         for name, (number, letters, packing, columns) in _KINDS.items():

@@ -97,7 +97,7 @@ class Sensed:
     above_ground_m: float = math.inf
 
 
-class Pilot:
+class AnyPilot:
     """What every simulated autopilot knows and tells, whoever made it. Positions are in the frame, as estimated."""
 
     def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:
@@ -152,7 +152,7 @@ class Pilot:
             self.heading_goal_rad = math.atan2(east, north) % (2 * math.pi)
 
 
-class SimulatedPilot(Pilot):
+class SimulatedPilot(AnyPilot):
     """ArduCopter's state that its modes read and change."""
 
     def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:

@@ -16,7 +16,7 @@ FASTER_DOWN_M_S = 0.5
 LARGEST_THRUST_M_S2 = 20.0
 
 
-class PositionControl:
+class Px4PositionControl:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._memory: Vec3 = (0.0, 0.0, 0.0)

@@ -14,15 +14,15 @@ import numpy as np
 from telemetry.simulation.simulator.airframe.dynamics import Demand
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S, Answer, HomeSet, Sensed, StateChanged
-from telemetry.simulation.simulator.autopilot.px4.position_control import PositionControl
+from telemetry.simulation.simulator.autopilot.px4.position_control import Px4PositionControl
 from telemetry.simulation.simulator.autopilot.px4.px4_flying import Px4Flying
 from telemetry.simulation.simulator.autopilot.px4.px4_mission import MissionMode
 from telemetry.simulation.simulator.autopilot.px4.px4_modes import (
-    Hold,
-    Landing,
-    Mode,
     Offboard,
-    Return,
+    Px4Hold,
+    Px4Landing,
+    Px4Mode,
+    Px4Return,
     Stage,
     Sticks,
     TakeOff,
@@ -57,9 +57,9 @@ class Px4Pilot(Px4Flying):
         super().__init__(frame, parameters, boot_s)
         shaken, moved = np.random.SeedSequence(seed).spawn(2)
         self.missions = MissionMode()
-        self.mode: Mode = Hold()
+        self.mode: Px4Mode = Px4Hold()
         self.mode.enter(self)
-        self.control = PositionControl(parameters)
+        self.control = Px4PositionControl(parameters)
         self._unrest = Unrest(np.random.default_rng(shaken))
         self._moving_home = MovingHome(np.random.default_rng(moved), is_on=home_moves)
         self._speedup = speedup
@@ -155,7 +155,7 @@ class Px4Pilot(Px4Flying):
 
     def hold_at(self, place_neu: Vec3) -> None:
         self.change_mode("HOLD")
-        if isinstance(self.mode, Hold):
+        if isinstance(self.mode, Px4Hold):
             self.mode.go_to(self, place_neu)
 
     def start_mission(self) -> Verdict:
@@ -178,11 +178,11 @@ class Px4Pilot(Px4Flying):
         """``hold``: changes to HOLD for it."""
         if not self.flying:
             return "denied"
-        if not isinstance(self.mode, Hold):
+        if not isinstance(self.mode, Px4Hold):
             if not hold or not self.change_mode("HOLD"):
                 return "denied"
             self._chosen = "HOLD"
-        assert isinstance(self.mode, Hold)
+        assert isinstance(self.mode, Px4Hold)
         self.mode.go_to(self, goal_neu)
         if heading_rad is None:
             self.face(goal_neu, at_least_m=self.parameters["NAV_ACC_RAD"])
@@ -293,7 +293,7 @@ class Px4Pilot(Px4Flying):
             self.missions.state = "not_started"
         self._set_home()
         chosen = "HOLD" if self._chosen == "MISSION" and self.missions.state == "complete" else self._chosen
-        self._take(self._mode(chosen) or Hold())
+        self._take(self._mode(chosen) or Px4Hold())
         self.mode.enter(self)
         self.tell(StateChanged())
 
@@ -303,17 +303,19 @@ class Px4Pilot(Px4Flying):
         self._stop_motors()
         self.say(0, reason)
 
-    def _take(self, mode: Mode) -> None:
+    def _take(self, mode: Px4Mode) -> None:
         if self.mode is self.missions and mode is not self.missions:
             self.missions.leave()
         self.mode = mode
         self.cruise_m_s = self.cruise_m_s if self.armed and mode.name in ("MISSION", "HOLD") else None
         self.tell(StateChanged())
 
-    def _mode(self, name: str) -> Mode | None:
+    def _mode(self, name: str) -> Px4Mode | None:
         if name == "MISSION":
             return self.missions
-        made = {"HOLD": Hold, "RTL": Return, "LAND": Landing, "TAKEOFF": TakeOff, "OFFBOARD": Offboard}.get(name)
+        made = {"HOLD": Px4Hold, "RTL": Px4Return, "LAND": Px4Landing, "TAKEOFF": TakeOff, "OFFBOARD": Offboard}.get(
+            name
+        )
         if made:
             return made()
         return Sticks(name) if name in BY_HAND else None

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.mission_steps import MissionSteps, Step
-from telemetry.simulation.simulator.autopilot.pilot import Answer, Pilot
+from telemetry.simulation.simulator.autopilot.pilot import Answer, AnyPilot
 from telemetry.simulation.simulator.autopilot.px4.trajectory import Limits, Trajectory
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
@@ -31,7 +31,7 @@ class OffboardInput:
         return now_s - self.heard_s <= self.SLOWEST_S and self.heard_s - self._before_s <= self.SLOWEST_S
 
 
-class Px4Flying(Pilot, ABC):
+class Px4Flying(AnyPilot, ABC):
     """State that modes read and change. Positions are in the frame, as estimated."""
 
     def __init__(self, frame: NeuFrame, parameters: Parameters, boot_s: float) -> None:

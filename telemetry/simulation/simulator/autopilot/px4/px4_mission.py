@@ -8,7 +8,7 @@ from typing import Literal
 from telemetry.simulation.simulator.autopilot.mission_steps import Step
 from telemetry.simulation.simulator.autopilot.pilot import Reached
 from telemetry.simulation.simulator.autopilot.px4.px4_flying import Px4Flying
-from telemetry.simulation.simulator.autopilot.px4.px4_modes import Landing, Stage
+from telemetry.simulation.simulator.autopilot.px4.px4_modes import Px4Landing, Stage
 from telemetry.simulation.simulator.neu_frame import Vec3
 
 MissionState = Literal["not_started", "active", "paused", "complete"]
@@ -27,7 +27,7 @@ class MissionMode:
         self._points: tuple[Vec3, Vec3, Vec3] | None = None
         self._climb: Vec3 | None = None
         """Straight up first, to the height of what comes next."""
-        self._landing: Landing | None = None
+        self._landing: Px4Landing | None = None
         self._arrived_s: float | None = None
 
     def enter(self, pilot: Px4Flying) -> str | None:
@@ -89,7 +89,7 @@ class MissionMode:
             self._done(pilot)
 
     def _land(self, pilot: Px4Flying) -> None:
-        self._landing, self.stage = Landing(self.goal), "landing"
+        self._landing, self.stage = Px4Landing(self.goal), "landing"
         self._landing.enter(pilot)
 
     def landed(self, pilot: Px4Flying) -> None:

@@ -14,7 +14,7 @@ SLOWER_JERK = 0.6
 """Share of MPC_JERK_AUTO with which PX4 reckons where HOLD stops."""
 
 
-class Mode(Protocol):
+class Px4Mode(Protocol):
     name: str
     stage: Stage
     goal: Vec3 | None
@@ -44,7 +44,7 @@ class Sticks:
         """It stands."""
 
 
-class Hold:
+class Px4Hold:
     """Stops, stays, and goes where it is told (DO_REPOSITION)."""
 
     name = "HOLD"
@@ -89,7 +89,7 @@ class TakeOff:
             pilot.hold_at(self.goal)
 
 
-class Landing:
+class Px4Landing:
     """Down here; slower from MPC_LAND_ALT1 on, slowest on the last metre."""
 
     name = "LAND"
@@ -117,7 +117,7 @@ class Landing:
         return slow + (fast - slow) * max(0.0, min(1.0, (above_m - low_m) / (high_m - low_m)))
 
 
-class Return:
+class Px4Return:
     """Up to its return height, straight home, down."""
 
     name = "RTL"
@@ -125,7 +125,7 @@ class Return:
     def __init__(self) -> None:
         self.stage: Stage = "flight"
         self.goal: Vec3 | None = None
-        self._landing: Landing | None = None
+        self._landing: Px4Landing | None = None
 
     def enter(self, pilot: Px4Flying) -> str | None:
         self.stage = "flight" if pilot.flying else "ground"
@@ -154,7 +154,7 @@ class Return:
             return
         pilot.fly_towards((self._from, self.goal, self.goal), dt_s)
         if pilot.is_at(self.goal):
-            self._landing, self.stage = Landing((*self.goal[:2], 0.0)), "landing"
+            self._landing, self.stage = Px4Landing((*self.goal[:2], 0.0)), "landing"
             self._landing.enter(pilot)
             pilot.say(6, "RTL: land at destination")
 
