@@ -22,7 +22,7 @@ from telemetry.mavlink.commands import CommandRun
 from telemetry.mavlink.conversation import BootClock
 from telemetry.mavlink.parameters.values import BYTEWISE
 from telemetry.mavlink.reduce import reduce
-from telemetry.mavlink.texts import Heard, Speech
+from telemetry.mavlink.texts import HeardWords, Speech
 from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 from telemetry.topics.vehicle import Autopilot, VehicleState
 
@@ -201,7 +201,7 @@ class AdoptedVehicle:
             self._telling.unsure()
         self._on_heard(self._speech.on_message(message, now_s), now_s)
 
-    def _on_heard(self, heard: Heard, now_s: float) -> None:
+    def _on_heard(self, heard: HeardWords, now_s: float) -> None:
         for severity, text in heard.texts:
             self._telling.text(severity, text)
         if heard.reasons is not None:

@@ -19,7 +19,7 @@ EVENT_KINDS = frozenset({"EVENT", "CURRENT_EVENT_SEQUENCE", "RESPONSE_EVENT_ERRO
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardWords:
     texts: tuple[tuple[int, str], ...] = ()
     """(severity, words) of what is new."""
     reasons: tuple[str, ...] | None = None
@@ -33,20 +33,20 @@ class Speech:
         """When, whether by an event, and what."""
         self._wants_report, self._has_events = False, False
 
-    def on_message(self, message: Message, now_s: float) -> Heard:
+    def on_message(self, message: Message, now_s: float) -> HeardWords:
         kind = message.get_type()
         if kind == "STATUSTEXT":
-            return Heard(self._once(self._texts.on_message(message, now_s), now_s, by_event=False))
+            return HeardWords(self._once(self._texts.on_message(message, now_s), now_s, by_event=False))
         if kind not in EVENT_KINDS:
-            return Heard()
+            return HeardWords()
         if not self._has_events:
             self._has_events = self._wants_report = True
         return self._on_events(self._events.on_message(message, now_s), now_s)
 
-    def on_tick(self, now_s: float) -> Heard:
+    def on_tick(self, now_s: float) -> HeardWords:
         """At infinity: nothing is waited for any more."""
         heard = self._on_events(self._events.on_tick(now_s), now_s)
-        return Heard((*self._once(self._texts.on_tick(now_s), now_s, by_event=False), *heard.texts), heard.reasons)
+        return HeardWords((*self._once(self._texts.on_tick(now_s), now_s, by_event=False), *heard.texts), heard.reasons)
 
     def take_requests(self) -> list[Message]:
         """For events that got lost."""
@@ -57,7 +57,7 @@ class Speech:
         wish, self._wants_report = self._wants_report, False
         return wish
 
-    def _on_events(self, events: list[VehicleEvent | LostEvents], now_s: float) -> Heard:
+    def _on_events(self, events: list[VehicleEvent | LostEvents], now_s: float) -> HeardWords:
         texts: list[tuple[int, str]] = []
         reasons: tuple[str, ...] | None = None
         for event in events:
@@ -70,7 +70,7 @@ class Speech:
                 texts += self._report.news(report)
             elif not is_of_report and event.severity <= DEBUG:
                 texts.append((event.severity, words_of(event) or unknown_words(event)))
-        return Heard(self._once(texts, now_s, by_event=True), reasons)
+        return HeardWords(self._once(texts, now_s, by_event=True), reasons)
 
     def _once(self, texts: list[tuple[int, str]], now_s: float, *, by_event: bool) -> tuple[tuple[int, str], ...]:
         """What repeats itself is told again: only what came the other way within the time is left out."""
