@@ -43,7 +43,7 @@ from server.settings import DemoAutopilot
 from server.studies.scenario_desk import ScenarioDesk
 from server.work.jobs import Lane
 from server.workspace import Workspace
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus

@@ -16,7 +16,7 @@ from server.errors import BadRequestError, CheckNeededError, StorageError
 from server.flying.checklists import Checklists
 from server.heard.onboard import Aboard
 from server.schemas import ChecklistDoc, TickBody
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.checklist import ChecklistPoint, ChecklistRecord, digest_of
 from telemetry.topics.messages import LinkStatus, Topic

@@ -23,7 +23,7 @@ from server.heard.onboard import Aboard, onboard
 from server.obstacles.obstacle_watch import Watch
 from server.schemas import CheckRow, FlyMessage, FlyState, Pages, PreflightDoc, StartFlight, TickBody
 from server.workspace import Workspace
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
 from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, Topic

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from mapping.sensor_frames import CloudFrame, RadarFrame, UwbScan
 from server.errors import BusyError
 from telemetry.agent.intake import Frame, Intake
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic, VehicleText
 
 AGENTS_MAX = 4

@@ -10,7 +10,7 @@ from server.heard.ground_task import Ground
 from server.schemas import NodeDoc, NodesMessage, Pages
 from server.settings import DemoAutopilot
 from server.work.supervisor import NodeState, Supervisor
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node_lock import running_node
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.requests import RecorderRequest, ReplayRequest, StartRecording

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import REPLAY_PREFIX, Topic
 
 Handler = Callable[[Any], object]

@@ -29,7 +29,7 @@ from server.schemas import (
     Source,
 )
 from server.work.jobs import Lane
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.perception.sensor_kinds import check_memory, check_perception
 from telemetry.topics.messages import LinkStatus, PlanRecord, Topic

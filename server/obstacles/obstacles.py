@@ -31,7 +31,7 @@ from server.scene.layers.sights import Sights
 from server.schemas import Pages, Source
 from server.work.jobs import Lane
 from server.workspace import Workspace
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import LinkStatus, Topic
 from telemetry.topics.obstacles import SENSORS, Sensor

@@ -10,7 +10,7 @@ from server.heard.node_states import Nodes
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
 from server.library.terrains import ground_notice
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import PlanRecord, Topic
 from telemetry.topics.obstacles import SENSORS, GroundNotice, Sensor
 

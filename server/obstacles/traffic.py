@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from server.library.whole_files import write_atomically
 from server.schemas import Pages, Source, TrafficMessage, TrafficSettingsBody
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 

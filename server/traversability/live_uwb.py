@@ -17,7 +17,7 @@ from server.errors import reported
 from server.library import Library
 from server.schemas import UwbLiveDoc
 from server.traversability.traversability_desk import TraversabilityDesk
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.perception.uwb_drive import UwbDrive
 from telemetry.sensors.uwb_log import write_uwb_log
 from telemetry.topics.messages import Topic, VehicleText

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, overload
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.liveness import Liveness
 from telemetry.bus.node_lock import running_node, silence_counts
 from telemetry.errors import BusError, OvertakenError

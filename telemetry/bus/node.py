@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from planning.errors import DescribedError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node_lock import NodeLock
 from telemetry.bus.sockets import private_directory
 from telemetry.errors import BusError

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import msgspec
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import GIVEN_UP_S, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.audit import AUDIT_FILE, open_audit

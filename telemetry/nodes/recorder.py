@@ -13,7 +13,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.continuing import find_unfinished

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext, run_node
 from telemetry.errors import RecordingError
 from telemetry.recording.player import STATUS_EVERY_S, Due, Player

@@ -19,7 +19,7 @@ from typing import get_args
 
 import numpy as np
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.scene import World

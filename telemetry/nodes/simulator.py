@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planning.errors import DescribedError, ParameterError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import EXIT_ENDED, EXIT_REFUSED, LOOK_EVERY_S, NodeContext, run_node
 from telemetry.simulation.simulator.airframe.gnss import RECEIVERS
 from telemetry.simulation.simulator.airframe.gnss_script import read_event

@@ -14,7 +14,7 @@ import numpy as np
 
 from mapping.sensor_frames import RadarFrame
 from mapping.tracking.tracker import Tracker
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.perception.frame_worker import PLAN, SETTINGS, FrameWorker, Give
 from telemetry.perception.inbox import Inbox

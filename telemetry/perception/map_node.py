@@ -6,7 +6,7 @@ import asyncio
 import logging
 import time
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.perception.ahead import Ahead, Flight
 from telemetry.perception.frame_worker import CONFLICT, WHOLE

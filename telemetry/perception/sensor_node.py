@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from planning.errors import DescribedError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import BusError
 from telemetry.perception.frame_worker import AVOIDANCE, CAMERA, FLIGHT, GROUND, NOTICE, PLAN, SETTINGS, STATE

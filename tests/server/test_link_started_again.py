@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from server.work.supervisor import Supervisor
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node_lock import running_node
 from telemetry.nodes.link import read_memory
 from tests.telemetry.bus_runs import run, short_folder

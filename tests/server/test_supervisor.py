@@ -13,7 +13,7 @@ import pytest
 from server.work import node_process, supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.liveness import HUNG_S, STARVED_S
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 

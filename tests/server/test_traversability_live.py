@@ -22,7 +22,7 @@ from server.stations import RUNTIME_FOLDER
 from server.traversability.live_uwb import AGAIN_S, SILENT_S, LiveUwb
 from telemetry.agent.client import Agent
 from telemetry.agent.link_messages import Uwb
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic, VehicleText
 from tests.server.scene_fixtures import hill
 from tests.server.station import Station, ok, station

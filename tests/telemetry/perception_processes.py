@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import ServerAlive, Topic
 from telemetry.topics.obstacles import MapDelta, ObstacleAlert, PerceptionStatus
 from tests.telemetry import perception_flights as flights

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.errors import BusError
 from telemetry.topics.messages import PlanRecord, RawFrame, ServerAlive, Topic, VehicleText
 from telemetry.topics.vehicle import VehicleState

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from planning.errors import CapacityError, DescribedError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.encoding import encode, error_of
 from telemetry.errors import BusError, MissionUnknownError, RefusedError, SilentError
 from telemetry.topics.messages import ErrorInfo

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.errors import BusError
 from telemetry.topics.messages import ServerAlive
 from tests.telemetry.bus_runs import Participant, run, short_folder
@@ -15,7 +15,7 @@ from tests.telemetry.bus_runs import Participant, run, short_folder
 BODY = """
 import asyncio, sys
 from pathlib import Path
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.topics.messages import ServerAlive
 
 async def main(name, folder):

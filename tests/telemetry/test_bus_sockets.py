@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.sockets import neighbours, private_directory, socket_directory
 from telemetry.errors import BusError
 from telemetry.topics.messages import Topic

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import COMMAND_S, LinkClient
 from telemetry.bus.node_lock import running_node
 from telemetry.errors import AddressError, BusError, MissionUnknownError, NoVehicleError

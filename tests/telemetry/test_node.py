@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import GIVEN_UP_S, UNATTENDED_S, NodeContext
 from telemetry.bus.node_lock import NodeLock, running_node, running_nodes
 from telemetry.topics.messages import ServerAlive, Topic

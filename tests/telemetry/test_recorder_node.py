@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.nodes.recorder import mend_all
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.topics.messages import RawFrame, RecorderStatus, ServerAlive, Topic

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.bus.node_lock import NodeLock
 from telemetry.errors import RecordingError

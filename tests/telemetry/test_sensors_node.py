@@ -15,7 +15,7 @@ import pytest
 
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, rows
 from planning.errors import FormatError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.bus.node_lock import NodeLock
 from telemetry.nodes.sensors import REST_HZ, SensorOptions, main, sense

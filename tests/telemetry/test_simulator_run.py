@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.errors import ParameterError
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.node import NodeContext
 from telemetry.bus.node_lock import NodeLock
 from telemetry.errors import AddressError, ConnectionFailedError

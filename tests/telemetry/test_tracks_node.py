@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.topics.messages import ServerAlive, Topic
 from telemetry.topics.obstacles import ObstacleAlert, PerceptionStatus

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from server.library.directory_lock import locked
 from server.work.supervisor import Supervisor
-from telemetry.bus import Bus
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import ServerAlive, Topic
 from telemetry.topics.requests import Operator
