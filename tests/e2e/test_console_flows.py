@@ -69,14 +69,20 @@ def test_points_are_dragged_reordered_and_brought_back(demo_3d: Page) -> None:
 def test_profile_and_view_mark_the_same_place(demo_3d: Page) -> None:
     demo = demo_3d
     plot = demo.locator(".u-over")
-    # It is made anew when what it shows is another; between the two there is none.
-    wait_until(demo, lambda: plot.count() == 1 and plot.bounding_box() is not None)
-    chart = plot.bounding_box()
-    assert chart is not None
     values = demo.get_by_test_id("cursor-values")
-    demo.mouse.move(chart["x"] + 0.5 * chart["width"], chart["y"] + 0.5 * chart["height"])
     # The place in degrees is the server's answer, which comes with the mark in 3D.
-    expect(values).to_contain_text(re.compile(r"37\.\d{7}, 14\.\d{7}"))
+    place = re.compile(r"37\.\d{7}, 14\.\d{7}")
+
+    def shown() -> bool:
+        """The chart is made anew when what it shows is another: a pointer that rested on the old one marks nothing."""
+        demo.mouse.move(0, 0)
+        plot.hover()
+        with contextlib.suppress(AssertionError):
+            expect(values).to_contain_text(place, timeout=3000)
+            return True
+        return False
+
+    wait_until(demo, shown)
 
     demo.get_by_test_id("view-worst").click()  # which also takes the pointer off the chart
     expect(values).to_have_count(0)
