@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -37,9 +37,12 @@ class Scenery:
         while True:
             await asyncio.sleep(PERIOD_S)
             beat += 1
-            self.draw(with_tracks=beat % _TRACK_EVERY == 0)
+            for _ in self.drawn(with_tracks=beat % _TRACK_EVERY == 0):
+                # Each vehicle takes the loop some milliseconds: what else waits comes between them.
+                await asyncio.sleep(0)
 
-    def draw(self, *, with_tracks: bool = True) -> None:
+    def drawn(self, *, with_tracks: bool) -> Iterator[None]:
+        """Vehicle by vehicle."""
         dsm = None if self._stage is None else self._stage.dsm
         if self._stage is None or dsm is None:
             self._placer = None
@@ -54,6 +57,7 @@ class Scenery:
             # A replay leaves states out when it runs fast or jumps; its whole line is drawn from the recording.
             if with_tracks and name != REPLAY:
                 actor.draw_track(self._stage, self._placer)
+            yield
 
 
 _NOWHERE = np.full((1, 3), np.nan)

@@ -83,11 +83,11 @@ class MapDrawing:
             await asyncio.sleep(PERIOD_S)
             source = self._shown_source()
             watch = self._watches[source]
-            routes = self._manoeuvres.routes if source == "live" else []
+            routes = list(self._manoeuvres.routes) if source == "live" else []
             tracks = self._tracks[source].status
             origin = _origin(watch) or (None if tracks is None else tracks.origin)
-            stage.draw_now(source, origin, watch.statuses, routes, tracks)
-            stage.draw_cloud(source, watch.fresh_cloud())
+            await asyncio.to_thread(stage.draw_now, source, origin, dict(watch.statuses), routes, tracks)
+            await asyncio.to_thread(stage.draw_cloud, source, watch.fresh_cloud())
 
     async def _draw_maps(self, stage: Sights) -> None:
         while True:

@@ -50,7 +50,7 @@ class SceneView:
         self._server = server = host.server
         self._canvas = Canvas(server)
         self.vehicles = Vehicles(self._canvas)
-        self.sights = Sights(server, self._canvas)
+        self.sights = Sights(server, Canvas(server))
         self.traffic = TrafficStage(self._canvas)
         self._cameras = Cameras(host, self.vehicles)
         self._layers = layers(self._watch_gizmo)
@@ -110,7 +110,7 @@ class SceneView:
             await asyncio.sleep(CAMERAS_EVERY_S)
             if self._drawn is not None:
                 self._cameras.follow(self._drawn)
-                self._cameras.tidy(self._canvas.nodes)
+                self._cameras.tidy([*self._canvas.nodes, *self.sights.moving])
 
     def sample_under(self, page_id: str, x: float, y: float) -> float | None:
         """The distance flown ``s_m`` at the path's place under a page's pointer; None when it points elsewhere.

@@ -109,15 +109,15 @@ def test_the_3d_view_draws_no_line_to_where_a_lost_vehicle_was_found_again() -> 
 
     fly(0.0, 50.0)
     fly(1.0, 51.0)
-    scenery.draw()
+    list(scenery.drawn(with_tracks=True))
     fly(20.0, 90.0)
     fly(21.0, 91.0)
-    scenery.draw()
+    list(scenery.drawn(with_tracks=True))
     x_m = stage.path_m[:, 0] - west
     np.testing.assert_allclose(x_m, [50.0, 51.0, np.nan, 90.0, 91.0], atol=0.01)
     fly(40.0, 20.0)
     fly(41.0, 21.0)
-    scenery.draw()
+    list(scenery.drawn(with_tracks=True))
     np.testing.assert_allclose(stage.path_m[5:, 0] - west, [np.nan, 20.0, 21.0], atol=0.01)
 
 

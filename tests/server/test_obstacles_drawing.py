@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -131,3 +134,34 @@ def test_another_map_takes_the_place_of_the_one_before() -> None:
     maps.draw(stage, "radar", live)
     assert stage.drawn == [((0, 0, 0), 1)]
     assert live.origin == ORIGIN
+
+
+class Threads(FakeStage):
+    """Which thread draws what moves, and whether a map may."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.drew: dict[str, int] = {}
+
+    def draw_now(self, source: Any, origin: Any, statuses: Any, routes: Any, tracks: Any = None) -> None:
+        self.drew["now"] = threading.get_ident()
+
+    def draw_cloud(self, source: Any, look: Any) -> None:
+        self.drew["cloud"] = threading.get_ident()
+
+
+def test_the_event_loop_draws_nothing_of_what_moves() -> None:
+    stage = Threads()
+    watches = {source: Watch(source, Told()) for source in ("live", "replay")}
+    nothing = {source: SimpleNamespace(status=None) for source in ("live", "replay")}
+    maps = MapDrawing(stage, watches, NoRoutes(), nothing)  # pyright: ignore[reportArgumentType]
+
+    async def draw() -> None:
+        drawing = asyncio.create_task(maps.run())
+        async with asyncio.timeout(60):
+            while len(stage.drew) < 2:
+                await asyncio.sleep(0.01)
+        drawing.cancel()
+
+    asyncio.run(draw())
+    assert threading.get_ident() not in stage.drew.values()

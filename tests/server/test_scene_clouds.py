@@ -58,7 +58,7 @@ def server() -> Iterator[viser.ViserServer]:
 def test_each_cloud_is_drawn_once_and_only_while_the_layer_is_on(server: viser.ViserServer) -> None:
     drawing, placing = placed()
     put: list[dict[str, Any]] = []
-    sights = Sights(server, cast(Any, SimpleNamespace(draw=put.append)))
+    sights = Sights(server, cast(Any, SimpleNamespace(draw=put.append, nodes=[])))
     sights.redraw(showing(drawing, on=False))
     cloud = look(placing.origin, 50)
     for _ in range(3):

@@ -190,7 +190,7 @@ def server() -> Iterator[viser.ViserServer]:
 def test_on_the_stage_what_has_gone_is_taken_away(server: viser.ViserServer) -> None:
     drawing, placing = placed()
     put: dict[str, Any] = {}
-    sights = Sights(server, cast(Any, SimpleNamespace(draw=put.update)))
+    sights = Sights(server, cast(Any, SimpleNamespace(draw=put.update, nodes=[])))
     sights.redraw(drawing)
     sights.draw_now("live", placing.origin, {"radar": status(occupied=True)}, [])
     assert len(put["regions_live"]) == 2

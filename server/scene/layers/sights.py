@@ -1,6 +1,6 @@
 """What was seen, on the stage: maps by their chunks, and above them what happens now.
 
-Maps have a canvas of their own, which is drawn from a thread: vehicles and regions wait for none of it.
+Each has a canvas of its own, drawn from a thread: vehicles wait for none of it, and neither waits for the other.
 """
 
 from __future__ import annotations
@@ -45,11 +45,13 @@ class MapLook:
 
 
 class Sights:
-    """``draw_chunks`` is for one thread at a time; all else belongs to the event loop."""
+    """``draw_chunks`` is for one thread at a time, ``draw_now`` with ``draw_cloud`` for another, all else for the loop."""
 
-    def __init__(self, server: viser.ViserServer, canvas: Canvas) -> None:
-        self._server, self._canvas = server, canvas
+    def __init__(self, server: viser.ViserServer, moving: Canvas) -> None:
+        """``moving``: a canvas that nobody else draws on, for what happens now."""
+        self._server, self._moving = server, moving
         self._maps = Canvas(server)
+        self._moving_nodes: tuple[Node, ...] = ()
         self._nodes: dict[str, list[Node]] = {}
         self._drawing: Drawing | None = None
         self._placing: EnuPlacing | None = None
@@ -60,6 +62,11 @@ class Sights:
     @property
     def dsm(self) -> Dsm | None:
         return None if self._drawing is None else self._drawing.dsm
+
+    @property
+    def moving(self) -> tuple[Node, ...]:
+        """What ``draw_now`` and ``draw_cloud`` have drawn."""
+        return self._moving_nodes
 
     def redraw(self, drawing: Drawing | None) -> None:
         """Another model, frame or choice of layers; what moves is drawn again at the next turn."""
@@ -83,8 +90,9 @@ class Sights:
         routes: Sequence[Route],
         tracks: TracksStatus | None = None,
     ) -> None:
-        """Regions, conflicts, manoeuvres and moving objects: few and small, ten times a second."""
-        drawing, placing = self._drawing, self._place(origin)
+        """Regions, conflicts, manoeuvres and moving objects, ten times a second. Up to 20 ms where many move."""
+        drawing = self._drawing
+        placing = self._place(drawing, origin)
         key = (drawing, placing, tracks, *statuses.values(), *routes)
         if len(key) == len(self._now) and all(a is b for a, b in zip(key, self._now, strict=True)):
             return
@@ -102,7 +110,7 @@ class Sights:
         self._shown = {layer for layer, nodes in drawn.items() if nodes}
         changed = {layer: drawn.get(layer, []) for layer in self._shown | gone}
         if changed:
-            self._canvas.draw(changed)
+            self._draw_moving(changed)
 
     def draw_cloud(self, source: Source, look: CloudLook | None) -> None:
         """The camera's newest points; nothing travels while the layer is off."""
@@ -112,11 +120,15 @@ class Sights:
         if key[0] == self._cloud[0] and all(a is b for a, b in zip(key[1:], self._cloud[1:], strict=True)):
             return
         self._cloud = key
-        placing = None if wanted is None else self._place(wanted.origin)
+        placing = None if wanted is None else self._place(drawing, wanted.origin)
         nodes: list[Node] = []
         if drawing is not None and placing is not None:
             nodes = cloud_nodes(drawing, placing, wanted, prefix=f"/now_{source}")
-        self._canvas.draw({"cloud": nodes})
+        self._draw_moving({"cloud": nodes})
+
+    def _draw_moving(self, layers: Mapping[str, list[Node]]) -> None:
+        self._moving.draw(layers)
+        self._moving_nodes = tuple(self._moving.nodes)
 
     def ground_up_m(self, origin: MapOrigin, enu_m: F64) -> F64:
         """(N, 3) places -> (N,) up of the surface model there, above home; NaN where it is unknown."""
@@ -155,10 +167,10 @@ class Sights:
         else:
             self._nodes.pop(name, None)
 
-    def _place(self, origin: MapOrigin | None) -> EnuPlacing | None:
-        dsm = self.dsm
-        if dsm is None or origin is None:
+    def _place(self, drawing: Drawing | None, origin: MapOrigin | None) -> EnuPlacing | None:
+        if drawing is None or origin is None:
             return None
+        dsm = drawing.dsm
         if self._placing is None or self._placing.dsm is not dsm or self._placing.origin != origin:
             self._placing = EnuPlacing.of(dsm, origin)
         return self._placing
