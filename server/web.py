@@ -63,6 +63,7 @@ from server.schemas.station_docs import FIRST_VEHICLE
 from server.settings import Settings
 from server.studies.radar_desk import RadarDesk
 from server.studies.scenario_desk import ScenarioDesk
+from server.work.loading import loaded_to_stay
 from server.work.loop_lag import LoopLag
 from server.work.task_group import Background
 
@@ -142,9 +143,10 @@ async def _lifespan(
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         background = Background(group)
         stack.callback(background.stop)
-        await asyncio.to_thread(_complete_routes, app)
         try:
-            parts = await _open(settings, library, make_workspace, open_fleet, background, stack, demo, tls)
+            with loaded_to_stay():
+                await asyncio.to_thread(_complete_routes, app)
+                parts = await _open(settings, library, make_workspace, open_fleet, background, stack, demo, tls)
         except DescribedError as error:
             app.state.start_error = error
             raise

@@ -34,6 +34,7 @@ async def health(request: Request) -> HealthDoc:
         longest_ms=1000 * lag.longest_s,
         longest_utc=lag.longest_utc,
         since_utc=lag.since_utc,
+        longest_work_ms=1000 * lag.longest_work_s,
     )
     return HealthDoc(version=__version__, loop=loop, confinement=str(what_holds()))
 

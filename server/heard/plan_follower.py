@@ -21,6 +21,7 @@ from planning.terrain.dsm import Dsm
 from server.heard.vehicle_place import Placer, home_distance_bearing
 from server.library.documents import clearance_of
 from server.schemas import FollowDoc
+from server.work.loading import loaded_to_stay
 from telemetry.topics.messages import FlightStatus, PlanRecord
 from telemetry.topics.vehicle import VehicleState
 
@@ -55,7 +56,7 @@ class Followed:
     @staticmethod
     def over(reference: Reference, dsm: Dsm) -> Followed:
         """With every kernel loaded that following it needs: the first position would load them on the event loop."""
-        with _KERNELS:
+        with _KERNELS, loaded_to_stay():
             surface = SurfaceDistance(_window(dsm, reference.points_m))
             x, y, z = map(float, reference.first_m)
             surface.distance_m((x, y, z))

@@ -15,6 +15,8 @@ class LoopDoc(Strict):
     longest_ms: float
     longest_utc: str
     since_utc: str
+    longest_work_ms: float
+    """Of the processor's time that the loop took for itself at once: not above 20, however busy the machine is."""
 
 
 class HealthDoc(Strict):

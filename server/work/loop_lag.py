@@ -30,23 +30,29 @@ class Lag:
     longest_s: float
     longest_utc: str
     since_utc: str
+    longest_work_s: float
+    """Of the processor's time, that the loop's own thread took between two ticks: what the loop owes to itself alone,
+    however busy the machine is."""
 
 
 class LoopLag:
     """Measures the loop that ``run`` runs on. Another thread looks what the loop is at while it is late."""
 
-    def __init__(self, *, now_s: Callable[[], float] = time.monotonic) -> None:
-        self._now_s = now_s
+    def __init__(
+        self, *, now_s: Callable[[], float] = time.monotonic, worked_s: Callable[[], float] = time.thread_time
+    ) -> None:
+        self._now_s, self._worked_s = now_s, worked_s
         self._late_s: deque[float] = deque(maxlen=round(WINDOW_S / TICK_S))
         self._longest_s, self._longest_utc, self._since_utc = 0.0, "", _utc()
         self._due_s = now_s() + TICK_S
         self._seen, self._logged_s = "", -_LOG_EVERY_S
+        self._work_s, self._longest_work_s = worked_s(), 0.0
 
     @property
     def lag(self) -> Lag:
         late_s = sorted(self._late_s)
         p99_s = late_s[len(late_s) * 99 // 100] if late_s else 0.0
-        return Lag(p99_s, self._longest_s, self._longest_utc, self._since_utc)
+        return Lag(p99_s, self._longest_s, self._longest_utc, self._since_utc, self._longest_work_s)
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -54,7 +60,7 @@ class LoopLag:
         watch = threading.Thread(
             target=self._watch, args=(threading.get_ident(), ended), name="watches the loop", daemon=True
         )
-        self._due_s = self._now_s() + TICK_S
+        self._due_s, self._work_s = self._now_s() + TICK_S, self._worked_s()
         watch.start()
         try:
             while True:
@@ -68,6 +74,8 @@ class LoopLag:
         late_s = max(0.0, now_s - self._due_s)
         self._due_s = now_s + TICK_S
         self._late_s.append(late_s)
+        before_s, self._work_s = self._work_s, self._worked_s()
+        self._longest_work_s = max(self._longest_work_s, self._work_s - before_s)
         if late_s > self._longest_s:
             self._longest_s, self._longest_utc = late_s, _utc()
         if late_s > LONG_S and now_s - self._logged_s > _LOG_EVERY_S:

@@ -23,6 +23,17 @@ def test_what_comes_late_is_counted_and_what_comes_early_is_not() -> None:
     assert meter.lag.longest_utc
 
 
+def test_the_loops_own_work_is_told_apart_from_a_busy_machine() -> None:
+    now_s, worked_s = [0.0], [0.0]
+    meter = LoopLag(now_s=lambda: now_s[0], worked_s=lambda: worked_s[0])
+    for late_s, own_s in ((0.5, 0.001), (0.0, 0.012), (0.03, 0.004)):
+        now_s[0] += TICK_S + late_s
+        worked_s[0] += own_s
+        meter.note(now_s[0])
+    assert meter.lag.longest_s == pytest.approx(0.5)
+    assert meter.lag.longest_work_s == pytest.approx(0.012)
+
+
 def hold_up_the_loop(seconds: float) -> None:
     ends = time.monotonic() + seconds
     while time.monotonic() < ends:
@@ -42,5 +53,6 @@ def test_what_holds_the_loop_up_is_named_in_the_log(caplog: pytest.LogCaptureFix
     with caplog.at_level(logging.WARNING, "hedgehop.loop"):
         meter = asyncio.run(use())
     assert meter.lag.longest_s > 2 * LONG_S
+    assert 0.0 < meter.lag.longest_work_s <= meter.lag.longest_s + TICK_S + 0.01
     assert "hold_up_the_loop" in caplog.text
     assert __file__ in caplog.text
