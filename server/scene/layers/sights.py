@@ -45,7 +45,7 @@ class MapLook:
 
 
 class Sights:
-    """``draw_chunks`` is for one thread at a time, ``draw_now`` with ``draw_cloud`` for another, all else for the loop."""
+    """``draw_chunks`` is for one thread, ``draw_now`` and ``draw_cloud`` for another, the rest for the event loop."""
 
     def __init__(self, server: viser.ViserServer, moving: Canvas) -> None:
         """``moving``: a canvas that nobody else draws on, for what happens now."""
