@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from planning.formats.detect import read_mission
 from planning.formats.kml import poi_from_placemark
 from planning.formats.kml_reader import Placemark, read_placemarks
 from planning.formats.poi_csv import read_pois_csv
-from planning.formats.safe_text import check_count, clean_name, decode_text, load_json, said_once
+from planning.formats.safe_text import check_count, check_loiter, clean_name, decode_text, load_json, said_once
 from planning.formats.swapped import looks_swapped
 from planning.terrain.dsm import SurfaceModel
 
@@ -69,7 +70,7 @@ def _read(name: str, data: bytes) -> PoiFile:
     if text.startswith("<"):
         return _from_placemarks(read_placemarks(name, data), clean_name(name))
     if text.upper().startswith("QGC WPL"):
-        return _from_mission(read_mission(name, data))
+        return _from_mission(read_mission(name, data), clean_name(name))
     if text.startswith(("{", "[")):
         return _from_json(name, data, load_json(name, text))
     return PoiFile(read_pois_csv(name, data))
@@ -77,7 +78,7 @@ def _read(name: str, data: bytes) -> PoiFile:
 
 def _from_json(name: str, data: bytes, document: object) -> PoiFile:
     if isinstance(document, dict) and "fileType" in document:
-        return _from_mission(read_mission(name, data))
+        return _from_mission(read_mission(name, data), clean_name(name))
     file = clean_name(name)
     found = [_from_feature(f, f"{file}, feature {k}") for k, f in enumerate(geojson.features(document, file), start=1)]
     return _joined(found)
@@ -113,16 +114,20 @@ def _from_placemark(mark: Placemark, where: str) -> PoiFile:
     return PoiFile(tuple(Poi(lat, lon) for lat, lon in places))
 
 
-def _from_mission(mission: Mission) -> PoiFile:
+def _from_mission(mission: Mission, file: str) -> PoiFile:
     if mission.pois:
         return PoiFile(mission.pois, None, mission.warnings, mission)
-    places = [item for item in mission.items if item.command in FLOWN_TO and has_position(item)]
-    return PoiFile(tuple(_poi_from_item(item) for item in places), None, mission.warnings, mission)
+    pois = tuple(
+        _poi_from_item(item, f"{file}, item {number}")
+        for number, item in enumerate(mission.items, start=1)
+        if item.command in FLOWN_TO and has_position(item)
+    )
+    return PoiFile(pois, None, mission.warnings, mission)
 
 
-def _poi_from_item(item: MissionItem) -> Poi:
+def _poi_from_item(item: MissionItem, where: str) -> Poi:
     hold_s = item.params[0] if item.command in (MavCmd.NAV_WAYPOINT, MavCmd.NAV_LOITER_TIME) else 0.0
-    return Poi(item.lat_deg, item.lon_deg, "", hold_s if hold_s > 0 else 0.0)
+    return Poi(item.lat_deg, item.lon_deg, "", check_loiter(0.0 if math.isnan(hold_s) else hold_s, where))
 
 
 def _ring(corners: Sequence[tuple[float, float]], where: str) -> Polygon:

@@ -95,6 +95,9 @@ def test_swapped_points_are_noticed_only_where_the_swap_would_mend_them():
     assert warn_swapped(right, dsm) == ()
 
 
+HOME_ROW = "0\t1\t0\t16\t0\t0\t0\t0\t47.1\t8.2\t100\t1\n"
+
+
 def test_a_negative_wait_is_refused_in_every_kind_of_file_with_its_place():
     dsm = make_dsm()
     path = make_path(dsm)
@@ -106,6 +109,7 @@ def test_a_negative_wait_is_refused_in_every_kind_of_file_with_its_place():
         (write_kml(path, mission, dsm), "placemark"),
         (write_plan(mission), r"\.pois\[0\]"),
         ("47.1,8.2,a,-5\n", "row 1"),
+        (f"QGC WPL 110\n{HOME_ROW}1\t0\t3\t16\t-5\t0\t0\t0\t47.1\t8.2\t20\t1\n", "item 1"),
     ):
         with pytest.raises(FormatError, match=f"{where}.*negative: -5 s"):
             read_pois("f", text.encode())
