@@ -41,7 +41,8 @@ def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
     for arguments, words in (
         (("--out", tmp_path / "dsm.tif"), "--crs EPSG:32633"),
         (("--out", tmp_path / "dsm.ply"), ".tif"),
-        (("--out", tmp_path / "dsm.tif", "--cell", -1), "greater than 0"),
+        (("--out", tmp_path / "dsm.tif", "--cell", -1), "--cell-m: The cell size must be greater than 0, got -1."),
+        (("--out", tmp_path / "dsm.tif", "--z-scale", 0), "--z-scale: The height scale must be greater than 0"),
     ):
         run = hedgehop("cloud", cloud, *arguments)
         assert run.code == 2, run.out

@@ -43,9 +43,13 @@ class CloudParams:
     limits: RasterLimits = LIMITS
 
     def __post_init__(self) -> None:
-        for name, value in (("cell size", self.cell_m), ("height scale", self.z_scale)):
+        for name, option, value in (
+            ("cell size", "--cell-m", self.cell_m),
+            ("height scale", "--z-scale", self.z_scale),
+        ):
             if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ParameterError(f"The {name} must be greater than 0, got {value}.")
+                advice = f"Leave {option} out, or give metres."
+                raise ParameterError(f"The {name} must be greater than 0, got {value:g}.", where=option, advice=advice)
 
 
 @dataclass(frozen=True, slots=True)
