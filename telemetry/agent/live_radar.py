@@ -25,6 +25,8 @@ class LiveStatus(abc.ABC):
 
     interruptions: int = 0
     """Times that the radar went away: a pulled cable, no power, silence."""
+    left_out: int = 0
+    """Targets beyond the most of a frame: the weakest."""
     trouble: str = ""
     """Why nothing comes at present; empty while frames come."""
 
@@ -36,14 +38,23 @@ class LiveStatus(abc.ABC):
     @abc.abstractmethod
     def as_dict(self) -> dict[str, int | str]: ...
 
+    def crowded(self, targets: int) -> str:
+        """Counts what is left out of a frame; words with the first such frame, for what is left out is not seen."""
+        is_first, beyond = not self.left_out, max(0, targets - TARGETS_MAX)
+        self.left_out += beyond
+        if not (is_first and beyond):
+            return ""
+        return f"A frame has {targets:,} targets: the {TARGETS_MAX:,} strongest are passed on, the others are not."
+
     def _as_dict(self, counts: TiCounts | Position2GoCounts, **found: int) -> dict[str, int | str]:
         """``found``: in its frames."""
-        own = {"interruptions": self.interruptions, "trouble": self.trouble}
+        own = {"left_out": self.left_out, "interruptions": self.interruptions, "trouble": self.trouble}
         return {"frames": self.frames, **found, **asdict(counts), **own}
 
     def told(self, counts: str) -> str:
         """``counts`` with what has gone wrong."""
-        text = f"radar: {counts}, {self.interruptions} interruptions"
+        beyond = f", {self.left_out} beyond {TARGETS_MAX:,} of a frame left out" if self.left_out else ""
+        text = f"radar: {counts}{beyond}, {self.interruptions} interruptions"
         return f"{text}; {self.trouble}" if self.trouble else text
 
 
@@ -94,6 +105,10 @@ class LiveRadar(abc.ABC):
             self._live.trouble = ""
             self._tell("The radar sends frames again.")
             yield NoticeReading(self._now(), False, "radar: It sends frames again.")
+
+    def _crowded(self, targets: int) -> Iterator[NoticeReading]:
+        if words := self._live.crowded(targets):
+            yield self._notice(words, words)
 
     def _notice(self, line: str, words: str) -> NoticeReading:
         """A warning: ``line`` for whoever reads along on board, ``words`` for the pilot."""

@@ -69,7 +69,7 @@ class Position2Go(LiveRadar):
             for taken in session.frames(params.chirps * params.chirp_interval_s / 2):
                 yield from self._fine()
                 yield from self._clipped(taken)
-                yield self._processed(chain, taken)
+                yield from self._processed(chain, taken)
 
     def _chain_of(self, params: FmcwParams) -> RadarChain:
         """What the board sends is said once; the first frame must not wait for the compiler."""
@@ -91,7 +91,8 @@ class Position2Go(LiveRadar):
             self._told_clipped = True
             yield self._notice(TOO_STRONG, TOO_STRONG)
 
-    def _processed(self, chain: RadarChain, taken: TakenFrame) -> RadarReading:
+    def _processed(self, chain: RadarChain, taken: TakenFrame) -> Iterator[RadarReading | NoticeReading]:
         found = chain.process(taken.frame.cube)
         self.status.targets += len(found)
-        return reading_of(taken.t_s, found.xyz_m, found.radial_speed_m_s, found.snr_db, taken.lost_before)
+        yield from self._crowded(len(found))
+        yield reading_of(taken.t_s, found.xyz_m, found.radial_speed_m_s, found.snr_db, taken.lost_before)

@@ -102,6 +102,7 @@ class TiRadar(LiveRadar):
                     continue
                 yield from self._fine()
                 yield from self._compare(frame)
+                yield from self._crowded(len(frame.xyz_m))
                 self.status.points += len(frame.xyz_m)
                 yield frame_reading(frame, t_s, self._config.least_snr_db)
 
@@ -150,6 +151,8 @@ def captured_readings(
                 advice="Give the radar's configuration with --ti-config.",
             )
         status.points += len(frame.xyz_m)
+        if words := status.crowded(len(frame.xyz_m)):
+            tell(words)
         yield after_s, frame_reading(frame, after_s, least_snr_db)
     if not stream.counts.frames:
         raise RadarDataError(

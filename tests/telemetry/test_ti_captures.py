@@ -40,6 +40,19 @@ def test_a_thousand_targets_are_sent_and_no_more() -> None:
     assert reading.targets[:, 4].min() > 10.05
 
 
+def test_targets_beyond_a_thousand_are_counted_and_told_once(tmp_path: Path) -> None:
+    path, status, told = tmp_path / "radar.bin", TiStatus(), list[str]()
+    crowd = [(0.0, 10.0 + 0.01 * k, 0.0, 0.0) for k in range(1300)]
+    path.write_bytes(frame(1) + sdk3(2, crowd) + sdk3(3, crowd[:1000]) + sdk3(4, crowd[:1100]))
+    assert [len(reading.targets) for _, reading in captured(path, status=status, tell=told.append)] == [
+        2, 1000, 1000, 1000,
+    ]  # fmt: skip
+    assert told == ["A frame has 1,300 targets: the 1,000 strongest are passed on, the others are not."]
+    assert (status.left_out, status.as_dict()["left_out"]) == (400, 400)
+    assert "400 beyond 1,000 of a frame left out" in str(status)
+    assert "left out" not in str(TiStatus())
+
+
 def test_targets_of_unknown_strength_count_as_just_detected() -> None:
     (found,) = TiStream().feed(sdk3(1, POINTS))
     reading = frame_reading(found, 0.0, 13.5)

@@ -123,6 +123,19 @@ def test_it_is_configured_line_by_line_and_its_points_come(tmp_path: Path) -> No
     assert told == []
 
 
+def test_a_crowded_frame_is_a_notice_for_the_pilot_once(tmp_path: Path) -> None:
+    told: list[str] = []
+    with plugged(tmp_path) as board, listening(board, told) as listener:
+        until(configured(board))
+        for number in (1, 2):
+            board.send(sdk3(number, [(0.0, 10.0 + 0.01 * k, 0.0, 0.0) for k in range(1001)]))
+            assert len(listener.next().targets) == 1000
+        assert listener.radar.status.left_out == 2
+    assert [notice.warning for notice in listener.notices] == [True]
+    assert listener.notices[0].text == f"radar: {told[0]}"
+    assert "A frame has 1,001 targets" in told[0]
+
+
 def test_a_pulled_cable_is_told_counted_and_recovered_from(tmp_path: Path) -> None:
     told: list[str] = []
     with plugged(tmp_path) as board, listening(board, told) as listener:
