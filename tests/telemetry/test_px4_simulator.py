@@ -89,6 +89,7 @@ def hovering(up_m: float = 8.0) -> Bench:
     return bench
 
 
+@pytest.mark.fact("P21", "P22", "P23")
 def test_it_says_unasked_what_px4_says_and_at_its_rates() -> None:
     bench = ready()
     before = len(bench.heard)
@@ -105,6 +106,7 @@ def test_it_says_unasked_what_px4_says_and_at_its_rates() -> None:
     assert sum(one.message.get_type() == "GLOBAL_POSITION_INT" for one in bench.heard[before:]) in (20, 21)
 
 
+@pytest.mark.fact("P1", "P2", "P24", "P30")
 def test_who_it_is_and_that_it_is_ready() -> None:
     bench = ready()
     assert bench.command(MESSAGE, 148) == ACCEPTED
@@ -125,6 +127,7 @@ def test_who_it_is_and_that_it_is_ready() -> None:
     assert all(text.endswith("\t") for text in bench.texts())
 
 
+@pytest.mark.fact("P29", "P31")
 def test_a_mission_is_asked_for_and_given_back_as_px4_does() -> None:
     bench = ready()
     assert upload(bench, flight()) == ACCEPTED
@@ -177,6 +180,7 @@ def test_hedgehops_upload_arrives_over_loss(loss: float) -> None:
         assert run.result.verified, run.result.differences
 
 
+@pytest.mark.fact("P37")
 def test_fence_and_rally_points_are_kept() -> None:
     bench = ready()
     corners = [item(seq, 5001, param1=3.0, param4=0.0, x=LAT + 90 * seq, kind=1) for seq in range(3)]
@@ -187,6 +191,7 @@ def test_fence_and_rally_points_are_kept() -> None:
     assert upload(bench, [item(0, 5001, param1=2.0, kind=1)], 1) == wire.MAV_MISSION_ERROR
 
 
+@pytest.mark.fact("P26")
 def test_integers_stand_bytewise_in_parameters() -> None:
     bench = ready()
     read = wire.MAVLink_param_request_read_message(1, 1, b"RTL_CONE_ANG", -1)
@@ -205,6 +210,7 @@ def test_integers_stand_bytewise_in_parameters() -> None:
     assert {one.param_index for one in values if one.param_index < 65535} == set(range(values[-1].param_count))
 
 
+@pytest.mark.fact("P25")
 def test_the_defaults_are_those_that_were_measured() -> None:
     parameters = ready().vehicle.parameters
     for name, value in {
@@ -218,6 +224,7 @@ def test_the_defaults_are_those_that_were_measured() -> None:
         assert parameters[name] == value, name
 
 
+@pytest.mark.fact("P27", "P28", "P32", "P35")
 def test_a_mission_from_the_ground_to_the_ground() -> None:
     """MISSION on the ground, armed: it takes off at once; its end is RTL, and then the mode before."""
     bench = ready()
@@ -245,6 +252,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
     assert (bench.last("MISSION_CURRENT").mission_state, bench.last("MISSION_CURRENT").seq) == (5, 4)
 
 
+@pytest.mark.fact("P10")
 def test_after_a_hold_below_the_next_place_it_climbs_first() -> None:
     bench = ready()
     upload(bench, flight())
@@ -262,6 +270,7 @@ def test_after_a_hold_below_the_next_place_it_climbs_first() -> None:
     assert math.dist(bench.vehicle.autopilot.p_neu[:2], (n, e)) < 1.5
 
 
+@pytest.mark.fact("P33")
 def test_a_return_keeps_a_greater_height() -> None:
     bench = hovering(34.0)
     assert mode(bench, RTL) == ACCEPTED
@@ -270,6 +279,7 @@ def test_a_return_keeps_a_greater_height() -> None:
     assert said in {f"RTL: start return at {803 + up} m ({up} m above destination)\t" for up in (33, 34)}
 
 
+@pytest.mark.fact("P34")
 def test_it_goes_where_it_is_told_above_the_sea() -> None:
     bench = hovering()
     order = wire.MAVLink_command_int_message(1, 1, 0, REPOSITION, 0, 0, -1, 1, 0, math.nan, LAT + 1000, LON, 815.24)
@@ -279,6 +289,7 @@ def test_it_goes_where_it_is_told_above_the_sea() -> None:
     assert bench.vehicle.autopilot.mode.name == "HOLD"
 
 
+@pytest.mark.fact("P36")
 def test_offboard_needs_a_stream_and_ends_without_it() -> None:
     bench = hovering()
     mask = 0b0000_1101_1100_0111
@@ -291,6 +302,7 @@ def test_offboard_needs_a_stream_and_ends_without_it() -> None:
         if sent == 1:
             assert mode(bench, OFFBOARD) == ACCEPTED
     assert bench.vehicle.autopilot.p_neu[0] - began_m > 2.0
+    assert bench.vehicle.autopilot.v_neu[0] == pytest.approx(0.89, abs=0.15)  # as measured where 1 m/s was asked
     bench.advance(1.5)
     assert bench.vehicle.autopilot.mode.name == "HOLD"
 
@@ -307,6 +319,18 @@ def test_what_it_does_not_do() -> None:
     assert flying.command(ARM, 0) == REJECTED
 
 
+@pytest.mark.fact("P38")
+@pytest.mark.parametrize("command", [246, 179, 207, 209])
+def test_what_is_for_the_ground_is_denied_while_it_is_armed(command: int) -> None:
+    """Starting again, another home, the fence's switch, turning single motors."""
+    bench = ready()
+    assert bench.command(command, 1) == UNSUPPORTED
+    assert bench.command(ARM, 1) == ACCEPTED
+    assert bench.command(command, 1) == DENIED
+    assert bench.command(ARM, 0) == ACCEPTED
+    assert not bench.vehicle.autopilot.armed
+
+
 def test_its_motors_stop_when_it_does_not_take_off() -> None:
     bench = ready()
     assert bench.command(ARM, 1) == ACCEPTED
@@ -316,6 +340,7 @@ def test_its_motors_stop_when_it_does_not_take_off() -> None:
     assert not bench.vehicle.autopilot.armed
 
 
+@pytest.mark.fact("P11")
 def test_home_moves_with_a_receiver_of_metres_alone() -> None:
     shifts = {}
     for name in ("standalone", "rtk"):

@@ -146,6 +146,7 @@ class Auto:
 
     def _start_end(self, pilot: SimulatedPilot, step: Step) -> None:
         if step.kind == "return":
+            pilot.forget_speeds()  # the mission's do not hold on the way home: recorded
             self._other = Return()
             self._other.enter(pilot)
         else:

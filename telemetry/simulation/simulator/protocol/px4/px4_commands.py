@@ -24,6 +24,13 @@ from telemetry.simulation.simulator.protocol.command_protocol import (
 )
 from telemetry.simulation.simulator.protocol.px4.px4_numbers import name_of
 
+ON_THE_GROUND_ONLY = {
+    wire.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
+    wire.MAV_CMD_DO_SET_HOME,
+    wire.MAV_CMD_DO_FENCE_ENABLE,
+    wire.MAV_CMD_DO_MOTOR_TEST,
+}
+"""Not simulated; while the motors turn they are denied: measured."""
 RESULTS: dict[Verdict, int] = {"accepted": 0, "rejected": 1, "denied": 2, "unsupported": 3, "failed": 4}
 
 
@@ -47,6 +54,8 @@ class Px4Commands:
         """MAV_RESULT."""
         if order.command in WITHOUT_MOTION:
             return RESULTS["accepted"]
+        if order.command in ON_THE_GROUND_ONLY and self._pilot.armed:
+            return RESULTS["denied"]
         handler = self._handlers.get(order.command)
         return RESULTS[handler(order) if handler else "unsupported"]
 
