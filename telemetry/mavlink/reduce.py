@@ -159,8 +159,8 @@ def _sys_status(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
         # A fence that is switched off tells no more that it is kept again.
         "fence_breach": None if fence_ok is None and state.fence_ok is not None else state.fence_breach,
         "not_ready_words": () if ready else state.not_ready_words,
-        "battery_v": scaled(message.voltage_battery, 1000, UINT16_MAX),
         "battery_a": scaled(message.current_battery, 100, -1),
+        **_voltage(state, scaled(message.voltage_battery, 1000, UINT16_MAX), t_mono_s),
         **_charge(state, message, t_mono_s),
     }
 
@@ -171,6 +171,14 @@ def _charge(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
     if left is None and state.battery_share is not None and told_s is not None and t_mono_s - told_s < _CHARGE_S:
         return {}
     return {"battery_t_mono_s": t_mono_s, "battery_share": left}
+
+
+def _voltage(state: VehicleState, told_v: float | None, t_mono_s: float) -> Changes:
+    """As with the share: what one of two messages knows goes when that one's last word is old."""
+    told_s = state.battery_v_t_mono_s
+    if told_v is None and told_s is not None and t_mono_s - told_s < _CHARGE_S:
+        return {}
+    return {"battery_v": told_v, "battery_v_t_mono_s": None if told_v is None else t_mono_s}
 
 
 def _statustext(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
@@ -197,12 +205,11 @@ def _battery_status(state: VehicleState, message: Any, t_mono_s: float) -> Chang
         return {}
     cells = [v for v in message.voltages if v != UINT16_MAX] + [v for v in message.voltages_ext if v != 0]
     # SYS_STATUS is about the same battery: what only one of the two knows must not come and go.
-    volts = sum(cells) / 1000 if cells else state.battery_v
     amperes = scaled(message.current_battery, 100, -1)
     return {
-        "battery_v": volts,
         "battery_a": state.battery_a if amperes is None else amperes,
         "battery_used_mah": scaled(message.current_consumed, 1, -1),
+        **_voltage(state, sum(cells) / 1000 if cells else None, t_mono_s),
         **_charge(state, message, t_mono_s),
     }
 

@@ -65,6 +65,8 @@ class VehicleState:
 
     battery_t_mono_s: float | None = None
     battery_v: float | None = None
+    battery_v_t_mono_s: float | None = None
+    """When it was told: of two messages about the battery one may not know it. None in vehicles' own logs."""
     battery_a: float | None = None
     battery_share: float | None = None
     """0 to 1"""

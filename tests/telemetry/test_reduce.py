@@ -151,7 +151,7 @@ def test_batteries_say_what_they_know() -> None:
     assert (state.battery_a, state.battery_share, state.battery_used_mah) == (12.34, 0.87, 450)
     unknown = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0)
     state = known(status, unknown)
-    assert (state.battery_v, state.battery_a, state.battery_share) == (None, None, 0.87)
+    assert (state.battery_v, state.battery_a, state.battery_share) == (16.1, None, 0.87)
 
 
 def test_a_share_that_one_message_knows_outlives_the_other_until_it_is_old() -> None:
@@ -166,6 +166,19 @@ def test_a_share_that_one_message_knows_outlives_the_other_until_it_is_old() -> 
     assert told == [(0.76, 5.0), (0.76, 5.0), (0.76, 5.0), (None, 15.1)]
 
 
+def test_a_voltage_that_one_message_knows_outlives_the_other_until_it_is_old() -> None:
+    state = known(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [4000] * 4 + [65535] * 6, -1, 450, -1, 76))
+    unknown = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 65535, -1, 76, 0, 0, 0, 0, 0, 0)
+    nothing = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [65535] * 10, -1, -1, -1, 76)
+    told = []
+    for t_mono_s, message in ((6.0, unknown), (14.0, nothing), (14.9, unknown), (15.1, unknown), (16.0, nothing)):
+        state = reduce(state, heard(message), t_mono_s=t_mono_s, t_utc_s=0.0)
+        assert state is not None
+        told.append(state.battery_v)
+    assert told == [16.0, 16.0, 16.0, None, None]
+
+
+@pytest.mark.fact("P2")
 @pytest.mark.parametrize(("health", "ready"), [(mavlink.MAV_SYS_STATUS_PREARM_CHECK, True), (0, False)])
 def test_the_pre_arm_bit_counts_where_it_is_checked(health: int, ready: bool) -> None:
     bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -209,6 +222,7 @@ def test_reasons_of_an_earlier_look_are_forgotten() -> None:
     assert state.not_ready_words == ("PreArm: Battery low", "PreArm: Fence")
 
 
+@pytest.mark.fact("P1")
 def test_a_constant_position_is_bad_in_the_air_only() -> None:
     px4 = mavlink.MAV_AUTOPILOT_PX4
     standing = mavlink.MAVLink_estimator_status_message(0, 1023, 0, 0, 0, 0, 0, 0, 0, 0)

@@ -660,6 +660,7 @@ export interface VehicleState {
   heading_rad: number | null;
   battery_t_mono_s: number | null;
   battery_v: number | null;
+  battery_v_t_mono_s: number | null;
   battery_a: number | null;
   battery_share: number | null;
   battery_used_mah: number | null;
