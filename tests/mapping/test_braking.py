@@ -14,9 +14,17 @@ MEASURED_M = {3.0: 4.8, 4.0: 6.7, 5.0: 8.8, 6.2: 11.3, 8.0: 15.4}
 """ArduCopter 4.7, default parameters: from BRAKE to standstill."""
 
 
+@pytest.mark.fact("A39")
 @pytest.mark.parametrize(("speed_m_s", "measured_m"), MEASURED_M.items())
 def test_it_is_what_the_real_vehicle_needed_and_never_less(speed_m_s: float, measured_m: float) -> None:
     assert measured_m <= Braking().distance_m(speed_m_s) <= measured_m + 0.3
+
+
+@pytest.mark.fact("A40")
+@pytest.mark.parametrize(("speed_m_s", "mean_m_s2"), [(3.0, 0.93), (5.0, 1.4), (6.2, 1.7)])
+def test_in_the_mean_it_is_the_softer_the_slower_it_was(speed_m_s: float, mean_m_s2: float) -> None:
+    """Where a constant 2.5 m/s2 was believed."""
+    assert speed_m_s**2 / (2 * Braking().distance_m(speed_m_s)) == pytest.approx(mean_m_s2, rel=0.06)
 
 
 def in_small_steps_m(braking: Braking, speed_m_s: float) -> float:
@@ -52,6 +60,7 @@ def test_at_the_largest_speed_a_region_just_suffices(depth_m: float, latency_s: 
         assert stopping.distance_m(speed_m_s) == pytest.approx(depth_m, abs=1e-6)
 
 
+@pytest.mark.fact("A37")
 def test_the_papers_regions_suffice_for_less_than_was_believed() -> None:
     """A constant 2.5 m/s2 allowed 6.2 m/s for 10 m."""
     stopping = Stopping(Braking(), 0.4, 1.15)

@@ -64,6 +64,7 @@ def test_it_agrees_with_the_rule_written_slowly(
     assert [found.low_dsm_m, found.high_dsm_m] == pytest.approx([low_m, high_m], abs=1e-9, nan_ok=True)
 
 
+@pytest.mark.fact("A12")
 def test_what_is_clear_in_a_plan_is_clear_wherever_the_vehicle_is_set_down_beside_it() -> None:
     """A plan said "clear", and the check "not clear" 0.03 m away. What the check looks at is a part of what it did."""
     rng = np.random.default_rng(4)
@@ -104,6 +105,7 @@ def test_home_on_a_spike_is_not_certified_but_beside_it() -> None:
     assert codes(certify(dsm_of(cells, res=0.2), moved, RTK)) == []
 
 
+@pytest.mark.fact("P5")
 @pytest.mark.parametrize(("away_m", "clear"), [(0.3, False), (0.5, False), (0.9, True)])
 def test_home_on_a_roofs_edge(away_m: float, clear: bool) -> None:
     cells = fine()
@@ -113,6 +115,7 @@ def test_home_on_a_roofs_edge(away_m: float, clear: bool) -> None:
     assert found.on_top != clear
 
 
+@pytest.mark.fact("A13")
 def test_a_bush_below_the_legs_is_no_obstacle_but_counts_for_heights() -> None:
     """0.6 m high, 0.2 m from where the vehicle takes off: it was refused."""
     cells = fine()
@@ -312,6 +315,7 @@ def _open_places(dsm: Dsm) -> tuple[tuple[float, float], tuple[float, float]]:
     return near.xy_m, (near.xy_m[0] + 12.0, near.xy_m[1])
 
 
+@pytest.mark.fact("A14")
 def test_a_plan_from_a_spike_is_refused_and_one_without_a_home_chooses_another(shared_data: Path) -> None:
     dsm, pois = spiky(shared_data)
     request = PlanRequest(pois, VehicleProfile("quad", position_error_m=0.1, rtl_height_m=60.0))

@@ -51,6 +51,7 @@ def test_a_heavier_vehicle_is_felt_farther_below(mass_kg: float, times: float) -
     assert budget_of(heavy).value_m("downwash") == pytest.approx(budget_of(light).value_m("downwash") * times**0.25)
 
 
+@pytest.mark.fact("A4", "P9")
 def test_following_is_what_was_measured_and_grows_beyond_it() -> None:
     assert set(MEASURED) == {(firmware, way) for firmware in FIRMWARE_NAMES for way in WAY_NAMES}
     for (firmware, way), row in MEASURED.items():

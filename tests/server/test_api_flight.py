@@ -68,6 +68,7 @@ def observer(served: Running) -> Iterator[httpx.Client]:
         client.delete("/api/session")
 
 
+@pytest.mark.fact("A26")
 @pytest.mark.parametrize(("path", "body"), COMMANDS)
 def test_only_the_one_in_charge_commands(
     served: Running, pilot: httpx.Client, observer: httpx.Client, path: str, body: dict[str, object]

@@ -156,6 +156,7 @@ def test_waypoints_one_at_a_time_over_another_model_than_the_planned_one_which_i
     assert again.json["other_surface"] == first
 
 
+@pytest.mark.fact("A43")
 def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp_path: Path) -> None:
     planned = PlannedFor(load_profile("mapper-rtk"), "auto", required_clearance_m=40.0)
     high = write_mission(tmp_path / "high.waypoints", replace(SHORT, planned_for=planned))
@@ -175,6 +176,7 @@ def test_vehicle_and_demands_come_from_the_missions_own_file(ground: Ground, tmp
     assert wider.code == 1
 
 
+@pytest.mark.fact("A44")
 def test_a_mission_too_low_is_not_started(ground: Ground, tmp_path: Path) -> None:
     low = write_mission(tmp_path / "low.waypoints", mission([(50.0, 150.0, 3.0), (90.0, 150.0, 3.0)]))
     record = tmp_path / "refused.mcap"
@@ -257,6 +259,7 @@ def test_review_of_a_vehicles_own_log(shared_data: Path) -> None:
     assert "The file ends in the middle of a message." in run.json["notes"]
 
 
+@pytest.mark.fact("A2")
 def test_a_flight_below_its_required_clearance_ends_with_1(shared_data: Path) -> None:
     """A real ArduCopter in GUIDED: certified at 1.29 m, 1.15 m required, 0.76 m by its own positions."""
     dsm = shared_data / "dsm" / "coromandel" / "coromandel_dsm_050.tif"

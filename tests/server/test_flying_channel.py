@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
+
 from server.heard.channel import Channel
 from server.heard.present import Present
 from server.schemas import FlightMessage, HealthMessage, TextMessage, TrackMessage, VehicleMessage
@@ -40,6 +42,7 @@ def run(scenario: Callable[[Bench], None]) -> None:
     asyncio.run(whole())
 
 
+@pytest.mark.fact("A18")
 def test_a_position_is_told_at_once() -> None:
     def scenario(bench: Bench) -> None:
         for step in range(15):

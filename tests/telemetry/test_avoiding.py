@@ -192,6 +192,7 @@ def test_however_short_it_sees_it_brakes_for_what_it_sees() -> None:
     it.until(lambda: BRAKE in it.modes(), 120)
 
 
+@pytest.mark.fact("A41")
 def test_a_way_home_that_is_too_fast_is_slowed() -> None:
     """RTL_SPEED 0: as fast as WPNAV_SPEED says, whatever the mission's own speed was."""
     it = craft(senses=[Sense("radar", 10.0, 0.1)])

@@ -90,6 +90,7 @@ def flown(speed_m_s: float, top_m: float) -> RadarCraft:
     return it
 
 
+@pytest.mark.fact("A36", "A37")
 @pytest.mark.parametrize("speed_m_s", [4.9, 6.0])
 @pytest.mark.parametrize("top_m", [22.0, 30.0])
 def test_it_stops_clear_of_the_wall_and_flies_over_it(speed_m_s: float, top_m: float) -> None:
@@ -134,6 +135,7 @@ def too_late(speed_m_s: float, top_m: float, *, gap_m: float = 0.3, trail: Trail
     return it
 
 
+@pytest.mark.fact("A38")
 def test_too_near_to_see_it_goes_back_until_it_sees_and_climbs_there() -> None:
     """At 0.3 m the radar is blind: the wall's upper half was taken for clear, and flown through."""
     it = too_late(3.0, 30.0)

@@ -34,6 +34,7 @@ def onboard(*speeds_m_s: float | None) -> OnboardMission:
     return OnboardMission(tuple(items), 1.0, 1.0, 0.0, "digest")
 
 
+@pytest.mark.fact("A42")
 def test_switched_on_without_eyes_it_wants_to_be_accepted() -> None:
     blind = row(AvoidanceStatus(enabled=True, state="blind"))
     assert (blind.code, blind.state) == ("avoidance", "accept")
@@ -58,6 +59,7 @@ def test_a_mission_that_is_faster_than_its_sensors_see_is_to_be_accepted() -> No
     assert row(ON, Speeds(4.1, 4.0, "RTL_SPEED", 5.0)).state == "good"
 
 
+@pytest.mark.fact("A41")
 @pytest.mark.parametrize(
     ("parameters", "value"),
     [

@@ -41,6 +41,7 @@ def test_the_order_of_things() -> None:
     assert any("clearance: At least 12.00 m" in line for line in heard.lines)
 
 
+@pytest.mark.fact("P4")
 def test_the_firmware_is_told_though_it_is_known_only_after_the_vehicle_was_heard() -> None:
     class Late(Pilot):
         def _tell(self) -> None:

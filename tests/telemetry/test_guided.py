@@ -282,6 +282,7 @@ def test_it_says_how_far_behind_the_plan_it_is_and_skips_nothing() -> None:
     assert abs(prompt.behind_s) < 2.5
 
 
+@pytest.mark.fact("P12")
 def test_px4_is_sent_on_when_its_home_moves_in_flight() -> None:
     craft = Craft(px4=True)
 
@@ -297,6 +298,7 @@ def test_px4_is_sent_on_when_its_home_moves_in_flight() -> None:
     assert {round(up_m, 1) for t, up_m in heights if t > 9.5} >= {11.2}
 
 
+@pytest.mark.fact("A11")
 @pytest.mark.parametrize(
     ("stuck_s", "words"),
     [(3.0, "no nearer to the height of the take-off for 1"), (9.5, "no nearer to item 5 for 1")],
@@ -323,6 +325,7 @@ def test_a_flight_that_does_not_move_says_so(stuck_s: float, words: str) -> None
     assert words in stuck
 
 
+@pytest.mark.fact("A11", "P13")
 def test_what_keeps_a_vehicle_from_going_on_is_guessed_from_its_state() -> None:
     place = Place(HOME[0], HOME[1], -5.0, HOME[2])
     here = replace(READY, lat_deg=HOME[0], lon_deg=HOME[1], alt_rel_home_m=0.0)

@@ -33,6 +33,7 @@ def within(off_m: F64) -> float:
     return float(np.percentile(np.abs(off_m), 95))
 
 
+@pytest.mark.fact("A5")
 @pytest.mark.parametrize("stretch", TURNING, ids=lambda stretch: stretch.recording)
 def test_the_simulated_vehicle_leaves_the_straight_leg_as_the_recorded_one_did(
     replay_of: Callable[[Stretch], Replay], stretch: Stretch
@@ -66,6 +67,7 @@ def off(flight: ScriptedFlight) -> F64:
     return np.hypot(*off_line(flight.track[:, 1:4], flight.line))
 
 
+@pytest.mark.fact("A6")
 @pytest.mark.parametrize("name", ["coro2", "coro2.h1"])
 def test_it_keeps_within_a_third_of_a_metre_of_the_line_led_or_by_itself(
     fly: Callable[..., ScriptedFlight], name: str

@@ -58,6 +58,7 @@ def test_a_vehicle_that_is_set_right_has_nothing_to_change(firmware: Firmware) -
     assert findings["RTL_ALT" if firmware == "ardupilot" else "RTL_RETURN_ALT"].state == "good"
 
 
+@pytest.mark.fact("A19")
 @pytest.mark.parametrize(
     ("changed", "name", "state", "better", "words"),
     [

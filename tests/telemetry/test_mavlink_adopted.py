@@ -68,6 +68,7 @@ def with_bench(act: Callable[[Bench], Awaitable[None]]) -> None:
     run(whole)
 
 
+@pytest.mark.fact("A23")
 def test_silence_is_stale_after_a_second_and_a_half_and_lost_after_three_and_a_half() -> None:
     bench = Bench()
     bench.hear(heartbeat())
@@ -99,6 +100,7 @@ def known(bench: Bench) -> None:
     bench.vehicle.onboard.transfer_ends(OnboardMission((), None, None, None, "digest"), bench.now_s - 60)
 
 
+@pytest.mark.fact("A28")
 def test_after_a_restart_the_mission_is_unknown_and_streams_are_asked_for_again() -> None:
     bench = Bench()
     bench.hear(heartbeat(), attitude(100_000))
@@ -127,6 +129,7 @@ def test_after_a_long_silence_on_the_ground_the_mission_is_unknown() -> None:
     assert bench.unsure == 1
 
 
+@pytest.mark.fact("A24")
 def test_after_a_long_silence_in_flight_it_is_not() -> None:
     bench = Bench()
     bench.hear(heartbeat(base_mode=ARMED))

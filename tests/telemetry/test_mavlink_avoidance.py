@@ -124,6 +124,7 @@ def test_other_autopilots_are_refused() -> None:
     run(whole)
 
 
+@pytest.mark.fact("A36")
 def test_in_auto_it_climbs_over_a_wall_and_the_flight_ends_as_planned() -> None:
     async def whole() -> None:
         async with before_a_wall() as (bench, simulator):

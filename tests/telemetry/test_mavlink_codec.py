@@ -18,6 +18,7 @@ def boot_times(messages: list) -> list[int]:
     return [message.time_boot_ms for message in messages]
 
 
+@pytest.mark.fact("A27")
 @given(gaps=st.lists(NOISE, min_size=1, max_size=8), cut=st.integers(1, 60))
 def test_a_stream_gives_back_every_message_among_text_however_it_is_cut(gaps: list[bytes], cut: int) -> None:
     data = b"".join(gap + packed(attitude(k)) for k, gap in enumerate(gaps))
@@ -70,6 +71,7 @@ def test_a_flipped_bit_costs_one_message() -> None:
     assert boot_times(found) == [0, 1, 3, 4]
 
 
+@pytest.mark.fact("P17")
 def test_frames_of_another_dialect_are_stepped_over() -> None:
     foreign = bytearray(packed(attitude(0)))
     foreign[7:10] = (0xABCDEF).to_bytes(3, "little")

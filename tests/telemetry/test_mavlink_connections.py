@@ -61,6 +61,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("telemetry.mavlink.connections.base.RETRY_S", (0.001,))
 
 
+@pytest.mark.fact("P19")
 def test_udp_hears_everyone_and_answers_only_who_is_named() -> None:
     async def whole() -> None:
         port = free_port()

@@ -52,6 +52,7 @@ def test_the_seeds_of_the_checksums_follow_from_the_fields(kind: Any) -> None:
     assert (crc.crc & 255) ^ (crc.crc >> 8) == kind.crc_extra
 
 
+@pytest.mark.fact("P18")
 def test_frames_of_events_are_no_bad_bytes() -> None:
     parser = Parser(datagrams=True)
     frame = wire.EventMessage(0, 0, 77, 1, 9, 0x64, b"\x01\x02".ljust(40, b"\0")).pack(mavlink.MAVLink(None, 1, 1))

@@ -57,6 +57,7 @@ def test_a_mission_without_a_way_home_is_over_at_its_last_waypoint() -> None:
     assert follow(keeper, at(2, mission_reached=2), LANDED, onboard=WAYPOINTS) == ["returning", "landed"]
 
 
+@pytest.mark.fact("A9")
 @pytest.mark.parametrize(("autopilot", "mode"), [("ardupilot", "AUTO"), ("px4", "MISSION")])
 def test_a_vehicle_that_forgets_its_mission_before_it_says_that_it_is_disarmed(autopilot: str, mode: str) -> None:
     keeper, last = started(), 5 if autopilot == "ardupilot" else 4
@@ -88,6 +89,7 @@ def test_a_failsafe_that_is_resumed_has_not_broken_off() -> None:
     assert keeper.status.broke_off_at is None
 
 
+@pytest.mark.fact("A22")
 def test_leaving_the_mission_is_a_pause() -> None:
     keeper = started()
     assert follow(keeper, at(2), at(2, mode="BRAKE"), at(2)) == ["flying", "paused", "flying"]

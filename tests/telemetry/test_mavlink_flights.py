@@ -306,6 +306,7 @@ def test_a_vehicle_that_is_not_ready_says_why() -> None:
     run(whole)
 
 
+@pytest.mark.fact("A28")
 def test_what_was_not_read_back_is_not_flown() -> None:
     async def whole() -> None:
         async with simulated() as (bench, _):

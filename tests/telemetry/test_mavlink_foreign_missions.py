@@ -74,12 +74,14 @@ async def refused_after(count: int, after_s: float) -> None:
         stranger.close()
 
 
+@pytest.mark.fact("A29")
 @pytest.mark.parametrize("count", [5, 7])
 def test_a_start_right_after_a_foreign_write_is_refused(count: int) -> None:
     """At any moment between two looks of the link at what is on board, on as many vehicles at once."""
     run(lambda: asyncio.gather(*(refused_after(count, after_s) for after_s in (0.0, 0.02, 0.05, 0.09))))
 
 
+@pytest.mark.fact("A29")
 def test_a_foreign_write_during_the_start_is_never_flown_away_with() -> None:
     async def whole() -> None:
         async with simulated(speedup=1.0) as (bench, simulator):
@@ -95,6 +97,7 @@ def test_a_foreign_write_during_the_start_is_never_flown_away_with() -> None:
     run(whole)
 
 
+@pytest.mark.fact("A31")
 @pytest.mark.parametrize("count", [5, 8])
 def test_in_flight_it_is_an_alarm_and_a_hold(count: int) -> None:
     async def whole() -> None:

@@ -83,6 +83,7 @@ async def in_flight() -> AsyncIterator[tuple[Console, Flying, int]]:
             yield bench, flying, port
 
 
+@pytest.mark.fact("A32")
 def test_what_is_forged_in_the_vehicles_name_neither_lands_nor_moves_nor_forgets_it() -> None:
     async def body() -> None:
         async with in_flight() as (bench, flying, _):

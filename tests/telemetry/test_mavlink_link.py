@@ -354,6 +354,7 @@ def test_a_command_is_written_down_before_it_is_sent() -> None:
     run(whole)
 
 
+@pytest.mark.fact("A34")
 def test_a_refused_arming_carries_the_vehicles_words() -> None:
     async def whole() -> None:
         async with commanded({400: 4}, b"Arm: Compass not calibrated") as (bench, _, _):

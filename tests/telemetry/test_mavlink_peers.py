@@ -35,6 +35,7 @@ def test_an_autopilots_heartbeat_makes_a_candidate() -> None:
     assert (candidate.id, candidate.autopilot) == ("udpin:0.0.0.0:14550/10.0.0.2:4000/1/1", "ardupilot")
 
 
+@pytest.mark.fact("A25")
 def test_another_ground_station_never_counts_as_a_vehicle() -> None:
     peers = Peers()
     peers.adopt_first_of(UDP, wanted=True)
@@ -106,6 +107,7 @@ def test_a_second_vehicle_with_the_same_id_does_not_mix_in_and_is_warned_of() ->
     assert peers.warnings(20.0) == ()
 
 
+@pytest.mark.fact("P20")
 def test_a_vehicle_with_another_id_is_a_candidate_without_a_warning() -> None:
     peers = adopted()
     assert peers.hear(at(system=2), heard(heartbeat(), system=2), 1.0) == "stranger"

@@ -215,6 +215,7 @@ def test_a_vehicle_that_does_not_say_whether_it_flies_is_judged_by_its_height() 
     run(whole)
 
 
+@pytest.mark.fact("A30")
 @pytest.mark.parametrize(("found", "words"), [(None, "not known"), ("other", "Another mission")])
 def test_a_mission_that_somebody_replaced_is_not_gone_on_with(found: str | None, words: str) -> None:
     onboard = OnBoard()

@@ -60,6 +60,7 @@ def disarmed_s(path: Path) -> float | None:
 WHOLE = ["idle", "taking_off", "flying", "returning", "landed"]
 
 
+@pytest.mark.fact("A10")
 @pytest.mark.parametrize(
     ("name", "way", "items"),
     [
@@ -87,6 +88,7 @@ def test_a_flight_that_was_lost_from_sight_on_its_way_down_is_not_over(flown: An
     assert (link.flight.broke_off_at, link.told[-1][1].target, link.told[-1][1].targets) == (None, 4, 5)
 
 
+@pytest.mark.fact("P1")
 @pytest.mark.parametrize(("name", "version"), [("px4-1.17_auto_rtk", None), ("arducopter-4.7_auto", "4.7.0-dev")])
 def test_a_vehicle_that_was_started_then_may_be_started_now(flown: Any, name: str, version: str | None) -> None:
     """PX4 says that its position is constant as long as it stands on the ground."""

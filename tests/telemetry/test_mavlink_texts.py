@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.mavlink.texts import Texts
@@ -23,6 +24,7 @@ def test_a_short_text_comes_at_once() -> None:
     assert Texts().on_message(heard(attitude()), 0.0) == []
 
 
+@pytest.mark.fact("P16")
 def test_the_tab_with_which_px4_ends_is_left_out() -> None:
     assert Texts().on_message(part("Armed by external command\t"), 0.0) == [(4, "Armed by external command")]
     texts = Texts()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import statistics
 from typing import Any
 
 import pytest
@@ -30,6 +31,25 @@ def test_at_30_percent_loss_every_upload_succeeds(vehicle: type, seed: int) -> N
     assert run.now_s <= 60.0
 
 
+@pytest.mark.fact("A15")
+@pytest.mark.parametrize(
+    ("faults", "measured_s"),
+    [
+        (Faults(loss=0.1), 4.9),
+        (Faults(loss=0.3), 20.3),
+        (Faults(loss=0.3, reordering=0.05, duplicates=0.05, late_s=0.25), 20.8),
+    ],
+    ids=["10 %", "30 %", "30 %, reordered, twice"],
+)
+def test_all_of_15_uploads_of_100_items_succeed_as_they_did_to_a_real_vehicle(
+    faults: Faults, measured_s: float
+) -> None:
+    """And none is said to have failed that is on board. The median may be twice the one of the real autopilot."""
+    runs = [upload(mission(100, seed=seed), ArduCopter(), faults, seed=seed) for seed in range(15)]
+    assert [run.result.verified for run in runs] == [True] * 15
+    assert statistics.median(run.now_s for run in runs) < 2 * measured_s
+
+
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_at_50_percent_loss_49_of_50_succeed(vehicle: type) -> None:
     ends = [upload(mission(50, seed=seed), vehicle(), WORSE, seed=seed).end for seed in range(50)]
@@ -37,6 +57,7 @@ def test_at_50_percent_loss_49_of_50_succeed(vehicle: type) -> None:
     assert sum(isinstance(result, UploadReport) and result.verified for result in results) >= 49
 
 
+@pytest.mark.fact("A16")
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_a_cut_link_never_looks_like_success(vehicle: type) -> None:
     """The link dies at any message, in both directions or in one: 1,000 cuts over both kinds of vehicle."""
@@ -71,6 +92,7 @@ def digest_of(craft: Any) -> str:
     return digest(tuple(item_from_message(row) for row in rows))
 
 
+@pytest.mark.fact("A17")
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @seeds(50)
 def test_a_lost_last_acknowledgement_is_settled_by_reading_back(vehicle: type, seed: int) -> None:

@@ -50,6 +50,7 @@ def test_ardupilot_gets_a_home_row_and_its_own_home_comes_back() -> None:
     assert [item.command for item in onboard.items] == [22, 16, 16, 16, 20]
 
 
+@pytest.mark.fact("P29")
 def test_px4_gets_no_home_row() -> None:
     run = upload(mission(5), Px4())
     assert [row.seq for _, way, row in run.log if way == "up" and row.get_type() == "MISSION_ITEM_INT"] == [

@@ -88,6 +88,7 @@ def test_fifty_of_fifty_writings_are_whole_over_a_lossy_link(
         assert made.now_s < 60.0, seed
 
 
+@pytest.mark.fact("P26")
 def test_integers_of_px4_go_bytewise() -> None:
     vehicle = Px4Parameters({"NAV_DLL_ACT": (0.0, 6), "BIG": (0.0, 6), "NEG": (0.0, 6)})
     assert all(w.outcome == "set" for w in write(vehicle, NAV_DLL_ACT=2.0, BIG=2_000_000_001.0, NEG=-1.0))

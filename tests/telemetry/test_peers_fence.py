@@ -18,6 +18,7 @@ FENCE = Fence(
 RALLY = (RallyPoint(-37.1245, 175.6895, 40.0), RallyPoint(-37.1235, 175.688, 55.0))
 
 
+@pytest.mark.fact("A46")
 @pytest.mark.slow
 def test_what_mavproxy_sends_hedgehop_reads_and_the_other_way_round(tmp_path: Path) -> None:
     if importlib.util.find_spec("MAVProxy") is None:

@@ -9,6 +9,7 @@ from tests.server.cli_runs import hedgehop
 from tests.telemetry.simulator_process import child, simulated_vehicle
 
 
+@pytest.mark.fact("A48")
 @pytest.mark.slow
 def test_mavproxy_and_hedgehop_read_the_same_log(tmp_path: Path) -> None:
     if importlib.util.find_spec("MAVProxy") is None:

@@ -24,6 +24,7 @@ def mavproxy() -> None:
         pytest.skip("MAVProxy is not installed: pip install --no-deps -r requirements-peers.txt")
 
 
+@pytest.mark.fact("A50")
 @pytest.mark.slow
 @pytest.mark.usefixtures("mavproxy")
 def test_mavproxy_loads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ ITEMS = (
 )
 
 
+@pytest.mark.fact("A49")
 @pytest.mark.slow
 def test_mavsdk_uploads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> None:
     with simulated_vehicle(tmp_path, *FAST) as (_, port):
@@ -51,6 +52,7 @@ def test_mavsdk_uploads_a_mission_and_flies_it_to_the_end(tmp_path: Path) -> Non
     assert own.faults == ()
 
 
+@pytest.mark.fact("P39")
 @pytest.mark.slow
 def test_mavsdk_flies_the_simulated_px4(tmp_path: Path) -> None:
     quick = ("--speedup", "8", "--parameter", "MPC_LAND_SPEED=1.5", "--parameter", "MPC_LAND_CRWL=1")

@@ -176,6 +176,7 @@ def test_home_off_the_model() -> None:
     assert row(checked(state_at((-50.0, 150.0))), "home").state == "bad"
 
 
+@pytest.mark.fact("P3")
 @pytest.mark.parametrize(
     ("changes", "state"),
     [
@@ -215,6 +216,7 @@ def test_return_height(parameters, state, words) -> None:
     assert words in found.text
 
 
+@pytest.mark.fact("A20")
 def test_a_return_height_that_is_not_enough() -> None:
     below = mission([(50.0, 150.0, 6.0), (50.0, 200.0, 6.0), (250.0, 200.0, 6.0), (250.0, 150.0, 6.0)])
     found = checked(flown=below, parameters={"RTL_ALT": 500.0})
@@ -253,6 +255,7 @@ def test_ready(changes, state) -> None:
     assert row(checked(state_at(**changes)), "ready").state == state
 
 
+@pytest.mark.fact("A33")
 def test_a_vehicle_that_is_not_ready_is_quoted() -> None:
     words = ("PreArm: Compass not healthy", "PreArm: Battery 1 low voltage failsafe")
     found = row(checked(state_at(ready_to_arm=False, not_ready_words=words)), "ready")
@@ -388,6 +391,7 @@ def test_a_height_above_the_sea_knows_its_geoid_to_half_a_metre() -> None:
     assert drops_m == pytest.approx([0.76, 1.0], abs=1e-4)
 
 
+@pytest.mark.fact("A12")
 def test_a_plan_that_is_clear_is_clear_at_the_vehicle_beside_it() -> None:
     """Planned "clear", refused 0.03 m away: a wall just beyond the plan's reach was just within the check's."""
     cells = np.array(PLAIN.elevation_m)

@@ -122,6 +122,7 @@ def simulated(mission: Mission) -> list[Flown]:
     return [simulated_flight(mission, seed) for seed in SEEDS]
 
 
+@pytest.mark.fact("P7")
 def test_led_from_place_to_place_it_leaves_the_line_as_far(shared_data: Path) -> None:
     """Recorded: 1.12 m at most and 0.77 m in 95 % beside the line, from 0.59 m below to 0.47 m above it."""
     plan = shared_data / "logs" / "real_flights" / "plans" / "px4" / "mission.waypoints"
@@ -140,6 +141,7 @@ def mean(flights: list[Flown], figure: Any) -> float:
     return float(np.mean([figure(flight) for flight in flights]))
 
 
+@pytest.mark.fact("P6")
 def test_it_leaves_the_line_as_far(real: Flown, simulated: list[Flown]) -> None:
     for figure, tolerance in (
         (lambda flight: np.percentile(flight.beside_m, 95), 0.15),
@@ -152,6 +154,7 @@ def test_it_leaves_the_line_as_far(real: Flown, simulated: list[Flown]) -> None:
         assert mean(simulated, figure) == pytest.approx(figure(real), rel=tolerance)
 
 
+@pytest.mark.fact("P8")
 def test_it_takes_as_long(real: Flown, simulated: list[Flown]) -> None:
     assert mean(simulated, lambda flight: flight.legs_s.sum()) == pytest.approx(real.legs_s.sum(), rel=0.05)
     legs_s = np.mean([flight.legs_s for flight in simulated], axis=0)

@@ -36,6 +36,7 @@ async def px4() -> AsyncIterator[tuple[Console, Simulator]]:
         yield bench, simulator
 
 
+@pytest.mark.fact("P14")
 def test_a_mission_is_uploaded_verified_started_held_and_flown() -> None:
     async def whole() -> None:
         async with px4() as (bench, _):
@@ -59,6 +60,7 @@ def test_a_mission_is_uploaded_verified_started_held_and_flown() -> None:
     run(whole)
 
 
+@pytest.mark.fact("P15")
 def test_return_and_land_are_obeyed_and_parameters_read_bytewise() -> None:
     async def whole() -> None:
         async with px4() as (bench, _):

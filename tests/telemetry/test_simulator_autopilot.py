@@ -163,6 +163,7 @@ def velocity(bench: Bench, frame: int, north: float, east: float, down: float, *
     )
 
 
+@pytest.mark.fact("A45")
 @pytest.mark.parametrize(
     ("frame", "mask", "flown"),
     [

@@ -32,6 +32,7 @@ def flying_north(speed_m_s: float) -> Bench:
     return bench
 
 
+@pytest.mark.fact("A39")
 @pytest.mark.parametrize(("speed_m_s", "measured_m"), [(3.0, 4.8), (4.0, 6.7), (5.0, 8.8), (6.2, 11.3), (8.0, 15.4)])
 def test_it_stops_where_the_real_one_stopped(speed_m_s: float, measured_m: float) -> None:
     bench = flying_north(speed_m_s)
@@ -41,6 +42,7 @@ def test_it_stops_where_the_real_one_stopped(speed_m_s: float, measured_m: float
     assert bench.vehicle.truth.p_neu[0] - from_m == pytest.approx(measured_m, rel=0.05)
 
 
+@pytest.mark.fact("A40")
 @pytest.mark.parametrize("name", ["arducopter-4.7_console_a", "arducopter-4.7_console_b"])
 def test_it_slows_down_as_the_recorded_vehicle_did(shared_data: Path, name: str) -> None:
     braked_s, speeds = None, []

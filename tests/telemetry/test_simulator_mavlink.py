@@ -127,6 +127,7 @@ def test_only_its_own_ground_station_feeds_the_failsafe() -> None:
     assert "GCS Failsafe" in bench.texts()
 
 
+@pytest.mark.fact("A19")
 def test_parameters_are_listed_read_and_set() -> None:
     bench = Bench(heartbeat=False)
     assert bench.send(wire.MAVLink_param_request_list_message(1, 1)) == []

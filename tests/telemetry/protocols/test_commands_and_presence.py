@@ -31,6 +31,7 @@ def test_its_heart_beats_once_a_second(station: Station) -> None:
     assert (beat.type, beat.mavlink_version) == (wire.MAV_TYPE_QUADROTOR, 3)
 
 
+@pytest.mark.fact("A47")
 @pytest.mark.parametrize("seq", [0, 1, 2**32 - 1])
 def test_a_ping_to_everybody_comes_back_to_its_sender(station: Station, seq: int) -> None:
     (pong,) = station.answers(wire.MAVLink_ping_message(123_456_789, seq, 0, 0), system=77, component=3)
