@@ -20,7 +20,7 @@ from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.topics.checklist import ChecklistPoint, ChecklistRecord, digest_of
 from telemetry.topics.messages import LinkStatus, Topic
-from telemetry.topics.requests import Operator, TickPoint
+from telemetry.topics.requests import NoteChecklist, Operator, TickPoint
 
 _LOOK_AGAIN = "Look at the list under Before the start again."
 
@@ -42,6 +42,8 @@ class ChecklistDesk:
         self._ticked: dict[int, ChecklistPoint] = {}
         """Points by their number, 1 is the first."""
         self._why_again = ""
+        self._noted: tuple[str, str, str] | None = None
+        """The text that the log of commands was told last: its vehicle, profile and revision."""
 
     @property
     def doc(self) -> ChecklistDoc | None:
@@ -86,6 +88,7 @@ class ChecklistDesk:
         if (body.number in self._ticked) == body.ticked:
             return
         point = asked.points[body.number - 1]
+        await self._note(operator, asked)
         await self._link.call(
             TickPoint(operator, body.number, len(asked.points), point.text, asked.profile, ticked=body.ticked)
         )
@@ -98,6 +101,15 @@ class ChecklistDesk:
         if len(self._ticked) == len(asked.points):
             self._why_again = ""
         self._publish()
+
+    async def _note(self, operator: Operator, asked: _Asked) -> None:
+        """Who wrote what is ticked is in the log before the first tick of it: a change by somebody shows there."""
+        kept = self._lists.of(asked.profile)
+        noted = asked.vehicle, asked.profile, kept.revision
+        if noted != self._noted:
+            written = kept.changed_by, kept.changed_utc
+            await self._link.call(NoteChecklist(operator, asked.profile, len(asked.points), kept.revision, *written))
+            self._noted = noted
 
     def check(self, digest: str) -> None:
         """Raises CheckNeededError unless every point is ticked for this mission; StorageError where the lists are not

@@ -93,6 +93,7 @@ class Answering:
             requests.ReadVehicleLog: self._read_log,
             requests.HighestToken: self._highest_token,
             requests.TickPoint: self._tick_point,
+            requests.NoteChecklist: self._note_checklist,
             requests.StartAuto: self._start_auto,
             requests.StartGuided: self._start_guided,
             requests.FlyWay: self._fly_way,
@@ -227,6 +228,12 @@ class Answering:
         what = "tick" if request.ticked else "take back the tick of"
         point = f"point {request.number} of {request.of} of the checklist of {request.profile}: {request.text}"
         await self._record(request, f"{what} {point}{f' (by {request.by})' if request.by else ''}")
+
+    async def _note_checklist(self, request: requests.NoteChecklist) -> None:
+        self._link.need_session()
+        text = f"{request.points} points, SHA-256 {request.digest[:12]}"
+        written = f"written by {request.written_by} at {request.written_utc}"
+        await self._record(request, f"ticks the checklist of {request.profile}: {text}, {written}")
 
     async def _start_auto(self, request: requests.StartAuto) -> None:
         session = self._link.need_session()

@@ -174,6 +174,19 @@ class TickPoint(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class NoteChecklist(OperatorRequest):
+    """Writes down which text of a profile's checklist is ticked from here on. -> None"""
+
+    profile: str
+    points: int
+    digest: str
+    """SHA-256 of the text."""
+    written_by: str
+    written_utc: str
+    """ISO 8601"""
+
+
+@dataclass(frozen=True, slots=True)
 class StartAuto(OperatorRequest):
     """Arms if need be and flies the mission on board from ``from_item`` on. Only if its digest is this. -> None
 
@@ -310,6 +323,7 @@ LinkRequest = (
     | Arm
     | Disarm
     | TickPoint
+    | NoteChecklist
     | StartAuto
     | StartGuided
     | FlyWay

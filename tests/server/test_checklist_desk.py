@@ -18,7 +18,7 @@ from server.schemas import ChecklistDoc, TickBody
 from telemetry.errors import RecordingFullError
 from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
-from telemetry.topics.requests import Operator, TickPoint
+from telemetry.topics.requests import NoteChecklist, Operator, TickPoint
 
 ANNA, BEN = Operator("Anna", 7), Operator("Ben", 8)
 QUAD = Candidate("udp/1/1", "udpin:127.0.0.1:14550", "127.0.0.1:9", 1, 1, "ardupilot", 2)
@@ -42,6 +42,7 @@ class Desk:
     def __init__(self, root: Path) -> None:
         self.lists, self.aboard = Checklists(root), Aboard(root / "onboard.json")
         self.asked: list[TickPoint] = []
+        self.noted: list[NoteChecklist] = []
         self.published: list[ChecklistRecord] = []
         self.refusal: Exception | None = None
         self.meanwhile: Callable[[], object] = lambda: None
@@ -53,6 +54,9 @@ class Desk:
     async def call(self, request: Any) -> None:
         if self.refusal is not None:
             raise self.refusal
+        if isinstance(request, NoteChecklist):
+            self.noted.append(request)
+            return
         self.asked.append(request)
         self.meanwhile()
 
@@ -132,6 +136,22 @@ def test_a_tick_is_taken_back_and_one_that_stands_keeps_its_name(desk: Desk) -> 
     assert [(each.number, each.ticked) for each in desk.asked] == [(1, True), (2, True), (3, True), (2, False)]
     with pytest.raises(CheckNeededError, match="Battery"):
         desk.desk.check("mission")
+
+
+def test_whose_text_is_ticked_is_noted_before_the_first_tick_of_each(desk: Desk) -> None:
+    desk.refusal = RecordingFullError("No space is left for the audit log.")
+    with pytest.raises(RecordingFullError):
+        desk.tick(1)
+    desk.refusal = None
+    desk.tick_all()
+    first = desk.lists.of("Quad")
+    desk.lists.write("Quad", "Propellers\n", instead_of=first.revision, by="Eve")
+    desk.tick(1, BEN)
+    second = desk.lists.of("Quad")
+    assert desk.noted == [
+        NoteChecklist(ANNA, "Quad", 3, first.revision, "Anna", first.changed_utc),
+        NoteChecklist(BEN, "Quad", 1, second.revision, "Eve", second.changed_utc),
+    ]
 
 
 def test_what_cannot_be_written_down_is_not_ticked(desk: Desk) -> None:

@@ -168,6 +168,9 @@ def test_a_start_is_refused_until_each_point_is_ticked_and_review_shows_who_did(
 
     words = [entry["words"] for entry in ok(planned.http.get("/api/audit")).json()["newest"]]
     assert f"tick point 3 of 3 of the checklist of {PROFILE}: Wind will do" in words
+    written = [line for line in words if f"ticks the checklist of {PROFILE}: " in line]
+    assert len({line.partition(", written by ")[0] for line in written}) == 2
+    assert all(f"written by {planned.server.name} at 20" in line for line in written)
     listed = planned.until(
         lambda m: m.type == "recordings" and any(r.name == recording.name and not r.fault for r in m.recordings), LONG_S
     ).recordings
