@@ -36,6 +36,11 @@ class ClearanceParams:
         """Radius of the tube around the line for which the certificate is made."""
         return 0.0 if self.budget is None else self.budget.value_m("following")
 
+    @property
+    def fence_margin_m(self) -> float:
+        """Kept from a fence: how far the vehicle's outermost point may be beside where it should be."""
+        return self.vehicle_radius_m + self.position_error_m + self.following_m
+
 
 @dataclass(frozen=True, slots=True)
 class WorstPoint:

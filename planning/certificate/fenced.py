@@ -36,7 +36,7 @@ def fence_verdict(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> FenceVe
         home_lat_lon_deg=(float(home_lat_deg), float(home_lon_deg)),
         rally_lat_lon_deg=tuple((point.lat_deg, point.lon_deg) for point in line.rally),
         return_rel_home_m=params.rtl_height_m + max(0.0, highest_rally_m),
-        margin_m=params.vehicle_radius_m + params.position_error_m + params.following_m,
+        margin_m=params.fence_margin_m,
     )
     return judge_fence(line.fence, flight)
 

@@ -55,8 +55,8 @@ def to_circle(triangles_m: F64, centre_m: F64, radius_m: float, *, inclusion: bo
         away_m = np.linalg.norm(triangles_m - centre_m, axis=2)
         farthest = np.argmax(away_m, axis=1)
         return NearestOfTriangles(np.maximum(0.0, radius_m - away_m[rows, farthest]), triangles_m[rows, farthest])
-    nearest = [_foot(triangles_m[:, k], triangles_m[:, (k + 1) % 3], centre_m) for k in range(3)]
-    away_m = np.stack([np.linalg.norm(foot - centre_m, axis=1) for foot in nearest])
+    nearest = [foot(triangles_m[:, k], triangles_m[:, (k + 1) % 3], centre_m) for k in range(3)]
+    away_m = np.stack([np.linalg.norm(place - centre_m, axis=1) for place in nearest])
     side = np.argmin(away_m, axis=0)
     place_m, within = np.stack(nearest)[side, rows], _holds(triangles_m, centre_m)
     place_m[within] = centre_m
@@ -96,13 +96,13 @@ def _is_inside(place_m: F64, corners_m: F64, ends_m: F64) -> bool:
 
 def _between(a: F64, b: F64, p: F64, q: F64) -> tuple[F64, F64]:
     """(K,) distances of the segments a-b to the segment p-q, and (K, 2) where on a-b."""
-    candidates = [_foot(a, b, p), _foot(a, b, q), a, b]
+    candidates = [foot(a, b, p), foot(a, b, q), a, b]
     reach = np.stack(
         [
             np.linalg.norm(candidates[0] - p, axis=1),
             np.linalg.norm(candidates[1] - q, axis=1),
-            np.linalg.norm(_foot(p, q, a) - a, axis=1),
-            np.linalg.norm(_foot(p, q, b) - b, axis=1),
+            np.linalg.norm(foot(p, q, a) - a, axis=1),
+            np.linalg.norm(foot(p, q, b) - b, axis=1),
         ]
     )
     which, rows = np.argmin(reach, axis=0), np.arange(len(a))
@@ -126,7 +126,7 @@ def _crossing(a: F64, b: F64, p: F64, q: F64) -> F64:
     return np.where(crosses, share, np.nan)
 
 
-def _foot(a: F64, b: F64, p: F64) -> F64:
+def foot(a: F64, b: F64, p: F64) -> F64:
     """The point of each segment a-b nearest to p; a and b, or p, may be one point or one for each."""
     along = b - a
     square = np.sum(along * along, axis=-1)

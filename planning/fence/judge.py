@@ -15,16 +15,12 @@ from typing import Literal
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.geometry.frames import LocalFrame
 from planning.fence.distance import NearestOfTriangles, to_circle, to_polygon
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
+from planning.fence.home_plane import FARTHEST_M, HomePlane, longest_m, plane_at
 
 CIRCLE_SHARE = 0.007
 """Of a radius: metres on a sphere differ from true ones by up to 0.6 %."""
-FARTHEST_M = 200_000.0
-"""From home: in the tangent plane farther places are no longer where they are."""
-BEND_RADIUS_M = 6_335_000.0
-"""The Earth's smallest radius of curvature."""
 Part = Literal["line", "home", "rally"]
 
 
@@ -69,20 +65,19 @@ class FenceVerdict:
 
 def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
     """The verdict on a flight of which all places are finite."""
-    lat_deg, lon_deg = flight.home_lat_lon_deg
-    frame = _Plane(LocalFrame(lat_deg, lon_deg, 0.0), abs(lat_deg))
+    frame = plane_at(flight.home_lat_lon_deg)
     distance_m, shape, part, place_m, far = math.inf, "", "line", np.zeros(2), ""
     parts = _parts(flight, frame)
-    longest_m = max(_longest_m(triangles) for _, triangles in parts)
+    longest_way_m = max(longest_m(triangles) for _, triangles in parts)
     for name, each in named_shapes(fence):
         if frame.reach_m(each) > FARTHEST_M:
             far = name
         for kind, triangles in parts:
-            nearest = _nearest(triangles, each, frame, longest_m)
+            nearest = _nearest(triangles, each, frame, longest_way_m)
             k, found_m = nearest.worst()
             if found_m < distance_m:
                 distance_m, shape, part, place_m = found_m, name, kind, nearest.place_m[k]
-    at_lat_deg, at_lon_deg = frame.lat_lon(place_m)
+    at_lat_deg, at_lon_deg = map(float, frame.lat_lon_deg(place_m[None])[0])
     heights_m = flight.line_rel_home_m
     lowest_m, highest_m = float(heights_m.min()), max(float(heights_m.max()), flight.return_rel_home_m)
     faults = [
@@ -108,33 +103,7 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Plane:
-    frame: LocalFrame
-    lat_deg: float
-
-    def xy_m(self, lat_lon_deg: object) -> F64:
-        """(N, 2) degrees -> (N, 2) east and north of home."""
-        lat_deg, lon_deg = np.asarray(lat_lon_deg, np.float64).reshape(-1, 2).T
-        return self.frame.to_tangent(lat_deg, lon_deg, np.zeros(len(lat_deg)))[:, :2]
-
-    def lat_lon(self, xy_m: F64) -> LatLon:
-        lat_deg, lon_deg, _ = self.frame.to_geodetic(np.array([[*xy_m, 0.0]]))[0]
-        return float(lat_deg), float(lon_deg)
-
-    def reach_m(self, shape: FencePolygon | FenceCircle) -> float:
-        """From home to the farthest corner or the centre, through the Earth: also right on its other side."""
-        places = shape.corners_lat_lon_deg if isinstance(shape, FencePolygon) else (shape.centre_lat_lon_deg,)
-        lat_deg, lon_deg = np.array(places).T
-        return float(np.linalg.norm(self.frame.to_tangent(lat_deg, lon_deg, np.zeros(len(lat_deg))), axis=1).max())
-
-    def bend_m(self, longest_m: float) -> float:
-        """How far two straight lines of this length, each straight in a frame of its own, can be apart."""
-        steep = math.tan(math.radians(min(self.lat_deg + 1.0, 85.0)))
-        return 2.0 * longest_m**2 * max(steep, longest_m / BEND_RADIUS_M) / (8.0 * BEND_RADIUS_M)
-
-
-def _parts(flight: FencedFlight, frame: _Plane) -> list[tuple[Part, F64]]:
+def _parts(flight: FencedFlight, frame: HomePlane) -> list[tuple[Part, F64]]:
     """(K, 3, 2) triangles of the line, of the ways home and of those to each rally point."""
     xy_m = frame.xy_m(flight.line_lat_lon_deg)
     a, b = xy_m[:-1], xy_m[1:]
@@ -157,7 +126,7 @@ def named_shapes(fence: Fence) -> list[tuple[str, FencePolygon | FenceCircle]]:
     ]
 
 
-def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: _Plane, flown_m: float) -> NearestOfTriangles:
+def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: HomePlane, flown_m: float) -> NearestOfTriangles:
     """``flown_m``: the longest straight way of the flight."""
     if isinstance(shape, FenceCircle):
         share = -CIRCLE_SHARE if shape.inclusion else CIRCLE_SHARE
@@ -167,13 +136,8 @@ def _nearest(triangles: F64, shape: FencePolygon | FenceCircle, frame: _Plane, f
     else:
         corners_m = frame.xy_m(shape.corners_lat_lon_deg)
         found = to_polygon(triangles, corners_m, inclusion=shape.inclusion)
-        bend_m = frame.bend_m(flown_m) + frame.bend_m(_longest_m(corners_m[None]))
+        bend_m = frame.bend_m(flown_m) + frame.bend_m(longest_m(corners_m[None]))
     return NearestOfTriangles(np.maximum(0.0, found.distance_m - bend_m), found.place_m)
-
-
-def _longest_m(polygons_m: F64) -> float:
-    """Of the sides of (K, N, 2) polygons."""
-    return float(np.linalg.norm(polygons_m - np.roll(polygons_m, 1, axis=1), axis=2).max())
 
 
 def _far_words(shape: str) -> str:

@@ -34,9 +34,10 @@ from planning.missions.feasibility import Feasibility, feasibility_of, photos_ro
 from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
+from planning.planner.laid import Detour, Route, home_place, laid_route
 from planning.planner.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
 from planning.planner.request import PlanRequest, check_request, check_size, effective_profile
-from planning.route.path import MIN_SEGMENT_M, sampled_path
+from planning.route.path import sampled_path
 from planning.route.poi import check_pois
 from planning.route.survey_coverage import SurveyCoverage, survey_coverage
 from planning.route.timing import path_timing
@@ -75,11 +76,18 @@ class Plan:
     """What a survey's photos really see; None where the plan is no survey, or takes no photos."""
     feasibility: Feasibility
     """Whether the vehicle can fly it: a verdict of its own, beside the certificate's."""
+    detours: tuple[Detour, ...]
+    """Points of the path that nobody asked for: it is laid around the fence there."""
     warnings: tuple[str, ...]
 
     @property
     def mission(self) -> Mission:
         return self.built.mission
+
+    @property
+    def detour_vertices(self) -> list[int]:
+        """Of the path, in the order of ``detours``: all without a point but home's, which comes first."""
+        return [k for k, poi in enumerate(self.path.vertex_poi) if poi is None and k > 0]
 
 
 def plan_mission(
@@ -128,22 +136,23 @@ class _Job:
 def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
     """``why_moved``: what is wrong with home at the first point; empty when it is there or was given."""
     model, request = job.model, job.request
-    points_xy_m = np.vstack([_points(model, request), model.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))])
+    route = laid_route(model, request, home)
+    points_xy_m = np.vstack([_points(model, request), route.vertices_xy_m, home_place(model, home)])
     feels_m = felt_m(request)
 
     def is_enough(ground: Ground, plan: Plan) -> bool:
         return was_enough(ground, model, plan.line, plan.certificate, felt_m=feels_m)
 
     return job.grounds.judged(
-        points_xy_m, least_margin_m(request), lambda ground: _planned(job, ground, home, why_moved), is_enough
+        points_xy_m, least_margin_m(request), lambda ground: _planned(job, ground, home, why_moved, route), is_enough
     )
 
 
-def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
+def _planned(job: _Job, ground: Ground, home: Home, why_moved: str, route: Route) -> Plan:
     request, filled, holes = job.request, ground.filled, ground.holes
     first = request.pois[0]
     home_notes = [moved_note((first.lat_deg, first.lon_deg), home, why_moved)] if why_moved else []
-    vertices_xy_m, vertex_poi = _vertices(filled, request, home)
+    vertices_xy_m, vertex_poi = route.vertices_xy_m, route.vertex_poi
     # Melita 2020, fig. 7
     surfaces = safe_surface(filled, request.surface, around_xy_m=vertices_xy_m)
     job.report(PATH_STEP, 0.5)
@@ -172,7 +181,8 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str) -> Plan:
         predicted=predicted,
         coverage=coverage,
         feasibility=_feasibility(built.mission, profile, predicted, coverage),
-        warnings=(*home_notes, *built.warnings, *_warnings(request)),
+        detours=route.detours,
+        warnings=(*home_notes, *route.notes, *built.warnings, *_warnings(request)),
     )
 
 
@@ -235,16 +245,6 @@ def plan_trade(plan: Plan) -> list[Choice]:
     profile = effective_profile(request.profile, request.path)
     params = replace(request.mission, end="rtl")
     return decimation_trade(plan.path, plan.mission.home, params, profile, plan.dsm, request.pois)
-
-
-def _vertices(dsm: Dsm, request: PlanRequest, home: Home) -> tuple[np.ndarray, tuple[int | None, ...]]:
-    lat_lon = np.array([(p.lat_deg, p.lon_deg) for p in request.pois])
-    xy_m = dsm.xy_from_lat_lon(lat_lon)
-    poi_index: tuple[int | None, ...] = tuple(range(len(xy_m)))
-    home_xy = dsm.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))
-    if np.hypot(*(home_xy[0] - xy_m[0])) < max(request.path.step_m, MIN_SEGMENT_M):
-        return xy_m, poi_index
-    return np.vstack([home_xy, xy_m]), (None, *poi_index)
 
 
 def _points(model: SurfaceModel, request: PlanRequest) -> np.ndarray:

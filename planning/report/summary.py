@@ -71,6 +71,7 @@ def plan_summary(plan: Plan, source: SurfaceModel) -> dict[str, Any]:
         "items": len(plan.mission.items),
         "max_items": request.mission.max_items,
         "excess_height_m": plan.built.excess_height_m,
+        "detours": [asdict(detour) for detour in plan.detours],
         "dsm": dsm_summary(source, plan.ground, holes_filled=plan.holes.count),
         "survey": None if plan.coverage is None else survey_summary(plan.coverage),
         "warnings": list(plan.warnings),

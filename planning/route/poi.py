@@ -39,14 +39,15 @@ def check_pois(
     xy_m[sound] = dsm.xy_from_lat_lon(degrees[sound])
     for i, poi in enumerate(pois):
         if problem := _range_problem(poi) or _place_problem(poi, xy_m[i], dsm, surface, bounds):
-            problems.append(f"{_label(i, poi)}: {problem}")
+            problems.append(f"{poi_label(i, poi)}: {problem}")
     problems += _too_close(pois, xy_m)
     if problems:
         raise PoiError(" ".join(problems), where="points of interest" if len(problems) > 1 else "")
     return xy_m
 
 
-def _label(index: int, poi: Poi) -> str:
+def poi_label(index: int, poi: Poi) -> str:
+    """As errors call it."""
     return f'Point {index + 1} "{poi.name}"' if poi.name else f"Point {index + 1}"
 
 
@@ -92,6 +93,6 @@ def _lands_when_swapped(poi: Poi, dsm: SurfaceModel, bounds: Bounds) -> bool:
 def _too_close(pois: Sequence[Poi], xy_m: F64) -> list[str]:
     apart_m = np.hypot(*np.diff(xy_m, axis=0).T) if len(xy_m) > 1 else np.empty(0)
     return [
-        f"{_label(i, pois[i])} and {_label(i + 1, pois[i + 1])} are {apart_m[i]:.2f} m apart: delete one of them."
+        f"{poi_label(i, pois[i])} and {poi_label(i + 1, pois[i + 1])} are {apart_m[i]:.2f} m apart: delete one of them."
         for i in np.flatnonzero(apart_m < MIN_APART_M).tolist()
     ]

@@ -12,13 +12,14 @@ from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
 from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
+from planning.errors import PoiError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from planning.formats import qgc_plan
 from planning.missions.flown import flown_line
 from planning.planner.part import certify_part
 from planning.planner.plan import plan_mission
 from planning.terrain.dsm import Dsm
-from tests.planning.plan_examples import request_over, small_dsm
+from tests.planning.plan_examples import pois_at, request_over, small_dsm
 from tests.planning.test_flown import HOME, RTL, TAKE_OFF, at, flat_dsm, item
 
 PARAMS = ClearanceParams(required_clearance_m=2.0, vehicle_radius_m=0.5, position_error_m=1.0, rtl_height_m=15.0)
@@ -110,19 +111,73 @@ def test_a_fence_elsewhere_is_told_to_be_too_far_to_judge() -> None:
     assert "not judged" in judged(far).reasons[0].text
 
 
-def test_a_plan_keeps_its_fence_in_its_certificate_and_in_its_file() -> None:
+def place_in(dsm: Dsm, east: float, north: float) -> tuple[float, float]:
+    """At shares of the model's sides."""
+    (poi,) = pois_at(dsm, [(east, north)])
+    return poi.lat_deg, poi.lon_deg
+
+
+def test_a_plan_that_cannot_keep_its_fence_says_so_in_its_certificate_and_in_its_file() -> None:
+    """Home is the first point: from the second the way back leads through the circle, however the line is laid."""
     dsm = small_dsm()
     asked = request_over(dsm, [(0.3, 0.3), (0.7, 0.6)])
     free = plan_mission(dsm, asked)
-    west, south, east, north = dsm.bounds_m
-    lat_deg, lon_deg = dsm.lat_lon_from_xy(np.array([[(west + east) / 2, south + 0.45 * (north - south)]]))[0]
-    exclusion = Fence(circles=(circle(float(lat_deg), float(lon_deg), 2.0, inclusion=False, where="t"),))
+    exclusion = Fence(circles=(circle(*place_in(dsm, 0.5, 0.45), 2.0, inclusion=False, where="t"),))
     fenced = plan_mission(dsm, replace(asked, fence=exclusion))
     assert "fence" not in codes(free.certificate)
     assert "fence" in codes(fenced.certificate)
+    assert fenced.certificate.fence is not None
+    assert fenced.certificate.fence.part == "home"
+    assert {detour.shape for detour in fenced.detours} == {"exclusion circle 1"}
     written = qgc_plan.read_plan(qgc_plan.write_plan(fenced.mission))
     assert written.fence == exclusion
     params = asked.clearance()
     _, again = certify_part(dsm, written, params, max_hole_m2=asked.surface.fill_hole_area_m2, assumptions={})
     assert codes(again) == codes(fenced.certificate)
     assert again.fence == fenced.certificate.fence
+
+
+def test_a_plan_is_laid_around_its_fence_and_certified_while_its_points_stay_what_they_are() -> None:
+    dsm = small_dsm()
+    asked = request_over(dsm, [(0.2, 0.6), (0.8, 0.6)], home_lat_lon_deg=place_in(dsm, 0.5, 0.1))
+    asked = replace(asked, pois=tuple(replace(poi, loiter_s=4.0) for poi in asked.pois))
+    exclusion = Fence(circles=(circle(*place_in(dsm, 0.5, 0.6), 3.0, inclusion=False, where="t"),))
+    straight, laid = plan_mission(dsm, asked), plan_mission(dsm, replace(asked, fence=exclusion))
+    assert straight.detours == ()
+    assert "fence" not in codes(laid.certificate)
+    assert laid.certificate.fence is not None
+    assert laid.certificate.fence.min_distance_m >= laid.certificate.fence.margin_m
+    assert {(detour.shape, detour.before_poi) for detour in laid.detours} == {("exclusion circle 1", 1)}
+    assert len(laid.path.vertex) == len(straight.path.vertex) + len(laid.detours)
+    waits_s = [item.params[0] for item in laid.mission.items if item.command == 16]
+    assert sum(waits_s) == 8.0
+    assert laid.mission.pois == straight.mission.pois
+    assert float(laid.path.s_m[-1]) > float(straight.path.s_m[-1])
+
+
+def test_points_where_the_fence_lets_nobody_be_are_refused_all_at_once_and_by_name() -> None:
+    dsm = small_dsm()
+    asked = request_over(dsm, [(0.2, 0.6), (0.5, 0.6), (0.8, 0.6)], home_lat_lon_deg=place_in(dsm, 0.5, 0.1))
+    circles = (
+        circle(*place_in(dsm, 0.5, 0.6), 3.0, inclusion=False, where="t"),
+        circle(*place_in(dsm, 0.2, 0.6), 40.0, inclusion=True, where="t"),
+        circle(*place_in(dsm, 0.8, 0.6), 1.0, inclusion=False, where="t"),
+    )
+    with pytest.raises(PoiError) as refused:
+        plan_mission(dsm, replace(asked, fence=Fence(circles=circles)))
+    assert 'Point 2 "P2" lies 3.02 m inside exclusion circle 1 of the fence' in refused.value.what
+    assert 'Point 3 "P3" lies' in refused.value.what
+    assert 'Point 1 "P1"' not in refused.value.what
+
+
+def test_a_point_that_is_closed_in_is_told_with_the_shapes_that_close_it() -> None:
+    dsm = small_dsm()
+    asked = request_over(dsm, [(0.2, 0.6), (0.8, 0.6)], home_lat_lon_deg=place_in(dsm, 0.5, 0.1))
+    wall = polygon(
+        [place_in(dsm, *at) for at in ((0.5, 0.0), (0.52, 0.0), (0.52, 1.0), (0.5, 1.0))], inclusion=False, where="t"
+    )
+    plan = plan_mission(dsm, replace(asked, fence=Fence((wall,)), home_lat_lon_deg=place_in(dsm, 0.2, 0.1)))
+    assert "fence" in codes(plan.certificate)
+    assert plan.detours == ()
+    said = 'from Point 1 "P1" to Point 2 "P2" that keeps to the fence: exclusion polygon 1'
+    assert any(said in warning for warning in plan.warnings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -101,16 +100,31 @@ def test_certify_judges_the_fence_of_a_plan_and_the_one_that_is_given(tmp_path: 
 
 def test_a_plan_carries_its_fence_into_its_file_and_certify_finds_it_there(tmp_path: Path) -> None:
     model, points = write_demo(tmp_path)
-    first = json.loads(hedgehop("plan", model, points, "--out", tmp_path / "free", "--json").out)["home"]
-    around = Fence(circles=(circle(first["lat_deg"], first["lon_deg"], 5.0, inclusion=True, where="t"),))
+    free = hedgehop("plan", model, points, "--out", tmp_path / "free", "--json").json
+    assert free["detours"] == []
+    home = free["home"]
+    low = Fence(
+        circles=(circle(home["lat_deg"], home["lon_deg"], 2000.0, inclusion=True, where="t"),), ceiling_rel_home_m=1.0
+    )
     fence = tmp_path / "fence.kml"
-    fence.write_text(write_fence(fence.name, around, ()))
+    fence.write_text(write_fence(fence.name, low, ()))
     planned = hedgehop("plan", model, points, "--out", tmp_path / "out", "--fence", fence)
     assert planned.code == 1
     assert "fence: NOT kept" in planned.out
     written = tmp_path / "out" / "mission.plan"
-    assert read_plan(written.read_bytes()).fence == around
+    assert read_plan(written.read_bytes()).fence == low
     again = hedgehop("certify", model, written, "--json")
     assert again.code == 1
     assert "fence" in {reason["code"] for reason in again.json["reasons"]}
-    assert "Fence: 1 circle of the mission's own file." in again.err
+    assert "Fence: 1 circle, ceiling at 1 m above home of the mission's own file." in again.err
+
+
+def test_a_plan_whose_points_the_fence_leaves_out_is_refused_with_each_distance(tmp_path: Path) -> None:
+    model, points = write_demo(tmp_path)
+    home = hedgehop("plan", model, points, "--out", tmp_path / "free", "--json").json["home"]
+    around = Fence(circles=(circle(home["lat_deg"], home["lon_deg"], 5.0, inclusion=True, where="t"),))
+    fence = tmp_path / "fence.kml"
+    fence.write_text(write_fence(fence.name, around, ()))
+    planned = hedgehop("plan", model, points, "--out", tmp_path / "out", "--fence", fence)
+    assert planned.code == 2
+    assert "m outside inclusion circle 1 of the fence" in planned.err

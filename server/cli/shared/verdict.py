@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Any
 
 from planning.missions.feasibility import verdict_words
@@ -23,6 +24,8 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
     ]
     if (fence := summary["fence"]) is not None:
         lines.append(f"  fence: {_fence(fence)}")
+    if detours := summary.get("detours"):
+        lines.append(f"  laid around: {_around(detours)}")
     if (survey := summary.get("survey")) is not None:
         lines.append(f"  photos: {_photos(survey)}")
     lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
@@ -50,6 +53,11 @@ def _fence(fence: dict[str, Any]) -> str:
         f"{verb}: {part} comes within {metres(fence['min_distance_m'])} of {fence['shape']} at "
         f"{fence['lat_deg']:.7f}, {fence['lon_deg']:.7f}; the vehicle needs {metres_up(fence['margin_m'])}"
     )
+
+
+def _around(detours: list[dict[str, Any]]) -> str:
+    counts = Counter(detour["shape"] for detour in detours)
+    return ", ".join(f"{shape} ({count} point{'s' * (count > 1)})" for shape, count in counts.items())
 
 
 def _percent(share: float | None) -> str:
