@@ -44,6 +44,7 @@ from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
 from server.scene.mirror import Voxels
 from server.schemas import (
     BetterHomeDoc,
+    DetourDoc,
     FenceVerdictDoc,
     HomeDoc,
     PlanDoc,
@@ -190,6 +191,7 @@ def result_doc(plan: Plan, source: Dsm, seconds: dict[str, float], seen_columns:
         max_height_above_ground_m=finite_or_none(certificate.max_height_above_ground_m),
         reasons=[ReasonDoc(code=r.code, text=r.text, mend=r.mend) for r in certificate.reasons],
         fence=None if summary["fence"] is None else FenceVerdictDoc(**summary["fence"]),
+        detours=[DetourDoc(**each) for each in summary["detours"]],
         survey=None if summary["survey"] is None else SurveyResult(**summary["survey"]),
         gsd_min_cm=gsd_min,
         gsd_max_cm=gsd_max,
@@ -255,6 +257,7 @@ def _gsd_range_cm(plan: Plan) -> tuple[float | None, float | None]:
 
 def plan_scene(plan: Plan) -> PlanScene:
     path, line, worst = plan.path, plan.line, plan.certificate.worst
+    around_m = np.column_stack([path.xy_m, path.alt_dsm_m])[path.vertex[plan.detour_vertices]]
     keep = kept_within(path.s_m, path.alt_dsm_m, PATH_TOLERANCE_M, must_keep=path.vertex)
     return PlanScene(
         safe_surface=relief(plan.surfaces, path),
@@ -267,6 +270,8 @@ def plan_scene(plan: Plan) -> PlanScene:
         required_clearance_m=plan.certificate.required_clearance_m,
         home_m=np.array([*line.home_xy_m, line.home_alt_dsm_m]),
         takeoff_alt_dsm_m=line.takeoff_alt_dsm_m,
+        around_m=around_m,
+        around=tuple(detour.shape for detour in plan.detours),
     )
 
 

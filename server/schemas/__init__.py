@@ -99,6 +99,7 @@ from server.schemas.result_docs import (
     BetterHomeDoc,
     Chart,
     Computation,
+    DetourDoc,
     ErrorDoc,
     FenceVerdictDoc,
     HomeDoc,

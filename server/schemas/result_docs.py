@@ -162,6 +162,16 @@ class FenceVerdictDoc(Strict):
     faults: list[str]
 
 
+class DetourDoc(Strict):
+    """A point that was put into the path to keep to the fence; the fields of ``planning.planner.laid.Detour``."""
+
+    lat_deg: float
+    lon_deg: float
+    shape: str
+    before_poi: int
+    """Index of the point that the leg leads to."""
+
+
 class ResultDoc(Strict):
     other_surface: str = ""
     """That the points were planned on another surface model, and how far home moves; empty: they were not."""
@@ -196,6 +206,7 @@ class ResultDoc(Strict):
     excess_height_m: float
     fence: FenceVerdictDoc | None = None
     """Null: the plan has no fence."""
+    detours: list[DetourDoc] = Field(default=[])
     survey: SurveyResult | None = None
     gsd_min_cm: float | None
     gsd_max_cm: float | None

@@ -51,6 +51,8 @@ def plan_over(dsm: Dsm, *, height_m: float = 5.0) -> PlanScene:
         required_clearance_m=3.0,
         home_m=np.array([*xy[0], ground[0]]),
         takeoff_alt_dsm_m=float(path[0, 2]),
+        around_m=np.empty((0, 3)),
+        around=(),
     )
 
 

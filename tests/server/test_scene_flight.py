@@ -60,3 +60,13 @@ def test_the_worst_point_says_how_near_it_is(distance_m: float, words: str) -> N
     assert drawing is not None
     labels = [node.props["text"] for node in flight_nodes(drawing) if node.kind == "label"]
     assert labels == [words]
+
+
+def test_where_the_path_begins_to_turn_around_a_shape_stands_which() -> None:
+    state, plan = state_over(DSM), plan_over(DSM)
+    around = ("exclusion circle 1", "exclusion circle 1", "inclusion polygon 2")
+    turning = replace(plan, around_m=plan.path_m[[20, 24, 40]], around=around)
+    drawing = Drawing.of(DSM, replace(state, plan=turning))
+    assert drawing is not None
+    labels = [node.props["text"] for node in flight_nodes(drawing) if node.kind == "label"]
+    assert labels[:2] == ["around exclusion circle 1", "around inclusion polygon 2"]

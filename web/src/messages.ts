@@ -1019,6 +1019,15 @@ export interface FenceVerdictDoc {
   faults: string[];
 }
 
+/** A point that was put into the path to keep to the fence; the fields of ``planning.planner.laid.Detour``. */
+export interface DetourDoc {
+  lat_deg: number;
+  lon_deg: number;
+  shape: string;
+  /** Index of the point that the leg leads to. */
+  before_poi: number;
+}
+
 export interface ResultDoc {
   /** That the points were planned on another surface model, and how far home moves; empty: they were not. */
   other_surface: string;
@@ -1053,6 +1062,7 @@ export interface ResultDoc {
   excess_height_m: number;
   /** Null: the plan has no fence. */
   fence: FenceVerdictDoc | null;
+  detours: DetourDoc[];
   survey: SurveyResult | null;
   gsd_min_cm: number | null;
   gsd_max_cm: number | null;

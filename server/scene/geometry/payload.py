@@ -64,6 +64,10 @@ class PlanScene:
     home_m: F64
     """(3,)"""
     takeoff_alt_dsm_m: float
+    around_m: F64
+    """(D, 3) where the path turns around a fence"""
+    around: tuple[str, ...]
+    """(D,) the shape"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ _PLANNED_PX, _FLOWN_PX = 3.0, 3.0
 _MOST_WAYPOINT_MARKS = 1500
 _WAYPOINT_PX, _WORST_PX = 6.0, 13.0
 _CURTAIN_OPACITY = 0.42
+_MOST_AROUND = 50
 _WORST_POLE = 6.0
 """In radii of a mark: lifts the words above those of the points of interest."""
 
@@ -27,7 +28,8 @@ def flight_nodes(drawing: Drawing) -> list[Node]:
     plan = drawing.state.plan
     if plan is None or not drawing.state.view.show_path or len(plan.path_m) < 2:
         return []
-    return [*_path(drawing, plan), *_flown(drawing, plan), *_takeoff(drawing, plan), *_worst(drawing, plan)]
+    parts = (_path, _flown, _around, _takeoff, _worst)
+    return [node for part in parts for node in part(drawing, plan)]
 
 
 def path_clearance_m(plan: PlanScene) -> F64:
@@ -89,6 +91,16 @@ def _flown(drawing: Drawing, plan: PlanScene) -> list[Node]:
         rgb = tuple(palette.dimmed(palette.POI, stale=drawing.state.plan_is_stale).tolist())
         nodes.append(dots_node("/waypoints", points, rgb, size_px=_WAYPOINT_PX))
     return nodes
+
+
+def _around(drawing: Drawing, plan: PlanScene) -> list[Node]:
+    """Words where the path begins to turn around a shape of the fence."""
+    begins = [k for k, shape in enumerate(plan.around) if k == 0 or plan.around[k - 1] != shape]
+    places = drawing.frame.scene_from_model(plan.around_m)
+    return [
+        label_node(f"/around/{k}", f"around {plan.around[k]}", raised(places[k], 1.6 * drawing.mark_m))
+        for k in begins[:_MOST_AROUND]
+    ]
 
 
 def _takeoff(drawing: Drawing, plan: PlanScene) -> list[Node]:

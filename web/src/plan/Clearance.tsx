@@ -1,4 +1,4 @@
-import { clearance, demanded, latLon, metres } from "../format";
+import { clearance, count, demanded, latLon, metres } from "../format";
 import type { ResultDoc } from "../messages";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -68,7 +68,7 @@ function Worst({ result }: { result: ResultDoc }) {
 const PARTS = { line: "the line", home: "a way home", rally: "a way to a rally point" } as const;
 
 /** How near the flight comes to what the fence forbids. */
-function Fence({ verdict }: { verdict: ResultDoc["fence"] }) {
+function Fence({ verdict, detours }: { verdict: ResultDoc["fence"]; detours: ResultDoc["detours"] }) {
   if (!verdict) return null;
   const { min_distance_m, shape, part, margin_m } = verdict;
   const level = verdict.keeps ? "good" : "bad";
@@ -91,6 +91,14 @@ function Fence({ verdict }: { verdict: ResultDoc["fence"] }) {
             testid="fence-distance"
           />
         )}
+        {[...new Set(detours.map((each) => each.shape))].map((around) => (
+          <Figure
+            key={around}
+            label={`Laid around ${around}`}
+            value={count(detours.filter((each) => each.shape === around).length, "point")}
+            testid="fence-around"
+          />
+        ))}
       </dl>
       {min_distance_m !== null && (
         <p class="row place">
@@ -166,7 +174,7 @@ export function Clearance({ result }: { result: ResultDoc }) {
         </p>
       )}
       <Worst result={result} />
-      <Fence verdict={result.fence} />
+      <Fence verdict={result.fence} detours={result.detours} />
       <h2>Return and home</h2>
       <Return result={result} />
     </section>
