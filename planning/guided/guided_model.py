@@ -117,6 +117,8 @@ class GuidedWay:
     seconds: float
     problem: Problem | None
     """None: it may be flown."""
+    turns: int = 0
+    """Places where it turns to pass beside a fence."""
 
     @property
     def clearance_m(self) -> float:

@@ -1,15 +1,16 @@
 """Lays a guided way over the surface and proves it: straight where that is clear, else up, over and down.
 
 Nothing here is trusted: the line is judged by the certificate, whose code knows nothing of how it was laid. What can be
-mended by height is raised until it is certified; what cannot is refused with the certificate's own words. A vehicle
-that is nearer to the surface than it must be climbs straight up first: climbing brings it nearer to nothing.
+mended by height is raised until it is certified, a fence is passed beside; what cannot be mended is refused with the
+certificate's own words. A vehicle that is nearer to the surface than it must be climbs straight up first: climbing
+brings it nearer to nothing.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -42,6 +43,7 @@ from planning.guided.guided_model import (
     Wish,
 )
 from planning.guided.shapes import circle, simplified
+from planning.route.around_fence import Kept, laid_legs
 from planning.terrain.dsm import Dsm, SurfaceModel, true_cells
 
 LIFTS_M = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0)
@@ -70,6 +72,8 @@ class _Shape:
     """They are given; else they are the lowest that is asked for."""
     direct: bool = True
     """The straight line to the first is tried before the way over the top."""
+    around_xy_m: F64 = field(default_factory=lambda: np.empty((0, 2)))
+    """(N, 2) where the way over the top turns before it comes to the first: around a fence."""
 
 
 class _Level:
@@ -107,13 +111,38 @@ def guided_way(dsm: Dsm, ground: SurfaceModel, here: Here, wish: Wish, demand: D
     if away_m > FARTHEST_M:
         what = f"The way leads {away_m / 1000:.1f} km away; {FARTHEST_M / 1000:g} km are the most."
         raise MissionError(what, advice="Choose a place that is nearer.")
+    asked = _Asked(dsm, ground, at_m, home_xy_m, home_m, wish, demand)
+    way = _lowest(asked, shape)
+    around_xy_m = _around(asked, here, shape, way)
+    if not len(around_xy_m):
+        return way
+    around = _lowest(asked, replace(shape, direct=False, around_xy_m=around_xy_m))
+    return way if around.problem == "way" else replace(around, turns=len(around_xy_m))
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What stays the same however the way is laid."""
+
+    dsm: Dsm
+    ground: SurfaceModel
+    at_m: F64
+    home_xy_m: LatLon
+    home_m: float
+    wish: Wish
+    demand: Demand
+
+
+def _lowest(asked: _Asked, shape: _Shape) -> GuidedWay:
+    """The lowest that is certified, or the first that was tried."""
+    dsm, demand, wish = asked.dsm, asked.demand, asked.wish
     lands_xy_m = (float(shape.tail_m[-1, 0]), float(shape.tail_m[-1, 1])) if isinstance(wish, Rally | Back) else None
     best: GuidedWay | None = None
-    for points_m in _lines(dsm, shape, at_m, demand, takes_off=isinstance(wish, TakeOff)):
-        line = _flown(points_m, home_xy_m, home_m, demand, lands_xy_m)
-        certificate = certify(dsm, line, demand.clearance, ground=ground)
+    for points_m in _lines(dsm, shape, asked.at_m, demand, takes_off=isinstance(wish, TakeOff)):
+        line = _flown(points_m, asked.home_xy_m, asked.home_m, demand, lands_xy_m)
+        certificate = certify(dsm, line, demand.clearance, ground=asked.ground)
         codes = {reason.code for reason in certificate.reasons}
-        way = _way(dsm, at_m, points_m, certificate, home_m, demand, _problem(codes, wish), shape.tail_m[-1, 2])
+        way = _way(asked, points_m, certificate, _problem(codes, wish), shape.tail_m[-1, 2])
         if way.problem is None:
             return way
         hopeless = not codes <= MENDED_BY_HEIGHT | OWN_RETURNS | LANDINGS
@@ -123,6 +152,21 @@ def guided_way(dsm: Dsm, ground: SurfaceModel, here: Here, wish: Wish, demand: D
             break
     assert best is not None
     return best
+
+
+def _around(asked: _Asked, here: Here, shape: _Shape, way: GuidedWay) -> F64:
+    """Where it has to turn before the first place; nowhere if a fence is not what is in the way."""
+    fence = way.certificate.fence
+    if fence is None or fence.keeps or isinstance(asked.wish, TakeOff | Look | Back):
+        return np.empty((0, 2))
+    kept = Kept(
+        fence=asked.demand.fence,
+        home_lat_lon_deg=here.home_lat_lon_deg,
+        rally=asked.demand.rally,
+        margin_m=asked.demand.clearance.fence_margin_m,
+        from_edge_m=asked.demand.clearance.required_clearance_m,
+    )
+    return laid_legs(asked.dsm, np.vstack([asked.at_m[:2], shape.tail_m[0, :2]]), kept).legs[0].corners_xy_m
 
 
 def _problem(codes: set[str], wish: Wish) -> Problem | None:
@@ -139,7 +183,9 @@ def _lines(dsm: Dsm, shape: _Shape, at_m: F64, demand: Demand, *, takes_off: boo
         for lift_m in LIFTS_M:
             yield _lifted(np.vstack([tail_m, tail_m]), lift_m)
         return
-    level = _Level(dsm, np.vstack([at_m[None, :2], tail_m[:, :2]]), demand.clearance.required_clearance_m)
+    level = _Level(
+        dsm, np.vstack([at_m[None, :2], shape.around_xy_m, tail_m[:, :2]]), demand.clearance.required_clearance_m
+    )
     if level.distance_m(at_m) <= 0.0:
         raise MissionError(
             "By the surface model the vehicle is inside what stands here: the model, its home or its height is wrong.",
@@ -151,11 +197,12 @@ def _lines(dsm: Dsm, shape: _Shape, at_m: F64, demand: Demand, *, takes_off: boo
         tail_m = np.column_stack([tail_m[:, :2], np.maximum(tail_m[:, 2], needed_m)])
     if shape.direct:
         yield np.vstack([begins_m, tail_m])
-    over_m = _finite(level.altitude(np.vstack([at_m[:2], tail_m[0, :2]])), "on the way")
+    across_xy_m = np.vstack([shape.around_xy_m, tail_m[0, :2]])
+    over_m = _finite(level.altitude(np.vstack([at_m[:2], across_xy_m])), "on the way")
     for lift_m in LIFTS_M:
         lifted_m, lower_m = _lifted(tail_m, lift_m), _lifted(begins_m[None], lift_m)
         top_m = max(over_m + lift_m, float(lower_m[0, 2]), float(lifted_m[0, 2]))
-        up_m, across_m = [*at_m[:2], top_m], [*lifted_m[0, :2], top_m]
+        up_m, across_m = [*at_m[:2], top_m], np.column_stack([across_xy_m, np.full(len(across_xy_m), top_m)])
         yield _without_repeats(np.vstack([lower_m, up_m, across_m, lifted_m]))
 
 
@@ -197,16 +244,8 @@ def _flown(
     )
 
 
-def _way(
-    dsm: Dsm,
-    at_m: F64,
-    points_m: F64,
-    certificate: Certificate,
-    home_m: float,
-    demand: Demand,
-    problem: Problem | None,
-    asked_m: float,
-) -> GuidedWay:
+def _way(asked: _Asked, points_m: F64, certificate: Certificate, problem: Problem | None, asked_m: float) -> GuidedWay:
+    dsm, at_m, home_m, demand = asked.dsm, asked.at_m, asked.home_m, asked.demand
     whole_m = _without_repeats(np.vstack([at_m, points_m]))
     legs = np.diff(whole_m, axis=0)
     flat_m, up_m = np.hypot(legs[:, 0], legs[:, 1]), legs[:, 2]

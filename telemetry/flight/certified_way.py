@@ -198,6 +198,8 @@ def way_notes(way: GuidedWay) -> list[str]:
     notes = []
     if way.rises_m > 0.05 and np.ptp(way.points_m[:, :2], axis=0).any():
         notes.append(f"It first climbs {rounded_up(way.rises_m)} m straight up.")
+    if way.turns:
+        notes.append("It passes beside the fence.")
     if way.raised_m > 0.05:
         notes.append(f"It ends {rounded_up(way.raised_m)} m higher than asked: lower is not certified.")
     return notes

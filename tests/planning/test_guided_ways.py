@@ -154,6 +154,26 @@ def test_a_fence_refuses_with_its_own_words_and_is_not_flown_over() -> None:
     assert "exclusion circle 1" in way.reasons[0]
 
 
+@pytest.mark.parametrize("wish", ["to", "orbit"])
+def test_a_fence_on_the_way_is_passed_beside_where_home_stays_in_sight(wish: str) -> None:
+    dsm = model(flat())
+    fence = Fence(circles=(circle(*at(dsm, 85.0, 60.0), 4.0, inclusion=False, where="test"),))
+    goal = at(dsm, 85.0, 95.0)
+    way = asked(
+        flat(),
+        GoTo(8.0, goal) if wish == "to" else Orbit(goal, 5.0, 8.0),
+        start=here(dsm, 85.0, 30.0, 8.0),
+        demand=replace(DEMAND, fence=fence),
+    )
+    assert way.problem is None
+    assert way.turns > 0
+    assert way.certificate.fence is not None
+    assert way.certificate.fence.keeps
+    assert way.points_m[:, 0].min() < WEST + 80.0
+    assert way.raised_m == 0.0
+    assert nearest_m(flat(), way) >= REQUIRED_M
+
+
 def test_a_height_limit_is_not_raised_over() -> None:
     demand = replace(DEMAND, clearance=replace(CLEARANCE, max_height_above_ground_m=10.0))
     way = asked(walled(), GoTo(5.0, at(model(walled()), 100.0, 60.0)), demand=demand)
