@@ -44,6 +44,11 @@ class Field:
         hit = _entered(way_m, self.normals, self.offsets_m, self.sides)
         return set(self.owner[hit].tolist())
 
+    def blocked(self, from_m: F64, to_m: F64) -> list[tuple[float, float]]:
+        """Shares of the straight way that lie in what is blocked, overlapping as they come."""
+        found = _blocked(from_m, to_m, self.normals, self.offsets_m, self.sides)
+        return [(float(a), float(b)) for a, b in found if b > a]
+
     def names(self, zones: set[int]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.zones[k].shape for k in sorted(zones)))
 
@@ -139,8 +144,13 @@ def _shortest(field: Field, from_m: F64, to_m: F64, taken: list[int]) -> tuple[F
 
 
 @njit(cache=True, nogil=True)
-def _enters(ax: float, ay: float, bx: float, by: float, normals: F64, offsets_m: F64, sides: int) -> bool:
-    """Whether a segment has a part within half-planes: what each leaves of it is cut off (Cyrus and Beck 1978)."""
+def _within(
+    ax: float, ay: float, bx: float, by: float, normals: F64, offsets_m: F64, sides: int
+) -> tuple[float, float]:
+    """From which to which share a segment lies within half-planes: what each leaves is cut (Cyrus and Beck 1978).
+
+    Nowhere if the first is not the smaller.
+    """
     begins, ends = 0.0, 1.0
     for k in range(sides):
         nx, ny = normals[k, 0], normals[k, 1]
@@ -151,10 +161,24 @@ def _enters(ax: float, ay: float, bx: float, by: float, normals: F64, offsets_m:
         elif rate < 0.0:
             begins = max(begins, room / rate)
         elif room < 0.0:
-            return False
+            return 1.0, 0.0
         if begins >= ends:
-            return False
-    return True
+            return 1.0, 0.0
+    return begins, ends
+
+
+@njit(cache=True, nogil=True)
+def _enters(ax: float, ay: float, bx: float, by: float, normals: F64, offsets_m: F64, sides: int) -> bool:
+    begins, ends = _within(ax, ay, bx, by, normals, offsets_m, sides)
+    return begins < ends
+
+
+@njit(cache=True, nogil=True)
+def _blocked(p: F64, q: F64, normals: F64, offsets_m: F64, sides: I64) -> F64:
+    found = np.empty((len(sides), 2))
+    for b in range(len(sides)):
+        found[b, 0], found[b, 1] = _within(p[0], p[1], q[0], q[1], normals[b], offsets_m[b], sides[b])
+    return found
 
 
 @njit(cache=True, nogil=True)

@@ -53,6 +53,15 @@ class Disc:
     def holds(self, places_m: F64) -> np.ndarray:
         return np.linalg.norm(places_m - self.centre_m, axis=1) <= self.radius_m
 
+    def left_out(self, from_m: F64, to_m: F64) -> list[tuple[float, float]]:
+        """Shares of a straight way that lie outside."""
+        along, to = to_m - from_m, from_m - self.centre_m
+        a, b, c = float(along @ along), float(along @ to), float(to @ to) - self.radius_m**2
+        if a <= 0.0 or b * b <= a * c:
+            return [(0.0, 1.0)] if c > 0.0 else []
+        half = math.sqrt(b * b - a * c)
+        return [(0.0, (-b - half) / a), ((-b + half) / a, 1.0)]
+
 
 @dataclass(frozen=True, slots=True)
 class Flat:

@@ -34,7 +34,7 @@ from planning.missions.feasibility import Feasibility, feasibility_of, photos_ro
 from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
-from planning.planner.laid import Detour, Route, home_place, laid_route
+from planning.planner.laid import Detour, Route, before_home, home_place, laid_route
 from planning.planner.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
 from planning.planner.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import sampled_path
@@ -106,6 +106,7 @@ def plan_mission(
     """
     check_request(request)
     check_size(request, model)
+    request = before_home(model, request)
     report(SURFACE_STEP, 0.0)
     grounds = Grounds(model, request.surface.fill_hole_area_m2)
     first = grounds.around(_points(model, request), least_margin_m(request))
@@ -137,6 +138,7 @@ def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
     """``why_moved``: what is wrong with home at the first point; empty when it is there or was given."""
     model, request = job.model, job.request
     route = laid_route(model, request, home)
+    job = replace(job, request=replace(request, pois=route.pois))
     points_xy_m = np.vstack([_points(model, request), route.vertices_xy_m, home_place(model, home)])
     feels_m = felt_m(request)
 

@@ -15,7 +15,7 @@ from mapping.geometry.arrays import F64
 from planning.fence.fence_model import Fence, LatLon, RallyPoint
 from planning.fence.home_plane import HomePlane, plane_at
 from planning.fence.ways_around import Field, WayAround, field_of, way_around
-from planning.fence.zones import Flat, disc_of, flat_shapes, zones_of
+from planning.fence.zones import Disc, Flat, disc_of, flat_shapes, zones_of
 from planning.terrain.dsm import SurfaceModel
 
 ROUNDS = 4
@@ -60,15 +60,16 @@ def laid_legs(model: SurfaceModel, stands_xy_m: F64, kept: Kept) -> Laid:
     """Between (N, 2) places in the model's CRS, one after the other."""
     plane = plane_at(kept.home_lat_lon_deg)
     stands_m = plane.xy_m(model.lat_lon_from_xy(stands_xy_m))
-    backs_m = np.vstack([np.zeros((1, 2)), plane.xy_m([(point.lat_deg, point.lon_deg) for point in kept.rally])])
+    backs_m = backs_of(plane, kept)
     longest_m, laid_m = 0.0, stands_m
     flats, ways = [], []
     for _ in range(ROUNDS):
-        if (flown_m := _longest_m(laid_m, backs_m)) <= longest_m:
+        if (flown_m := longest_way_m(laid_m, backs_m)) <= longest_m:
             break
         longest_m = flown_m
         flats = flat_shapes(kept.fence, plane, longest_m)
-        ways = _ways(model, plane, flats, stands_m, backs_m, kept)
+        blocked = blocked_of(model, plane, flats, stands_m, backs_m, kept)
+        ways = [_way(blocked.seeing, blocked.alone, a, b) for a, b in pairwise(stands_m)]
         laid_m = np.vstack(
             [stands_m[:1], *(m for w, b in zip(ways, stands_m[1:], strict=True) for m in (w.corners_m, b))]
         )
@@ -78,12 +79,23 @@ def laid_legs(model: SurfaceModel, stands_xy_m: F64, kept: Kept) -> Laid:
     )
 
 
-def _ways(
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """What the fence forbids, in the plane at home."""
+
+    discs: tuple[Disc, ...]
+    alone: Field
+    """For the line itself."""
+    seeing: Field | None
+    """For all ways back as well; None: home or a rally point is too near to the fence."""
+
+
+def blocked_of(
     model: SurfaceModel, plane: HomePlane, flats: list[Flat], stands_m: F64, backs_m: F64, kept: Kept
-) -> list[WayAround]:
+) -> Blocked:
     places_m = np.vstack([stands_m, backs_m])
     zones = [zone for flat in flats for zone in zones_of(flat, kept.margin_m, places_m)]
-    discs = [disc for flat in flats if (disc := disc_of(flat, kept.margin_m, places_m)) is not None]
+    discs = tuple(disc for flat in flats if (disc := disc_of(flat, kept.margin_m, places_m)) is not None)
     west, south, east, north = model.bounds_m
 
     def known(corners_m: F64) -> np.ndarray:
@@ -93,8 +105,12 @@ def _ways(
 
     alone = field_of(zones, discs, np.empty((0, 2)), known)
     assert alone is not None
-    seeing = field_of(zones, discs, backs_m, known)
-    return [_way(seeing, alone, a, b) for a, b in pairwise(stands_m)]
+    return Blocked(discs, alone, field_of(zones, discs, backs_m, known))
+
+
+def backs_of(plane: HomePlane, kept: Kept) -> F64:
+    """(T, 2) home and rally points in its plane."""
+    return np.vstack([np.zeros((1, 2)), plane.xy_m([(point.lat_deg, point.lon_deg) for point in kept.rally])])
 
 
 def _way(seeing: Field | None, alone: Field, from_m: F64, to_m: F64) -> WayAround:
@@ -124,7 +140,7 @@ def _forbidden_words(flat: Flat, room_m: float, lack_m: float, margin_m: float) 
     )
 
 
-def _longest_m(line_m: F64, backs_m: F64) -> float:
+def longest_way_m(line_m: F64, backs_m: F64) -> float:
     """Of the line's legs and of the ways back."""
     legs_m = np.linalg.norm(np.diff(line_m, axis=0), axis=1)
     return float(max(legs_m.max(initial=0.0), np.linalg.norm(line_m[:, None] - backs_m, axis=2).max()))

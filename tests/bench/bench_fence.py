@@ -25,13 +25,12 @@ def main() -> None:
     fence = _fence(dsm, rng, points_xy_m)
     lat_deg, lon_deg = dsm.lat_lon_from_xy(points_xy_m[:1])[0]
     kept = Kept(fence, (float(lat_deg), float(lon_deg)), (), MARGIN_M, 5.0)
-    laid_legs(dsm, points_xy_m[:3], kept)
+    corners = sum(len(leg.shapes) for leg in laid_legs(dsm, points_xy_m, kept).legs)
     times = []
     for _ in range(3):
         start_s = time.perf_counter()
-        laid = laid_legs(dsm, points_xy_m, kept)
+        laid_legs(dsm, points_xy_m, kept)
         times.append(time.perf_counter() - start_s)
-    corners = sum(len(leg.shapes) for leg in laid.legs)
     print(
         f"{POINTS} points between {ZONES} zones, {corners} corners: best {min(times):.3f} s "
         f"(at most {LIMIT_S:g} s: {'yes' if min(times) <= LIMIT_S else 'NO'})"

@@ -226,7 +226,7 @@ def test_where_a_fine_grid_has_a_way_so_have_the_zones() -> None:
         shapes: list[Shape] = [(flat.corners_m, flat.radius_m + MARGIN_M) for flat in flats]
         # Between neighbours and to the nearest node nothing is farther than this from a node that is free.
         free = kept(grid, grid, seen_from_m, shapes, spare_m=1.45).reshape(len(axis), len(axis))
-        islands = measure.label(free, connectivity=1)
+        islands = np.asarray(measure.label(free, connectivity=1))
         on = [islands[tuple(np.rint((end + 70.0) / 2.0).astype(int)[::-1])] for end in ends_m]
         if on[0] == 0 or on[0] != on[1]:
             continue
