@@ -3,7 +3,7 @@ import type { FenceDoc } from "../src/messages";
 import { plan } from "./samples";
 
 vi.stubGlobal("location", { protocol: "http:", host: "test", hash: "" });
-const { markTitle, withoutMark } = await import("../src/store/fence");
+const { aroundTo, markTitle, withoutMark } = await import("../src/store/fence");
 
 const place = (lat_deg: number) => ({ lat_deg, lon_deg: 7 });
 const fence: FenceDoc = {
@@ -36,5 +36,16 @@ describe("the fence of a plan", () => {
   it("calls what is selected by its kind and number", () => {
     const titles = ["p.1", "q", "c", "r", "gone"].map((mark) => markTitle(document, mark));
     expect(titles).toEqual(["corner 2 of polygon 1", "polygon 2", "circle 1", "rally point 1", null]);
+  });
+
+  it("names each shape once that the way to a point is laid around", () => {
+    const turn = (shape: string, before_poi: number) => ({ lat_deg: 1, lon_deg: 7, shape, before_poi });
+    const detours = [
+      turn("exclusion circle 1", 2),
+      turn("exclusion circle 1", 2),
+      turn("inclusion polygon 1", 2),
+    ];
+    expect(aroundTo(detours, 2)).toEqual(["exclusion circle 1", "inclusion polygon 1"]);
+    expect(aroundTo(detours, 1)).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-import type { FenceDoc, PlanDoc, RallyDoc } from "../messages";
+import type { DetourDoc, FenceDoc, PlanDoc, RallyDoc } from "../messages";
 import { edit } from "./plan";
 import { document_, selection } from "./state";
 import { setSelection } from "./stream";
@@ -66,3 +66,8 @@ export function removeMark(mark: string | null): void {
 
 export const selectMark = (mark: string | null) =>
   setSelection({ tool: "select", fence_mark: mark, poi_id: null, draft: [] });
+
+/** The shapes that the path is laid around on the way to a point, each once. */
+export function aroundTo(detours: readonly DetourDoc[], index: number): string[] {
+  return [...new Set(detours.filter((each) => each.before_poi === index).map((each) => each.shape))];
+}

@@ -6,7 +6,8 @@ import { NumberField } from "../../ui/NumberField";
 import { TextField } from "../../ui/fields";
 import { poiTitle, withPoi } from "../../store/poi";
 import { edit } from "../../store/plan";
-import { selection } from "../../store/state";
+import { aroundTo } from "../../store/fence";
+import { result, selection } from "../../store/state";
 import { setSelection } from "../../store/stream";
 import { removeSelectedPoi } from "../../store/plans";
 import { CopyPlace } from "../../ui/CopyPlace";
@@ -19,6 +20,17 @@ function onRowKey(event: KeyboardEvent, poi: PoiDoc, index: number, last: number
   if (!event.altKey || (event.key !== "ArrowUp" && event.key !== "ArrowDown")) return;
   event.preventDefault();
   movePoi(poi, index, Math.min(last, Math.max(0, index + (event.key === "ArrowUp" ? -1 : 1))));
+}
+
+/** Said in the line that is there anyway: nothing moves when it comes. */
+function Around({ index }: { index: number }) {
+  const shapes = aroundTo(result.value?.detours ?? [], index).join(", ");
+  if (!shapes) return null;
+  return (
+    <span class="around" data-testid="poi-around" title={`The way to this point is laid around ${shapes}`}>
+      around {shapes}
+    </span>
+  );
 }
 
 function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
@@ -48,6 +60,7 @@ function RowFields({ poi, index }: { poi: PoiDoc; index: number }) {
         <span>{degrees(poi.lat_deg)}</span>
         <span>{degrees(poi.lon_deg)}</span>
         <CopyPlace place={poi} name={poiTitle(poi, index)} />
+        <Around index={index} />
       </span>
     </div>
   );
