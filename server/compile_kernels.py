@@ -13,12 +13,15 @@ from mapping.voxels.map import VoxelMap
 from planning.basics.plan_model import Poi, VehicleProfile
 from planning.evading.manoeuvres import Seen, around, over
 from planning.evading.seen import Columns, burn, conflicts
+from planning.fence.fence_model import Fence, circle
 from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface_distance import SurfaceDistance
 from planning.ground.demo_hillside import small_hill
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
+from planning.route.around_fence import Kept, laid_legs
+from planning.route.survey_fenced import fenced_lines
 from planning.safe_surface.surface import block_max
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
@@ -42,6 +45,7 @@ def main() -> None:
     _see_and_avoid()
     dsm = small_hill()
     _raise_and_fill(dsm)
+    _lay_around(dsm)
     _follow_a_flight(dsm)
     west, south, east, north = dsm.bounds_m
     above_m = np.array([(west + east) / 2, (south + north) / 2, 1e4])
@@ -68,6 +72,18 @@ def _see_and_avoid() -> None:
     conflicts(line_m, wall_m, resolution_m=1.0, radius_m=0.5)
     Polyline(line_m).nearest(line_m[0])
     _change_a_map(wall_m)
+
+
+def _lay_around(dsm: Dsm) -> None:
+    """A leg and a survey's line around a circle."""
+    west, south, east, north = dsm.bounds_m
+    ends_xy_m = np.array([(west + share * (east - west), (south + north) / 2) for share in (0.2, 0.8)])
+    first, last = ((float(lat), float(lon)) for lat, lon in dsm.lat_lon_from_xy(ends_xy_m))
+    middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
+    fence = Fence(circles=(circle(*middle, 1.0, inclusion=False, where="warm-up"),))
+    kept = Kept(fence, first, (), margin_m=1.0, from_edge_m=0.0)
+    laid_legs(dsm, ends_xy_m, kept)
+    fenced_lines(dsm, (Poi(*first), Poi(*last)), kept, ways_back=False)
 
 
 def _change_a_map(points_m: F64) -> None:

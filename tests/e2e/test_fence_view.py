@@ -26,10 +26,9 @@ def test_a_fence_drawn_over_the_way_is_judged_at_once_and_undone(
     page.get_by_test_id("tool-fence_polygon").click()
     _click_corners(page, station, [(0.35, 0.35), (0.65, 0.35), (0.5, 0.65)])
     expect(page.get_by_test_id("fence-row")).to_have_count(1)
-    reason = page.get_by_test_id("reasons").locator("[data-code=fence]")
-    expect(reason).to_contain_text("enters exclusion polygon 1 of the fence")
-    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "not_certified")
-    expect(page.get_by_test_id("fence-kept")).to_contain_text("does not keep inside")
+    refused = page.get_by_test_id("error-box")
+    expect(refused).to_contain_text("inside exclusion polygon 1 of the fence")
+    expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "error")
 
     page.keyboard.press("Escape")
     with page.expect_download() as download:
@@ -44,7 +43,18 @@ def test_a_fence_drawn_over_the_way_is_judged_at_once_and_undone(
     certified(page)
     choose(page, page.get_by_test_id("fence-import"), file)
     expect(page.get_by_test_id("fence-row")).to_have_count(1)
-    expect(reason).to_be_visible()
+    expect(refused).to_contain_text("inside exclusion polygon 1 of the fence")
+
+
+def test_a_fence_in_the_way_is_passed_and_counted(station: Station, page: Page) -> None:
+    """Between the fourth and the fifth point of the demo: all of it is seen from the first, which is home."""
+    open_demo(page, station)
+    before, after = station.state["plan"]["document"]["pois"][3:5]
+    centre = {key: (before[key] + after[key]) / 2 for key in ("lat_deg", "lon_deg")}
+    station.change(fence={"circles": [{"id": "c", "inclusion": False, "centre": centre, "radius_m": 4}]})
+    expect(page.get_by_test_id("fence-around")).to_contain_text("points")
+    expect(page.get_by_test_id("fence-kept")).to_contain_text("keeps inside")
+    certified(page)
 
 
 def test_a_ceiling_is_kept_or_not_and_a_fence_that_is_none_says_what_to_do(
