@@ -45,6 +45,8 @@ class FenceVerdict:
     """The nearest that a flight comes to what its fence forbids."""
 
     keeps: bool
+    line_keeps: bool
+    """Whatever is wrong is so of ways back alone."""
     margin_m: float
     """Kept from it: vehicle radius + position error + following."""
     min_distance_m: float
@@ -67,6 +69,7 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
     """The verdict on a flight of which all places are finite."""
     frame = plane_at(flight.home_lat_lon_deg)
     distance_m, shape, part, place_m, far = math.inf, "", "line", np.zeros(2), ""
+    line_m = math.inf
     parts = _parts(flight, frame)
     longest_way_m = max(longest_m(triangles) for _, triangles in parts)
     for name, each in named_shapes(fence):
@@ -75,11 +78,13 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
         for kind, triangles in parts:
             nearest = _nearest(triangles, each, frame, longest_way_m)
             k, found_m = nearest.worst()
+            line_m = min(line_m, found_m) if kind == "line" else line_m
             if found_m < distance_m:
                 distance_m, shape, part, place_m = found_m, name, kind, nearest.place_m[k]
     at_lat_deg, at_lon_deg = map(float, frame.lat_lon_deg(place_m[None])[0])
     heights_m = flight.line_rel_home_m
     lowest_m, highest_m = float(heights_m.min()), max(float(heights_m.max()), flight.return_rel_home_m)
+    height_faults = _height_words(fence, lowest_m, highest_m, flight.margin_m)
     faults = [
         *([_far_words(far)] if far else []),
         *(
@@ -87,10 +92,11 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
             if distance_m < flight.margin_m
             else []
         ),
-        *_height_words(fence, lowest_m, highest_m, flight.margin_m),
+        *height_faults,
     ]
     return FenceVerdict(
         keeps=not faults,
+        line_keeps=not far and not height_faults and line_m >= flight.margin_m,
         margin_m=flight.margin_m,
         min_distance_m=distance_m,
         shape=shape,

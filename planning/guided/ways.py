@@ -141,7 +141,7 @@ def _lowest(asked: _Asked, shape: _Shape) -> GuidedWay:
     for points_m in _lines(dsm, shape, asked.at_m, demand, takes_off=isinstance(wish, TakeOff)):
         line = _flown(points_m, asked.home_xy_m, asked.home_m, demand, lands_xy_m)
         certificate = certify(dsm, line, demand.clearance, ground=asked.ground)
-        codes = {reason.code for reason in certificate.reasons}
+        codes = _codes(certificate, wish)
         way = _way(asked, points_m, certificate, _problem(codes, wish), shape.tail_m[-1, 2])
         if way.problem is None:
             return way
@@ -157,7 +157,7 @@ def _lowest(asked: _Asked, shape: _Shape) -> GuidedWay:
 def _around(asked: _Asked, here: Here, shape: _Shape, way: GuidedWay) -> F64:
     """Where it has to turn before the first place; nowhere if a fence is not what is in the way."""
     fence = way.certificate.fence
-    if fence is None or fence.keeps or isinstance(asked.wish, TakeOff | Look | Back):
+    if way.problem is None or fence is None or fence.keeps or isinstance(asked.wish, TakeOff | Look | Back):
         return np.empty((0, 2))
     kept = Kept(
         fence=asked.demand.fence,
@@ -167,6 +167,13 @@ def _around(asked: _Asked, here: Here, shape: _Shape, way: GuidedWay) -> F64:
         from_edge_m=asked.demand.clearance.required_clearance_m,
     )
     return laid_legs(asked.dsm, np.vstack([asked.at_m[:2], shape.tail_m[0, :2]]), kept).legs[0].corners_xy_m
+
+
+def _codes(certificate: Certificate, wish: Wish) -> set[str]:
+    """Without a fence that only the vehicle's own ways back would breach, for who is on the way back."""
+    codes = {reason.code for reason in certificate.reasons}
+    fence = certificate.fence
+    return codes - {"fence"} if isinstance(wish, RETURNS) and fence is not None and fence.line_keeps else codes
 
 
 def _problem(codes: set[str], wish: Wish) -> Problem | None:

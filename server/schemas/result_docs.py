@@ -150,6 +150,8 @@ class FenceVerdictDoc(Strict):
     """The nearest that the line and the ways back come to what the fence forbids."""
 
     keeps: bool
+    line_keeps: bool = True
+    """Whatever is wrong is so of ways back alone."""
     margin_m: float
     min_distance_m: float | None
     """Null: the fence has no shapes, only heights."""

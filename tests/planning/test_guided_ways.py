@@ -174,6 +174,21 @@ def test_a_fence_on_the_way_is_passed_beside_where_home_stays_in_sight(wish: str
     assert nearest_m(flat(), way) >= REQUIRED_M
 
 
+@pytest.mark.parametrize("wish", ["home", "rally"])
+def test_ways_home_lead_around_a_fence_that_hides_home(wish: str) -> None:
+    """The vehicle's own straight way back would breach it; who is on a certified way home does not need that one."""
+    dsm = model(flat())
+    fence = Fence(circles=(circle(*at(dsm, 80.0, 60.0), 4.0, inclusion=False, where="test"),))
+    start, demand = here(dsm, 100.0, 60.0, 8.0), replace(DEMAND, fence=fence)
+    goal = ToHome(8.0) if wish == "home" else Rally(RallyPoint(*at(dsm, 50.0, 60.0), 8.0), 8.0)
+    way = asked(flat(), goal, start=start, demand=demand)
+    assert way.problem is None
+    assert way.turns > 0
+    assert way.certificate.fence is not None
+    assert (way.certificate.fence.keeps, way.certificate.fence.line_keeps) == (False, True)
+    assert asked(flat(), GoTo(8.0, at(dsm, 60.0, 60.0)), start=start, demand=demand).problem == "way"
+
+
 def test_a_height_limit_is_not_raised_over() -> None:
     demand = replace(DEMAND, clearance=replace(CLEARANCE, max_height_above_ground_m=10.0))
     way = asked(walled(), GoTo(5.0, at(model(walled()), 100.0, 60.0)), demand=demand)

@@ -1007,6 +1007,8 @@ export interface HomeDoc {
 /** The nearest that the line and the ways back come to what the fence forbids. */
 export interface FenceVerdictDoc {
   keeps: boolean;
+  /** Whatever is wrong is so of ways back alone. */
+  line_keeps: boolean;
   margin_m: number;
   /** Null: the fence has no shapes, only heights. */
   min_distance_m: number | null;
