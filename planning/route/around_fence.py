@@ -61,7 +61,7 @@ def laid_legs(model: SurfaceModel, stands_xy_m: F64, kept: Kept) -> Laid:
     plane = plane_at(kept.home_lat_lon_deg)
     stands_m = plane.xy_m(model.lat_lon_from_xy(stands_xy_m))
     backs_m = backs_of(plane, kept)
-    longest_m, laid_m = 0.0, stands_m
+    longest_m, laid_m = -1.0, stands_m
     flats, ways = [], []
     for _ in range(ROUNDS):
         if (flown_m := longest_way_m(laid_m, backs_m)) <= longest_m:

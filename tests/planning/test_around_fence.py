@@ -75,6 +75,12 @@ def test_without_anything_in_the_way_a_leg_stays_straight() -> None:
     assert (len(found.legs[0].corners_xy_m), found.legs[0].closed_by, found.forbidden) == (0, (), ("", ""))
 
 
+@pytest.mark.parametrize("fence", [Fence(ceiling_rel_home_m=50.0), Fence(circles=(disc(0.0, 60.0, 5.0),))])
+def test_a_leg_of_no_length_at_home_is_one(fence: Fence) -> None:
+    (leg,) = laid(fence, (0.0, 0.0), (0.0, 0.0)).legs
+    assert (len(leg.corners_xy_m), leg.closed_by) == (0, ())
+
+
 @pytest.mark.parametrize(
     "shape",
     [disc(0.0, 30.0, 6.0), ring((-5, 25), (5, 25), (5, 35), (-5, 35)), ring((-5, 22), (0, 29), (5, 22), (0, 33))],
