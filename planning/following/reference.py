@@ -76,13 +76,19 @@ class Reference:
 
 
 def reference_line(
-    mission: Mission, dsm: Dsm, profile: VehicleProfile, *, waypoint_radius_m: float = WAYPOINT_RADIUS_M
+    mission: Mission,
+    dsm: Dsm,
+    profile: VehicleProfile,
+    *,
+    waypoint_radius_m: float = WAYPOINT_RADIUS_M,
+    begins_in_air: bool = False,
 ) -> Reference:
     """The reference of a mission over a surface model. Raises MissionError when no line can be told from it.
 
+    ``begins_in_air``: it was taken up in flight, and begins at its first item's place.
     Times are left unknown, with a note, when the mission's duration cannot be predicted.
     """
-    line = flown_line(mission, dsm)
+    line = flown_line(mission, dsm, begins_in_air=begins_in_air)
     notes = [*line.notes, *(text for text, _ in unjudged_words(line.unjudged))]
     predicted: PredictedTime | None = None
     try:

@@ -42,6 +42,14 @@ class GoTo:
 
 
 @dataclass(frozen=True, slots=True)
+class Join:
+    """To a place of a planned line, as high as that, or higher where the way there asks for it."""
+
+    lat_lon_deg: LatLon
+    alt_rel_home_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Look:
     """The nose turns to a place; the vehicle stays where it is."""
 
@@ -84,7 +92,7 @@ class Back:
     """(lat_deg, lon_deg, alt_rel_home_m), the first at the take-off, the last near the vehicle."""
 
 
-Wish = TakeOff | GoTo | Look | Orbit | ToHome | Rally | Back
+Wish = TakeOff | GoTo | Join | Look | Orbit | ToHome | Rally | Back
 RETURNS = (ToHome, Rally, Back)
 
 

@@ -33,6 +33,7 @@ from planning.guided.guided_model import (
     GoTo,
     GuidedWay,
     Here,
+    Join,
     LatLon,
     Look,
     Orbit,
@@ -218,6 +219,8 @@ def _shape(dsm: Dsm, wish: Wish, at_m: F64, home_xy_m: LatLon, home_m: float) ->
         return _Shape(np.array([[*home_xy_m, home_m + wish.alt_rel_home_m]]))
     if isinstance(wish, Look):
         return _Shape(at_m[None])
+    if isinstance(wish, Join):
+        return _Shape(np.array([[*_xy(dsm, wish.lat_lon_deg), home_m + wish.alt_rel_home_m]]), keeps_heights=True)
     if isinstance(wish, ToHome):
         return _Shape(np.array([[*home_xy_m, home_m + wish.height_m]]), direct=False)
     if isinstance(wish, Back):
@@ -317,6 +320,7 @@ def _finite(alt_m: float, where: str) -> float:
 
 def _check(here: Here, wish: Wish, demand: Demand) -> None:
     numbers = [*here.lat_lon_deg, *here.home_lat_lon_deg, here.alt_rel_home_m]
+    numbers += [*wish.lat_lon_deg, wish.alt_rel_home_m] if isinstance(wish, Join) else []
     if not np.isfinite(numbers).all():
         raise MissionError("The vehicle's place, height or home is not known.", advice="Wait for its position.")
     if not 0.0 < demand.speed_m_s < math.inf:

@@ -29,15 +29,16 @@ RELATIVE = "Give the height above home (frame 3) instead."
 PLACED = STRAIGHT | TAKEOFFS | frozenset(BENT) | {MavCmd.NAV_LAND}
 
 
-def flown_line(mission: Mission, dsm: Dsm) -> FlownLine:
+def flown_line(mission: Mission, dsm: Dsm, *, begins_in_air: bool = False) -> FlownLine:
     """The polyline flown through a mission's items, in the surface model's CRS and vertical datum.
 
+    ``begins_in_air``: the vehicle hovers at the first item's place, and there is no take-off.
     Items that cannot be judged are named in ``unjudged``, never skipped in silence; the line then shows
     the straight line to their place where they have one. Raises MissionError when home or an item
     cannot be placed at all, or nothing is flown.
     """
     xy_m = _item_places(mission, dsm)
-    flight = _Flight(mission, dsm, xy_m)
+    flight = _Flight(mission, dsm, xy_m, begins_in_air=begins_in_air)
     for index, item in enumerate(mission.items):
         flight.fly(index, item)
     return flight.line()
@@ -91,9 +92,9 @@ def _stored_m(alt_m: float) -> float:
 class _Flight:
     """Where the vehicle is, and the line so far, while the items are gone through."""
 
-    def __init__(self, mission: Mission, dsm: Dsm, item_xy_m: F64) -> None:
+    def __init__(self, mission: Mission, dsm: Dsm, item_xy_m: F64, *, begins_in_air: bool) -> None:
         self.ardupilot = mission.firmware == "ardupilot"
-        self.item_xy_m = item_xy_m
+        self.item_xy_m, self.begins_in_air = item_xy_m, begins_in_air
         self.absolute = is_amsl(dsm.vertical_datum)
         self.datum = dsm.vertical_datum or "unknown"
         self.unjudged: list[Unjudged] = []
@@ -166,7 +167,7 @@ class _Flight:
             self._cannot_judge(index, item, *OTHER_UNJUDGED.get(item.command, UNKNOWN))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
-        if self.points:
+        if self.points or self.begins_in_air:
             self._cannot_judge(index, item, "is a take-off in flight", "Remove it: one take-off begins the mission.")
             return
         alt_m = self._altitude(index, item, present_m=self.home_alt_m)
@@ -179,6 +180,10 @@ class _Flight:
             self._leg(index, self._place(index), alt_m)
 
     def _go(self, index: int, item: MissionItem) -> None:
+        if not self.points and self.begins_in_air and not math.isnan(self.item_xy_m[index, 0]):
+            self.points.append((*self._place(index), self._altitude(index, item, present_m=self.home_alt_m)))
+            self.first_item = index
+            return
         if not self.points:
             what = "comes before any take-off: how the vehicle gets there is unknown"
             self._cannot_judge(index, item, what, "Begin the mission with a take-off.")
