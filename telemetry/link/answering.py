@@ -85,6 +85,7 @@ class Answering:
             requests.Upload: self._upload,
             requests.Download: self._download,
             requests.UploadPlaces: self._upload_places,
+            requests.TakeUp: self._take_up,
             requests.DownloadPlaces: self._download_places,
             requests.ReadParameters: self._read_parameters,
             requests.ListParameters: self._list_parameters,
@@ -166,9 +167,10 @@ class Answering:
 
     async def _upload(self, request: requests.Upload) -> object:
         session = self._link.need_session()
-        _refuse_in_mission(session.pilot)
-        await self._record(request, f"upload {len(request.items)} items")
-        _refuse_in_mission(session.pilot)  # a start may have come while the disk was waited for
+        _refuse_in_mission(session.pilot, request)
+        await self._record(request, f"upload {len(request.items)} items{_HOLDING[request.while_holding]}")
+        _refuse_in_mission(session.pilot, request)  # a start may have come while the disk was waited for
+        session.pilot.replaces()
         report = await session.transfers.upload(request)
         session.pilot.uploaded(report.onboard)
         return report
@@ -179,11 +181,18 @@ class Answering:
 
     async def _upload_places(self, request: requests.UploadPlaces) -> object:
         session = self._link.need_session()
-        _refuse_in_mission(session.pilot)
+        _refuse_in_mission(session.pilot, request)
         words = f"upload {request.kind} of {len(request.items)} items" if request.items else f"clear {request.kind}"
-        await self._record(request, words)
-        _refuse_in_mission(session.pilot)  # a start may have come while the disk was waited for
+        await self._record(request, f"{words}{_HOLDING[request.while_holding]}")
+        _refuse_in_mission(session.pilot, request)  # a start may have come while the disk was waited for
         return await session.transfers.upload_places(request)
+
+    async def _take_up(self, request: requests.TakeUp) -> None:
+        session = self._link.need_session()
+        _refuse_while(session.transfers.is_busy)
+        await self._record(request, f"take up mission {request.digest[:12]} in flight")
+        _refuse_while(session.transfers.is_busy)
+        await session.pilot.take_up(request)
 
     async def _download_places(self, request: requests.DownloadPlaces) -> object:
         return await self._link.need_session().transfers.download_places(request.kind)
@@ -289,8 +298,13 @@ class Answering:
         self._written[id(request)] = words
 
 
-def _refuse_in_mission(pilot: Pilot) -> None:
-    if pilot.flies_mission:
+_HOLDING = {False: "", True: " while it holds in flight"}
+
+
+def _refuse_in_mission(pilot: Pilot, request: requests.Upload | requests.UploadPlaces) -> None:
+    if request.while_holding:
+        pilot.check_holds()
+    elif pilot.flies_mission:
         what = "A mission is being flown: replacing it would send the vehicle somewhere else."
         raise NotAllowedError(what, advice="Land first.")
 

@@ -8,12 +8,13 @@ from collections.abc import Callable
 
 from telemetry.errors import NotAllowedError, SilentError
 from telemetry.flight.avoidance.avoiding import Avoiding
-from telemetry.flight.guided.remaining_mission import RemainingMission
+from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.actions import Action, Message, Send
 from telemetry.mavlink.modes import commanded_mode
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
+from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.requests import FlyManoeuvre, FlyRest
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
@@ -137,3 +138,26 @@ class Avoidance:
         for action in actions:
             if isinstance(action, Send):
                 self._vehicle.send(action.message)
+
+
+def remaining_after(
+    request: FlyManoeuvre, remaining: RemainingMission | None, onboard: OnboardMission | None, *, flies_way: bool
+) -> RemainingMission:
+    """What is flown after the way past an obstacle, of what was under way, else of the mission on board.
+
+    ``flies_way``: a certified way is flown. Raises NotAllowedError where nothing can be flown from that item on.
+    """
+    item = request.rejoin_item
+    if item is None:
+        return RemainingMission((), "hold")
+    if remaining is not None and remaining.way == "guided" and flies_way:
+        # It has no items: nothing of it would be left, and one that ends with landing would land beside its place.
+        what = f"A certified way is flown, not a mission: it has no item {item} to go on from."
+        raise NotAllowedError(what, advice="Hold, then ask for another way.")
+    if remaining is not None:
+        return RemainingMission(tuple(t for t in remaining.targets if t.item >= item), remaining.end, remaining.way)
+    remaining = None if onboard is None else remaining_from(onboard, item)
+    if remaining is None:
+        what = f"What follows from item {item} on cannot be flown in GUIDED."
+        raise NotAllowedError(what, advice="Pause, and fly past the obstacle by hand.")
+    return remaining

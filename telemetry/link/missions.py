@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
@@ -16,13 +17,16 @@ from mapping.geometry.frames import apart_m
 from planning.basics.mav_cmd import MavCmd
 from planning.formats.commands import FLOWN_TO
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
+from telemetry.flight.guided.beginning import why_moves, why_not_from
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard
+from telemetry.mavlink.autopilot_orders import HOLD_MODES
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item, OnboardMission
-from telemetry.topics.requests import StartAuto
+from telemetry.topics.requests import FlyWay, StartAuto, TakeUp
 from telemetry.topics.vehicle import VehicleState
 
 ARMED_WITHIN_S = 10.0
@@ -39,6 +43,13 @@ CAREFUL_M_S = 2.0
 PATIENCE_S = 30.0
 MODE_SHOWS_S = 5.0
 GUIDED = "GUIDED"
+FIRST = 1
+UNKNOWN_MISSION = "unknown"
+"""No digest is this."""
+FOREIGN_MISSION = (
+    "The mission on board is not the one that was started any more: another ground station has written to it."
+    " The vehicle holds. Return home or land."
+)
 
 
 async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: ReadMission) -> None:
@@ -104,7 +115,7 @@ def check_same_mission(onboard: OnBoard, digest: str) -> None:
         return
     what = "What is on board is not known any more" if onboard.digest is None else "Another mission is on board"
     raise MissionUnknownError(
-        f"{what}: somebody else has replaced it since it was checked.",
+        f"{what}: it was replaced since it was checked.",
         advice="Return home, then upload the plan and check it again.",
     )
 
@@ -124,6 +135,43 @@ async def check_again(onboard: OnBoard, digest: str, read_mission: ReadMission) 
             advice="Improve the link, then start again.",
         ) from None
     check_same_mission(onboard, digest)
+
+
+def check_holds(state: VehicleState, *, is_led: bool) -> None:
+    """Before what is on board is replaced in flight. ``is_led``: something here still leads the vehicle.
+
+    Raises NotAllowedError.
+    """
+    if not (state.armed and is_in_the_air(state)):
+        raise NotAllowedError("The vehicle is not in the air.", advice="Upload the plan and check it.")
+    if is_led or state.mode not in HOLD_MODES.get(state.autopilot, ()):
+        does = "being led past something" if is_led else f"in {state.mode}"
+        what = f"The vehicle does not hold: it is {does}."
+        raise NotAllowedError(what, advice="Hold first: what is on board is replaced only then.")
+    if (refusal := why_moves(state)) is not None:
+        raise refusal
+
+
+def check_begins(request: TakeUp | FlyWay, state: VehicleState) -> None:
+    """Raises NotAllowedError unless the vehicle holds still where what it is to fly was certified to begin."""
+    if (refusal := why_not_from(request, state, time.monotonic())) is not None:
+        raise refusal
+
+
+async def first_item_next(vehicle: AdoptedVehicle) -> None:
+    """Until the vehicle's state shows it. Raises RefusedError, SilentError."""
+    sequence = sequence_of(FIRST, vehicle.state.autopilot)
+    await vehicle.obey(vehicle.orders.mission_item(sequence))
+    await vehicle.wait_until(
+        lambda state: state.mission_item == sequence, timeout_s=MODE_SHOWS_S, what="go to the mission's first item"
+    )
+
+
+def same_route(one: OnboardMission, other: OnboardMission) -> bool:
+    """Other heights are no other route."""
+    return [(i.command, i.lat_deg, i.lon_deg) for i in one.items] == [
+        (i.command, i.lat_deg, i.lon_deg) for i in other.items
+    ]
 
 
 async def set_speeds(vehicle: AdoptedVehicle, item: int) -> None:

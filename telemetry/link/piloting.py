@@ -9,26 +9,33 @@ from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
-from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.guided import GuidedScript
-from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight, remaining_from
+from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.link.avoidance import Avoidance
-from telemetry.link.missions import JoinMission, ReadMission, check_same_mission, set_speeds, start_mission
+from telemetry.link.avoidance import Avoidance, remaining_after
+from telemetry.link.missions import (
+    FOREIGN_MISSION,
+    UNKNOWN_MISSION,
+    JoinMission,
+    ReadMission,
+    check_begins,
+    check_holds,
+    check_same_mission,
+    first_item_next,
+    same_route,
+    set_speeds,
+    start_mission,
+)
 from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, guided_way
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.topics.onboard_lists import OnboardMission
-from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided
+from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
 SUPERSEDED = "Another command was given."
-FOREIGN_MISSION = (
-    "The mission on board is not the one that was started any more: another ground station has written to it."
-    " The vehicle holds. Return home or land."
-)
 
 
 class Pilot:
@@ -60,6 +67,8 @@ class Pilot:
         """What was on board in the last flight."""
         self._started_digest: str | None = None
         """Of the mission that is under way, if it was started from here."""
+        self._begins: TakeUp | None = None
+        """Where a mission that was taken up in flight begins, until it is flown."""
         self._known_foreign = False
         """The alarm over another mission has been raised."""
 
@@ -98,6 +107,8 @@ class Pilot:
             return
         if self.script is not None:
             self._follow_script(self.script)
+        if self.flight.status.phase != "paused":
+            self._begins = None
         if not self.flight.is_under_way:
             self._started_digest = None
         elif self.vehicle.onboard.mission is not None:
@@ -107,9 +118,14 @@ class Pilot:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
         self._watch_mission(state)
 
+    def replaces(self) -> None:
+        """What is on board is replaced in flight: it is not flown before it is taken up."""
+        if self.flight.is_under_way:
+            self._started_digest = self._started_digest or self.vehicle.onboard.digest or UNKNOWN_MISSION
+
     def uploaded(self, onboard: OnboardMission) -> None:
         """Where a flight broke off is a place of that flight's route; other heights are no other route."""
-        if self._flown is None or not _same_route(self._flown, onboard):
+        if self._flown is None or not same_route(self._flown, onboard):
             self.flight.begin_anew()
 
     def _watch_mission(self, state: VehicleState) -> None:
@@ -173,8 +189,7 @@ class Pilot:
         """From where the vehicle hovers. What was under way ends; a mission that was paused is not gone on with."""
         if not request.targets or any(not 0.0 < target.speed_m_s <= request.most_m_s for target in request.targets):
             raise NotAllowedError("The way has no targets, or is faster than certified.", advice="Ask for it again.")
-        if (refusal := why_not_from(request, self.vehicle.state, time.monotonic())) is not None:
-            raise refusal  # before anything ends that may hold the vehicle now
+        check_begins(request, self.vehicle.state)  # before anything ends that may hold the vehicle now
         self._end_current()
         self._started_digest = None
         await self._fly_script(request)
@@ -220,8 +235,7 @@ class Pilot:
         if self.avoidance.is_engaged:
             self.avoidance.pause()
             return
-        if self.script_flies:
-            assert self.script is not None
+        if self.script_flies and self.script is not None:
             self._tell_script(self.script.pause(time.monotonic()))
             if not self.script_flies or self.script.phase == "paused":
                 return
@@ -235,8 +249,7 @@ class Pilot:
         if self.avoidance.is_engaged:
             self.avoidance.resume()
             return
-        if self.script_flies:
-            assert self.script is not None
+        if self.script_flies and self.script is not None:
             if self.script.is_flown:
                 raise NotAllowedError("The way is flown: nothing is paused.", advice="Ask for another one, or return.")
             self._tell_script(self.script.resume(time.monotonic()))
@@ -250,8 +263,27 @@ class Pilot:
             return
         if self._started_digest is not None:
             check_same_mission(self.vehicle.onboard, self._started_digest)
-        await self._check_goes_on()
+        if self._begins is None:
+            await self._check_goes_on()
+        else:
+            check_begins(self._begins, self.vehicle.state)
         await self._procedures.take_over(self._mission_mode)
+
+    def check_holds(self) -> None:
+        """Raises NotAllowedError unless the vehicle holds in the air, and nothing here leads it."""
+        leads = self.script_flies and self.script is not None and self.script.phase != "paused"
+        check_holds(self.vehicle.state, is_led=leads or self.avoidance.is_engaged or self._procedures.is_under_way)
+
+    async def take_up(self, request: TakeUp) -> None:
+        self.check_holds()
+        check_begins(request, self.vehicle.state)
+        check_same_mission(self.vehicle.onboard, request.digest)
+        self._end_current()
+        self.script = self.join = None
+        await first_item_next(self.vehicle)
+        onboard = self.vehicle.onboard.mission
+        self._started_digest, self._begins = request.digest, request
+        self.flight.replaced(len(onboard.items) if onboard else 0, time.time())
 
     async def return_home(self) -> None:
         await self._change_mode("RTL")
@@ -282,24 +314,11 @@ class Pilot:
 
     def _remaining_after(self, request: FlyManoeuvre) -> RemainingMission:
         """What is flown after the way past an obstacle. Raises NotAllowedError where that cannot be flown."""
-        item = request.rejoin_item
-        if item is None:
-            return RemainingMission((), "hold")
         remaining = self.avoidance.remaining
         if remaining is None and self.script_flies and self.script is not None:
             remaining = RemainingMission(self.script.left, self.script.end, "guided")
-        if remaining is not None and remaining.way == "guided" and self._most_m_s is not None:
-            # It has no items: nothing of it would be left, and one that ends with landing would land beside its place.
-            what = f"A certified way is flown, not a mission: it has no item {item} to go on from."
-            raise NotAllowedError(what, advice="Hold, then ask for another way.")
-        if remaining is not None:
-            return RemainingMission(tuple(t for t in remaining.targets if t.item >= item), remaining.end, remaining.way)
-        onboard = self.vehicle.onboard.mission
-        remaining = None if onboard is None else remaining_from(onboard, item)
-        if remaining is None:
-            what = f"What follows from item {item} on cannot be flown in GUIDED."
-            raise NotAllowedError(what, advice="Pause, and fly past the obstacle by hand.")
-        return remaining
+        flies_way = self._most_m_s is not None
+        return remaining_after(request, remaining, self.vehicle.onboard.mission, flies_way=flies_way)
 
     def _yield_to_avoidance(self) -> None:
         """What is under way sends nothing any more."""
@@ -380,9 +399,3 @@ class Pilot:
         self.avoidance.stop()
         if self.script_flies and self.script is not None:
             self.script.stop(SUPERSEDED)
-
-
-def _same_route(one: OnboardMission, other: OnboardMission) -> bool:
-    return [(i.command, i.lat_deg, i.lon_deg) for i in one.items] == [
-        (i.command, i.lat_deg, i.lon_deg) for i in other.items
-    ]

@@ -45,6 +45,12 @@ class FlightKeeper:
         self._completed = self._was_armed = False
         self.status = FlightStatus(way="auto", phase="arming", target=first, targets=targets, since_utc_s=t_utc_s)
 
+    def replaced(self, targets: int, t_utc_s: float) -> None:
+        """Another mission is on board, to be flown from its beginning; the vehicle holds."""
+        self._completed, self._was_armed = False, True
+        since_utc_s = self.status.since_utc_s or t_utc_s
+        self.status = FlightStatus(way="auto", phase="paused", target=1, targets=targets, since_utc_s=since_utc_s)
+
     def begin_anew(self) -> None:
         """Another mission is on board: it is not gone on with where the last flight broke off."""
         if not self.is_under_way:

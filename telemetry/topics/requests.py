@@ -75,13 +75,17 @@ class SetSigning(OperatorRequest):
 
 @dataclass(frozen=True, slots=True)
 class Upload(OperatorRequest):
-    """Replaces the mission on board and reads it back. Refused while a mission is being flown. -> UploadReport"""
+    """Replaces the mission on board and reads it back. Refused while a mission is being flown. -> UploadReport
+
+    ``while_holding``: in flight as well, of a vehicle that holds still; ``TakeUp`` then makes it the one that is flown.
+    """
 
     items: tuple[Item, ...]
     """Without home."""
     home_lat_deg: float
     home_lon_deg: float
     home_alt_amsl_m: float
+    while_holding: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,21 @@ class UploadPlaces(OperatorRequest):
 
     kind: PlaceList
     items: tuple[Item, ...]
+    while_holding: bool = False
+    """As of ``Upload``."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeUp(OperatorRequest):
+    """Makes the mission on board, if its digest is this, the one that ``Resume`` flies, from its first item. -> None
+
+    Refused unless the vehicle holds still where that mission was certified to begin; so is ``Resume`` then.
+    """
+
+    digest: str
+    begins_lat_deg: float
+    begins_lon_deg: float
+    begins_alt_rel_home_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,6 +332,7 @@ LinkRequest = (
     | Upload
     | Download
     | UploadPlaces
+    | TakeUp
     | DownloadPlaces
     | ReadParameters
     | ListParameters

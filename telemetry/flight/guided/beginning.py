@@ -8,7 +8,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import away_m, is_fresh
 from telemetry.flight.guided.orders import Place
 from telemetry.mavlink.believing import is_in_the_air
-from telemetry.topics.requests import FlyWay, StartGuided
+from telemetry.topics.requests import FlyWay, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
 
 BEGINS_M, STANDS_M_S = 1.0, 1.0
@@ -24,7 +24,7 @@ def why_moves(state: VehicleState) -> NotAllowedError | None:
     return NotAllowedError(what, advice="Hold, then ask for the way again.")
 
 
-def why_not_from(request: StartGuided | FlyWay, state: VehicleState, now_s: float) -> NotAllowedError | None:
+def why_not_from(request: StartGuided | FlyWay | TakeUp, state: VehicleState, now_s: float) -> NotAllowedError | None:
     """A mission's script begins on the ground; a certified way in the air, at rest, where it was certified."""
     if isinstance(request, StartGuided):
         return _why_not_up(request, state, now_s)
