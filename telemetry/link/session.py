@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError, TelemetryError
+from telemetry.flight.home_watch import HomeWatch
 from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
@@ -67,7 +68,7 @@ class Session:
         self, candidate: Candidate, line: Line, around: Around, ranges: RangeReader, settings: Settings
     ) -> None:
         self._around, self._ranges, self._is_over = around, ranges, False
-        self.traffic = TrafficPicture(settings.traffic)
+        self.traffic, self._home = TrafficPicture(settings.traffic), HomeWatch()
         telling = Telling(
             state=self._on_state,
             text=self._on_text,
@@ -175,6 +176,9 @@ class Session:
 
     def _on_state(self, state: VehicleState) -> None:
         self._around.states.offer(state)
+        if (moved := self._home.on_state(state)) is not None:
+            self._on_text(ALERT, moved)
+            self._around.spawn(self._around.commands.record(AUTOPILOT, moved, must=False))
         self.pilot.avoidance.on_state(state)
 
     def _on_order(self, message: Message) -> None:

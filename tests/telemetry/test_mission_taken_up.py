@@ -116,7 +116,7 @@ def test_a_vehicle_that_does_not_hold_keeps_its_mission(autopilot: str, paramete
             rest = Upload(ME, rest_from(bench), LAT_DEG, LON_DEG, ALT_M, while_holding=True)
             await bench.handle(Resume(ME))
             await until(lambda: bench.flight.phase == "flying")
-            with pytest.raises(NotAllowedError, match="does not hold: it is in (AUTO|MISSION)"):
+            with pytest.raises(NotAllowedError, match=r"does not hold: it is in (AUTO|MISSION)"):
                 await bench.handle(rest)
             with pytest.raises(NotAllowedError, match="being flown"):
                 await bench.handle(replace(rest, while_holding=False))
@@ -154,7 +154,7 @@ def test_an_upload_that_breaks_off_in_the_middle_leaves_it_holding(autopilot: st
 
 def test_a_mission_that_was_taken_up_is_not_flown_from_elsewhere() -> None:
     async def whole() -> None:
-        async with holding("ardupilot", QUICKLY_DOWN) as (bench, simulator, _):
+        async with holding("ardupilot", QUICKLY_DOWN) as (bench, _, _):
             report = await put_on_board(bench)
             await bench.handle(taking_up(bench, report.onboard.digest))
             vehicle = bench.vehicle

@@ -1,0 +1,66 @@
+"""Home that moves in flight: set by the transmitter, another station or a command. The ways home were proven for the
+home of the take-off, and what counts its heights from home flies higher or lower with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mapping.geometry.frames import offset_m
+from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.vehicle import VehicleState
+
+MOVED_M, ROSE_M = 1.0, 0.5
+"""Less is what receivers and barometers wander, and autopilots follow."""
+EIGHTHS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+WHAT_TO_DO = (
+    "The ways home are certified for the home before. Hold, then certify the rest from here (Fly, On board),"
+    " or set home back; do not rely on Return until then."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class HomePlace:
+    lat_deg: float
+    lon_deg: float
+    alt_amsl_m: float
+
+
+def home_of(state: VehicleState) -> HomePlace | None:
+    lat_deg, lon_deg, alt_m = state.home_lat_deg, state.home_lon_deg, state.home_alt_amsl_m
+    return None if lat_deg is None or lon_deg is None or alt_m is None else HomePlace(lat_deg, lon_deg, alt_m)
+
+
+class HomeWatch:
+    """Of one flight after the other."""
+
+    def __init__(self) -> None:
+        self._home: HomePlace | None = None
+
+    def on_state(self, state: VehicleState) -> str | None:
+        """What is to be said at once, each time that home has moved since it was last said."""
+        if not (state.armed and is_in_the_air(state)):
+            self._home = None
+            return None
+        home = home_of(state)
+        if home is None or self._home is None:
+            self._home = home or self._home
+            return None
+        words = moved_words(self._home, home)
+        if words is not None:
+            self._home = home
+        return words
+
+
+def moved_words(before: HomePlace, now: HomePlace) -> str | None:
+    """None where it has not moved by more than it wanders."""
+    east_m, north_m = offset_m((before.lat_deg, before.lon_deg), now.lat_deg, now.lon_deg)
+    away_m, rose_m = math.hypot(east_m, north_m), now.alt_amsl_m - before.alt_amsl_m
+    if away_m <= MOVED_M and abs(rose_m) <= ROSE_M:
+        return None
+    parts = []
+    if away_m > MOVED_M:
+        parts.append(f"{away_m:.0f} m to the {EIGHTHS[round(math.atan2(east_m, north_m) / (math.pi / 4)) % 8]}")
+    if abs(rose_m) > ROSE_M:
+        parts.append(f"{abs(rose_m):.1f} m {'up' if rose_m > 0 else 'down'}")
+    return f"Home has moved in flight: {' and '.join(parts)}. {WHAT_TO_DO}"
