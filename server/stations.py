@@ -19,12 +19,13 @@ from server.flying.apart.other_vehicles import Other, known
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
+from server.flying.in_flight.taking_up import TakingUp
+from server.flying.in_flight.way_desk import WayDesk
 from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
 from server.flying.recordings import Recording, TrackSoFar
 from server.flying.simulation import Simulation
 from server.flying.vehicle_log_desk import VehicleLogs
-from server.flying.way_desk import WayDesk
 from server.flying.work import FlightWork
 from server.heard.agents import Agents
 from server.heard.channel import Channel
@@ -143,10 +144,11 @@ class Flying:
         self.traffic, self.traffic_settings = self._obstacles.traffic, self._obstacles.traffic_desk
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
+        taking_up = TakingUp(link, self.live, workspace, library, lane, self._watch, aboard)
         checklist = ChecklistDesk(link, shared.checklists, aboard, bus)
         alone = wanted.is_alone
         self.desk = FlightDesk(
-            link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, is_alone=alone
+            link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, taking_up, is_alone=alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
         name = "" if alone else wanted.name

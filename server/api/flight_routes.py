@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
-from server.schemas import FlyState, FlyWayBody, GuidedState, StartFlight, UploadPlan, WayBody, WaySpeedBody
+from server.schemas import FlyState, FlyWayBody, GuidedState, StartFlight, TakeUpPlan, UploadPlan, WayBody, WaySpeedBody
 from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome, StopMotors
 
 router = APIRouter(prefix="/api/flight", tags=["flight"], responses=ERROR_RESPONSES)
@@ -24,6 +24,13 @@ async def upload(body: UploadPlan, operator: InCharge, flying: Fly) -> Response:
 async def check(operator: InCharge, flying: Fly) -> Response:
     """Reads the mission back and judges it where the vehicle really stands."""
     return answer(await flying.desk.check(operator))
+
+
+@router.post("/take_up", response_model=FlyState)
+async def take_up(body: TakeUpPlan, operator: InCharge, flying: Fly) -> Response:
+    """In flight: holds the vehicle and puts the way into the open plan and the plan's rest on board, certified and read
+    back; resume flies them. 409 with what is in the way, and what is on board then."""
+    return answer(await flying.desk.take_up(operator, body))
 
 
 @router.post("/start", **DONE)

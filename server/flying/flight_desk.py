@@ -11,23 +11,36 @@ import time
 from collections.abc import AsyncIterator
 from dataclasses import replace
 
+from planning.errors import DescribedError
 from server.errors import CheckNeededError, ConflictError
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
+from server.flying.in_flight.take_up_task import Asked, MadeTakeUp
+from server.flying.in_flight.taking_up import FIRMWARES, UNTOUCHED, TakingUp, said_of, with_words
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard, onboard
 from server.obstacles.obstacle_watch import Watch
-from server.schemas import CheckRow, FlyMessage, FlyState, Pages, PreflightDoc, StartFlight, TickBody
+from server.schemas import (
+    CheckRow,
+    FlyMessage,
+    FlyState,
+    Pages,
+    PreflightDoc,
+    StartFlight,
+    TakenUpDoc,
+    TakeUpPlan,
+    TickBody,
+)
 from server.workspace import Workspace
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
 from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, Topic
-from telemetry.topics.onboard_lists import Item, PlaceList, UploadReport
+from telemetry.topics.onboard_lists import Item, OnboardMission, PlaceList, UploadReport
 from telemetry.topics.requests import (
     Download,
     DownloadPlaces,
@@ -53,12 +66,13 @@ class FlightDesk:
         watch: Watch,
         bus: Bus,
         pages: Pages,
+        taking_up: TakingUp,
         *,
         is_alone: bool,
     ) -> None:
         """``is_alone``: the station has no other vehicle."""
         self._link, self._work, self._aboard, self._workspace = link, work, aboard, workspace
-        self._checklist = checklist
+        self._checklist, self._taking_up = checklist, taking_up
         self._live, self._watch, self._bus, self._pages = live, watch, bus, pages
         self._utc_minus_mono_s = time.time() - time.monotonic()
         self._flight = FlightStatus()
@@ -68,6 +82,7 @@ class FlightDesk:
         self._written = 0
         """How often parameters were written."""
         self._told: FlyState | None = None
+        self._taken_up: TakenUpDoc | None = None
 
     @property
     def state(self) -> FlyState:
@@ -77,6 +92,7 @@ class FlightDesk:
             checklist=self._checklist.doc,
             resume_from_item=self._flight.broke_off_at,
             at_fence=self._at_fence,
+            taken_up=self._taken_up,
             busy=self._busy,
         )
 
@@ -86,7 +102,7 @@ class FlightDesk:
         before = self._aboard.vehicle
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
-            self._at_fence = ""
+            self._at_fence, self._taken_up = "", None
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
@@ -94,6 +110,8 @@ class FlightDesk:
 
     def on_flight(self, flight: FlightStatus) -> None:
         self._flight = flight
+        if flight.phase != "paused" and not self._busy:
+            self._taken_up = None
         self.refresh()
 
     def on_others(self, row: CheckRow) -> None:
@@ -135,6 +153,24 @@ class FlightDesk:
             _check_firmware(made.record, self._state())
             await self._send_places(operator, made)
             await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
+        return self.state
+
+    async def take_up(self, operator: Operator, body: TakeUpPlan) -> FlyState:
+        """Holds the vehicle, makes the way from there into the open plan and the plan's rest its mission, and leaves it
+        holding: ``resume`` flies that. Raises what is in the way, and says where that leaves the vehicle."""
+        async with self._doing("Holding the vehicle"):
+            self._ready = self._taken_up = None
+            taking, item, before = self._taking_up, self._taking_up.item(), self._taking_up.before()
+            await taking.hold(operator)
+            self._set_busy("Finding the way into the plan")
+            with said_of(UNTOUCHED):
+                asked, made = await taking.made(operator, body, item)
+            self._set_busy("Uploading")
+            try:
+                await self._put_on_board(operator, asked, made)
+            except DescribedError as error:
+                raise with_words(error, await taking.what_is_aboard(operator, before)) from error
+            self._taken_up = made.doc
         return self.state
 
     async def check(self, operator: Operator) -> FlyState:
@@ -201,15 +237,35 @@ class FlightDesk:
         self._checklist.check(body.digest)
         return ready
 
+    async def _put_on_board(self, operator: Operator, asked: Asked, made: MadeTakeUp) -> None:
+        """Only what was read back, and certified as such, is taken up."""
+        for kind, items in made.places.items():
+            report = await self._link.call(UploadPlaces(operator, kind, items, while_holding=True))
+            if not report.verified:
+                raise _not_verified(report, _LISTS[kind])
+        home = (asked.state.home_lat_deg or 0.0, asked.state.home_lon_deg or 0.0, made.record.home_alt_dsm_m or 0.0)
+        found = await self._send(operator, made.items, made.record, home, while_holding=True)
+        self._set_busy("Certifying what is on board")
+        self._aboard.certified(await self._taking_up.certificate(operator, asked, found))
+        await self._taking_up.begin(operator, found.digest, made)
+        await self._note()
+
     async def _send(
-        self, operator: Operator, items: tuple[Item, ...], record: PlanRecord, home: tuple[float, float, float]
-    ) -> None:
-        report = await self._link.call(Upload(operator, items, *home))
+        self,
+        operator: Operator,
+        items: tuple[Item, ...],
+        record: PlanRecord,
+        home: tuple[float, float, float],
+        *,
+        while_holding: bool = False,
+    ) -> OnboardMission:
+        report = await self._link.call(Upload(operator, items, *home, while_holding=while_holding))
         if not report.verified:
             raise _not_verified(report)
         record = replace(record, digest=report.onboard.digest, t_utc_s=time.time())
         self._aboard.read_back(onboard(record, len(report.onboard.items), report.rounded))
         await self._note()
+        return report.onboard
 
     async def _send_places(self, operator: Operator, made: MadeUpload) -> None:
         """Before the mission, which counts as on board only with them. A list that the plan does not have is left as it
@@ -293,12 +349,9 @@ def _still_holds(ready: Ready, status: LinkStatus) -> bool:
 def _check_firmware(record: PlanRecord, state: VehicleState) -> None:
     if state.autopilot != "other" and state.autopilot != record.firmware:
         raise NotAllowedError(
-            f"The plan was made for {_FIRMWARES[record.firmware]}, the vehicle flies {_FIRMWARES[state.autopilot]}.",
+            f"The plan was made for {FIRMWARES[record.firmware]}, the vehicle flies {FIRMWARES[state.autopilot]}.",
             advice="Choose the vehicle's own profile in Plan, then upload again.",
         )
-
-
-_FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 def _marks(items: tuple[Item, ...]) -> list[tuple[int, int, int]]:

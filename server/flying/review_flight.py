@@ -14,6 +14,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
+from planning.certificate.commands import TAKEOFFS
 from planning.errors import PlanningError
 from planning.following.reference import Reference, level_model, reference_line
 from planning.following.surface_distance import SurfaceDistance
@@ -141,12 +142,17 @@ def _reference(log: FlightLog, mission: Mission | None, model: Dsm, notes: list[
         notes.append("There is no mission to hold the flight against: choose one to see its errors.")
         return None
     try:
-        reference = reference_line(mission, model, profile_of(log))
+        taken_up = log.plan is not None and log.plan.taken_up and _has_no_take_off(mission)
+        reference = reference_line(mission, model, profile_of(log), begins_in_air=taken_up)
     except PlanningError as error:
         notes.append(f"The flight cannot be held against the mission: {error.what}")
         return None
     notes += reference.notes
     return reference
+
+
+def _has_no_take_off(mission: Mission) -> bool:
+    return all(item.command not in TAKEOFFS for item in mission.items)
 
 
 def _height_at(model: Dsm, home: Home, reference: Reference | None, notes: list[str]) -> float:

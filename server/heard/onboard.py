@@ -110,6 +110,7 @@ class Aboard:
             items=kept.items,
             rounded=list(kept.rounded),
             rounded_note=kept.note,
+            taken_up=kept.record.taken_up,
         )
 
 

@@ -50,7 +50,7 @@ class Followed:
         """Takes seconds on a busy machine: for a thread. Raises PlanningError."""
         mission = read_wpl(record.mission_wpl)
         profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
-        over = Followed.over(reference_line(mission, dsm, profile), dsm)
+        over = Followed.over(reference_line(mission, dsm, profile, begins_in_air=record.taken_up), dsm)
         return replace(over, demanded=_demanded(record), profile=profile)
 
     @staticmethod

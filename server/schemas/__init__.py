@@ -32,6 +32,8 @@ from server.schemas.flight_docs import (
     SetVehicleSigning,
     Source,
     StartFlight,
+    TakenUpDoc,
+    TakeUpPlan,
     TrackDoc,
     UploadPlan,
     VehicleLogDoc,

@@ -106,6 +106,25 @@ class OnboardDoc(Strict):
     rounded: list[Rounded] = Field(default_factory=list)
     rounded_note: str = ""
     """One sentence: what the vehicle rounded."""
+    taken_up: bool = False
+    """In flight: it begins in the air, and is no mission to start from the ground."""
+
+
+class TakenUpDoc(Strict):
+    """A plan that was taken up in flight: it is on board, verified and certified, and flown by ``resume``."""
+
+    item: int
+    """Of the plan, counted from 1: the first that is flown to after the way there."""
+    way_m: float
+    """Length of the way from where the vehicle holds to where the plan's line is joined."""
+    seconds: float
+    """Of that way."""
+    left_out: int
+    """Waypoints of the plan that lie before that and are not flown."""
+    clearance_m: float
+    required_m: float
+    notes: list[str]
+    battery: CheckRow
 
 
 class FlyState(Strict):
@@ -119,6 +138,8 @@ class FlyState(Strict):
     """After a flight that broke off: where it can go on."""
     at_fence: str = ""
     """What the vehicle does when it crosses its fence, as read at the last check; empty: not known."""
+    taken_up: TakenUpDoc | None = None
+    """Until it is flown."""
     busy: str = ""
     """What is being done right now: "Uploading", "Checking the start" ..."""
 
@@ -195,6 +216,14 @@ class UploadPlan(Strict):
     """Uploads the open plan, which must be at this revision."""
 
     revision: int
+
+
+class TakeUpPlan(Strict):
+    """Takes up the open plan, which must be at this revision, from where the vehicle is."""
+
+    revision: int
+    accept: list[Literal["battery"]] = Field(default_factory=list)
+    """That it may not suffice for the reserve, or is not told."""
 
 
 class StartFlight(Strict):

@@ -92,7 +92,7 @@ def judged_way(
         what = f"{speed_m_s:g} m/s were asked for; the profile's top speed is {profile.max_speed_m_s:g} m/s."
         raise NotAllowedError(what, advice="Give a speed within that.")
     demand = Demand(
-        _demanded(state, flown),
+        demanded(state, flown),
         speed_m_s,
         profile.max_climb_m_s,
         profile.max_descent_m_s,
@@ -125,7 +125,7 @@ def _firmware(state: VehicleState) -> Firmware:
     return "px4" if state.autopilot == "px4" else "ardupilot"
 
 
-def _demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
+def demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
     """With the vehicle's own return height, and its receiver's accuracy where that is worse than was assumed."""
     row = gnss_row(state, flown.profile)
     if row.state in ("bad", "unknown"):

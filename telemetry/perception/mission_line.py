@@ -35,7 +35,7 @@ def mission_line(plan: PlanRecord, origin: MapOrigin) -> FlightLine | None:
     """As the vehicle will fly it; None for a mission that is no line."""
     try:
         mission = read_wpl(plan.mission_wpl, plan.name)
-        flown = flown_line(mission, _level(origin))
+        flown = flown_line(mission, _level(origin), begins_in_air=plan.taken_up)
     except PlanningError:
         return None
     if len(flown.points_m) < 2:

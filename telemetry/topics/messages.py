@@ -256,6 +256,8 @@ class PlanRecord:
     """The plan document of the console, if it came from there."""
     path_csv: str = ""
     """``trajectory.csv`` with the paper's timing, if there is one."""
+    taken_up: bool = False
+    """In flight: the mission has no take-off, and begins at its first item's place, in the air."""
 
 
 @dataclass(frozen=True, slots=True)

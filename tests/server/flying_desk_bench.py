@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
+from server.flying.in_flight.taking_up import TakingUp
 from server.flying.work import FlightWork
 from server.heard.onboard import Aboard
 from server.library import Library
@@ -18,6 +21,7 @@ from server.plan import demo, tasks
 from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMessage
 from server.work.jobs import Lane
+from telemetry.errors import SilentError, TransferError
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
@@ -35,11 +39,18 @@ class Vehicle:
     def __init__(self) -> None:
         self.items: tuple[Any, ...] = ()
         self.told: list[Any] = []
-        self.swaps_two_items = self.drops_fences = False
+        self.swaps_two_items = self.drops_fences = self.answers_no_download = False
+        self.breaks_off: Literal["", "keeps", "mixes"] = ""
+        """An upload in flight; and what is on board then."""
         self.places: dict[str, tuple[Any, ...]] = {"fence": (), "rally": ()}
         self.parameters: dict[str, float] = {"RTL_ALT": 6000.0}
 
     async def call(self, request: Any) -> Any:
+        if isinstance(request, Upload) and request.while_holding and self.breaks_off:
+            self.items = self.items[:3] if self.breaks_off == "mixes" else self.items
+            raise TransferError("The upload broke off at item 3.", advice="Try again.")
+        if isinstance(request, Download) and self.answers_no_download:
+            raise SilentError("The vehicle does not answer.", advice="Look at the link.")
         if isinstance(request, Upload):
             self.items = as_stored(request.items, "ardupilot")
             if self.swaps_two_items:
@@ -122,13 +133,32 @@ class Made:
         )
 
 
+class Live:
+    """What is heard; in flight its positions are of now."""
+
+    def __init__(self, state: VehicleState) -> None:
+        self._state = state
+        self.track = SimpleNamespace(states=[])
+
+    @property
+    def state(self) -> VehicleState:
+        if not self._state.armed:
+            return self._state
+        now_s = time.monotonic()
+        return replace(self._state, position_t_mono_s=now_s, gnss_t_mono_s=now_s)
+
+    @state.setter
+    def state(self, state: VehicleState) -> None:
+        self._state = state
+
+
 class Bench:
     """Stands for all that hangs on the desk, but for the vehicle."""
 
     def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane], *, is_alone: bool = True) -> None:
         self.vehicle, self.plan = Vehicle(), made.plan()
         self.plan_lane = lanes[0]
-        self.live = SimpleNamespace(state=made.standing())
+        self.live = Live(made.standing())
         self.watch = SimpleNamespace(avoidance=AvoidanceStatus())
         self.told: list[FlyState] = []
         self.records: list[PlanRecord] = []
@@ -138,8 +168,9 @@ class Bench:
         bus: Any = SimpleNamespace(publish=self._heard)
         self.aboard = Aboard(file)
         checklist = ChecklistDesk(me.vehicle, Checklists(made.library.root), self.aboard, bus)
+        taking_up = TakingUp(me.vehicle, me.live, me, made.library, lanes[1], me.watch, self.aboard)
         self.desk = FlightDesk(
-            me.vehicle, work, self.aboard, checklist, me, me.live, me.watch, bus, self, is_alone=is_alone
+            me.vehicle, work, self.aboard, checklist, me, me.live, me.watch, bus, self, taking_up, is_alone=is_alone
         )
         self.desk.on_link(LinkStatus(0.0, adopted=QUAD, state="live", mission_state="unknown"))
 

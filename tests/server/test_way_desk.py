@@ -17,8 +17,8 @@ from planning.errors import ParameterError
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
-from server.flying.way_desk import WayDesk, flown_places
-from server.flying.way_task import WayJudged, wish_of
+from server.flying.in_flight.way_desk import WayDesk, flown_places
+from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.scene.mirror import Voxels
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
@@ -215,7 +215,7 @@ def test_a_way_that_was_judged_long_ago_is_asked_for_again(
         bench = Bench(made, lane)
         way = await bench.judged(action="height", height_m=20.0)
         late_s = time.monotonic() + CHECK_FRESH_S + 1.0
-        monkeypatch.setattr("server.flying.way_desk.time.monotonic", lambda: late_s)
+        monkeypatch.setattr("server.flying.in_flight.way_desk.time.monotonic", lambda: late_s)
         with pytest.raises(CheckNeededError, match="120 s ago"):
             await bench.desk.fly(ME, FlyWayBody(id=way.id))
         assert bench.vehicle.told == []

@@ -1469,6 +1469,24 @@ export interface OnboardDoc {
   rounded: Rounded[];
   /** One sentence: what the vehicle rounded. */
   rounded_note: string;
+  /** In flight: it begins in the air, and is no mission to start from the ground. */
+  taken_up: boolean;
+}
+
+/** A plan that was taken up in flight: it is on board, verified and certified, and flown by ``resume``. */
+export interface TakenUpDoc {
+  /** Of the plan, counted from 1: the first that is flown to after the way there. */
+  item: number;
+  /** Length of the way from where the vehicle holds to where the plan's line is joined. */
+  way_m: number;
+  /** Of that way. */
+  seconds: number;
+  /** Waypoints of the plan that lie before that and are not flown. */
+  left_out: number;
+  clearance_m: number;
+  required_m: number;
+  notes: string[];
+  battery: CheckRow;
 }
 
 /** What is on board, whether it may be flown, and what is being done about it. */
@@ -1481,6 +1499,8 @@ export interface FlyState {
   resume_from_item: number | null;
   /** What the vehicle does when it crosses its fence, as read at the last check; empty: not known. */
   at_fence: string;
+  /** Until it is flown. */
+  taken_up: TakenUpDoc | null;
   /** What is being done right now: "Uploading", "Checking the start" ... */
   busy: string;
 }
@@ -1551,6 +1571,13 @@ export interface SetVehicleSigning {
 /** Uploads the open plan, which must be at this revision. */
 export interface UploadPlan {
   revision: number;
+}
+
+/** Takes up the open plan, which must be at this revision, from where the vehicle is. */
+export interface TakeUpPlan {
+  revision: number;
+  /** That it may not suffice for the reserve, or is not told. */
+  accept?: "battery"[];
 }
 
 export interface StartFlight {

@@ -66,11 +66,13 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
       items: 0,
       rounded: [],
       rounded_note: "",
+      taken_up: false,
     },
     preflight: null,
     checklist: null,
     resume_from_item: null,
     at_fence: "",
+    taken_up: null,
     busy: "",
     ...fields,
   };

@@ -74,6 +74,13 @@ describe("the next step", () => {
     expect(nextStep(facts({ fly, obstacle: "No plan" })).id).toBe("start");
   });
 
+  it("is to upload again once a plan that was taken up in the air has landed: it is no mission for a start", () => {
+    const taken = onboard({ taken_up: true });
+    expect(nextStep(facts({ fly: { ...checked(row("good")), onboard: taken } })).id).toBe("upload");
+    const flight = { phase: "paused" } as FlightStatus;
+    expect(nextStep(facts({ flight, inAir: true, fly: flyState({ onboard: taken }) })).id).toBe("resume");
+  });
+
   it("is no start while anything is bad or unknown", () => {
     for (const state of ["bad", "unknown"] as const) {
       expect(nextStep(facts({ fly: checked(row("good"), row(state, "ready")) })).id).toBe("check");

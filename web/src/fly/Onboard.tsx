@@ -1,13 +1,16 @@
-import { count, number } from "../format";
-import type { OnboardDoc, Rounded } from "../messages";
+import { useSignal } from "@preact/signals";
+import { clearance, count, demanded, metres, number, withUnit } from "../format";
+import type { OnboardDoc, Rounded, TakenUpDoc } from "../messages";
 import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { whyNotCommand, whyUnheard } from "../store/reach";
 import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
+import { Check } from "../ui/fields";
+import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Section } from "../ui/Section";
-import { NEXT, checkStart, uploadPlan, uploadRefusal } from "../vehicle/orders";
+import { NEXT, checkStart, takeUpPlan, uploadPlan, uploadRefusal } from "../vehicle/orders";
 
 const SUMMARIES = { unknown: "not known", none: "none", verified: "verified" } as const;
 const MOST_ROWS = 40;
@@ -63,10 +66,66 @@ function State({ onboard }: { onboard: OnboardDoc }) {
   );
 }
 
+/** The open plan, from where the vehicle is: it is held first, and goes on when the operator presses Resume. */
+function FromHere({ onboard }: { onboard: OnboardDoc }) {
+  const acceptsBattery = useSignal(false);
+  const taken = fly.value?.taken_up;
+  if (taken) return <TakenUp taken={taken} />;
+  if (!isInAir.value) return null;
+  const isFlown = onboard.state === "verified" && onboard.is_open_plan;
+  const why = whyNotCommand.value ?? uploadRefusal();
+  return (
+    <div class="callout wrap-row" data-testid="fly-from-here">
+      <Icon name="route" />
+      <p>
+        The open plan ({document_.value?.name ?? "none"}) is {isFlown ? "on board" : "not what is on board"}.
+      </p>
+      <Check
+        label="Battery reserve may be used"
+        checked={acceptsBattery.value}
+        testid="take-up-battery"
+        onChange={(yes) => (acceptsBattery.value = yes)}
+      />
+      <HoldButton
+        label={isFlown ? "Certify the rest from here" : "Fly the new plan from here"}
+        icon="play"
+        place={NEXT}
+        disabled={why !== null || Boolean(fly.value?.busy)}
+        title={why ?? "Holds; the way there and the rest are certified and sent; Resume flies them"}
+        testid="take-up"
+        onHold={() => void takeUpPlan(acceptsBattery.value)}
+      />
+    </div>
+  );
+}
+
+function TakenUp({ taken }: { taken: TakenUpDoc }) {
+  return (
+    <div class="onboard verified" data-testid="taken-up">
+      <Icon name="check" />
+      <div>
+        <strong>CERTIFIED from here</strong>
+        <p>
+          {metres(taken.way_m, 0)} to the plan, {withUnit(taken.seconds, "s")}; then item {taken.item} on.
+          {taken.left_out > 0 && ` ${count(taken.left_out, "waypoint")} before it left out.`}
+        </p>
+        <p>
+          Clear by {clearance(taken.clearance_m)}, required {demanded(taken.required_m)}.
+        </p>
+        {[...taken.notes, taken.battery.text].map((note) => (
+          <p key={note} class="muted">
+            {note}
+          </p>
+        ))}
+      </div>
+    </div>
+  );
+}
+
 /** An older plan may be flown as well, after the same check; a mission from elsewhere may not. */
 function NotThePlan({ onboard }: { onboard: OnboardDoc }) {
-  if (onboard.state !== "verified" || onboard.is_open_plan) return null;
-  const busy = pending.value.has(NEXT) || whyNotCommand.value !== null || isInAir.value;
+  if (isInAir.value || onboard.state !== "verified" || onboard.is_open_plan) return null;
+  const busy = pending.value.has(NEXT) || whyNotCommand.value !== null;
   return (
     <div class="callout wrap-row" data-testid="not-the-plan">
       <Icon name="warning" />
@@ -108,6 +167,7 @@ export function OnboardSection() {
     >
       <State onboard={onboard} />
       <NotThePlan onboard={onboard} />
+      <FromHere onboard={onboard} />
       {onboard.rounded_note && (
         <p class="hint" data-testid="rounded-note">
           {onboard.rounded_note}

@@ -60,7 +60,7 @@ function inFlight(facts: Facts): Step | null {
 function onGround(facts: Facts): Step {
   const { fly, accepted, obstacle } = facts;
   const onboard = fly?.onboard;
-  if (onboard?.state !== "verified" || (!onboard.is_open_plan && obstacle === null)) {
+  if (onboard?.state !== "verified" || onboard.taken_up || (!onboard.is_open_plan && obstacle === null)) {
     return obstacle ? { id: "upload", why: obstacle } : { id: "upload" };
   }
   const rows = fly?.preflight?.rows;

@@ -1,5 +1,5 @@
 import { computed, signal } from "@preact/signals";
-import type { CheckRow, LeaseDoc, StartFlight } from "../messages";
+import type { CheckRow, LeaseDoc, StartFlight, TakeUpPlan } from "../messages";
 import { fly } from "../store/flying";
 import { order, say } from "../store/outcomes";
 import { allSent } from "../store/plan";
@@ -89,6 +89,16 @@ export async function uploadPlan(place: string): Promise<void> {
   // What is on board comes by the stream alone: by now the answer may be older than what was told since.
   const answer = await order({ place, path: "/api/flight/upload", body: { revision } });
   if (answer) say(place, "On board: read back and verified.");
+}
+
+/** Holds first, whatever comes of it; the answer to a refusal says what is on board then. */
+export async function takeUpPlan(acceptsBattery: boolean): Promise<void> {
+  await allSent();
+  const revision = plan.value?.revision;
+  if (revision === undefined) return;
+  const body: TakeUpPlan = { revision, accept: acceptsBattery ? ["battery"] : [] };
+  const answer = await order({ place: NEXT, path: "/api/flight/take_up", moves: true, body });
+  if (answer) say(NEXT, "The new plan is on board, certified from here. Resume flies it.");
 }
 
 export const checkStart = () => order({ place: NEXT, path: "/api/flight/check" });

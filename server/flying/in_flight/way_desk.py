@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from mapping.geometry.frames import apart_m
 from planning.guided.guided_model import RETURNS
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
-from server.flying.way_task import WayAsked, WayJudged, judge_way
+from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.library import Library
 from server.obstacles.obstacle_watch import Watch

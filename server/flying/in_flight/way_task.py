@@ -70,7 +70,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
         wish = replace(wish, point=nearest_rally(rally, asked.state))
     speed_m_s = asked.body.speed_m_s or demands.profile.mean_speed_m_s
     ground = load_terrain(asked.terrain)
-    seen = _with_seen(ground, asked)
+    seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state)
     way = judged_way(
         part_for(ground, asked.state, wish, rally),
         None if seen is None else part_for(seen, asked.state, wish, rally),
@@ -89,16 +89,17 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     return WayJudged(way, wish, speed_m_s, demands.profile.max_speed_m_s, seen is not None)
 
 
-def _with_seen(ground: Dsm, asked: WayAsked) -> Dsm | None:
+def with_seen(
+    ground: Dsm, terrain: Path, seen_id: str | None, maps: tuple[Voxels, ...], state: VehicleState
+) -> Dsm | None:
     """None where nothing was seen, neither in this flight nor in the plan."""
     from server.library.seen_columns import load_planned_terrain
     from server.obstacles.coming_down_task import burned
 
-    seen_id = asked.document.seen_id
-    if seen_id is None and not any((~voxels.explained).any() for voxels in asked.maps):
+    if seen_id is None and not any((~voxels.explained).any() for voxels in maps):
         return None
-    planned = ground if seen_id is None else load_planned_terrain(asked.terrain, seen_id)
-    return burned(planned, asked.maps, asked.state)
+    planned = ground if seen_id is None else load_planned_terrain(terrain, seen_id)
+    return burned(planned, maps, state)
 
 
 def wish_of(body: WayBody, flown: tuple[tuple[float, float, float], ...]) -> Wish:

@@ -1,0 +1,193 @@
+"""A plan that is taken up in flight, step by step: the vehicle is held, the way and the rest are made and judged, and
+what came on board is judged once more before it is the mission that ``resume`` flies."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from planning.errors import DescribedError
+from planning.missions.vehicle_profile import parse_profile
+from server.errors import NotReadyError
+from server.flying.in_flight.take_up_task import Asked, MadeTakeUp, check_take_up, make_take_up
+from server.flying.work import check_uploadable
+from server.heard.channel import Channel
+from server.heard.onboard import Aboard
+from server.library import Library
+from server.library.terrain_of import FlownOver, terrain_of
+from server.obstacles.obstacle_watch import Watch
+from server.obstacles.surroundings import seen_maps
+from server.schemas import TakeUpPlan
+from server.work.jobs import Lane
+from server.workspace import Workspace
+from telemetry.bus.link_client import LinkClient
+from telemetry.errors import NotAllowedError, NoVehicleError, SilentError, TelemetryError
+from telemetry.flight.guided.beginning import why_moves
+from telemetry.flight.home_watch import HomePlace, home_of
+from telemetry.flight.preflight.parameters import NAMES
+from telemetry.mavlink.autopilot_orders import HOLD_MODES
+from telemetry.mavlink.believing import is_in_the_air
+from telemetry.mavlink.flight_keeper import item_of
+from telemetry.topics.messages import PlanRecord
+from telemetry.topics.onboard_lists import OnboardMission, PlacesOnboard
+from telemetry.topics.requests import Download, DownloadPlaces, Operator, Pause, ReadParameters, TakeUp
+from telemetry.topics.vehicle import VehicleState
+
+E = TypeVar("E", bound=DescribedError)
+HOLDS_WITHIN_S, LOOK_EVERY_S, STILL_S = 30.0, 0.1, 1.0
+"""So long it must be still, at a stretch, before its place is taken for the beginning."""
+UNTOUCHED = "The vehicle holds, and the mission before is still on board: Resume flies that."
+FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """What was on board before anything was sent."""
+
+    digest: str | None
+    record: PlanRecord | None
+
+
+class TakingUp:
+    """Raises what the vehicle said, and DescribedErrors that say what is in the way."""
+
+    def __init__(
+        self,
+        link: LinkClient,
+        live: Channel,
+        workspace: Workspace,
+        library: Library,
+        lane: Lane,
+        watch: Watch,
+        aboard: Aboard,
+    ) -> None:
+        self._link, self._live, self._workspace, self._library = link, live, workspace, library
+        self._lane, self._watch, self._aboard = lane, watch, aboard
+
+    async def hold(self, operator: Operator) -> None:
+        """Until it has stood still for a while."""
+        state = self._state()
+        if not (state.armed and is_in_the_air(state)):
+            raise NotAllowedError("The vehicle is not in the air.", advice="Upload the plan and check it.")
+        await self._link.call(Pause(operator))
+        end_s, still_s = time.monotonic() + HOLDS_WITHIN_S, 0.0
+        while still_s < STILL_S:
+            if time.monotonic() > end_s:
+                what = f"The vehicle does not stand still within {HOLDS_WITHIN_S:.0f} s."
+                raise SilentError(what, advice="Look at it. Nothing was sent: the mission before is still on board.")
+            await asyncio.sleep(LOOK_EVERY_S)
+            still_s = still_s + LOOK_EVERY_S if _holds(self._state()) else 0.0
+
+    async def made(self, operator: Operator, body: TakeUpPlan, item: int) -> tuple[Asked, MadeTakeUp]:
+        """``item``: that was flown to before the hold, of the mission on board; nothing is sent."""
+        plan = self._workspace.state
+        check_uploadable(plan, body.revision)
+        document, state, before = plan.document, self._state(), self._aboard.record
+        _check_same(document.profile.firmware, document.profile.name, state, before)
+        terrain = terrain_of(FlownOver(document.terrain_id or ""), self._library.terrains())
+        if terrain is None:
+            raise NotReadyError("The plan's surface model has been deleted.", advice="Open another plan.")
+        if before is not None and before.terrain_sha256 != terrain.sha256:
+            what = f'The plan is over "{terrain.name}", the vehicle took off over "{before.terrain_name}".'
+            raise NotAllowedError(what, where="surface model", advice="Plan over the model that the flight began over.")
+        asked = Asked(
+            self._library.terrain_dir(terrain.id),
+            document,
+            terrain.name,
+            before,
+            item,
+            state,
+            time.monotonic(),
+            await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"])),
+            await self._places(operator),
+            await asyncio.to_thread(seen_maps, self._watch),
+            self._took_off(),
+        )
+        asked = replace(asked, state=self._state(), now_mono_s=time.monotonic())
+        made = await self._workspace.plan_lane.call(make_take_up, asked)
+        battery = made.doc.battery
+        if battery.state != "good" and (battery.state != "accept" or "battery" not in body.accept):
+            raise NotAllowedError(battery.text, where="battery", advice=battery.mend)
+        return asked, made
+
+    async def certificate(self, operator: Operator, asked: Asked, onboard: OnboardMission) -> str:
+        """Of what was read back, as JSON."""
+        now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=await self._places(operator))
+        return await self._lane.call(check_take_up, now, onboard)
+
+    async def begin(self, operator: Operator, digest: str, made: MadeTakeUp) -> None:
+        await self._link.call(TakeUp(operator, digest, *made.begins))
+
+    def before(self) -> Before:
+        record = self._aboard.record
+        return Before(None if record is None else record.digest, record)
+
+    def item(self) -> int:
+        """Of the mission on board, that is flown to."""
+        return item_of(self._state()) or 1
+
+    async def what_is_aboard(self, operator: Operator, before: Before) -> str:
+        """After something went wrong on the way: read now, not remembered."""
+        try:
+            found = await self._link.call(Download(operator))
+        except TelemetryError as error:
+            return (
+                f"The vehicle holds. What is on board is not known ({error.what.rstrip('.')}): Resume is refused."
+                " Try again, return home, or land."
+            )
+        if before.digest is not None and found.digest == before.digest:
+            return UNTOUCHED
+        return (
+            f"The vehicle holds. On board are {len(found.items)} items that are not the mission before, and they are"
+            " not certified: Resume is refused. Try again, return home, or land."
+        )
+
+    def _took_off(self) -> HomePlace | None:
+        """Home as the vehicle told it first in the air: before that it may be the one of an earlier flight."""
+        flown = (state for state in self._live.track.states if is_in_the_air(state))
+        return next((home for state in flown if (home := home_of(state)) is not None), None)
+
+    async def _places(self, operator: Operator) -> PlacesOnboard:
+        try:
+            fence = await self._link.call(DownloadPlaces(operator, "fence"))
+            return PlacesOnboard(fence, await self._link.call(DownloadPlaces(operator, "rally")))
+        except TelemetryError as error:
+            return PlacesOnboard(unread=error.what)
+
+    def _state(self) -> VehicleState:
+        if self._live.state is None:
+            raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
+        return self._live.state
+
+
+@contextlib.contextmanager
+def said_of(words: str) -> Iterator[None]:
+    """Whatever is refused in it says this as well."""
+    try:
+        yield
+    except DescribedError as error:
+        raise with_words(error, words) from error
+
+
+def with_words(error: E, words: str) -> E:
+    """The same error, which also says where that leaves the vehicle."""
+    return type(error)(error.what, where=error.where, advice=f"{error.advice} {words}".strip())
+
+
+def _holds(state: VehicleState) -> bool:
+    return state.mode in HOLD_MODES.get(state.autopilot, ()) and why_moves(state) is None
+
+
+def _check_same(firmware: str, profile: str, state: VehicleState, before: PlanRecord | None) -> None:
+    """Raises NotAllowedError for a plan of another vehicle."""
+    if state.autopilot in FIRMWARES and state.autopilot != firmware:
+        what = f"The plan was made for {FIRMWARES[firmware]}, the vehicle flies {FIRMWARES[state.autopilot]}."
+        raise NotAllowedError(what, where="vehicle", advice="Choose the vehicle's own profile in Plan.")
+    flown = None if before is None else parse_profile(before.profile_toml.encode(), where="the plan on board").name
+    if flown is not None and flown != profile:
+        what = f'The plan was made for "{profile}", the vehicle flies as "{flown}".'
+        raise NotAllowedError(what, where="vehicle", advice="Choose the profile of this flight in Plan.")
