@@ -281,8 +281,7 @@ class Pilot:
         self._end_current()
         self.script = self.join = None
         await first_item_next(self.vehicle)
-        onboard = self.vehicle.onboard.mission
-        self._started_digest, self._begins = request.digest, request
+        self._started_digest, self._begins, onboard = request.digest, request, self.vehicle.onboard.mission
         self.flight.replaced(len(onboard.items) if onboard else 0, time.time())
 
     async def return_home(self) -> None:

@@ -136,19 +136,19 @@ class Made:
 class Live:
     """What is heard; in flight its positions are of now."""
 
-    def __init__(self, state: VehicleState) -> None:
+    def __init__(self, state: VehicleState | None) -> None:
         self._state = state
         self.track = SimpleNamespace(states=[])
 
     @property
-    def state(self) -> VehicleState:
-        if not self._state.armed:
+    def state(self) -> Any:
+        if self._state is None or not self._state.armed:
             return self._state
         now_s = time.monotonic()
         return replace(self._state, position_t_mono_s=now_s, gnss_t_mono_s=now_s)
 
     @state.setter
-    def state(self, state: VehicleState) -> None:
+    def state(self, state: VehicleState | None) -> None:
         self._state = state
 
 
