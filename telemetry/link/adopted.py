@@ -13,8 +13,9 @@ from telemetry.link.exchanges import Exchanges
 from telemetry.link.heartbeat import heartbeat
 from telemetry.link.line import Line
 from telemetry.link.onboard import OnBoard
-from telemetry.link.quality import RoundTripClock, SequenceQuality
 from telemetry.link.streams import StreamRequests
+from telemetry.link.ways.way import Way
+from telemetry.link.ways.ways import ChangeOver, Ways
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import Order, Orders
 from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing
@@ -27,7 +28,7 @@ from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 from telemetry.topics.vehicle import Autopilot, VehicleState
 
 FAST_LINK_BAUD = 400_000
-ALERT = 1
+ALERT, WARNING, INFO = 1, 4, 6
 """MAV_SEVERITY"""
 SIMULATION = b"hedgehop"
 """What Hedgehop's own simulated vehicle says for its firmware's version; others have a hash of their sources there."""
@@ -43,6 +44,10 @@ class Telling:
     sent: Callable[[bytes], None]
     ordered: Callable[[Message], None] = lambda _: None
     """Every message before it goes out."""
+    sent_spare: Callable[[str, bytes], None] = lambda *_: None
+    """A question or a heartbeat over a way that is not in use: address, frame."""
+    changed_over: Callable[[str], None] = lambda _: None
+    """Another way is in use: what is written down of it."""
 
 
 class AdoptedVehicle:
@@ -51,7 +56,8 @@ class AdoptedVehicle:
     ) -> None:
         """``flies``: a flight of it is under way, as the node before this one knew."""
         now_s = clock()
-        self.candidate, self.line = candidate, line
+        self.candidate = candidate
+        self.ways, self._lines = Ways(candidate, now_s), {candidate.address: line}
         self.target = (candidate.system_id, candidate.component_id)
         self.state = VehicleState(
             system_id=candidate.system_id,
@@ -66,12 +72,15 @@ class AdoptedVehicle:
         self.is_simulation = False
         """Hedgehop's own, as it says with its capabilities."""
         self._telling, self._clock = telling, clock
-        slow = line.address.kind == "serial" and line.address.baud < FAST_LINK_BAUD
-        self._streams = StreamRequests(self.target, candidate.autopilot, slow=slow, now_s=now_s)
-        self._quality, self._round_trip = SequenceQuality(), RoundTripClock()
+        self._streams = self._requests(now_s)
         self.believing, self._doubted = Believing(flies=flies), False
         self._boot, self._speech = BootClock(), Speech(self.target)
         self._next_state: asyncio.Future[None] | None = None
+
+    @property
+    def line(self) -> Line:
+        """That is in use."""
+        return self._lines[self.ways.chosen.address]
 
     @property
     def orders(self) -> Orders:
@@ -101,16 +110,51 @@ class AdoptedVehicle:
 
     @property
     def quality(self) -> float | None:
-        return self._quality.share(self._clock())
+        return self.ways.chosen.quality.share(self._clock())
 
     @property
     def round_trip_s(self) -> float | None:
-        return self._round_trip.round_trip_s
+        return self.ways.chosen.clock.round_trip_s
 
     def moved(self, candidate: Candidate, line: Line) -> None:
         """It sends from another port now, as the operator says."""
-        self.candidate, self.line = candidate, line
+        self.candidate = candidate
+        self.ways, self._lines = Ways(candidate, self._clock()), {candidate.address: line}
         self.send_first()
+
+    def ask_way(self, candidate: Candidate, line: Line) -> None:
+        """Somebody with its numbers is heard there too. A heartbeat: some vehicles answer nobody without."""
+        self.ways.add(candidate)
+        self._lines[candidate.address] = line
+        way = self.ways.get(candidate.address)
+        if way is not None:
+            self._send_over(way, heartbeat())
+
+    def way_gone(self, address: str) -> None:
+        """The far end hung up."""
+        way = self.ways.get(address)
+        if way is not None and self.ways.has_several:
+            way.gone()
+
+    def part_ways(self) -> list[Way]:
+        """Those that turned out to lead to another vehicle, or that nobody can tell of."""
+        parted = self.ways.part(self._clock())
+        for way in parted:
+            del self._lines[way.address]
+        return parted
+
+    def leave_way(self, address: str) -> bool:
+        """The connection is taken away. False: no other one leads to the vehicle."""
+        if self.ways.get(address) is None:
+            return True
+        if not self.ways.has_other_known(address):
+            return False
+        now_s = self._clock()
+        change = self.ways.remove(address, now_s)
+        if change is not None:
+            self._change_over(change, now_s)
+        del self._lines[address]
+        return True
 
     def send_first(self) -> None:
         """A heartbeat at once: some vehicles answer nobody whose heartbeat they have not heard."""
@@ -123,25 +167,47 @@ class AdoptedVehicle:
 
     def send(self, message: Message) -> None:
         self._telling.ordered(message)
-        frame = self.line.send(message, self.candidate.peer)
-        if frame is not None:
-            self._telling.sent(frame)
+        self._send_over(self.ways.chosen, message)
 
-    def on_message(self, message: Message, t_utc_s: float) -> tuple[Message, ...]:
-        """Any message of its system; those of its other components are only shown to the machines.
+    def _send_over(self, way: Way, message: Message) -> None:
+        frame = self._lines[way.address].send(message, way.candidate.peer)
+        if frame is None:
+            return
+        if way is self.ways.chosen:
+            self._telling.sent(frame)
+        else:
+            self._telling.sent_spare(way.address, frame)
+
+    def on_message(self, message: Message, t_utc_s: float, *, address: str | None = None) -> tuple[Message, ...]:
+        """Any message of its system; those of its other components are only shown to the machines. ``address``: of
+        the way that it came; None: of the one in use.
 
         What of it is believed by now: this message, none, or one from before as well.
         """
         now_s, believed = self._clock(), (message,)
+        address = address or self.ways.chosen.address
         if message.get_srcComponent() == self.target[1]:
             believed = self.believing.hear(self.state, message, now_s)
             self._tell_doubt(now_s)
         for each in believed:
-            self._believe(each, now_s, t_utc_s)
+            self._believe(each, now_s, t_utc_s, address)
         return believed
 
-    def _believe(self, message: Message, now_s: float, t_utc_s: float) -> None:
+    def on_spare(self, message: Message, address: str) -> None:
+        """A copy, or what is taken from the way in use alone: it tells of the way, and that the vehicle is there."""
         if message.get_srcComponent() == self.target[1]:
+            self._on_heard_over(message, self._clock(), address)
+
+    def _on_heard_over(self, message: Message, now_s: float, address: str) -> None:
+        if self.ways.is_known(address):
+            if now_s - self.heard_s > LOST_S:
+                self._came_back(now_s)
+            self.heard_s = now_s
+        self.ways.hear(address, message, now_s)
+
+    def _believe(self, message: Message, now_s: float, t_utc_s: float, address: str) -> None:
+        if message.get_srcComponent() == self.target[1]:
+            self._on_heard_over(message, now_s, address)
             self._on_own(message, now_s)
         new = reduce(self.state, message, t_mono_s=now_s, t_utc_s=t_utc_s)
         self.exchanges.on_message(message)
@@ -156,8 +222,12 @@ class AdoptedVehicle:
     def on_tick(self) -> None:
         now_s = self._clock()
         self.exchanges.on_tick()
-        for message in (*self._streams.on_tick(now_s), *self._round_trip.on_tick(now_s)):
+        for message in self._streams.on_tick(now_s):
             self.send(message)
+        for way, question in self.ways.on_tick(now_s):
+            self._send_over(way, question)
+        if (change := self.ways.choose(now_s)) is not None:
+            self._change_over(change, now_s)
         self._on_heard(self._speech.on_tick(now_s), now_s)
 
     async def obey(self, order: Order) -> None:
@@ -186,11 +256,6 @@ class AdoptedVehicle:
         await self.obey(orders[-1])
 
     def _on_own(self, message: Message, now_s: float) -> None:
-        if now_s - self.heard_s > LOST_S:
-            self._came_back(now_s)
-        self.heard_s = now_s
-        self._quality.hear(message.get_seq(), now_s)
-        self._round_trip.on_message(message, now_s)
         self._streams.on_message(message, now_s)
         if message.get_type() == "AUTOPILOT_VERSION":
             self.capabilities = message.capabilities
@@ -226,6 +291,18 @@ class AdoptedVehicle:
             self._next_state.set_result(None)
             self._next_state = None
         self._telling.state(state)
+
+    def _change_over(self, change: ChangeOver, now_s: float) -> None:
+        """Autopilots send what was asked for on the way that it was asked on: it is asked for anew."""
+        self._streams = self._requests(now_s)
+        text = f"Link: now over {change.now.address}, not {change.before.address}: {change.why}."
+        self._telling.text(WARNING if change.is_loss else INFO, text)
+        self._telling.changed_over(text)
+
+    def _requests(self, now_s: float) -> StreamRequests:
+        address = self.line.address
+        slow = address.kind == "serial" and address.baud < FAST_LINK_BAUD
+        return StreamRequests(self.target, self.candidate.autopilot, slow=slow, now_s=now_s)
 
     def _came_back(self, now_s: float) -> None:
         """After so long a silence it may have been restarted; in flight its boot clock will tell."""

@@ -135,7 +135,7 @@ class Answering:
         await command.carry_out(pilot)
 
     async def _connect(self, request: requests.Connect) -> None:
-        await self._link.connect(request.address, adopt=request.adopt)
+        await self._link.connect(request.address, adopt=request.adopt, as_way=request.as_way)
 
     async def _disconnect(self, request: requests.Disconnect) -> None:
         self._link.disconnect(request.address)

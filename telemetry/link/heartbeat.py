@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.link.quality import RateMeter
+from telemetry.link.ways.quality import RateMeter
 from telemetry.mavlink.actions import Message
 
 PERIOD_S = 1.0

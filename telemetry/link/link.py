@@ -10,17 +10,18 @@ import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.audit import AUTOPILOT, Audit, CommandLog
-from telemetry.link.heartbeat import PERIOD_S, Grace, Heartbeat, heartbeat
+from telemetry.link.heartbeat import Grace, Heartbeat, heartbeat
 from telemetry.link.line import Line
-from telemetry.link.peers import MOST_CANDIDATES, Peers, Source, is_same_vehicle
+from telemetry.link.peers import Expected, Peers, Source, is_same_vehicle
 from telemetry.link.publishing import StatePublisher, StatusTeller
 from telemetry.link.session import Around, Session, Settings
-from telemetry.link.signatures import KeyRing
+from telemetry.link.signatures import KeyRing, Late
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.connections import Peer
@@ -36,19 +37,6 @@ TICK_S = 0.05
 
 
 _NOT_YET_AGAIN = "The link has restarted and has not heard the vehicle yet: nothing brakes by itself."
-
-
-@dataclass(frozen=True, slots=True)
-class Expected:
-    """The vehicle of the node before this one, until it is heard again: it gets its heartbeats meanwhile."""
-
-    vehicle: Candidate
-    since_s: float
-    may_fly: bool
-    avoid_by: AvoidBy | None
-    """Avoidance was on when that node ended."""
-    is_given_up: bool = False
-    """It was not heard for so long that it counts as gone; it is still known when it does come back."""
 
 
 class Link:
@@ -67,8 +55,7 @@ class Link:
         self._publish = publish
         self.peers, self.lines = Peers(), dict[str, Line]()
         self.keys = keys or KeyRing()
-        self._late: dict[tuple[str, Peer], tuple[int, float]] = {}
-        """Who signed with a key, too late, and when it was last told the time."""
+        self._late = Late()
         self.flight = FlightKeeper()
         self.session: Session | None = None
         self._tasks, self._running = tasks, dict[str, asyncio.Task[None]]()
@@ -87,11 +74,13 @@ class Link:
 
     # Connections and the vehicle.
 
-    async def connect(self, address: str, *, adopt: bool, only: Candidate | None = None) -> None:
-        """Opens a connection and keeps it open; ``only``: adopt no other vehicle."""
+    async def connect(self, address: str, *, adopt: bool, only: Candidate | None = None, as_way: bool = False) -> None:
+        """Opens a connection and keeps it open; ``only``: adopt no other vehicle. ``as_way``: see ``Connect``."""
         parsed = parse_address(address)
         text = parsed.text
         self.peers.adopt_first_of(text, wanted=adopt, only=only)
+        if as_way:
+            self.peers.take_as_way(text)
         if text in self.lines:
             return
         taken = {line.number for line in self.lines.values()}
@@ -112,7 +101,7 @@ class Link:
         text = parse_address(address).text
         if text not in self.lines:
             raise NotAllowedError(f"There is no connection {text}.")
-        if self.session is not None and self.session.vehicle.line.text == text:
+        if self.session is not None and not self.session.vehicle.leave_way(text):
             self.release()
         self.peers.forget(text)
         del self.lines[text]
@@ -173,8 +162,10 @@ class Link:
         state = self.session.vehicle.state
         return state.heartbeat_t_mono_s is None or state.armed
 
-    def expect(self, vehicle: Candidate, *, may_fly: bool, avoid_by: AvoidBy | None) -> None:
-        self._expected = Expected(vehicle, time.monotonic(), may_fly, avoid_by)
+    def expect(
+        self, vehicle: Candidate, *, may_fly: bool, avoid_by: AvoidBy | None, ways: tuple[Candidate, ...] = ()
+    ) -> None:
+        self._expected = Expected(vehicle, time.monotonic(), may_fly, avoid_by, ways)
 
     def give_up_expected(self) -> None:
         if self._expected is not None:
@@ -212,7 +203,8 @@ class Link:
 
     def _heard(self, line: Line, source: Source, message: Message) -> None:
         now_s, t_utc_s = time.monotonic(), time.time()
-        proof = self.keys.judge(source.system_id, message.get_msgId(), bytes(message.get_msgbuf()), now_s)
+        frame = bytes(message.get_msgbuf())
+        proof = self.keys.judge(source.system_id, message.get_msgId(), frame, now_s, way=line.text)
         if proof != "good":
             if proof == "replayed" and is_vehicle_heartbeat(message):
                 self._tell_time(line, source, now_s)
@@ -227,28 +219,31 @@ class Link:
         if session is None:
             return
         if verdict == "adopted":
-            session.on_message(message, now_s, t_utc_s)
-        elif verdict == "stranger" and line is session.vehicle.line and not session.signs:
-            session.vehicle.on_foreign(message)  # a vehicle that demands signatures does not listen to it
-            session.traffic.on_message(message, session.vehicle.state, now_s)
+            session.on_message(message, now_s, t_utc_s, line.text)
+        elif verdict == "asked":
+            session.vehicle.on_spare(message, line.text)
+        elif verdict == "stranger":
+            if self.peers.may_join(source, message, now_s):
+                self._ask_way(session.vehicle, line, source, now_s)
+            session.on_stranger(message, now_s, line.text)
+
+    def _ask_way(self, vehicle: AdoptedVehicle, line: Line, source: Source, now_s: float) -> None:
+        """Whether this is the adopted vehicle, reached another way."""
+        candidate = self.peers.find(source.id, now_s)
+        if candidate is not None and line is not vehicle.line:
+            self.peers.ask(candidate, now_s)
+            vehicle.ask_way(candidate, line)
 
     def _tell_time(self, line: Line, source: Source, now_s: float) -> None:
         """A vehicle without a clock learns the time from what it hears. A heartbeat does no harm if it is not it."""
-        key = (line.text, source.peer)
-        if now_s - self._late.get(key, (0, -PERIOD_S))[1] < PERIOD_S:
-            return
-        self._late.pop(key, None)
-        self._late[key] = (source.system_id, now_s)
-        if len(self._late) > MOST_CANDIDATES:
-            del self._late[next(iter(self._late))]
-        line.send(heartbeat(), source.peer)
+        if self._late.is_to_be_told(line.text, source.peer, source.system_id, now_s):
+            line.send(heartbeat(), source.peer)
 
     def _seal(self, line: Line, peer: Peer, frame: bytes) -> bytes:
-        vehicle = self.session and self.session.vehicle
-        if vehicle and vehicle.line is line and vehicle.candidate.peer == peer:
-            return self.keys.seal(vehicle.target[0], frame, line.number)
-        system_id, _ = self._late.get((line.text, peer), (None, 0.0))
-        return self.keys.seal(system_id, frame, line.number)
+        place = self.peers.place_at(line.text)
+        if place is not None and place.peer == peer:
+            return self.keys.seal(place.system_id, frame, line.number)
+        return self.keys.seal(self._late.system_id(line.text, peer), frame, line.number)
 
     def on_perception(self, status: PerceptionStatus) -> None:
         """What a sensor's node says about the regions ahead."""
@@ -277,24 +272,26 @@ class Link:
         self._tell()
 
     def _gone(self, line: Line, peer: Peer) -> None:
-        self.peers.gone(line.text, peer)
+        if self.peers.gone(line.text, peer) and self.session is not None:
+            self.session.vehicle.way_gone(line.text)
 
     # What goes out by itself.
 
     def _beat(self, message: Message) -> bool:
-        """To the far ends that the operator has named, and to the adopted vehicle; to nobody else."""
-        session, anyone = self.session, False
-        expected = self._waited_for
-        vehicle = session.vehicle.candidate if session else expected and expected.vehicle
+        """To the far ends that the operator has named, and to the adopted vehicle over all ways; to nobody else."""
+        session, expected, anyone = self.session, self._waited_for, False
         for line in self.lines.values():
-            peer = vehicle.peer if vehicle is not None and vehicle.address == line.text else None
-            if peer is None and not line.address.names_far_end:
+            place = self.peers.place_at(line.text) if session else expected and expected.at(line.text)
+            if place is None and not line.address.names_far_end:
                 continue
-            frame = line.send(message, peer)
-            if frame is not None:
-                anyone = True
-                if session is not None and session.vehicle.line is line:
-                    session.on_sent(frame)
+            frame = line.send(message, place and place.peer)
+            if frame is None:
+                continue
+            anyone = True
+            if session is not None and session.vehicle.line is line:
+                session.on_sent(frame)
+            elif session is not None and place is not None:
+                session.on_sent_spare(line.text, frame)
         return anyone
 
     @property
@@ -307,6 +304,7 @@ class Link:
     def _on_tick(self) -> None:
         if self.session is not None:
             self.session.on_tick()
+            self.session.settle_ways(self.peers)
             if self._grace.wants_hold(self._server_age_s(), guided=self._is_guided, now_s=time.monotonic()):
                 self.spawn(self.session.hold())
         if self.flight.status != self._told_flight:
@@ -328,7 +326,9 @@ class Link:
         now_s, vehicle, awaited = time.monotonic(), self.session and self.session.vehicle, self._lost_from_sight
         return LinkStatus(
             t_mono_s=now_s,
-            connections=tuple(line.status() for line in self.lines.values()),
+            connections=tuple(
+                replace(line.status(), as_way=self.peers.is_as_way(text)) for text, line in self.lines.items()
+            ),
             candidates=self.peers.candidates(now_s),
             adopted=vehicle.candidate if vehicle else awaited and awaited.vehicle,
             state=vehicle.link_state if vehicle else "lost" if awaited else "none",
@@ -347,6 +347,7 @@ class Link:
                 *([self.commands.trouble] if self.commands.trouble else []),
             ),
             audit_head=self.commands.head,
+            ways=vehicle.ways.status(now_s) if vehicle else (),
         )
 
     def _tell(self) -> None:

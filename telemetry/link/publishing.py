@@ -74,9 +74,11 @@ class StatusTeller:
 def _shape(status: LinkStatus) -> tuple[object, ...]:
     """All but the figures that change all the time."""
     lines = tuple((line.address, line.state, line.error and line.error.what) for line in status.connections)
+    ways = tuple((way.address, way.peer, way.identity, way.in_use) for way in status.ways)
     mission = (status.mission_state, status.mission_digest)
     return (
         lines,
+        ways,
         status.candidates,
         status.adopted,
         status.state,

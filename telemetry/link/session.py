@@ -20,6 +20,7 @@ from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
 from telemetry.link.log_reading import LogReading
+from telemetry.link.peers import Peers
 from telemetry.link.piloting import Pilot
 from telemetry.link.procedures import Spawn
 from telemetry.link.publishing import StatePublisher
@@ -75,6 +76,8 @@ class Session:
             unsure=self._read_back,
             sent=self.on_sent,
             ordered=self._on_order,
+            sent_spare=self.on_sent_spare,
+            changed_over=self._on_change_over,
         )
         self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic, flies=around.flight.is_under_way)
         self.logs = LogReading(self.vehicle)
@@ -112,12 +115,38 @@ class Session:
 
     # What comes in.
 
-    def on_message(self, message: Message, now_s: float, t_utc_s: float) -> None:
-        """Any of the vehicle's system."""
-        frame = RawFrame(t_utc_s, False, self.vehicle.line.text, bytes(message.get_msgbuf()))
+    def on_message(self, message: Message, now_s: float, t_utc_s: float, address: str) -> None:
+        """Any of the vehicle's system, over any way."""
+        vehicle = self.vehicle
+        is_used = vehicle.ways.takes(address, message, now_s)
+        frame = RawFrame(t_utc_s, False, address, bytes(message.get_msgbuf()), spare=not is_used)
         self._around.publish(Topic.RAW, frame)
-        for believed in self.vehicle.on_message(message, t_utc_s):
+        if not is_used:
+            vehicle.on_spare(message, address)
+            return
+        for believed in vehicle.on_message(message, t_utc_s, address=address):
             self._on_believed(believed, now_s, t_utc_s)
+
+    def on_stranger(self, message: Message, now_s: float, address: str) -> None:
+        """Of somebody else on a connection that leads to the vehicle: a radio, another ground station, aircraft."""
+        vehicle, way = self.vehicle, self.vehicle.ways.get(address)
+        if way is None:
+            return
+        if message.get_type() == "RADIO_STATUS":
+            way.hear_radio(message, now_s)
+        if self.signs or way.identity != "known":
+            return
+        vehicle.on_foreign(message)  # a vehicle that demands signatures does not listen to it
+        if way is vehicle.ways.chosen:
+            self.traffic.on_message(message, vehicle.state, now_s)
+
+    def settle_ways(self, peers: Peers) -> None:
+        """What the comparison of the clocks has found."""
+        for way in self.vehicle.part_ways():
+            peers.part(way.address, refused=way.identity == "other")
+        for way in self.vehicle.ways:
+            if way.identity == "known":
+                peers.know(way.address)
 
     def _on_believed(self, message: Message, now_s: float, t_utc_s: float) -> None:
         heading_rad = self.vehicle.state.heading_rad
@@ -138,6 +167,9 @@ class Session:
 
     def on_sent(self, frame: bytes) -> None:
         self._around.publish(Topic.RAW, RawFrame(time.time(), True, self.vehicle.line.text, frame))
+
+    def on_sent_spare(self, address: str, frame: bytes) -> None:
+        self._around.publish(Topic.RAW, RawFrame(time.time(), True, address, frame, spare=True))
 
     # Signing.
 
@@ -172,7 +204,7 @@ class Session:
     def _give_key(self, key: bytes, timestamp: int) -> None:
         """Never through ``on_sent``: a recording must not hold the key."""
         message = mavlink.MAVLink_setup_signing_message(*self.vehicle.target, list(key), timestamp)
-        self.vehicle.line.send(message, self.vehicle.candidate.peer)
+        self.vehicle.line.send(message, self.vehicle.ways.chosen.candidate.peer)
 
     def _on_state(self, state: VehicleState) -> None:
         self._around.states.offer(state)
@@ -186,6 +218,10 @@ class Session:
 
     def _on_text(self, severity: int, text: str) -> None:
         self._around.publish(Topic.TEXT, VehicleText(time.time(), severity, text))
+
+    def _on_change_over(self, text: str) -> None:
+        self._around.changed()
+        self._around.spawn(self._around.commands.record(AUTOPILOT, text, must=False))
 
     # What goes out by itself.
 

@@ -16,7 +16,9 @@ from pathlib import Path
 
 import msgspec
 
+from telemetry.link.heartbeat import PERIOD_S
 from telemetry.link.keys import write_key_file
+from telemetry.mavlink.connections import Peer
 from telemetry.mavlink.signing import KEY_BYTES, PER_S, UNSIGNED, Signing, Stream, Verdict, is_signed, timestamp_of
 from telemetry.topics.messages import SigningMode, SigningStatus
 
@@ -24,7 +26,7 @@ AHEAD, STREAM_AHEAD = 60 * PER_S, 2 * PER_S
 """What is reserved with each save, of our own timestamps and of a stream's."""
 SAVE_EVERY_S = 0.25
 SAID_S = 10.0
-MOST_STREAMS = 64
+MOST_STREAMS, MOST_LATE = 64, 32
 
 
 class _Kept(msgspec.Struct, frozen=True):
@@ -93,8 +95,8 @@ class KeyRing:
         keyed = None if system_id is None else self.of(system_id)
         return frame if keyed is None else keyed.signing.sign(frame, link=link, now=self._now)
 
-    def judge(self, system_id: int, message_id: int, frame: bytes, now_s: float) -> Verdict:
-        """ "good": it may be used; that is every message of a vehicle without a key."""
+    def judge(self, system_id: int, message_id: int, frame: bytes, now_s: float, *, way: str = "") -> Verdict:
+        """ "good": it may be used; that is every message of a vehicle without a key. ``way``: where it came."""
         keyed = self.of(system_id)
         if keyed is None:
             if is_signed(frame):
@@ -102,7 +104,7 @@ class KeyRing:
             return "good"
         if keyed.mode == "let":
             return "good"  # whatever key it may have got since
-        verdict = keyed.signing.verify(frame, now=self._now)
+        verdict = keyed.signing.verify(frame, now=self._now, way=way)
         if verdict == "good":
             keyed.good_s = now_s
             if keyed.mode == "asked":
@@ -183,6 +185,27 @@ class KeyRing:
             self.trouble = (
                 f"The signing keys cannot be read ({error}): a vehicle that signs obeys nothing. See Signing."
             )
+
+
+class Late:
+    """Who signed with a key, too late, and when it was last told the time."""
+
+    def __init__(self) -> None:
+        self._told: dict[tuple[str, Peer], tuple[int, float]] = {}
+
+    def is_to_be_told(self, address: str, peer: Peer, system_id: int, now_s: float) -> bool:
+        """Once a second."""
+        key = (address, peer)
+        if now_s - self._told.get(key, (0, -PERIOD_S))[1] < PERIOD_S:
+            return False
+        self._told.pop(key, None)
+        self._told[key] = (system_id, now_s)
+        if len(self._told) > MOST_LATE:
+            del self._told[next(iter(self._told))]
+        return True
+
+    def system_id(self, address: str, peer: Peer) -> int | None:
+        return self._told.get((address, peer), (None, 0.0))[0]
 
 
 def _keyed(one: _Kept) -> Keyed:

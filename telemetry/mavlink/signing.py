@@ -24,6 +24,8 @@ YOUNG = 60 * PER_S
 FARTHEST = 366 * 86_400 * PER_S
 """A timestamp may be so much ahead: a vehicle with a clock, a computer without one. The largest one would lock out all
 others for ever."""
+COPY = 5 * PER_S
+"""A frame that came over another way before is a copy, once, unless it is older than this."""
 UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO})
 """Radios put these between the vehicle's own, and have no key."""
 _HEADER, _CHECKSUM, _SIGNATURE, _HASH = 10, 2, 13, 6
@@ -50,6 +52,12 @@ class Signing:
     key: bytes
     newest: int = 0
     streams: dict[Stream, int] = field(default_factory=dict)
+    _floors: dict[Stream, int] = field(init=False)
+    """What was proven before this process: below it nothing is a copy."""
+    _by_way: dict[tuple[Stream, str], int] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._floors = dict(self.streams)
 
     def sign(self, frame: bytes, *, link: int, now: int) -> bytes:
         """An unsigned MAVLink 2 frame, signed. A clock that goes back, or stands, never repeats a timestamp."""
@@ -62,21 +70,33 @@ class Signing:
         signed += crc.crc.to_bytes(_CHECKSUM, "little") + bytes([link]) + self.newest.to_bytes(6, "little")
         return bytes(signed) + _hash(self.key, signed)
 
-    def verify(self, frame: bytes, *, now: int) -> Verdict:
-        """Of a whole frame whose checksum holds. What is good is remembered; nothing else changes anything."""
+    def verify(self, frame: bytes, *, now: int, way: str = "") -> Verdict:
+        """Of a whole frame whose checksum holds. What is good is remembered; nothing else changes anything.
+
+        ``way``: the connection that it came on. Each brings every frame once, the slower one a little later.
+        """
         if not is_signed(frame) or len(frame) < _HEADER + _SIGNATURE:
             return "unsigned"
         if not hmac.compare_digest(_hash(self.key, frame[:-_HASH]), frame[-_HASH:]):
             return "wrong"
         stream, at = (frame[5], frame[6], frame[-_SIGNATURE]), int.from_bytes(frame[-12:-6], "little")
-        before = self.streams.get(stream)
-        if at <= before if before is not None else at + YOUNG < self.newest:
+        if self._is_replayed(stream, at, way):
             return "replayed"
         if at > max(now, self.newest) + FARTHEST:
             return "ahead"
-        self.streams[stream] = at
+        self._by_way[stream, way] = at
+        self.streams[stream] = max(at, self.streams.get(stream, 0))
         self.newest = max(self.newest, at)
         return "good"
+
+    def _is_replayed(self, stream: Stream, at: int, way: str) -> bool:
+        newest = self.streams.get(stream)
+        if newest is None:
+            return at + YOUNG < self.newest
+        if at > newest:
+            return False
+        before = max(self._by_way.get((stream, way), 0), self._floors.get(stream, 0))
+        return at <= before or at + COPY < newest
 
 
 def _hash(key: bytes, signed: bytes | bytearray) -> bytes:

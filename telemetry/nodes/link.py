@@ -39,6 +39,8 @@ class Wanted:
     address: str
     adopt: bool
     """The first autopilot heard there is to be adopted."""
+    as_way: bool = False
+    """It may be another way to the adopted vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,8 @@ class Memory:
     """The vehicle was not known to be disarmed."""
     avoid_by: AvoidBy | None = None
     """Avoidance is on for the adopted vehicle, its operator has consented; None: off, or its pilot has taken over."""
+    ways: tuple[Candidate, ...] = ()
+    """Where the adopted vehicle was reached, one for each connection."""
 
 
 def read_memory(file: Path) -> Memory:
@@ -82,15 +86,16 @@ class LinkNode:
         """What the node before this one had; then what this one was started with."""
         adopted = memory.adopted
         if adopted is not None:
-            self._link.expect(adopted, may_fly=memory.may_fly, avoid_by=memory.avoid_by)
+            self._link.expect(adopted, may_fly=memory.may_fly, avoid_by=memory.avoid_by, ways=memory.ways)
+        before = {place.address: place for place in (*([adopted] if adopted else []), *memory.ways)}
         for wanted in memory.connections:
-            was_there = adopted is not None and adopted.address == wanted.address
+            only = before.get(wanted.address)
             await self._link.connect(
-                wanted.address, adopt=wanted.adopt or was_there, only=adopted if was_there else None
+                wanted.address, adopt=wanted.adopt or only is not None, only=only, as_way=wanted.as_way
             )
         for address in links:
             if address not in self._link.lines:
-                await self._link.connect(address, adopt=True)
+                await self._link.connect(address, adopt=True, as_way=len(links) > 1)
         self._memory, self._expected = memory, adopted is not None
         self._link.flight.take_up(memory.flight)
 
@@ -130,13 +135,16 @@ class LinkNode:
 
     async def remember(self) -> None:
         link = self._link
-        wanted = tuple(Wanted(address, link.peers.adopts_first_of(address)) for address in link.lines)
-        adopted = link.peers.adopted
+        peers = link.peers
+        wanted = tuple(
+            Wanted(address, peers.adopts_first_of(address), peers.is_as_way(address)) for address in link.lines
+        )
+        adopted, ways = peers.adopted, peers.places
         if adopted is None and self._is_expected:
-            adopted = self._memory.adopted
+            adopted, ways = self._memory.adopted, self._memory.ways
         elif adopted is None:
             self._link.give_up_expected()
-        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.may_fly, link.avoids_by)
+        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.may_fly, link.avoids_by, ways)
         if memory != self._memory:
             self._memory = memory
             await asyncio.to_thread(write_memory, self._file, memory)

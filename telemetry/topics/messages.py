@@ -103,6 +103,8 @@ class RawFrame:
     """True: from Hedgehop to the vehicle."""
     link: str
     frame: bytes
+    spare: bool = False
+    """Of another way than the one in use, and nothing was made of it: all others together are what was heard, once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,8 @@ class ConnectionStatus:
     error: ErrorInfo | None = None
     received_messages: int = 0
     bad_bytes: int = 0
+    as_way: bool = False
+    """Named as a way to the adopted vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +153,39 @@ class SigningStatus:
     """By a timestamp that is years ahead."""
 
 
+WayIdentity = Literal["known", "asked", "other"]
+"""known: the adopted vehicle is at its end; asked: by its numbers, and its clock is being compared; other: by its
+clock it is another vehicle."""
+
+
+@dataclass(frozen=True, slots=True)
+class RadioSignal:
+    """RADIO_STATUS in the radio's own units, 0 to 254: of SiK about 1.9 to the dB; 255: not known."""
+
+    rssi: int
+    noise: int
+    remote_rssi: int
+    """As the vehicle's radio receives."""
+    remote_noise: int
+
+
+@dataclass(frozen=True, slots=True)
+class WayStatus:
+    """One of the ways to the adopted vehicle."""
+
+    address: str
+    peer: str
+    identity: WayIdentity
+    in_use: bool
+    """Orders go over it, and the vehicle's state comes from it."""
+    silent_s: float | None = None
+    """Age of the last packet; None: none yet, or the far end hung up."""
+    quality: float | None = None
+    """Share of the packets of the last seconds that arrived."""
+    round_trip_s: float | None = None
+    signal: RadioSignal | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
     t_mono_s: float
@@ -174,6 +211,8 @@ class LinkStatus:
     signing: SigningStatus = field(default_factory=SigningStatus)
     audit_head: str = ""
     """Hash of the audit log's last line: each recording holds it, so that lines removed from the end are missed."""
+    ways: tuple[WayStatus, ...] = ()
+    """To the adopted vehicle; ``quality`` and ``round_trip_s`` are those of the one in use."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,10 +41,15 @@ class OperatorRequest:
 
 @dataclass(frozen=True, slots=True)
 class Connect(OperatorRequest):
-    """Opens a connection and keeps it open. ``adopt``: take the first autopilot heard on it. -> None"""
+    """Opens a connection and keeps it open. ``adopt``: take the first autopilot heard on it. -> None
+
+    ``as_way``: whoever has the adopted vehicle's numbers on it and the same clock on board is that vehicle, reached
+    another way.
+    """
 
     address: str
     adopt: bool = False
+    as_way: bool = False
 
 
 @dataclass(frozen=True, slots=True)

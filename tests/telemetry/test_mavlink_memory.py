@@ -8,11 +8,12 @@ from telemetry.nodes.link import Memory, Wanted, read_memory, write_memory
 from telemetry.topics.messages import Candidate, FlightStatus
 
 FULL = Memory(
-    (Wanted("udpin:0.0.0.0:14550", True), Wanted("/dev/ttyACM0:57600", False)),
+    (Wanted("udpin:0.0.0.0:14550", True, True), Wanted("/dev/ttyACM0:57600", False)),
     Candidate("id", "udpin:0.0.0.0:14550", "10.0.0.2:4000", 1, 1, "ardupilot", 2),
     FlightStatus("auto", "flying", 3, 88, 1.7e9),
     highest_token=1_795_000_000_000,
     avoid_by="sidestep",
+    ways=(Candidate("id", "/dev/ttyACM0:57600", "/dev/ttyACM0", 1, 1, "ardupilot", 2),),
 )
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.link.quality import WINDOW_S, RateMeter, RoundTripClock, SequenceQuality
+from telemetry.link.ways.quality import MOST_QUESTIONS, WINDOW_S, RateMeter, RoundTripClock, SequenceQuality
 from tests.telemetry.frames import heard
 
 
@@ -48,14 +48,28 @@ def test_old_losses_are_forgotten() -> None:
 
 def test_the_round_trip_is_measured_by_our_own_question_only() -> None:
     clock = RoundTripClock()
-    (question,) = clock.on_tick(100.0)
-    assert clock.on_tick(100.5) == []
-    clock.on_message(heard(mavlink.MAVLink_timesync_message(0, 5)), 100.1)
-    clock.on_message(heard(mavlink.MAVLink_timesync_message(9, 12345)), 100.1)
+    question = clock.ask(100.0)
+    assert clock.on_message(heard(mavlink.MAVLink_timesync_message(0, question.ts1)), 100.1) is None
+    assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, 12345)), 100.1) is None
     assert clock.round_trip_s is None
-    clock.on_message(heard(mavlink.MAVLink_timesync_message(9, question.ts1)), 100.25)
+    answer = heard(mavlink.MAVLink_timesync_message(7_000_000_000, question.ts1))
+    reading = clock.on_message(answer, 100.25)
+    assert reading is not None
+    assert reading == clock.reading(question.ts1)
+    assert (reading.round_trip_s, reading.ahead_s) == (pytest.approx(0.25), pytest.approx(7.0 - 100.125))
+    assert clock.on_message(answer, 103.0) is None
     assert clock.round_trip_s == pytest.approx(0.25)
-    assert len(clock.on_tick(102.0)) == 1
+
+
+def test_an_answer_that_takes_longer_than_the_next_question_is_still_measured() -> None:
+    clock = RoundTripClock()
+    first, _ = clock.ask(100.0), clock.ask(101.0)
+    assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, first.ts1)), 102.5) is not None
+    assert clock.round_trip_s == pytest.approx(2.5)
+    for second in range(102, 102 + 2 * MOST_QUESTIONS):
+        late = clock.ask(float(second))
+    assert clock.reading(first.ts1) is None
+    assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, late.ts1)), 1000.0) is None
 
 
 def test_the_rate_is_what_really_happened() -> None:

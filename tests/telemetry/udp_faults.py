@@ -1,4 +1,4 @@
-"""A proxy between a ground station and a vehicle on UDP that loses datagrams, each way, by a seeded chance."""
+"""A proxy between a ground station and a vehicle on UDP that loses and delays datagrams, each way, or is cut."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ class _Side(asyncio.DatagramProtocol):
 class Proxy:
     """Ground stations talk to ``port``; whoever did so last is answered there."""
 
-    def __init__(self, vehicle_port: int, loss: float, seed: int) -> None:
+    def __init__(self, vehicle_port: int, loss: float, seed: int, delay_s: float) -> None:
         self._vehicle: Address = ("127.0.0.1", vehicle_port)
         self._random, self.loss, self.lost, self.carried = random.Random(seed), loss, 0, 0
+        self.delay_s, self.is_cut = delay_s, False
         self._near, self._far = _Side(self), _Side(self)
         self._station: Address | None = None
         self.port = 0
@@ -35,22 +36,33 @@ class Proxy:
         self.port = self._to_station.get_extra_info("sockname")[1]
         return self._to_station, self._to_vehicle
 
+    @property
+    def far_address(self) -> Address:
+        """As the vehicle sees this proxy."""
+        return self._to_vehicle.get_extra_info("sockname")
+
     def on_datagram(self, side: _Side, data: bytes, addr: Address) -> None:
         if side is self._near:
             self._station = addr
-        if self._random.random() < self.loss:
+        if self.is_cut or self._random.random() < self.loss:
             self.lost += 1
             return
         self.carried += 1
-        if side is self._near:
-            self._to_vehicle.sendto(data, self._vehicle)
-        elif self._station is not None:
-            self._to_station.sendto(data, self._station)
+        to, where = (self._to_vehicle, self._vehicle) if side is self._near else (self._to_station, self._station)
+        if where is not None and self.delay_s:
+            asyncio.get_running_loop().call_later(self.delay_s, self._deliver, to, data, where)
+        elif where is not None:
+            to.sendto(data, where)
+
+    @staticmethod
+    def _deliver(to: asyncio.DatagramTransport, data: bytes, where: Address) -> None:
+        if not to.is_closing():
+            to.sendto(data, where)
 
 
 @contextlib.asynccontextmanager
-async def lossy_udp(vehicle_port: int, *, loss: float, seed: int = 0) -> AsyncIterator[Proxy]:
-    proxy = Proxy(vehicle_port, loss, seed)
+async def lossy_udp(vehicle_port: int, *, loss: float, seed: int = 0, delay_s: float = 0.0) -> AsyncIterator[Proxy]:
+    proxy = Proxy(vehicle_port, loss, seed, delay_s)
     transports = await proxy.open()
     try:
         yield proxy

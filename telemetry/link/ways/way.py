@@ -1,0 +1,124 @@
+"""One way to the vehicle: what it loses, how long an answer takes, and whether the same vehicle is at its end.
+
+Two vehicles may have the same numbers. The clock since boot tells them apart: all ways are asked for it at one moment,
+and each answer is wrong by half its round trip at most. Positions, where both ways carry them, must not lie far apart.
+"""
+
+from __future__ import annotations
+
+from mapping.geometry.frames import apart_m
+from telemetry.link.ways.quality import Reading, RoundTripClock, SequenceQuality
+from telemetry.mavlink.actions import Message
+from telemetry.mavlink.reduce import lat_lon
+from telemetry.topics.messages import STALE_S, Candidate, RadioSignal, WayIdentity, WayStatus
+
+SILENT_S = 0.7
+"""A way that carries many messages is silent after this."""
+MISSED = 4.0
+"""Messages in a row that a way which carries few may miss, up to ``STALE_S``."""
+RESEND_S = 0.7
+"""What the cost of a loss is counted with: an order that was lost goes out again so much later."""
+LEAST_SHARE = 0.05
+SLACK_S = 0.1
+"""Between two clocks of one vehicle, beyond what the round trips explain."""
+TELLS_S = 1.5
+"""Round trips that together are longer tell nothing of the clocks."""
+AGREES, DIFFERS = 2, 3
+"""So many answers in a row decide."""
+FAR_M, FRESH_S = 300.0, 2.0
+"""No vehicle is in two places so far apart within the time that both are fresh."""
+SIGNAL_S = 10.0
+
+
+class Way:
+    """``identity`` "asked": by its numbers it is the vehicle, by its clock it is not known yet to be."""
+
+    def __init__(self, candidate: Candidate, *, identity: WayIdentity) -> None:
+        self.candidate = candidate
+        self.identity: WayIdentity = identity
+        self.heard_s = float("-inf")
+        self.quality, self.clock = SequenceQuality(), RoundTripClock()
+        self._signal: tuple[RadioSignal, float] | None = None
+        self._place: tuple[tuple[float, float], float] | None = None
+        self._agreed = self._differed = 0
+
+    @property
+    def address(self) -> str:
+        return self.candidate.address
+
+    def hear(self, message: Message, now_s: float) -> Reading | None:
+        """A message of the vehicle's autopilot that came over this way."""
+        self.heard_s = now_s
+        self.quality.hear(message.get_seq(), now_s)
+        if message.get_type() == "GLOBAL_POSITION_INT":
+            lat_deg, lon_deg = lat_lon(message.lat, message.lon)
+            if lat_deg is not None and lon_deg is not None:
+                self._place = ((lat_deg, lon_deg), now_s)
+        return self.clock.on_message(message, now_s)
+
+    def hear_radio(self, message: Message, now_s: float) -> None:
+        """RADIO_STATUS of the radio at this end."""
+        self._signal = (RadioSignal(message.rssi, message.noise, message.remrssi, message.remnoise), now_s)
+
+    def gone(self) -> None:
+        """The far end hung up: nothing is waited for."""
+        self.heard_s = float("-inf")
+
+    def silent_s(self, now_s: float) -> float:
+        return now_s - self.heard_s
+
+    def is_silent(self, now_s: float) -> bool:
+        """Sooner where much is heard: one message a second leaves gaps of its own."""
+        hz = self.quality.hz(now_s)
+        limit_s = STALE_S if hz == 0 else min(max(SILENT_S, MISSED / hz), STALE_S)
+        return self.silent_s(now_s) > limit_s
+
+    def is_ready(self, now_s: float) -> bool:
+        """It may be used."""
+        return self.identity == "known" and not self.is_silent(now_s)
+
+    def cost_s(self, now_s: float) -> float:
+        """How long an order takes until it is answered, the repetitions of what is lost either way in it."""
+        share, round_trip_s = self.quality.share(now_s), self.clock.round_trip_s
+        if share is None or round_trip_s is None:
+            return float("inf")
+        return round_trip_s + RESEND_S * (1 / max(share, LEAST_SHARE) ** 2 - 1)
+
+    def judge(self, witness: Way, asked_ns: int, now_s: float) -> None:
+        """Held against one that is known to be the vehicle's, by the question that both were asked at once."""
+        same = self._is_same(witness, asked_ns, now_s)
+        if same is None:
+            return
+        self._agreed, self._differed = (self._agreed + 1, 0) if same else (0, self._differed + 1)
+        if self._differed >= DIFFERS:
+            self.identity = "other"
+        elif self._agreed >= AGREES and self.identity == "asked":
+            self.identity = "known"
+
+    def _is_same(self, witness: Way, asked_ns: int, now_s: float) -> bool | None:
+        ours, theirs = self.clock.reading(asked_ns), witness.clock.reading(asked_ns)
+        if ours is None or theirs is None:
+            return None
+        both_s = ours.round_trip_s + theirs.round_trip_s
+        if both_s > TELLS_S:
+            return None
+        return abs(ours.ahead_s - theirs.ahead_s) <= both_s / 2 + SLACK_S and not self._is_far(witness, now_s)
+
+    def _is_far(self, witness: Way, now_s: float) -> bool:
+        ours, theirs = self._place, witness._place
+        if ours is None or theirs is None or now_s - min(ours[1], theirs[1]) > FRESH_S:
+            return False
+        return apart_m(ours[0], theirs[0]) > FAR_M
+
+    def status(self, now_s: float, *, in_use: bool) -> WayStatus:
+        signal = self._signal
+        return WayStatus(
+            address=self.address,
+            peer=self.candidate.peer,
+            identity=self.identity,
+            in_use=in_use,
+            silent_s=None if self.heard_s == float("-inf") else self.silent_s(now_s),
+            quality=self.quality.share(now_s),
+            round_trip_s=self.clock.round_trip_s,
+            signal=signal[0] if signal is not None and now_s - signal[1] < SIGNAL_S else None,
+        )

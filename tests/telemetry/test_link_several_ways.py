@@ -1,0 +1,279 @@
+"""One vehicle over several ways at once, on real sockets: change over in flight, back again, and never two orders."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import AsyncIterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.link.answering import OperatorRight
+from telemetry.link.ways.ways import SETTLE_S
+from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
+from telemetry.simulation.simulator.autopilot.flight_modes import Hold
+from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
+from telemetry.topics.messages import Candidate, RawFrame, WayStatus
+from telemetry.topics.requests import Arm, Connect, Disarm, Disconnect, Pause, Resume, StartAuto
+from tests.telemetry.bus_runs import run
+from tests.telemetry.fake_vehicle import UdpVehicle
+from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload
+from tests.telemetry.udp_faults import Proxy, lossy_udp
+
+OF_EVERY_WAY = {mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_TIMESYNC}
+FAILSAFE = (("FS_GCS_ENABLE", 1.0), ("FS_GCS_TIMEOUT", 3.0))
+
+
+class Obeying:
+    """What of the vehicle's orders arrived there, and from whom."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.orders: list[tuple[Any, int, int]] = []
+        """Peer, command, confirmation."""
+        self._on_message = simulator.endpoint.on_message
+        cast(Any, simulator.endpoint).on_message = self._look
+
+    def _look(self, message: Any, peer: Any, now_s: float) -> Any:
+        if message.get_type() == "COMMAND_LONG":
+            self.orders.append((peer, message.command, message.confirmation))
+        return self._on_message(message, peer, now_s)
+
+    def counted(self) -> Counter[int]:
+        return Counter(command for _, command, _ in self.orders)
+
+
+@contextlib.asynccontextmanager
+async def vehicle(**options: Any) -> AsyncIterator[tuple[Simulator, int]]:
+    wanted: dict[str, Any] = {"link": "udpin:127.0.0.1:0", "boot_s": 0.5, "speedup": 2.0, "parameters": FAILSAFE}
+    async with flying(SimOptions(LAT_DEG, LON_DEG, ALT_M, **(wanted | options))) as simulator:
+        yield simulator, int(simulator.address.rpartition(":")[2])
+
+
+def at(proxy: Proxy) -> str:
+    return f"udpout:127.0.0.1:{proxy.port}"
+
+
+def way(bench: Console, address: str) -> WayStatus | None:
+    return next((each for each in bench.status.ways if each.address == address), None)
+
+
+def used(bench: Console) -> str:
+    return next(each.address for each in bench.status.ways if each.in_use)
+
+
+async def reached(bench: Console, *addresses: str) -> None:
+    """Over all of them, the first one in use."""
+    for address in addresses:
+        await bench.handle(Connect(ME, address, adopt=address == addresses[0], as_way=True))
+        await bench.live()
+    await until(lambda: {each.address for each in bench.status.ways if each.identity == "known"} == set(addresses))
+
+
+def sent_frames(bench: Console, *, spare: bool) -> list[bytes]:
+    frames = [message for _, message in bench.published if isinstance(message, RawFrame)]
+    return [raw.frame for raw in frames if raw.sent and raw.spare is spare]
+
+
+def message_id(frame: bytes) -> int:
+    return int.from_bytes(frame[7:10], "little")
+
+
+def test_when_the_way_in_use_falls_silent_in_flight_another_takes_over_and_gives_it_back() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle() as (simulator, port),
+            lossy_udp(port, loss=0.0, delay_s=0.02) as good,
+            lossy_udp(port, loss=0.3, delay_s=0.1, seed=3) as bad,
+            console() as bench,
+        ):
+            obeyed = Obeying(simulator)
+            await reached(bench, at(good), at(bad))
+            report = await upload(bench, items(40))
+            await start(bench, StartAuto(ME, report.onboard.digest))
+            await phase(bench, "flying")
+            assert used(bench) == at(good)
+            worse = way(bench, at(bad))
+            assert worse is not None
+            assert worse.quality is not None
+            assert worse.round_trip_s is not None
+            assert worse.quality < 0.95
+            assert worse.round_trip_s >= 0.2
+            good.is_cut, cut_s, before = True, time.monotonic(), len(obeyed.orders)
+            await until(lambda: used(bench) == at(bad))
+            assert time.monotonic() - cut_s < 1.5
+            assert any("silent for" in text and at(bad) in text for text in bench.texts)
+            await bench.handle(Pause(ME))
+            await until(lambda: isinstance(simulator.vehicle.autopilot.mode, Hold), 10.0)
+            assert {peer for peer, *_ in obeyed.orders[before:]} == {bad.far_address}
+            assert bench.status.state == "live"
+            good.is_cut, back_s = False, time.monotonic()
+            await until(lambda: used(bench) == at(good), 30.0)
+            assert time.monotonic() - back_s >= SETTLE_S
+            await bench.handle(Resume(ME))
+            await phase(bench, "flying")
+            assert not any("GCS Failsafe" in text for text in bench.texts)
+            assert any(words.startswith("Link: now over") for words in bench.commands)
+            assert {message_id(frame) for frame in sent_frames(bench, spare=True)} == OF_EVERY_WAY
+            commands = [frame for frame in sent_frames(bench, spare=False) if message_id(frame) == 76]
+            sent = Counter(decoded.command for decoded in map(mavlink.MAVLink(None).decode, map(bytearray, commands)))
+            assert all(count <= sent[command] for command, count in obeyed.counted().items())
+
+    run(whole)
+
+
+def test_a_pause_is_obeyed_within_a_second_of_the_change_over() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle() as (simulator, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0, delay_s=0.1) as other,
+            console() as bench,
+        ):
+            await reached(bench, at(one), at(other))
+            report = await upload(bench, items(40))
+            await start(bench, StartAuto(ME, report.onboard.digest))
+            await phase(bench, "flying")
+            one.is_cut = True
+            await until(lambda: used(bench) == at(other), 2.0)
+            asked_s = time.monotonic()
+            await bench.handle(Pause(ME))
+            assert isinstance(simulator.vehicle.autopilot.mode, Hold)
+            assert time.monotonic() - asked_s < 1.0
+            await bench.handle(Disconnect(ME, at(one)))
+            assert [each.address for each in bench.status.ways] == [at(other)]
+            await bench.handle(Resume(ME))
+            await phase(bench, "flying")
+
+    run(whole)
+
+
+def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_releases() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (_, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0) as other,
+            console() as bench,
+        ):
+            await reached(bench, at(one), at(other))
+            adopted = bench.status.adopted
+            await bench.handle(Disconnect(ME, at(one)))
+            assert (used(bench), bench.status.adopted, bench.status.state) == (at(other), adopted, "live")
+            await bench.handle(Connect(ME, at(one), as_way=True))
+            await until(lambda: [each.identity for each in bench.status.ways] == ["known", "known"])
+            assert used(bench) == at(other)
+            await bench.handle(Disconnect(ME, at(one)))
+            assert bench.status.adopted == adopted
+            await bench.handle(Disconnect(ME, at(other)))
+            assert (bench.status.adopted, bench.status.ways) == (None, ())
+
+    run(whole)
+
+
+async def session_on_the_ground(*losses: float) -> tuple[list[str], tuple[Any, ...]]:
+    """Words and state after an upload, arming and disarming, over as many ways."""
+    async with vehicle(speedup=1.0, gnss="perfect") as (_, port), contextlib.AsyncExitStack() as stack:
+        proxies = [await stack.enter_async_context(lossy_udp(port, loss=loss, seed=5)) for loss in losses]
+        bench = await stack.enter_async_context(console())
+        await reached(bench, *map(at, proxies))
+        await upload(bench)
+        await bench.handle(Arm(ME))
+        await until(lambda: bench.state.armed)
+        await bench.handle(Disarm(ME))
+        await until(lambda: not bench.state.armed and any("Disarming" in text for text in bench.texts))
+        state = bench.state
+        same = (state.mode, state.armed, state.mission_items, state.home_lat_deg, state.autopilot, state.landed)
+        return [text for text in bench.texts if "rm" in text], same
+
+
+def test_over_two_ways_words_and_state_are_those_of_one() -> None:
+    async def whole() -> None:
+        assert await session_on_the_ground(0.0, 0.2) == await session_on_the_ground(0.0)
+
+    run(whole)
+
+
+def test_another_vehicle_with_the_same_number_is_no_way() -> None:
+    async def whole() -> None:
+        async with vehicle(speedup=1.0) as (_, port), vehicle(speedup=1.0, boot_s=0.4) as (twin, twin_port):
+            twin.vehicle.advance(30.0)
+            obeyed = Obeying(twin)
+            async with console() as bench:
+                own, foreign = f"udpout:127.0.0.1:{port}", f"udpout:127.0.0.1:{twin_port}"
+                await bench.handle(Connect(ME, own, adopt=True, as_way=True))
+                await bench.live()
+                await bench.handle(Connect(ME, foreign, as_way=True))
+                await until(lambda: way(bench, foreign) is not None)
+                await until(lambda: way(bench, foreign) is None)
+                await until(lambda: any("second vehicle" in warning for warning in bench.status.warnings))
+                assert (used(bench), obeyed.orders) == (own, [])
+                assert [candidate.address for candidate in bench.status.candidates] == [foreign]
+
+    run(whole)
+
+
+def test_a_connection_that_is_not_named_as_a_way_never_becomes_one() -> None:
+    async def whole() -> None:
+        async with vehicle(speedup=1.0) as (_, port), console() as bench, lossy_udp(port, loss=0.0) as other:
+            await bench.handle(Connect(ME, f"udpout:127.0.0.1:{port}", adopt=True))
+            await bench.live()
+            await bench.handle(Connect(ME, at(other)))
+            await until(lambda: any("second vehicle" in warning for warning in bench.status.warnings))
+            assert len(bench.status.ways) == 1
+
+    run(whole)
+
+
+def test_a_link_that_starts_again_beats_on_all_ways_and_comes_back_with_them(tmp_path: Path) -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (_, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0) as other,
+        ):
+            written = tmp_path / "link.json"
+            async with console() as bench:
+                await reached(bench, at(one), at(other))
+                await until(lambda: len(bench.link.peers.places) == 2)
+                node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), written)
+                await node.remember()
+                memory = read_memory(written)
+            assert [place.address for place in memory.ways] == [at(one), at(other)]
+            assert memory.connections == (Wanted(at(one), True, True), Wanted(at(other), False, True))
+            async with console() as bench:
+                node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), written)
+                one.is_cut = True
+                await node.take_up(memory, [])
+                await bench.live()
+                assert used(bench) == at(other)
+                one.is_cut = False
+                await until(lambda: len(bench.status.ways) == 2)
+                await until(lambda: all(each.identity == "known" for each in bench.status.ways))
+
+    run(whole)
+
+
+def test_until_it_is_heard_again_the_vehicle_gets_heartbeats_at_every_place_that_was_known() -> None:
+    async def whole() -> None:
+        addresses = [f"udpin:127.0.0.1:{free_port()}" for _ in range(2)]
+        radios = [UdpVehicle(int(address.rpartition(":")[2])) for address in addresses]
+        first, second = (
+            Candidate(f"{address}/x", address, f"127.0.0.1:{radio.port}", 1, 1, "ardupilot", 2)
+            for address, radio in zip(addresses, radios, strict=True)
+        )
+        async with console() as bench:
+            node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), Path("unused"))
+            wanted = tuple(Wanted(address, False, True) for address in addresses)
+            await node.take_up(Memory(wanted, first, ways=(first, second)), [])
+            await until(lambda: all(radio.kinds() == {"HEARTBEAT"} for radio in radios))
+            assert bench.status.adopted == first
+            assert bench.status.state == "lost"
+        for radio in radios:
+            radio.close()
+
+    run(whole)

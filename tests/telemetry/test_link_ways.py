@@ -1,0 +1,349 @@
+"""Several ways to one vehicle, with clocks of the test's own: which is in use, whose vehicle it is, what is a copy."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from telemetry.link.ways.copies import ANSWERS, KEEP_S, MOST, Copies
+from telemetry.link.ways.way import SILENT_S, TELLS_S, Way
+from telemetry.link.ways.ways import SETTLE_S, ChangeOver, Ways
+from telemetry.topics.messages import LOST_S, STALE_S, Candidate
+from tests.telemetry.frames import attitude, heard, heartbeat
+
+TICK_S = 0.05
+RADIO, WIFI, LTE = "/dev/ttyUSB0:57600", "udpin:0.0.0.0:14550", "tcp:10.0.0.7:5760"
+
+
+def candidate(address: str) -> Candidate:
+    return Candidate(f"{address}/x/1/1", address, "x", 1, 1, "ardupilot", 2)
+
+
+def position(lat_deg: float) -> Any:
+    return mavlink.MAVLink_global_position_int_message(0, round(lat_deg * 1e7), 89_000_000, 0, 0, 0, 0, 0, 0)
+
+
+@dataclass
+class Carrier:
+    """What a test's way does to packets."""
+
+    hz: float = 20.0
+    loss: float = 0.0
+    delay_s: float = 0.05
+    boot_s: float = -90.0
+    """The clock at its far end is so much ahead of ours."""
+    cut: bool = False
+    sequence: int = 0
+    due_s: float = 0.0
+    underway: list[tuple[float, Any]] = field(default_factory=list)
+
+
+class Field:
+    """Ways over carriers in simulated time; ``changes`` with the time of each."""
+
+    def __init__(self, seed: int = 0, **carriers: Carrier) -> None:
+        self.now_s, self._random = 100.0, random.Random(seed)
+        addresses = {"radio": RADIO, "wifi": WIFI, "lte": LTE}
+        self.carriers = {addresses[name]: carrier for name, carrier in carriers.items()}
+        first, *others = self.carriers
+        self.ways = Ways(candidate(first), self.now_s)
+        for address in others:
+            self.ways.add(candidate(address))
+        self.changes: list[tuple[float, ChangeOver]] = []
+
+    def run(self, seconds: float) -> None:
+        end_s = self.now_s + seconds
+        while self.now_s < end_s:
+            self._tick()
+
+    def _tick(self) -> None:
+        self.now_s += TICK_S
+        for address, carrier in self.carriers.items():
+            if self.now_s >= carrier.due_s:
+                carrier.due_s = self.now_s + 1 / carrier.hz
+                self._send(carrier, attitude(), carrier.delay_s)
+            arrived = [message for at_s, message in carrier.underway if at_s <= self.now_s]
+            carrier.underway = [(at_s, message) for at_s, message in carrier.underway if at_s > self.now_s]
+            for message in arrived:
+                self.ways.hear(address, message, self.now_s)
+        for way, question in self.ways.on_tick(self.now_s):
+            carrier = self.carriers[way.address]
+            if self._random.random() >= carrier.loss and not carrier.cut:
+                tc1 = int((self.now_s + carrier.delay_s + carrier.boot_s) * 1e9)
+                self._send(carrier, mavlink.MAVLink_timesync_message(tc1, question.ts1), 2 * carrier.delay_s)
+        if (change := self.ways.choose(self.now_s)) is not None:
+            self.changes.append((self.now_s, change))
+
+    def _send(self, carrier: Carrier, message: Any, delay_s: float) -> None:
+        carrier.sequence = (carrier.sequence + 1) % 256
+        if self._random.random() >= carrier.loss and not carrier.cut:
+            carrier.underway.append((self.now_s + delay_s, heard(message, sequence=carrier.sequence)))
+
+    @property
+    def used(self) -> str:
+        return self.ways.chosen.address
+
+
+def test_the_same_clock_makes_a_way_of_whoever_has_the_numbers() -> None:
+    field_ = Field(wifi=Carrier(), radio=Carrier(hz=2.0, loss=0.3, delay_s=0.2))
+    assert not field_.ways.is_known(RADIO)
+    field_.run(20.0)
+    assert field_.ways.is_known(RADIO)
+    assert (field_.used, field_.changes) == (WIFI, [])
+
+
+@pytest.mark.parametrize("apart_s", [-3600.0, -1.0, 1.0, 25.0])
+def test_another_clock_is_another_vehicle_and_never_used(apart_s: float) -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(boot_s=-90.0 + apart_s, delay_s=0.01))
+    field_.run(6.0)
+    assert [way.address for way in field_.ways.part(field_.now_s)] == [LTE]
+    field_.carriers[WIFI].cut = True
+    field_.run(5.0)
+    assert (field_.used, field_.changes) == (WIFI, [])
+    assert field_.ways.part(field_.now_s) == []
+
+
+def test_round_trips_that_are_too_long_tell_nothing() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(delay_s=TELLS_S))
+    field_.run(15.0)
+    way = field_.ways.get(LTE)
+    assert way is not None
+    assert way.clock.round_trip_s == pytest.approx(2 * TELLS_S, abs=2 * TICK_S)
+    assert way.identity == "asked"
+
+
+def test_a_vehicle_that_is_elsewhere_is_another_one_whatever_its_clock_says() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    for _ in range(6):
+        field_.run(1.0)
+        field_.ways.hear(WIFI, heard(position(47.0)), field_.now_s)
+        field_.ways.hear(LTE, heard(position(47.01)), field_.now_s)
+    assert [way.address for way in field_.ways.part(field_.now_s)] == [LTE]
+
+
+def test_one_that_was_known_and_differs_from_now_on_is_parted_with() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(delay_s=0.1))
+    field_.run(5.0)
+    assert field_.ways.is_known(LTE)
+    field_.carriers[LTE].boot_s = -10.0
+    field_.run(6.0)
+    assert [way.address for way in field_.ways.part(field_.now_s)] == [LTE]
+
+
+def test_a_restart_of_the_vehicle_parts_nothing() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(delay_s=0.2))
+    field_.run(5.0)
+    for carrier in field_.carriers.values():
+        carrier.boot_s = -field_.now_s
+    field_.run(8.0)
+    assert field_.ways.is_known(LTE)
+    assert field_.ways.part(field_.now_s) == []
+
+
+def test_what_nothing_can_be_compared_with_any_more_is_left_to_the_operator() -> None:
+    field_ = Field(wifi=Carrier(cut=True), lte=Carrier())
+    field_.run(LOST_S + 0.5)
+    assert [(way.address, way.identity) for way in field_.ways.part(field_.now_s)] == [(LTE, "asked")]
+
+
+@given(hz=st.floats(8.0, 60.0), spare_hz=st.floats(2.0, 20.0), seed=st.integers(0, 99))
+@settings(max_examples=12)
+def test_when_the_one_in_use_falls_silent_another_takes_over_within_a_second(
+    hz: float, spare_hz: float, seed: int
+) -> None:
+    field_ = Field(seed, wifi=Carrier(hz=hz), lte=Carrier(hz=spare_hz, delay_s=0.1))
+    field_.run(8.0 + seed / 100)
+    assert field_.used == WIFI
+    field_.carriers[WIFI].cut, cut_s = True, field_.now_s
+    field_.carriers[WIFI].underway.clear()
+    field_.run(1.0 + TICK_S)
+    ((at_s, change),) = field_.changes
+    assert (field_.used, change.is_loss) == (LTE, True)
+    assert SILENT_S - 1 / hz - 2 * TICK_S <= at_s - cut_s <= 1.0 + TICK_S
+    assert "silent for" in change.why
+
+
+def test_one_message_a_second_is_no_silence() -> None:
+    field_ = Field(wifi=Carrier(hz=1.0), lte=Carrier(hz=50.0))
+    field_.run(30.0)
+    assert not any(change.is_loss for _, change in field_.changes)
+
+
+def test_a_better_one_is_used_after_it_has_been_better_for_long_enough_and_then_it_stays() -> None:
+    field_ = Field(radio=Carrier(loss=0.3, delay_s=0.3), wifi=Carrier())
+    field_.run(30.0)
+    ((at_s, change),) = field_.changes
+    assert at_s >= 100.0 + SETTLE_S
+    assert (change.before.address, change.now.address, change.is_loss) == (RADIO, WIFI, False)
+    assert "instead of" in change.why
+
+
+def test_a_short_silence_begins_the_time_to_settle_anew() -> None:
+    field_ = Field(wifi=Carrier(), radio=Carrier(loss=0.3, delay_s=0.2))
+    field_.run(10.0)
+    field_.carriers[WIFI].cut = True
+    while field_.used == WIFI:
+        field_.run(TICK_S)
+    field_.run(0.3)
+    field_.carriers[WIFI].cut, back_s = False, field_.now_s
+    field_.run(30.0)
+    assert [change.now.address for _, change in field_.changes] == [RADIO, WIFI]
+    assert field_.changes[-1][0] - back_s >= SETTLE_S
+
+
+def test_after_a_silence_the_better_one_comes_back_once() -> None:
+    field_ = Field(wifi=Carrier(), radio=Carrier(loss=0.3, delay_s=0.2))
+    field_.run(10.0)
+    field_.carriers[WIFI].cut = True
+    field_.run(6.0)
+    assert field_.used == RADIO
+    field_.carriers[WIFI].cut, back_s = False, field_.now_s
+    field_.run(30.0)
+    assert [change.now.address for _, change in field_.changes] == [RADIO, WIFI]
+    assert field_.changes[-1][0] - back_s >= SETTLE_S
+
+
+@given(
+    losses=st.tuples(st.floats(0, 0.5), st.floats(0, 0.5), st.floats(0, 0.5)),
+    delays=st.tuples(st.floats(0.01, 0.3), st.floats(0.01, 0.3), st.floats(0.01, 0.3)),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=8)
+def test_between_changes_for_the_better_lies_the_time_to_settle(
+    losses: tuple[float, ...], delays: tuple[float, ...], seed: int
+) -> None:
+    names = ("radio", "wifi", "lte")
+    carriers = {n: Carrier(loss=loss, delay_s=d) for n, loss, d in zip(names, losses, delays, strict=True)}
+    field_ = Field(seed, **carriers)
+    field_.run(25.0)
+    for (before_s, _), (after_s, after) in zip(field_.changes, field_.changes[1:], strict=False):
+        assert after.is_loss or after_s - before_s >= SETTLE_S
+    assert len(field_.changes) <= 6
+
+
+def test_when_all_fall_silent_nothing_goes_back_and_forth() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(hz=7.0), radio=Carrier(hz=3.0))
+    field_.run(10.0)
+    before = len(field_.changes)
+    for carrier in field_.carriers.values():
+        carrier.cut = True
+    field_.run(20.0)
+    assert len(field_.changes) - before <= 2
+    used = field_.used
+    field_.run(20.0)
+    assert field_.used == used
+
+
+def test_who_hangs_up_is_not_waited_for() -> None:
+    field_ = Field(lte=Carrier(), wifi=Carrier())
+    field_.run(5.0)
+    field_.carriers[LTE].cut = True
+    field_.carriers[LTE].underway.clear()
+    field_.ways.chosen.gone()
+    field_.run(TICK_S)
+    assert field_.used == WIFI
+    assert field_.changes[-1][1].why == "the far end hung up"
+
+
+def test_the_one_in_use_can_be_taken_away_in_flight() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    field_.run(5.0)
+    assert field_.ways.has_other_known(WIFI)
+    change = field_.ways.remove(WIFI, field_.now_s)
+    assert change is not None
+    assert (field_.used, change.why) == (LTE, "it was taken away")
+    assert not field_.ways.has_other_known(LTE)
+
+
+def test_state_comes_from_the_way_in_use_and_answers_from_all_once() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    ack = heard(mavlink.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190))
+    assert not field_.ways.takes(LTE, ack, field_.now_s), "not known yet"
+    field_.run(5.0)
+    takes = field_.ways.takes
+    assert takes(WIFI, heard(heartbeat()), field_.now_s)
+    assert not takes(LTE, heard(heartbeat()), field_.now_s)
+    assert takes(LTE, ack, field_.now_s)
+    assert not takes(WIFI, ack, field_.now_s)
+    assert takes(WIFI, ack, field_.now_s), "it was said a second time"
+    assert not takes(LTE, ack, field_.now_s)
+    assert not takes("udpin:0.0.0.0:1", ack, field_.now_s)
+
+
+def test_with_one_way_everything_counts() -> None:
+    ways = Ways(candidate(WIFI), 0.0)
+    ack = heard(mavlink.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190))
+    assert all(ways.takes(WIFI, message, 0.0) for message in [ack, ack, heard(heartbeat())])
+
+
+@given(
+    said=st.lists(st.integers(0, 5), max_size=60),
+    losses=st.tuples(st.floats(0, 0.9), st.floats(0, 0.9)),
+    late=st.integers(0, 20),
+    seed=st.integers(0, 999),
+)
+def test_everything_that_comes_by_any_way_is_used_and_nothing_more_often_than_it_was_said(
+    said: list[int], losses: tuple[float, float], late: int, seed: int
+) -> None:
+    """Slow oracle: of each content no more than was said, no less than the way that brought most of it brought."""
+    chance, copies = random.Random(seed), Copies()
+    arrivals = [
+        (at + (late if way else 0), way, what)
+        for at, what in enumerate(said)
+        for way in (0, 1)
+        if chance.random() >= losses[way]
+    ]
+    used: Counter[int] = Counter()
+    for at, way, what in sorted(arrivals):
+        message = heard(mavlink.MAVLink_command_ack_message(what, 0, 0, 0, 255, 190), sequence=at % 256)
+        used[what] += copies.is_new(f"way {way}", message, at / 10)
+    for what in range(6):
+        by_way = [sum(w == way and content == what for _, w, content in arrivals) for way in (0, 1)]
+        assert max(by_way) <= used[what] <= said.count(what)
+
+
+def test_copies_are_forgotten_and_bounded() -> None:
+    copies = Copies()
+    text = heard(mavlink.MAVLink_statustext_message(6, b"Arming motors"))
+    assert copies.is_new(WIFI, text, 0.0)
+    assert not copies.is_new(LTE, text, KEEP_S)
+    assert copies.is_new(LTE, text, 2 * KEEP_S)
+    for number in range(2 * MOST):
+        copies.is_new(WIFI, heard(mavlink.MAVLink_log_data_message(1, number, 1, [0] * 90)), 2 * KEEP_S)
+    assert copies.is_new(WIFI, text, 2 * KEEP_S)
+
+
+def test_an_answer_in_the_old_dialect_is_the_same_answer() -> None:
+    message = mavlink.MAVLink_mission_count_message(255, 190, 3)
+    old = mavlink.MAVLink(None, 1, 1)
+    first = old.decode(bytearray(message.pack(old, force_mavlink1=True)))
+    copies = Copies()
+    assert copies.is_new(RADIO, first, 0.0)
+    assert not copies.is_new(WIFI, heard(message), 0.1)
+
+
+def test_only_what_the_dialect_has_is_listed() -> None:
+    assert {kind.msgname for kind in mavlink.mavlink_map.values()} >= ANSWERS
+
+
+def test_what_is_shown_of_a_way() -> None:
+    way = Way(candidate(RADIO), identity="known")
+    assert way.status(0.0, in_use=False).silent_s is None
+    for sequence in (0, 1, 4):
+        way.hear(heard(attitude(), sequence=sequence), 1.0)
+    radio = mavlink.MAVLink_radio_status_message(188, 180, 100, 40, 45, 0, 0)
+    way.hear_radio(heard(radio, system=51, component=68), 1.0)
+    shown = way.status(1.5, in_use=True)
+    assert (shown.in_use, shown.silent_s, shown.quality) == (True, 0.5, pytest.approx(0.6))
+    assert shown.signal is not None
+    assert (shown.signal.rssi, shown.signal.remote_rssi) == (188, 180)
+    assert (shown.signal.noise, shown.signal.remote_noise) == (40, 45)
+    assert way.status(60.0, in_use=True).signal is None
+    assert not way.is_ready(1.0 + STALE_S + 0.1)
