@@ -119,7 +119,8 @@ def read_mcap_flight(path: Path, data: Data) -> FlightLog:
         if isinstance(message, VehicleState):
             parts.on_state(message, entry.t_utc_s)
         elif isinstance(message, RawFrame):
-            parts.on_frame(message)
+            if not message.spare:
+                parts.on_frame(message)
         elif isinstance(message, VehicleText):
             parts.texts.append(message)
         elif isinstance(message, CommandRecord):

@@ -30,6 +30,6 @@ RAW_ENCODING = "mavlink"
 """Of the channels that hold bare frames; those of all other topics are JSON."""
 
 
-def raw_channel_topic(sent: bool) -> str:
-    """Raw frames have a channel per direction (and link)."""
-    return f"{Topic.RAW.value}/{'sent' if sent else 'received'}"
+def raw_channel_topic(sent: bool, spare: bool = False) -> str:
+    """Raw frames have a channel per direction (and link); those of ways that were not in use have their own."""
+    return f"{Topic.RAW.value}/{'sent' if sent else 'received'}{'_spare' if spare else ''}"

@@ -24,4 +24,5 @@ def test_every_recorded_message_has_a_schema() -> None:
 
 
 def test_directions_have_channels_of_their_own() -> None:
-    assert raw_channel_topic(True) != raw_channel_topic(False)
+    topics = {raw_channel_topic(sent, spare) for sent in (True, False) for spare in (True, False)}
+    assert len(topics) == 4

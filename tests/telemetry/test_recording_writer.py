@@ -93,8 +93,9 @@ def test_another_library_reads_every_message_and_checks_the_sums(tmp_path: Path)
     assert len(summary.chunk_indexes) > 50
 
 
-def test_both_directions_and_every_link_have_a_channel(tmp_path: Path) -> None:
-    frames = [RawFrame(T0_UTC_S, sent, link, b"f") for sent in (True, False) for link in ("udp", "serial")]
+def test_both_directions_and_every_link_have_a_channel_and_spare_frames_stay_apart(tmp_path: Path) -> None:
+    kinds = [(sent, spare) for sent in (True, False) for spare in (True, False)]
+    frames = [RawFrame(T0_UTC_S, sent, link, b"f", spare) for sent, spare in kinds for link in ("udp", "serial")]
     writer = RecordingWriter(tmp_path / "a.mcap", t_utc_s=T0_UTC_S, t_mono_s=0.0)
     for frame in frames:
         writer.write(Topic.RAW, frame, T0_UTC_S)

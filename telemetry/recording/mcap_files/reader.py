@@ -23,7 +23,7 @@ from telemetry.recording.tlog import Data
 from telemetry.topics.messages import MESSAGE_TYPES, Published, RawFrame, Topic
 
 UNFINISHED = "The recording was not finished: its recorder was killed, or is still recording."
-_RAW_TOPICS = {raw_channel_topic(sent): sent for sent in (True, False)}
+_RAW_TOPICS = {raw_channel_topic(sent, spare): (sent, spare) for sent in (True, False) for spare in (True, False)}
 
 
 def own_contents(name: str, data: Data, read: Callable[[Data], Contents]) -> Contents:
@@ -145,7 +145,8 @@ class Recording:
         if topic != Topic.RAW:
             return codec_of(MESSAGE_TYPES[topic]).decode(data)
         channel = self._contents.channels[number]
-        return RawFrame(own_utc_s, _RAW_TOPICS[channel.topic], channel.metadata.get("link", ""), data)
+        sent, spare = _RAW_TOPICS[channel.topic]
+        return RawFrame(own_utc_s, sent, channel.metadata.get("link", ""), data, spare)
 
     def _fault(self, text: str) -> None:
         """Each kind of fault once."""

@@ -93,7 +93,7 @@ class RecordingWriter:
         """``t_utc_s``: when it came here; never goes back within a recording."""
         self._last_ns = t_ns = max(self._last_ns, round(t_utc_s * 1e9))
         if isinstance(message, RawFrame):
-            channel = self._channel(raw_channel_topic(message.sent), message.link, "", b"", RAW_ENCODING)
+            channel = self._channel(raw_channel_topic(message.sent, message.spare), message.link, "", b"", RAW_ENCODING)
             self._add(channel, t_ns, _own_time_ns(message, t_ns), message.frame)
         else:
             codec: Any = codec_of(MESSAGE_TYPES[topic])
