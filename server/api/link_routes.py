@@ -37,8 +37,12 @@ async def release_lease(who: Who, flying: Fly) -> Response:
 
 @router.post("/link/connect", **DONE)
 async def connect(body: ConnectLink, operator: InCharge, flying: Fly) -> None:
-    """Opens a connection and keeps it open, such as ``udpin:0.0.0.0:14550`` or ``tcp:192.168.1.7:5760``."""
-    await flying.connections.connect(operator, body.address, adopt=body.adopt)
+    """Opens a connection and keeps it open, such as ``udpin:0.0.0.0:14550`` or ``tcp:192.168.1.7:5760``; several ways
+    to one vehicle at once with ``also``."""
+    if body.also:
+        await flying.connections.connect_all(operator, (body.address, *body.also), adopt=body.adopt)
+    else:
+        await flying.connections.connect(operator, body.address, adopt=body.adopt, as_way=body.as_way)
 
 
 @router.post("/link/disconnect", **DONE)

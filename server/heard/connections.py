@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass, replace
 
 from server.door.lease import Lease
 from server.errors import reported
@@ -14,11 +15,19 @@ from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Rele
 log = logging.getLogger("hedgehop.flying")
 
 
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """As in ``Connect``."""
+
+    adopt: bool = False
+    as_way: bool = False
+
+
 class Connections:
     def __init__(self, link: LinkClient, nodes: Nodes, lease: Lease, *, configured: tuple[str, ...] = ()) -> None:
         self._link, self._nodes, self._lease = link, nodes, lease
-        self._wanted: dict[str, bool] = dict.fromkeys(configured, True)
-        """Address -> whether the first vehicle heard on it is adopted."""
+        self._wanted = dict.fromkeys(configured, Wish(adopt=True, as_way=len(configured) > 1))
+        """By address. Several that are configured for one vehicle are ways to it."""
         self._candidate: str | None = None
         self._met = False
         """Whether a link node has told what it holds: from then on this list is the truth, and not the node's."""
@@ -31,14 +40,19 @@ class Connections:
 
     async def ask_for_configured(self) -> None:
         """At the start: a link node that is just starting has told nothing yet."""
-        for address, adopt in list(self._wanted.items()):
-            await self._ask(Connect(self._lease.server_operator(), address, adopt), f"Connecting {address}")
+        for address in list(self._wanted):
+            await self._ask_for(address)
 
-    async def connect(self, operator: Operator, address: str, *, adopt: bool) -> None:
+    async def connect(self, operator: Operator, address: str, *, adopt: bool, as_way: bool = False) -> None:
         """Raises AddressError, ConnectionFailedError."""
         await self._nodes.link()
-        await self._link.call(Connect(operator, address, adopt))
-        self._wanted[address] = adopt
+        await self._link.call(Connect(operator, address, adopt, as_way))
+        self._wanted[address] = Wish(adopt, as_way)
+
+    async def connect_all(self, operator: Operator, addresses: tuple[str, ...], *, adopt: bool) -> None:
+        """Several ways to one vehicle. Raises as ``connect``; those before the one that is wrong stay."""
+        for address in addresses:
+            await self.connect(operator, address, adopt=adopt, as_way=True)
 
     async def disconnect(self, operator: Operator, address: str) -> None:
         self._wanted.pop(address, None)
@@ -65,24 +79,28 @@ class Connections:
     async def release(self, operator: Operator) -> None:
         self._candidate = None
         # Otherwise a link node that is started again would adopt what was just let go of.
-        self._wanted = dict.fromkeys(self._wanted, False)
+        self._wanted = {address: replace(wish, adopt=False) for address, wish in self._wanted.items()}
         await self._link.call(Release(operator))
 
     async def on_status(self, status: LinkStatus) -> None:
         """What the node holds is taken over from a server before; what it lacks is asked for again."""
         self.status = status
-        held = {connection.address for connection in status.connections}
+        held = {connection.address: connection.as_way for connection in status.connections}
         if not self._met:
-            self._wanted |= dict.fromkeys(held - self._wanted.keys(), False)
+            new = held.keys() - self._wanted.keys()
+            self._wanted |= {address: Wish(as_way=held[address]) for address in new}
             self._met = True
         if status.adopted is not None:
             self._candidate = status.adopted.id
         for address in [address for address in self._wanted if address not in held]:
-            await self._ask(
-                Connect(self._lease.server_operator(), address, self._wanted[address]), f"Connecting {address}"
-            )
+            await self._ask_for(address)
         if status.adopted is None and self._candidate in {candidate.id for candidate in status.candidates}:
             await self._ask(Adopt(self._lease.server_operator(), self._candidate or ""), "Adopting the vehicle again")
+
+    async def _ask_for(self, address: str) -> None:
+        wish = self._wanted[address]
+        request = Connect(self._lease.server_operator(), address, wish.adopt, wish.as_way)
+        await self._ask(request, f"Connecting {address}")
 
     async def _ask(self, request: Connect | Disconnect | Adopt, doing: str) -> None:
         try:

@@ -196,8 +196,12 @@ class VehicleLogsDoc(Strict):
 
 
 class ConnectLink(Strict):
+    """``as_way``: who has the adopted vehicle's number on it, and the same clock, is it. ``also``: further ways."""
+
     address: Address
     adopt: bool = True
+    as_way: bool = False
+    also: Annotated[list[Address], Field(max_length=7)] = Field(default_factory=list)
 
 
 class DisconnectLink(Strict):

@@ -119,3 +119,33 @@ def test_a_fault_that_lasts_is_logged_once(caplog: pytest.LogCaptureFixture) -> 
 
     asyncio.run(scenario())
     assert caplog.text.count("Port 14550 is in use") == 1
+
+
+def test_several_that_are_configured_for_one_vehicle_are_ways_to_it() -> None:
+    link = Link()
+    asyncio.run(connections(link, UDP, TCP).ask_for_configured())
+    assert link.asked == [Connect(SERVER, UDP, True, True), Connect(SERVER, TCP, True, True)]
+
+
+def test_a_new_server_knows_which_connections_are_ways() -> None:
+    async def scenario() -> None:
+        link = Link()
+        wanted = connections(link)
+        await wanted.on_status(LinkStatus(0.0, connections=(ConnectionStatus(UDP, "open", as_way=True),)))
+        await wanted.on_status(status())
+        assert link.asked == [Connect(SERVER, UDP, False, True)]
+
+    asyncio.run(scenario())
+
+
+def test_a_release_keeps_the_ways_and_adopts_nothing_by_itself() -> None:
+    async def scenario() -> None:
+        link = Link()
+        wanted = connections(link)
+        await wanted.connect_all(ME, (UDP, TCP), adopt=True)
+        await wanted.release(ME)
+        link.asked.clear()
+        await wanted.on_status(status())
+        assert link.asked == [Connect(SERVER, UDP, False, True), Connect(SERVER, TCP, False, True)]
+
+    asyncio.run(scenario())

@@ -300,6 +300,7 @@ export interface ConnectionStatus {
   error: ErrorInfo | null;
   received_messages: number;
   bad_bytes: number;
+  as_way: boolean;
 }
 
 /** So many frames, points or events, and of what. */
@@ -369,6 +370,7 @@ export interface LinkStatus {
   again: Candidate | null;
   signing: SigningStatus;
   audit_head: string;
+  ways: WayStatus[];
 }
 
 /** Of the map frame. */
@@ -478,6 +480,14 @@ export interface PerceptionStatus {
   basis: Basis | null;
   flight_map: FlightMapStatus | null;
   placed: boolean;
+}
+
+/** RADIO_STATUS in the radio's own units, 0 to 254: of SiK about 1.9 to the dB; 255: not known. */
+export interface RadioSignal {
+  rssi: number;
+  noise: number;
+  remote_rssi: number;
+  remote_noise: number;
 }
 
 export interface RecorderStatus {
@@ -726,6 +736,18 @@ export interface VelocitySettings {
   stands_m: number;
   stands_s: number;
   choice: "room" | "edge";
+}
+
+/** One of the ways to the adopted vehicle. */
+export interface WayStatus {
+  address: string;
+  peer: string;
+  identity: "known" | "asked" | "other";
+  in_use: boolean;
+  silent_s: number | null;
+  quality: number | null;
+  round_trip_s: number | null;
+  signal: RadioSignal | null;
 }
 
 export interface PoiDoc {
@@ -1551,9 +1573,12 @@ export interface VehicleLogsDoc {
   download: LogDownloadDoc | null;
 }
 
+/** ``as_way``: who has the adopted vehicle's number on it, and the same clock, is it. ``also``: further ways. */
 export interface ConnectLink {
   address: string;
   adopt?: boolean;
+  as_way?: boolean;
+  also?: string[];
 }
 
 export interface DisconnectLink {

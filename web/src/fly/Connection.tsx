@@ -20,6 +20,8 @@ import {
   startSimulator,
 } from "../vehicle/orders";
 import { linkWords } from "../vehicle/vehicle_words";
+import { hasAnotherWay } from "../vehicle/way_words";
+import { WayTable } from "./WayTable";
 
 const PLACE = "connection";
 
@@ -45,11 +47,12 @@ const AUTOPILOTS: Readonly<Record<string, string>> = { ardupilot: "ArduPilot", p
 const describe = (found: Candidate) =>
   `${AUTOPILOTS[found.autopilot] ?? "Unknown autopilot"} ${KINDS[found.vehicle_type] ?? "vehicle"}, system ${found.system_id}`;
 
+/** With a vehicle in use it is another way to that one. */
 function AddressForm() {
   const [address, setAddress] = useState("");
   const submit = (event: Event) => {
     event.preventDefault();
-    if (address.trim()) void connectTo(address.trim());
+    if (address.trim()) void connectTo(address.trim(), adopted.value !== null);
   };
   return (
     <form class="address-form" onSubmit={submit}>
@@ -92,6 +95,7 @@ const STATES = { open: "open", waiting: "nothing heard yet", failed: "failed, tr
 
 function ConnectionRow({ connection }: { connection: ConnectionStatus }) {
   const { address, state, error, received_messages, bad_bytes } = connection;
+  const staysReached = hasAnotherWay(linkStatus.value?.status.ways ?? [], address);
   const isKnown = whyUnheard.value === null;
   return (
     <li data-testid="connection-row">
@@ -112,7 +116,7 @@ function ConnectionRow({ connection }: { connection: ConnectionStatus }) {
           class="small"
           icon="cross"
           title={`Close ${address}`}
-          disabled={whyNotCommand.value !== null || isInAir.value}
+          disabled={whyNotCommand.value !== null || (isInAir.value && !staysReached)}
           testid="link-disconnect"
           onClick={() => void disconnect(address)}
         />
@@ -261,6 +265,7 @@ export function ConnectionSection() {
       startsOpen={!used}
     >
       {used ? <Adopted used={used} /> : <NoVehicle waits={Boolean(status?.connections.length)} />}
+      {used && status && <WayTable ways={status.ways} />}
       {used && status && <Signing signing={status.signing} />}
       <Candidates found={status?.candidates ?? []} />
       {status && status.connections.length > 0 && (
@@ -272,7 +277,7 @@ export function ConnectionSection() {
       )}
       {used ? (
         <details class="details">
-          <summary>Another connection…</summary>
+          <summary>Another way to the vehicle…</summary>
           <AddressForm />
         </details>
       ) : (

@@ -9,6 +9,7 @@ import {
   modeWord,
   nodeWord,
 } from "../vehicle/vehicle_words";
+import { wayInUse } from "../vehicle/way_words";
 import {
   adopted,
   hasLinkFailed,
@@ -107,7 +108,7 @@ function VehicleChips() {
         {...words}
         testid="chip-link"
         class="link-chip"
-        title="Link quality and round trip"
+        title={`Link quality and round trip ${wayInUse(status?.ways ?? [])}`.trim()}
       />
       <Chip
         icon="satellite"
