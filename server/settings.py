@@ -111,7 +111,7 @@ class Settings(BaseSettings):
     """Largest surface model, orthophoto, recording or radar file that can be dropped in."""
     link: Names = ()
     """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
-    first vehicle heard on one of them is the one that is flown."""
+    first vehicle heard on one of them is the one that is flown; the others are further ways to it."""
     vehicle: Vehicles = ()
     """Several vehicles, each with its name and its connections, separated by semicolons: Bee=udpin:0.0.0.0:14550;
     Wasp=udpin:0.0.0.0:14560. What link names is the first vehicle then, and these come after it."""

@@ -37,8 +37,10 @@ async def release_lease(who: Who, flying: Fly) -> Response:
 
 @router.post("/link/connect", **DONE)
 async def connect(body: ConnectLink, operator: InCharge, flying: Fly) -> None:
-    """Opens a connection and keeps it open, such as ``udpin:0.0.0.0:14550`` or ``tcp:192.168.1.7:5760``; several ways
-    to one vehicle at once with ``also``."""
+    """Opens a connection and keeps it open, such as ``udpin:0.0.0.0:14550`` or ``tcp:192.168.1.7:5760``.
+
+    With ``as_way`` it is another way to the vehicle in use; ``also`` opens several to one vehicle at once.
+    """
     if body.also:
         await flying.connections.connect_all(operator, (body.address, *body.also), adopt=body.adopt)
     else:
