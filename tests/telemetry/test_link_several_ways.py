@@ -18,12 +18,12 @@ from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
 from telemetry.simulation.simulator.autopilot.flight_modes import Hold
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.messages import Candidate, RawFrame, WayStatus
-from telemetry.topics.requests import Arm, Connect, Disarm, Disconnect, Pause, Resume, StartAuto
+from telemetry.topics.requests import Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle
 from tests.telemetry.link_bench import ME, Console, console, free_port, until
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload
-from tests.telemetry.udp_faults import Proxy, lossy_udp
+from tests.telemetry.udp_faults import Proxy, lossy_udp, routed_udp
 
 OF_EVERY_WAY = {mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_TIMESYNC}
 FAILSAFE = (("FS_GCS_ENABLE", 1.0), ("FS_GCS_TIMEOUT", 3.0))
@@ -120,7 +120,8 @@ def test_when_the_way_in_use_falls_silent_in_flight_another_takes_over_and_gives
             assert any(words.startswith("Link: now over") for words in bench.commands)
             assert {message_id(frame) for frame in sent_frames(bench, spare=True)} == OF_EVERY_WAY
             commands = [frame for frame in sent_frames(bench, spare=False) if message_id(frame) == 76]
-            sent = Counter(decoded.command for decoded in map(mavlink.MAVLink(None).decode, map(bytearray, commands)))
+            decoder: Any = mavlink.MAVLink(None)
+            sent = Counter(decoder.decode(bytearray(frame)).command for frame in commands)
             assert all(count <= sent[command] for command, count in obeyed.counted().items())
 
     run(whole)
@@ -175,25 +176,61 @@ def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_r
     run(whole)
 
 
-async def session_on_the_ground(*losses: float) -> tuple[list[str], tuple[Any, ...]]:
+async def told_on_the_ground(bench: Console, *addresses: str) -> tuple[list[str], tuple[Any, ...]]:
     """Words and state after an upload, arming and disarming, over as many ways."""
-    async with vehicle(speedup=1.0, gnss="perfect") as (_, port), contextlib.AsyncExitStack() as stack:
-        proxies = [await stack.enter_async_context(lossy_udp(port, loss=loss, seed=5)) for loss in losses]
-        bench = await stack.enter_async_context(console())
-        await reached(bench, *map(at, proxies))
-        await upload(bench)
-        await bench.handle(Arm(ME))
-        await until(lambda: bench.state.armed)
-        await bench.handle(Disarm(ME))
-        await until(lambda: not bench.state.armed and any("Disarming" in text for text in bench.texts))
-        state = bench.state
-        same = (state.mode, state.armed, state.mission_items, state.home_lat_deg, state.autopilot, state.landed)
-        return [text for text in bench.texts if "rm" in text], same
+    await reached(bench, *addresses)
+    await upload(bench)
+    await bench.handle(Arm(ME))
+    await until(lambda: bench.state.armed)
+    await bench.handle(Disarm(ME))
+    await until(lambda: not bench.state.armed and any("Disarming" in text for text in bench.texts))
+    await until(lambda: bench.state.mission_items is not None)
+    state = bench.state
+    same = (state.mode, state.armed, state.mission_items, state.home_lat_deg, state.autopilot, state.landed)
+    return [text for text in bench.texts if "rm" in text], same
 
 
 def test_over_two_ways_words_and_state_are_those_of_one() -> None:
+    async def over_channels(*losses: float) -> tuple[list[str], tuple[Any, ...]]:
+        async with vehicle(speedup=1.0, gnss="perfect") as (_, port), contextlib.AsyncExitStack() as stack:
+            proxies = [await stack.enter_async_context(lossy_udp(port, loss=loss, seed=5)) for loss in losses]
+            return await told_on_the_ground(await stack.enter_async_context(console()), *map(at, proxies))
+
+    async def over_a_router(ends: int) -> tuple[list[str], tuple[Any, ...]]:
+        async with (
+            vehicle(speedup=1.0, gnss="perfect") as (_, port),
+            routed_udp(port, ends) as ports,
+            console() as bench,
+        ):
+            return await told_on_the_ground(bench, *(f"udpout:127.0.0.1:{each}" for each in ports))
+
     async def whole() -> None:
-        assert await session_on_the_ground(0.0, 0.2) == await session_on_the_ground(0.0)
+        one = await over_channels(0.0)
+        assert await over_channels(0.0, 0.2) == one
+        assert await over_a_router(2) == one
+
+    run(whole)
+
+
+def test_a_vehicle_that_signs_is_reached_over_both_and_nothing_counts_as_a_replay() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (_, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0, delay_s=0.2) as other,
+            console() as bench,
+        ):
+            await reached(bench, at(one), at(other))
+            await bench.handle(SetSigning(ME, enabled=True))
+            signed = len(bench.frames(sent=False))
+            await until(lambda: len(bench.frames(sent=False)) > signed + 200)
+            signing = bench.status.signing
+            assert (signing.mode, signing.replayed, signing.wrong, signing.ahead) == ("on", 0, 0, 0)
+            one.is_cut = True
+            await until(lambda: used(bench) == at(other), 3.0)
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await bench.handle(Arm(ME))
+            await until(lambda: bench.state.armed)
 
     run(whole)
 

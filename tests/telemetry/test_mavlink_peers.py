@@ -2,7 +2,8 @@
 
 import pytest
 
-from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, Peers, Source
+from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, TRY_S, Peers, Source
+from telemetry.topics.messages import LOST_S, Candidate
 from tests.telemetry.frames import attitude, ground_station_heartbeat, heard, heartbeat
 
 UDP = "udpin:0.0.0.0:14550"
@@ -153,3 +154,106 @@ def test_after_hanging_up_it_is_asked_for_at_once() -> None:
     peers.gone(UDP, HERE.peer)
     assert peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 0.1) == "stranger"
     assert peers.again(0.1) is not None
+
+
+TCP = "tcp:10.0.0.7:5760"
+THERE = at("10.0.0.7:5760", address=TCP)
+
+
+def with_a_way() -> Peers:
+    peers = adopted()
+    peers.take_as_way(TCP)
+    return peers
+
+
+def asked(peers: Peers, source: Source, now_s: float) -> Candidate:
+    peers.hear(source, heard(heartbeat()), now_s)
+    assert peers.may_join(source, heard(heartbeat()), now_s)
+    candidate = peers.find(source.id, now_s)
+    assert candidate is not None
+    peers.ask(candidate, now_s)
+    return candidate
+
+
+def test_only_on_a_connection_that_is_named_as_a_way_may_its_numbers_be_the_vehicle() -> None:
+    peers = with_a_way()
+    message = heard(heartbeat())
+    assert peers.may_join(THERE, message, 0.1)
+    assert not peers.may_join(at(address="tcp:10.0.0.8:5760"), message, 0.1)
+    assert not peers.may_join(at("10.0.0.7:5760", address=TCP, system=2), message, 0.1)
+    assert not peers.may_join(THERE, heard(heartbeat(kind=13)), 0.1), "another kind of vehicle"
+    assert not peers.may_join(THERE, heard(attitude()), 0.1)
+    assert not peers.may_join(at("10.0.0.9:4000"), message, 0.1), "the vehicle itself is there"
+
+
+def test_who_is_asked_is_neither_vehicle_nor_imposter_until_it_is_known() -> None:
+    peers = with_a_way()
+    candidate = asked(peers, THERE, 0.1)
+    assert peers.hear(THERE, heard(attitude()), 0.2) == "asked"
+    assert (peers.places, peers.place_at(TCP)) == ((peers.adopted,), candidate)
+    peers.know(TCP)
+    assert peers.hear(THERE, heard(attitude()), 0.3) == "adopted"
+    assert peers.places == (peers.adopted, candidate)
+    assert candidate not in peers.candidates(0.3)
+    assert not peers.may_join(at("10.0.0.7:5761", address=TCP), heard(heartbeat()), 0.4)
+
+
+def test_who_turned_out_to_be_another_vehicle_is_not_asked_again() -> None:
+    peers = with_a_way()
+    candidate = asked(peers, THERE, 0.1)
+    peers.part(TCP, refused=True)
+    assert peers.hear(THERE, heard(heartbeat()), 0.2) == "stranger"
+    assert not peers.may_join(THERE, heard(heartbeat()), 0.2)
+    assert candidate in peers.candidates(0.2)
+    assert peers.warnings(0.2) != ()
+    peers.forget(TCP)
+    peers.take_as_way(TCP)
+    assert peers.may_join(THERE, heard(heartbeat()), 0.3), "the connection was made anew"
+
+
+def test_who_never_answers_makes_room_for_the_next() -> None:
+    peers = with_a_way()
+    asked(peers, THERE, 0.1)
+    next_one = at("10.0.0.7:5761", address=TCP)
+    for now_s in (1.0, 2.0, TRY_S + 0.5):
+        peers.hear(HERE, heard(heartbeat()), now_s)
+        peers.hear(THERE, heard(heartbeat()), now_s)
+        assert peers.may_join(next_one, heard(heartbeat()), now_s) is (now_s > TRY_S)
+
+
+def test_a_way_that_was_lost_may_come_back_from_another_port_while_the_vehicle_is_heard_elsewhere() -> None:
+    peers = with_a_way()
+    asked(peers, THERE, 0.1)
+    peers.know(TCP)
+    again = at("10.0.0.2:4001")
+    now_s = LOST_S + 1.0
+    peers.hear(THERE, heard(heartbeat()), now_s)
+    assert peers.may_join(again, heard(heartbeat()), now_s), "the first one is a way as well"
+    later_s = 2 * now_s + LOST_S
+    peers.hear(again, heard(heartbeat()), later_s)
+    assert not peers.may_join(again, heard(heartbeat()), later_s), "nothing to compare it with"
+    assert peers.again(later_s) is not None, "now the operator decides"
+
+
+def test_while_one_way_is_heard_nobody_is_asked_whether_that_is_it() -> None:
+    peers = with_a_way()
+    asked(peers, THERE, 0.1)
+    peers.know(TCP)
+    assert peers.gone(UDP, HERE.peer)
+    assert not peers.gone(UDP, "10.0.0.9:1")
+    peers.hear(at("10.0.0.2:4001"), heard(heartbeat()), 0.2)
+    assert peers.again(0.2) is None
+    assert peers.gone(TCP, THERE.peer)
+    assert peers.again(0.3) is not None
+
+
+def test_a_release_forgets_all_places() -> None:
+    peers = with_a_way()
+    peers.adopt_first_of(TCP, wanted=True)
+    asked(peers, THERE, 0.1)
+    peers.know(TCP)
+    peers.release()
+    assert (peers.places, peers.adopted) == ((), None)
+    assert not peers.wants(THERE, heard(heartbeat()))
+    assert not peers.may_join(THERE, heard(heartbeat()), 0.2)
+    assert peers.is_as_way(TCP)

@@ -66,8 +66,7 @@ def test_an_answer_that_takes_longer_than_the_next_question_is_still_measured() 
     first, _ = clock.ask(100.0), clock.ask(101.0)
     assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, first.ts1)), 102.5) is not None
     assert clock.round_trip_s == pytest.approx(2.5)
-    for second in range(102, 102 + 2 * MOST_QUESTIONS):
-        late = clock.ask(float(second))
+    late = [clock.ask(float(second)) for second in range(102, 102 + 2 * MOST_QUESTIONS)][-1]
     assert clock.reading(first.ts1) is None
     assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, late.ts1)), 1000.0) is None
 

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import NotAllowedError, SilentError
 from telemetry.link.signatures import KeyRing
 from telemetry.mavlink.codec import Parser
-from telemetry.mavlink.signing import EPOCH_S, FARTHEST, PER_S, YOUNG, Signing, timestamp_of
+from telemetry.mavlink.signing import COPY, EPOCH_S, FARTHEST, PER_S, YOUNG, Signing, timestamp_of
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Arm, Connect, SetSigning
@@ -93,6 +93,27 @@ def test_two_links_have_streams_of_their_own() -> None:
     assert {ours.verify(frame, now=NOW) for frame in later} == {"good"}
     assert ours.verify(signed(one), now=NOW) == "good"
     assert ours.verify(later[-1], now=NOW) == "replayed"
+
+
+def test_the_copy_over_a_second_way_is_good_once_and_not_late() -> None:
+    ours, theirs = Signing(KEY), other_side()
+    frames = [signed(theirs, attitude(k)) for k in range(100)]
+    assert {ours.verify(frame, now=NOW, way="radio") for frame in frames} == {"good"}
+    for way in ("wifi", "lte"):
+        assert {ours.verify(frame, now=NOW, way=way) for frame in frames} == {"good"}
+        assert {ours.verify(frame, now=NOW, way=way) for frame in frames} == {"replayed"}
+    assert {ours.verify(frame, now=NOW, way="radio") for frame in frames} == {"replayed"}
+    assert ours.verify(signed(other_side(timestamp=NOW + COPY + 200)), now=NOW, way="radio") == "good"
+    assert ours.verify(frames[-1], now=NOW, way="another") == "replayed"
+
+
+def test_what_was_proven_before_a_restart_is_no_copy() -> None:
+    before, theirs = Signing(KEY), other_side()
+    frames = [signed(theirs, attitude(k)) for k in range(20)]
+    assert {before.verify(frame, now=NOW, way="radio") for frame in frames} == {"good"}
+    after = Signing(KEY, before.newest, dict(before.streams))
+    assert {after.verify(frame, now=NOW, way="wifi") for frame in frames} == {"replayed"}
+    assert after.verify(signed(theirs), now=NOW, way="wifi") == "good"
 
 
 async def ring_with(file: Path) -> KeyRing:

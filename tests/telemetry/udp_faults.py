@@ -69,3 +69,52 @@ async def lossy_udp(vehicle_port: int, *, loss: float, seed: int = 0, delay_s: f
     finally:
         for transport in transports:
             transport.close()
+
+
+class _Arm(asyncio.DatagramProtocol):
+    """One of a router's ends."""
+
+    def __init__(self, router: _Router) -> None:
+        self._router = router
+        self.transport: asyncio.DatagramTransport
+        self.station: Address | None = None
+
+    def datagram_received(self, data: bytes, addr: Address) -> None:
+        self._router.on_datagram(self, data, addr)
+
+
+class _Router:
+    """As mavlink-router on board: the vehicle sees one station, and every end hears everything."""
+
+    def __init__(self, vehicle_port: int, ends: int) -> None:
+        self._vehicle: Address = ("127.0.0.1", vehicle_port)
+        self.inner, self.arms = _Arm(self), [_Arm(self) for _ in range(ends)]
+
+    async def open(self) -> None:
+        loop = asyncio.get_running_loop()
+        for arm in (self.inner, *self.arms):
+            arm.transport, _ = await loop.create_datagram_endpoint(lambda arm=arm: arm, ("127.0.0.1", 0))
+
+    def on_datagram(self, arm: _Arm, data: bytes, addr: Address) -> None:
+        if arm is not self.inner:
+            arm.station = addr
+            self.inner.transport.sendto(data, self._vehicle)
+            return
+        for each in self.arms:
+            if each.station is not None:
+                each.transport.sendto(data, each.station)
+
+    def close(self) -> None:
+        for arm in (self.inner, *self.arms):
+            arm.transport.close()
+
+
+@contextlib.asynccontextmanager
+async def routed_udp(vehicle_port: int, ends: int) -> AsyncIterator[list[int]]:
+    """Ports at which the vehicle is reached."""
+    router = _Router(vehicle_port, ends)
+    await router.open()
+    try:
+        yield [arm.transport.get_extra_info("sockname")[1] for arm in router.arms]
+    finally:
+        router.close()
