@@ -55,12 +55,12 @@ class Expected:
     avoid_by: AvoidBy | None
     """Avoidance was on when that node ended."""
     ways: tuple[Candidate, ...] = ()
-    """Where else it was reached."""
+    """Where it was heard last, one for each connection."""
     is_given_up: bool = False
     """It was not heard for so long that it counts as gone; it is still known when it does come back."""
 
     def at(self, address: str) -> Candidate | None:
-        return next((place for place in (self.vehicle, *self.ways) if place.address == address), None)
+        return next((place for place in (*self.ways, self.vehicle) if place.address == address), None)
 
 
 @dataclass(slots=True)
@@ -109,8 +109,7 @@ class Peers:
     def take_as_way(self, address: str) -> None:
         """Whoever has the vehicle's numbers on this connection may be it, reached another way."""
         self._as_way.add(address)
-        if self.adopted is not None:
-            self._as_way.add(self.adopted.address)  # with two ways, the first one may come back from another port too
+        self._as_way.update(self._places)  # with two ways, the first one may come back from another port too
 
     def is_as_way(self, address: str) -> bool:
         return address in self._as_way
