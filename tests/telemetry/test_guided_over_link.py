@@ -62,6 +62,7 @@ async def simulated(
         await bench.handle(Connect(ME, f"udpout:127.0.0.1:{proxy.port}", True))
         await bench.live()
         await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+        await until(lambda: bench.link.session is not None and not bench.link.session.transfers.is_busy)
         yield bench, simulator, proxy
 
 
