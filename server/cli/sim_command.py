@@ -50,6 +50,9 @@ def sim(
     parameter: Annotated[
         list[str] | None, Option(metavar="NAME=VALUE", help="Of the autopilot; may be given several times.")
     ] = None,
+    parameter_errors: Annotated[
+        bool, Option("--parameter-errors", help="It says so when it has no such parameter, as newer firmware does.")
+    ] = False,
 ) -> None:
     """Simulate a vehicle on a MAVLink connection until Ctrl+C."""
     lat_deg, lon_deg, alt_m = read_home(home)
@@ -66,6 +69,7 @@ def sim(
         dsm=o.existing(dsm),
         world=o.existing(world),
         gnss_script=tuple(read_event(text) for text in gnss_event or ()),
+        parameter_errors=parameter_errors,
         parameters=tuple(read_parameter(text) for text in parameter or ()),
     )
     run(options, announce=say)

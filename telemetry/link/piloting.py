@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from telemetry.link.missions import (
     set_speeds,
     start_mission,
 )
-from telemetry.link.procedures import Accepted, Procedures, Spawn, change_mode, guided_way
+from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode, guided_way
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
@@ -47,7 +47,7 @@ class Pilot:
         flight: FlightKeeper,
         *,
         spawn: Spawn,
-        read_parameter: Callable[[str], Awaitable[float | None]],
+        read_parameters: ReadParameters,
         read_mission: ReadMission,
         alarm: Callable[[str], None],
     ) -> None:
@@ -59,7 +59,7 @@ class Pilot:
             vehicle, remaining=self._remaining, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
         )
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
-        self._read_parameter, self._read_mission, self._alarm = read_parameter, read_mission, alarm
+        self._read_parameters, self._read_mission, self._alarm = read_parameters, read_mission, alarm
         self._script_since_s: float | None = None
         self._most_m_s: float | None = None
         """For which the way that is flown is certified; None: it is a mission's."""
@@ -200,7 +200,7 @@ class Pilot:
 
         async def fly(_: Accepted) -> None:
             nonlocal begun
-            way = await guided_way(vehicle.firmware, self._read_parameter)
+            way = await guided_way(vehicle.firmware, self._read_parameters)
             begun = script = GuidedScript(
                 request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=way.note, feed=way.feed
             )
@@ -379,7 +379,7 @@ class Pilot:
     async def _check_goes_on(self) -> None:
         if self.vehicle.firmware != "ardupilot":
             return
-        if await self._read_parameter(RESTART_PARAMETER):
+        if (await self._read_parameters((RESTART_PARAMETER,)))[RESTART_PARAMETER]:
             what = f"The vehicle would begin its mission again: its parameter {RESTART_PARAMETER} is not 0."
             advice = f"Return home, set {RESTART_PARAMETER} to 0, and start where the flight broke off."
             raise NotAllowedError(what, advice=advice)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ Accepted = Callable[[], None]
 """To be called when the vehicle has taken the order: from then on nobody waits for the rest."""
 Procedure = Callable[[Accepted], Coroutine[Any, Any, None]]
 Spawn = Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]]
+ReadParameters = Callable[[tuple[str, ...]], Awaitable[dict[str, float | None]]]
 SHOWS_S = 3.0
 TRIES = 3
 OPTIONS, STRAIGHT_LEGS = "GUID_OPTIONS", 64
@@ -135,14 +136,17 @@ class GuidedWay:
     note: str = ""
 
 
-async def guided_way(firmware: Firmware, read_parameter: Callable[[str], Awaitable[float | None]]) -> GuidedWay:
+async def guided_way(firmware: Firmware, read_parameters: ReadParameters) -> GuidedWay:
     """What is not known is taken for the worse."""
     if firmware != "ardupilot":
         return GuidedWay()
-    options = await _known(OPTIONS, read_parameter)
+    known: Mapping[str, float | None] = {}
+    with contextlib.suppress(TelemetryError):
+        known = await read_parameters((OPTIONS, TIMEOUT))
+    options = known.get(OPTIONS)
     if options is not None and int(options) & STRAIGHT_LEGS:
         return GuidedWay()
-    silent_s = max(await _known(TIMEOUT, read_parameter) or 0.0, LEAST_SILENT_S)
+    silent_s = max(known.get(TIMEOUT) or 0.0, LEAST_SILENT_S)
     note = (
         "In GUIDED this vehicle shapes height and place apart: it is led along the legs, ten times a second, no faster"
         f" than a link that falls silent for {silent_s:g} s allows."
@@ -150,9 +154,3 @@ async def guided_way(firmware: Firmware, read_parameter: Callable[[str], Awaitab
         " or fly in AUTO."
     )
     return GuidedWay(Feed(silent_s=silent_s), note)
-
-
-async def _known(name: str, read_parameter: Callable[[str], Awaitable[float | None]]) -> float | None:
-    with contextlib.suppress(TelemetryError):
-        return await read_parameter(name)
-    return None

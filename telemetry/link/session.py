@@ -88,7 +88,7 @@ class Session:
             self.vehicle,
             around.flight,
             spawn=around.spawn,
-            read_parameter=self.transfers.read_parameter,
+            read_parameters=self.transfers.read_parameters,
             read_mission=self.transfers.read_back,
             alarm=self._alarm,
         )

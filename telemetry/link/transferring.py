@@ -116,9 +116,6 @@ class Transfers:
         """A download that nobody asked for."""
         return await self.download(own_idea=True)
 
-    async def read_parameter(self, name: str) -> float | None:
-        return (await self.read_parameters((name,)))[name]
-
     async def read_parameters(self, names: tuple[str, ...]) -> dict[str, float | None]:
         vehicle = self._vehicle
         machine = ParameterRead(names, target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)

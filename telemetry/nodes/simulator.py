@@ -84,6 +84,7 @@ def read_options(arguments: Sequence[str] | None = None) -> tuple[SimOptions, Pa
         boot_s=given.boot_s,
         endurance_s=given.endurance_s,
         traffic=given.traffic,
+        parameter_errors=given.parameter_errors,
         parameters=tuple(read_parameter(text) for text in given.parameter),
     )
     return options, given.runtime
@@ -142,6 +143,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--boot-s", type=float, default=default.boot_s, help="until the position is known")
     parser.add_argument("--endurance-s", type=float, default=default.endurance_s, help="of hovering")
     parser.add_argument("--traffic", action="store_true", help="tell of an aircraft that flies past")
+    parser.add_argument(
+        "--parameter-errors", action="store_true", help="say so when it has no such parameter, as newer firmware does"
+    )
     parser.add_argument("--parameter", action="append", default=[], metavar="NAME=VALUE", help="of the autopilot")
     return parser
 

@@ -31,11 +31,18 @@ class Heard:
 class Bench:
     """Keeps its own heartbeat unless told otherwise; ``heard`` holds everything that the vehicle sent to it."""
 
-    def __init__(self, vehicle: SimulatedVehicle | None = None, *, heartbeat: bool = True, **options: Any) -> None:
+    def __init__(
+        self,
+        vehicle: SimulatedVehicle | None = None,
+        *,
+        heartbeat: bool = True,
+        parameter_errors: bool = False,
+        **options: Any,
+    ) -> None:
         options.setdefault("boot_s", 0.5)
         options.setdefault("gnss", "perfect")
         self.vehicle = vehicle or SimulatedVehicle(HOME, **options)
-        self.endpoint = Endpoint(self.vehicle)
+        self.endpoint = Endpoint(self.vehicle, parameter_errors=parameter_errors)
         self.endpoint.connect("gcs")
         self.heard: list[Heard] = []
         self.heartbeat = heartbeat

@@ -44,8 +44,8 @@ class Desk:
         self.flight = FlightKeeper()
         self.tasks: set[asyncio.Task[None]] = set()
 
-        async def no_parameter(_: str) -> float | None:
-            return None
+        async def no_parameters(names: tuple[str, ...]) -> dict[str, float | None]:
+            return dict.fromkeys(names)
 
         async def read_mission() -> OnboardMission:
             mission = self.bench.vehicle.onboard.mission
@@ -57,7 +57,7 @@ class Desk:
             self.bench.vehicle,
             self.flight,
             spawn=self._spawn,
-            read_parameter=no_parameter,
+            read_parameters=no_parameters,
             read_mission=read_mission,
             alarm=self.alarms.append,
         )

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
+from telemetry.mavlink.conversation import Endpoints
 from telemetry.mavlink.parameters.values import parameter_of, same_value, why_not, wire_value
 from telemetry.mavlink.texts import VehicleWords
 from telemetry.topics.parameters import (
@@ -73,7 +74,7 @@ class ParameterWrite:
         self._words.on_message(message)
         if message.get_type() == "PARAM_VALUE" and message.param_id == self._change.name:
             return self._on_value(parameter_of(message, bytewise=self._bytewise), now_s)
-        if message.get_type() == "PARAM_ERROR" and message.param_id == self._change.name:
+        if message.get_type() == "PARAM_ERROR" and self._is_about_ours(message):
             text = _ERRORS.get(message.error, f"The vehicle refuses it (parameter error {message.error}).")
             return self._settle("refused", None if self._before is None else self._before.value, now_s, text)
         return []
@@ -90,6 +91,10 @@ class ParameterWrite:
     @property
     def _change(self) -> ParameterChange:
         return self._changes[len(self._written)]
+
+    def _is_about_ours(self, message: Message) -> bool:
+        """Another station's refusal says nothing of what we asked."""
+        return message.param_id == self._change.name and Endpoints(self._target).is_for_us(message)
 
     @property
     def _stops(self) -> bool:

@@ -61,6 +61,8 @@ class SimOptions:
     """Of hovering."""
     traffic: bool = False
     """Whether its receiver tells of an aircraft that flies past."""
+    parameter_errors: bool = False
+    """Whether it says so when it has no such parameter, as newer firmware does."""
     parameters: tuple[tuple[str, float], ...] = field(default=())
     """Autopilot parameters that differ from its defaults."""
 
@@ -71,7 +73,7 @@ class Simulator:
     def __init__(self, options: SimOptions) -> None:
         self.options = options
         self.vehicle = _vehicle(options)
-        self.endpoint = Endpoint(self.vehicle, traffic=options.traffic)
+        self.endpoint = Endpoint(self.vehicle, traffic=options.traffic, parameter_errors=options.parameter_errors)
         self._channels: dict[Hashable, _Channel] = {}
         self._key: tuple[bytes, int] | None = None
         """With which it signs, and the time that it was given with it."""

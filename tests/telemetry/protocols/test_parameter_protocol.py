@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from tests.telemetry.protocols.station import MAKES, Station
+from tests.telemetry.simulator_bench import Bench
 
 INT32, FLOAT = wire.MAV_PARAM_TYPE_INT32, wire.MAV_PARAM_TYPE_REAL32
 WHOLE = {"ardupilot": ("RTL_ALT", 1500, 4200), "px4": ("RTL_CONE_ANG", 45, 60)}
@@ -201,3 +202,18 @@ def test_a_change_arrives_over_a_link_that_loses_half(make: str) -> None:
             message, "PARAM_VALUE", tell=lambda one, value=value: (one.param_id, value_of(make, one)) == (name, value)
         )
         assert station.bench.vehicle.parameters[name] == value
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_newer_firmware_says_that_it_has_no_such_parameter(make: str) -> None:
+    bench = Bench(make=make, parameter_errors=True)
+    asked = wire.MAVLink_param_request_read_message(1, 1, b"NOT_THERE", -1)
+    beyond = wire.MAVLink_param_request_read_message(1, 1, b"", len(bench.vehicle.parameters))
+    written = wire.MAVLink_param_set_message(1, 1, b"NOT_THERE", 1.0, FLOAT)
+    for message, index in ((asked, -1), (beyond, len(bench.vehicle.parameters)), (written, -1)):
+        (answer,) = bench.send(message, system=254, component=191)
+        assert answer.get_type() == "PARAM_ERROR"
+        assert (answer.param_index, answer.error) == (index, wire.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+        assert (answer.target_system, answer.target_component) == (254, 191)
+    (value,) = bench.send(wire.MAVLink_param_request_read_message(1, 1, WHOLE[make][0].encode(), -1))
+    assert value.get_type() == "PARAM_VALUE"

@@ -20,6 +20,7 @@ from telemetry.simulation.simulator.protocol.dialects import DIALECTS
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
+from telemetry.simulation.simulator.protocol.parameter_errors import parameter_error
 from telemetry.simulation.simulator.protocol.passing_traffic import passing
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
@@ -66,10 +67,11 @@ class Endpoint:
     keeps simulated time.
     """
 
-    def __init__(self, vehicle: SimulatedVehicle, *, traffic: bool = False) -> None:
-        """``traffic``: an aircraft that flies past is told of."""
+    def __init__(self, vehicle: SimulatedVehicle, *, traffic: bool = False, parameter_errors: bool = False) -> None:
+        """``traffic``: an aircraft that flies past is told of. ``parameter_errors``: PARAM_ERROR is sent."""
         self.vehicle = vehicle
         self._traffic = _Stream(TRAFFIC_S, 0.0) if traffic else None
+        self._says_parameter_errors = parameter_errors
         self._pilot = vehicle.autopilot
         self._dialect = dialect = DIALECTS[vehicle.personality.make]
         parts = dialect.parts(vehicle)
@@ -174,6 +176,8 @@ class Endpoint:
         return []
 
     def _on_parameter(self, message: Any, peer: Hashable) -> list[Reply]:
+        if self._says_parameter_errors and (error := parameter_error(message, self.vehicle.parameters)) is not None:
+            return [(peer, error)]
         if message.get_type() != "PARAM_SET":
             return self._parameters.on_message(message, peer)
         return [reply for value in self._parameters.on_set(message) for reply in self._to_all(value)]
