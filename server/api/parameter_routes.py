@@ -7,8 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from server.api.access import ERROR_RESPONSES, Fly, InCharge, answer
+from server.api.access import ERROR_RESPONSES, All, Fly, InCharge, answer
 from server.door.uploads import display_name
+from server.errors import BadRequestError
 from server.flying.parameter_desk import FileFormat
 from server.schemas import ComparedDoc, ParametersDoc, WriteParametersBody, WrittenAnswer
 
@@ -47,6 +48,14 @@ async def save(file: FileFormat, flying: Fly) -> Response:
 async def compare(request: Request, flying: Fly, filename: Filename) -> Response:
     """The vehicle against a file; nothing is written."""
     return answer(await flying.parameters.compared(display_name(filename), await request.body()))
+
+
+@router.post("/compare/{other}", response_model=ComparedDoc)
+async def compare_vehicles(other: int, flying: Fly, fleet: All) -> Response:
+    """The vehicle against another one of this station, which is read anew; nothing is written."""
+    if other == flying.number:
+        raise BadRequestError(f"Vehicle {other} cannot be compared with itself.", advice="Name another one.")
+    return answer(await flying.parameters.compared_with(fleet.of(other).parameters))
 
 
 @router.post("/descriptions", response_model=ParametersDoc, openapi_extra=BYTES)

@@ -37,6 +37,7 @@ from telemetry.parameters.described import Description
 from telemetry.parameters.files import (
     FileParameter,
     is_kept_by_vehicles,
+    is_own_of_each,
     read_parameter_file,
     value_text,
     write_mission_planner,
@@ -142,6 +143,12 @@ class ParameterDesk:
     async def compared(self, name: str, data: bytes) -> ComparedDoc:
         """The vehicle against a file of Mission Planner's, MAVProxy's or QGroundControl's. Raises FormatError."""
         return await asyncio.to_thread(_compared, self._read_before(), name, data)
+
+    async def compared_with(self, other: ParameterDesk) -> ComparedDoc:
+        """Against another vehicle of this station, which is read anew. Raises what the link raises."""
+        ours = self._read_before()
+        await other.read()
+        return await asyncio.to_thread(_compared_vehicles, ours, other._read_before())
 
     async def describe(self, name: str, data: bytes) -> ParametersDoc:
         """Takes the makers' own file for this kind of autopilot. Raises FormatError."""
@@ -255,12 +262,26 @@ def _low_plan(record: PlanRecord) -> LowPlan:
 
 def _compared(read: _Read, name: str, data: bytes) -> ComparedDoc:
     given = read_parameter_file(name, data)
-    theirs = [p for p in given.parameters if not is_kept_by_vehicles(p.name)]
+    same, differences = _differences(read, given.parameters)
+    return ComparedDoc(file=name, same=same, differences=differences, notes=list(given.notes))
+
+
+def _compared_vehicles(ours: _Read, theirs: _Read) -> ComparedDoc:
+    same, differences = _differences(ours, of_vehicle(theirs.parameters.values()))
+    marked = [each.model_copy(update={"own": is_own_of_each(each.name)}) for each in differences]
+    notes: list[str] = []
+    if (ours.state.autopilot, ours.state.firmware_version) != (theirs.state.autopilot, theirs.state.firmware_version):
+        notes.append("The two have different firmware: names and units may differ.")
+    return ComparedDoc(file=theirs.title, is_vehicle=True, same=same, differences=marked, notes=notes)
+
+
+def _differences(read: _Read, given: Sequence[FileParameter]) -> tuple[int, list[DifferenceDoc]]:
+    """How many are the same, and the others; without what vehicles count by themselves."""
+    theirs = [p for p in given if not is_kept_by_vehicles(p.name)]
     ours = [p for p in of_vehicle(read.parameters.values()) if not is_kept_by_vehicles(p.name)]
     made = compare(ours, theirs)
-    differences = [
+    return made.same, [
         *(DifferenceDoc(name=d.name, here=d.here, there=d.there) for d in made.different),
         *(DifferenceDoc(name=p.name, here=p.value, there=None) for p in made.only_here),
         *(DifferenceDoc(name=p.name, here=None, there=p.value) for p in made.only_there),
     ]
-    return ComparedDoc(file=name, same=made.same, differences=differences, notes=list(given.notes))

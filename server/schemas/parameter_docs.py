@@ -86,11 +86,15 @@ class DifferenceDoc(Strict):
     here: float | None
     """On the vehicle; null: it lists no such parameter."""
     there: float | None
-    """In the file; null: it is not in there."""
+    """In the file, or on the other vehicle; null: it is not in there."""
+    own: bool = False
+    """Of one vehicle alone, such as its calibrations: not to be taken from another."""
 
 
 class ComparedDoc(Strict):
     file: str
+    """Its name, or what people call the other vehicle."""
+    is_vehicle: bool = False
     same: int
     differences: list[DifferenceDoc]
     notes: list[str]

@@ -28,6 +28,11 @@ KEPT_BY_VEHICLES = (
     *("STAT_*", "BARO*_GND_PRESS", "GND_ABS_PRESS", "GND_TEMP", "LND_FLIGHT_T_*", "COM_FLIGHT_UUID", "_HASH_CHECK"),
 )
 """What vehicles count and measure by themselves; a file's value would be a lie."""
+OWN_OF_EACH = (
+    *("SYSID_THISMAV", "MAV_SYSID", "MAV_SYS_ID", "BRD_SERIAL_NUM", "COMPASS_*", "INS_*", "AHRS_TRIM_*", "RC[0-9]*"),
+    *("BATT*_MULT", "BATT*_OFFSET", "BATT*_PERVLT", "CAL_*", "SENS_BOARD_*", "SENS_DPRES_OFF", "BAT*_V_DIV"),
+)
+"""A vehicle's number and what its own sensors and sticks were calibrated to: wrong on any other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +58,10 @@ class ParameterFile:
 
 def is_kept_by_vehicles(name: str) -> bool:
     return any(fnmatchcase(name.upper(), pattern) for pattern in KEPT_BY_VEHICLES)
+
+
+def is_own_of_each(name: str) -> bool:
+    return any(fnmatchcase(name.upper(), pattern) for pattern in OWN_OF_EACH)
 
 
 def read_parameter_file(name: str, data: bytes) -> ParameterFile:

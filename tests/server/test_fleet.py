@@ -169,6 +169,24 @@ def test_a_command_goes_to_the_vehicle_that_it_names_and_to_no_other(pair: Stati
     assert pair.until(lambda m: m.type == "fleet" and m.vehicles[1].holder is None).vehicles[0].holder is not None
 
 
+@pytest.mark.xdist_group("real-time")
+@pytest.mark.slow
+def test_parameters_of_two_vehicles_are_compared_and_one_is_set_as_on_the_other(pair: Station) -> None:
+    ok(pair.http.post("/api/parameters/read", headers=BEE))
+    assert ok(pair.http.post("/api/parameters/compare/2", headers=BEE)).json()["differences"] == []
+    change = {"changes": [{"name": "RTL_ALT", "value": 2100}]}
+    ok(pair.http.post("/api/parameters/write", json=change, headers=BEE))
+    made = ok(pair.http.post("/api/parameters/compare/2", headers=BEE)).json()
+    assert made["file"].startswith("Wasp (system 1), ardupilot")
+    assert made["differences"] == [{"name": "RTL_ALT", "here": 2100.0, "there": 1500.0, "own": False}]
+    back = {"changes": [{"name": "RTL_ALT", "value": made["differences"][0]["there"]}]}
+    ok(pair.http.post("/api/parameters/write", json=back, headers=BEE))
+    assert ok(pair.http.post("/api/parameters/compare/2", headers=BEE)).json()["differences"] == []
+    itself = pair.http.post("/api/parameters/compare/1", headers=BEE)
+    assert (itself.status_code, pair.http.post("/api/parameters/compare/3", headers=BEE).status_code) == (422, 404)
+    assert "cannot be compared with itself" in itself.json()["what"]
+
+
 def _wait_ready(page: Station) -> None:
     def is_ready(message: Any) -> bool:
         state = message.state if message.type == "vehicle" else None

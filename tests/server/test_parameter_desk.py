@@ -171,3 +171,35 @@ def test_what_was_saved_compares_as_equal_and_a_change_is_found(tmp_path: Path, 
         assert (difference.name, difference.here, difference.there) == ("RTL_ALT", 1800.0, 1500.0)
 
     run(play())
+
+
+def test_two_vehicles_are_compared_as_they_are_now(tmp_path: Path) -> None:
+    async def play() -> None:
+        bee, wasp = Bench(tmp_path, name="Bee"), Bench(tmp_path, name="Wasp")
+        with pytest.raises(NotReadyError):
+            await bee.desk.compared_with(wasp.desk)
+        await bee.desk.read()
+        await wasp.desk.read()
+        wasp.link.held |= {"RTL_ALT": 1800.0, "COMPASS_OFS_X": 12.0, "MAV_SYSID": 2.0, "STAT_BOOTCNT": 9.0}
+        bee.link.held["MAV_SYSID"] = 1.0
+        await bee.desk.read()
+        made = await bee.desk.compared_with(wasp.desk)
+        assert (made.file, made.is_vehicle, made.same, made.notes) == ("Wasp (system 1), ardupilot 4.6.0", True, 2, [])
+        assert [(d.name, d.here, d.there, d.own) for d in made.differences] == [
+            ("MAV_SYSID", 1.0, 2.0, True),
+            ("RTL_ALT", 1500.0, 1800.0, False),
+            ("COMPASS_OFS_X", None, 12.0, True),
+        ]
+        assert not any(isinstance(asked, WriteParameters) for asked in (*bee.link.asked, *wasp.link.asked))
+
+    run(play())
+
+
+def test_vehicles_with_other_firmware_are_compared_with_a_word_of_caution(tmp_path: Path) -> None:
+    async def play() -> None:
+        bee, wasp = Bench(tmp_path), Bench(tmp_path, replace(QUAD, firmware_version="4.7.0"))
+        await bee.desk.read()
+        (note,) = (await bee.desk.compared_with(wasp.desk)).notes
+        assert "different firmware" in note
+
+    run(play())

@@ -2054,12 +2054,16 @@ export interface DifferenceDoc {
   name: string;
   /** On the vehicle; null: it lists no such parameter. */
   here: number | null;
-  /** In the file; null: it is not in there. */
+  /** In the file, or on the other vehicle; null: it is not in there. */
   there: number | null;
+  /** Of one vehicle alone, such as its calibrations: not to be taken from another. */
+  own: boolean;
 }
 
 export interface ComparedDoc {
+  /** Its name, or what people call the other vehicle. */
   file: string;
+  is_vehicle: boolean;
   same: number;
   differences: DifferenceDoc[];
   notes: string[];

@@ -1,9 +1,9 @@
 import { describe, expect, it, vi } from "vitest";
-import type { ParameterDoc, ParametersDoc } from "../src/messages";
+import type { ComparedDoc, ParameterDoc, ParametersDoc, WrittenDoc } from "../src/messages";
 import { linkStatus } from "./flight_samples";
 
 vi.stubGlobal("location", { protocol: "http:", host: "test", hash: "" });
-const { checkValue, found, outside, parameters } = await import("../src/store/parameters");
+const { checkValue, found, outside, parameters, stillDifferent } = await import("../src/store/parameters");
 const { linkStatus: link } = await import("../src/store/flying");
 
 const one = (fields: Partial<ParameterDoc>) =>
@@ -40,6 +40,19 @@ describe("parameters", () => {
     const ranged = one({ low: 30, high: 3000, unit: "cm" });
     expect(outside(ranged, 30)).toBeNull();
     expect(outside(ranged, 29)).toBe("Its makers recommend 30 to 3000 cm.");
+  });
+
+  it("that were written as there are no difference any more", () => {
+    const differences = [
+      { name: "RTL_ALT", here: 1500, there: 1800 },
+      { name: "WPNAV_SPEED", here: 500, there: 900 },
+      { name: "ONLY_HERE", here: 1, there: null },
+    ];
+    const made = { file: "Wasp", same: 3, differences, notes: [] } as unknown as ComparedDoc;
+    const took = (name: string, asked: number, took: boolean) => ({ name, asked, took }) as WrittenDoc;
+    const now = stillDifferent(made, [took("RTL_ALT", 1800, true), took("WPNAV_SPEED", 900, false)]);
+    expect(now.differences.map(({ name }) => name)).toEqual(["WPNAV_SPEED", "ONLY_HERE"]);
+    expect(now.same).toBe(4);
   });
 
   it("of one vehicle are not shown as another's", () => {

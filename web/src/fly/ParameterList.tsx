@@ -74,13 +74,14 @@ function Compared({ made }: { made: ComparedDoc }) {
         only. {made.notes.join(" ")}
       </p>
       <ul>
-        {made.differences.slice(0, MOST_ROWS).map(({ name, here, there }) => (
+        {made.differences.slice(0, MOST_ROWS).map(({ name, here, there, own }) => (
           <li key={name} class="row wrap">
             <strong>{name}</strong>
             <span>
-              vehicle {here ?? "has none"}, file {there ?? "has none"}
+              vehicle {here ?? "has none"}, {made.is_vehicle ? "the other" : "file"} {there ?? "has none"}
             </span>
-            {here !== null && there !== null && (
+            {own && <span class="muted">of one vehicle alone</span>}
+            {here !== null && there !== null && !own && (
               <Button
                 class="small"
                 disabled={outcomesPending.value || whyNotWrite.value !== null}

@@ -1,10 +1,12 @@
 import { useEffect, useState } from "preact/hooks";
 import { clock } from "../format";
 import type { WrittenDoc } from "../messages";
-import { active } from "../store/fleet";
+import { active, fleet } from "../store/fleet";
 import { adopted } from "../store/flying";
 import {
+  comparingWith,
   compareWith,
+  compareWithVehicle,
   describeBy,
   isReading,
   lookAtParameters,
@@ -56,6 +58,22 @@ const fileOf = (ending: "param" | "params") =>
 const choose = (endings: string, take: (file: File) => Promise<void>) =>
   chooseFiles(endings, (files) => files.slice(0, 1).forEach((file) => void take(file)));
 
+/** The station's other vehicles, where it has some. */
+function Others() {
+  const others = fleet.value.filter(({ number }) => number !== active.value);
+  return others.map(({ number, name, link }) => (
+    <Button
+      key={number}
+      testid={`parameters-compare-${number}`}
+      disabled={comparingWith.value !== null || link !== "live"}
+      title={link === "live" ? "Reads its list anew, and writes nothing" : `${name} is not connected.`}
+      onClick={() => void compareWithVehicle(number)}
+    >
+      {comparingWith.value === number ? `Reading ${name}…` : `Compare with ${name}`}
+    </Button>
+  ));
+}
+
 function Files() {
   return (
     <div class="row wrap">
@@ -73,6 +91,7 @@ function Files() {
         >
           Compare with a file…
         </Button>
+        <Others />
         <Button
           icon="help"
           testid="parameters-describe"

@@ -14,6 +14,8 @@ const READ_LIMIT_MS = 600_000;
 /** As this page last heard of them; null: not read. */
 export const parameters = signal<ParametersDoc | null>(null);
 export const compared = signal<ComparedDoc | null>(null);
+/** Number of the vehicle whose list is read to be compared. */
+export const comparingWith = signal<number | null>(null);
 export const written = signal<readonly WrittenDoc[]>([]);
 /** Numbers of the vehicles whose list this page waits for. */
 const reading = signal<ReadonlySet<number>>(new Set());
@@ -68,6 +70,7 @@ export async function writeParameter(name: string, value: number): Promise<void>
   const came = (await answer.json()) as WrittenAnswer;
   if (!isStill()) return;
   parameters.value = came.now;
+  if (compared.value) compared.value = stillDifferent(compared.value, came.written);
   written.value = [...came.written, ...written.value.filter((one) => one.name !== name)];
 }
 
@@ -85,6 +88,33 @@ export async function compareWith(file: File): Promise<void> {
   const isStill = stillOf();
   const doc = await sendTo<ComparedDoc>("/api/parameters/compare", file);
   if (isStill()) compared.value = doc;
+}
+
+/** Its list is read anew: what it held before may not be so any more. */
+export async function compareWithVehicle(other: number): Promise<void> {
+  const isStill = stillOf();
+  comparingWith.value = other;
+  setError(PARAMETERS, null);
+  try {
+    const doc = await requestJson<ComparedDoc>(
+      "POST",
+      `/api/parameters/compare/${other}`,
+      {},
+      { limit_ms: READ_LIMIT_MS },
+    );
+    if (isStill()) compared.value = doc;
+  } catch (error) {
+    if (isStill()) setError(PARAMETERS, asErrorDoc(error));
+  } finally {
+    comparingWith.value = null;
+  }
+}
+
+/** Without the rows that are as asked by now. */
+export function stillDifferent(made: ComparedDoc, written: readonly WrittenDoc[]): ComparedDoc {
+  const taken = new Map(written.filter((one) => one.took).map((one) => [one.name, one.asked]));
+  const left = made.differences.filter(({ name, there }) => there === null || taken.get(name) !== there);
+  return { ...made, same: made.same + made.differences.length - left.length, differences: left };
 }
 
 export async function describeBy(file: File): Promise<void> {
