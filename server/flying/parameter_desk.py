@@ -213,17 +213,23 @@ def _parameter(parameter: Parameter, about: Description) -> ParameterDoc:
         unit=about.unit,
         low=about.low,
         high=about.high,
-        default=about.default,
+        default=_default(parameter, about),
         meaning="" if value is None else about.meaning(value),
         reboot=about.reboot,
         changed=_is_changed(parameter, about),
     )
 
 
+def _default(parameter: Parameter, about: Description) -> float | None:
+    """The vehicle knows its own; the makers' file may be of another version."""
+    return about.default if parameter.default is None else parameter.default
+
+
 def _is_changed(parameter: Parameter, about: Description) -> bool:
-    if about.default is None or parameter.value is None:
+    held = _default(parameter, about)
+    if held is None or parameter.value is None:
         return False
-    default = FileParameter(parameter.name, about.default, 0, parameter.kind)
+    default = FileParameter(parameter.name, held, 0, parameter.kind)
     return not compare(of_vehicle((parameter,)), [default]).is_equal
 
 

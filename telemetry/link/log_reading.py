@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -12,6 +13,7 @@ from telemetry.mavlink.logs.ftp.listing import FtpList
 from telemetry.mavlink.logs.ftp.log_files import FOLDERS, file_of_each
 from telemetry.mavlink.logs.ftp.questions import Numbers
 from telemetry.mavlink.logs.ftp.reading import FtpRead
+from telemetry.mavlink.logs.ftp.whole import FtpReadWhole
 from telemetry.mavlink.logs.listing import LogListRead
 from telemetry.mavlink.logs.on_the_ground import refuse_in_flight
 from telemetry.mavlink.logs.reading import LogRead
@@ -19,6 +21,8 @@ from telemetry.topics.requests import ReadVehicleLog
 from telemetry.topics.vehicle_logs import MOST_BYTES, VehicleLog
 
 INFO = 6
+SAYS_S = 1.5
+"""It is asked what it can as soon as it is adopted."""
 
 
 class LogReading:
@@ -63,6 +67,21 @@ class LogReading:
                 )
             assert isinstance(content, bytes)
             return content
+
+    async def whole_file(self, path: str, *, most_bytes: int) -> bytes | None:
+        """Another file than a log, to its end. None: not while a log is read or the vehicle is armed, or it has no
+        MAVLink FTP. Raises RefusedError, SilentError, TransferError, NotAllowedError."""
+        with contextlib.suppress(SilentError):
+            says = lambda _: self._vehicle.capabilities is not None  # noqa: E731
+            await self._vehicle.wait_until(says, timeout_s=SAYS_S, what="say what it can")
+        has_ftp = (self._vehicle.capabilities or 0) & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+        if not has_ftp or self._reading.locked() or self._vehicle.state.armed:
+            return None
+        async with self._reading:
+            target = self._vehicle.target
+            content = await self._run(FtpReadWhole(path, most_bytes=most_bytes, target=target, numbers=self._numbers))
+        assert isinstance(content, bytes)
+        return content
 
     def give_way(self) -> None:
         """Something that a flight needs is about to be transferred."""

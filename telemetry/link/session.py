@@ -81,9 +81,7 @@ class Session:
         )
         self.vehicle = AdoptedVehicle(candidate, line, telling, time.monotonic, flies=around.flight.is_under_way)
         self.logs = LogReading(self.vehicle)
-        self.transfers = Transfers(
-            self.vehicle, lambda status: around.publish(Topic.TRANSFER, status), begins=self.logs.give_way
-        )
+        self.transfers = Transfers(self.vehicle, lambda status: around.publish(Topic.TRANSFER, status), self.logs)
         self.pilot = Pilot(
             self.vehicle,
             around.flight,

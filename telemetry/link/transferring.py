@@ -8,11 +8,13 @@ import time
 from collections.abc import Callable
 from typing import Literal
 
-from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.errors import NotAllowedError, RefusedError, SilentError, TelemetryError, TransferError
 from telemetry.link.adopted import AdoptedVehicle
+from telemetry.link.log_reading import INFO, LogReading
 from telemetry.mavlink.actions import Progress
 from telemetry.mavlink.conversation import PLACE_LISTS
 from telemetry.mavlink.download import MissionDownload
+from telemetry.mavlink.parameters import packed
 from telemetry.mavlink.parameters.listing import ParameterListRead
 from telemetry.mavlink.parameters.reading import ParameterRead
 from telemetry.mavlink.parameters.writing import ParameterWrite
@@ -27,11 +29,11 @@ Phase = Literal["sending", "reading_back", "done", "failed"]
 
 
 class Transfers:
-    def __init__(
-        self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None], *, begins: Callable[[], None]
-    ) -> None:
-        """``begins`` is called before each transfer of a mission, fence or rally points."""
-        self._vehicle, self._tell, self._begins = vehicle, tell, begins
+    def __init__(self, vehicle: AdoptedVehicle, tell: Callable[[TransferStatus], None], files: LogReading) -> None:
+        """``files`` gives way before each transfer of a mission, fence or rally points."""
+        self._vehicle, self._tell, self._files = vehicle, tell, files
+        self._has_packed = True
+        """As far as known."""
         self._machine: MissionUpload | MissionDownload | None = None
         self._own_idea: MissionDownload | None = None
         """The newest download that nobody asked for."""
@@ -125,12 +127,29 @@ class Transfers:
         return values
 
     async def list_parameters(self) -> ParameterList:
+        """From its file of all of them where an ArduPilot has one, else one by one."""
         vehicle = self._vehicle
-        machine = ParameterListRead(target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
-        found = await vehicle.exchanges.run(machine)
+        found = await self._packed_list() if vehicle.state.autopilot == "ardupilot" else None
+        if found is None:
+            machine = ParameterListRead(target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
+            found = await vehicle.exchanges.run(machine)
         assert isinstance(found, ParameterList)
         vehicle.onboard.fence.take({each.name: each.value for each in found.parameters})
         return found
+
+    async def _packed_list(self) -> ParameterList | None:
+        """None: it has no such file, which is told once."""
+        if not self._has_packed:
+            return None
+        try:
+            content = await self._files.whole_file(packed.PATH, most_bytes=packed.MOST_BYTES)
+            if content is None:
+                return None
+            return ParameterList(await asyncio.to_thread(packed.read_packed, content))
+        except (RefusedError, SilentError, TransferError, NotAllowedError) as error:
+            self._has_packed = isinstance(error, NotAllowedError)
+            self._vehicle.tell(INFO, f"Parameters are read one by one, not as a file. {error.what}")
+            return None
 
     async def write_parameters(
         self, changes: tuple[ParameterChange, ...], *, even_armed: bool
@@ -163,7 +182,7 @@ class Transfers:
     async def _run(
         self, machine: MissionUpload | MissionDownload, direction: Literal["upload", "download"], total: int
     ) -> object:
-        self._begins()
+        self._files.give_way()
         self._machine, last = machine, Progress("sending" if direction == "upload" else "reading_back", 0, total)
 
         def progress(news: Progress) -> None:

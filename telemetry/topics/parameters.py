@@ -32,6 +32,8 @@ class Parameter:
     """None: what the vehicle sent is no number."""
     kind: int = REAL32
     """MAV_PARAM_TYPE"""
+    default: float | None = None
+    """Of its firmware, where the vehicle says it."""
 
 
 @dataclass(frozen=True, slots=True)

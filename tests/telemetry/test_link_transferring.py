@@ -43,7 +43,8 @@ class Exchanges:
 def bench() -> tuple[Transfers, Exchanges, list[TransferStatus]]:
     exchanges, told = Exchanges(), []
     vehicle = SimpleNamespace(firmware="ardupilot", target=(1, 1), exchanges=exchanges, onboard=OnBoard())
-    return Transfers(cast(Any, vehicle), told.append, begins=lambda: None), exchanges, told
+    files = SimpleNamespace(give_way=lambda: None)
+    return Transfers(cast(Any, vehicle), told.append, cast(Any, files)), exchanges, told
 
 
 def test_an_upload_that_pushes_a_read_back_aside_is_told_of_and_is_not_pushed_aside_itself() -> None:

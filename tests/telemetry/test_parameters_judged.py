@@ -62,6 +62,8 @@ def test_hedgehop_reads_and_writes_what_pymavlink_reads(tmp_path: Path) -> None:
             before = judged(station)
         listed, written, words = asyncio.run(ours(port))
         assert {p.name: p.value for p in listed.parameters} == dict(before)
+        # Only the file of all parameters says the defaults.
+        assert {p.name: p.default for p in listed.parameters} == {name: spec.default for name, spec in SPECS.items()}
         assert len(before) == len(SPECS)
         assert [(w.name, w.before, w.after, w.outcome) for w in written] == [
             ("RTL_ALT", 1500.0, 4000.0, "set"),

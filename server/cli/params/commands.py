@@ -67,7 +67,8 @@ def get(
     link: o.Link,
     search: Annotated[str | None, Option(metavar="TEXT", help="Only those whose name or description has this.")] = None,
     changed: Annotated[
-        bool, Option("--changed", help="Only those that differ from the default, where descriptions have it (PX4's).")
+        bool,
+        Option("--changed", help="Only those that differ from the default, as far as it is known."),
     ] = False,
     about: About = None,
     data_dir: o.Keys = None,
@@ -77,7 +78,7 @@ def get(
     parse_address(link)
     wanted = [name.upper() for name in names or ()]
     title, parameters, described = asyncio.run(_read(link, data_dir, about, wanted, whole=bool(search) or changed))
-    if changed and not any(d.default is not None for d in described.values()):
+    if changed and not any(known.default is not None for known in (*parameters, *described.values())):
         advice = "Compare with a file instead, or give PX4's parameters.json with --about."
         raise ParameterError("The defaults are not known.", where="--changed", advice=advice)
     found = [
@@ -101,7 +102,9 @@ def _is_found(name: str, text: str, described: Descriptions) -> bool:
 
 
 def _is_changed(parameter: Parameter, described: Descriptions) -> bool:
-    default = described[parameter.name].default if parameter.name in described else None
+    default = parameter.default
+    if default is None and parameter.name in described:
+        default = described[parameter.name].default
     if default is None or parameter.value is None:
         return False
     ours = of_vehicle((parameter,))

@@ -76,9 +76,13 @@ class FtpRead:
         if len(heard.data) < 4:
             what = f"The vehicle does not say how large {self._path} is."
             return self._fail(TransferError(what, advice="Read it another way."))
-        size = max(0, min(self._size, int.from_bytes(heard.data[:4], "little") - self._offset))
+        size = self._size_to_read(int.from_bytes(heard.data[:4], "little"))
         self._content, self._has = bytearray(size), bytearray(size)
         return self._burst(now_s) if size else self._close(now_s)
+
+    def _size_to_read(self, said: int) -> int:
+        """Of a file that is so large, as the vehicle says."""
+        return max(0, min(self._size, said - self._offset))
 
     def _on_refusal(self, heard: FtpPayload, now_s: float) -> list[Action]:
         if heard.answers == Opcode.BURST_READ_FILE:

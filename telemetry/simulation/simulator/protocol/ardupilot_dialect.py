@@ -12,6 +12,7 @@ from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parame
 from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS, Commands
 from telemetry.simulation.simulator.protocol.dialect import Dialect, Parts
+from telemetry.simulation.simulator.protocol.made_files import ardupilot_file
 from telemetry.simulation.simulator.protocol.message_streams import FIRMWARE, ArduStreams
 from telemetry.simulation.simulator.protocol.mission_protocol import MissionProtocol
 from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterProtocol
@@ -35,4 +36,4 @@ def _hears(parameters: Parameters, heartbeat: Any) -> bool:
     return heartbeat.get_srcSystem() == parameters["MAV_GCS_SYSID"]
 
 
-ARDUPILOT = Dialect(_parts, MODE_NUMBERS, FIRMWARE, _text, _hears)
+ARDUPILOT = Dialect(_parts, MODE_NUMBERS, FIRMWARE, _text, _hears, made_file=ardupilot_file)

@@ -12,6 +12,7 @@ from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parame
 from telemetry.simulation.simulator.autopilot.pilot import Event, Text
 from telemetry.simulation.simulator.protocol.command_protocol import ReceivedOrder
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
+from telemetry.simulation.simulator.protocol.made_files import MadeFile
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 
@@ -78,3 +79,5 @@ class Dialect:
     unknown_message: int = 4
     keeps_logs: bool = True
     log_folder: str = "/APM/LOGS"
+    made_file: Callable[[Parameters, str], MadeFile | None] = lambda *_: None
+    """By its path; None: there is none."""

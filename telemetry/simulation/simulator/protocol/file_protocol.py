@@ -1,14 +1,16 @@
-"""The vehicle's files for ground stations, by MAVLink FTP as ArduPilot speaks it: its logs, to be read only."""
+"""The vehicle's files for ground stations, by MAVLink FTP as ArduPilot speaks it: its logs, and what it makes when
+it is read. Nothing is written."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any
 
 from telemetry.mavlink.logs.ftp.payload import MOST_DATA, NUMBERS, FtpPayload, Nak, Opcode, read_payload
 from telemetry.simulation.simulator.own_log import OwnLogs
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
+from telemetry.simulation.simulator.protocol.made_files import MadeFile
 
 EVERY_S, BLOCKS = 0.02, 20
 BURST = 100
@@ -34,9 +36,9 @@ class _Session:
 
 
 class FileProtocol:
-    def __init__(self, own: OwnLogs, folder: str) -> None:
-        """``folder``: where the logs lie."""
-        self._own, self._folder = own, folder
+    def __init__(self, own: OwnLogs, folder: str, made: Callable[[str], MadeFile | None] = lambda _: None) -> None:
+        """``folder``: where the logs lie. ``made``: files that are made when they are opened, by their paths."""
+        self._own, self._folder, self._made = own, folder, made
         self._sessions: dict[tuple[Hashable, int], _Session] = {}
         """By station and the number that it opened the file with."""
         self._last: dict[Hashable, tuple[FtpPayload, FtpPayload]] = {}
@@ -115,13 +117,17 @@ class FileProtocol:
         return out
 
     def _open(self, asked: FtpPayload, peer: Hashable, to: tuple[int, int]) -> FtpPayload:
-        content = self._files().get(_path(asked))
-        if content is None:
+        file = self._file(_path(asked))
+        if file is None:
             return _nak(asked, Nak.FILE_NOT_FOUND)
         if (peer, asked.session) in self._sessions or len(self._sessions) >= MOST_SESSIONS:
             return _nak(asked, Nak.NO_SESSIONS_AVAILABLE)
-        self._sessions[peer, asked.session] = _Session(peer, to, bytes(content))
-        return _ack(asked, len(content).to_bytes(4, "little"))
+        self._sessions[peer, asked.session] = _Session(peer, to, file.content)
+        return _ack(asked, file.said_bytes.to_bytes(4, "little"))
+
+    def _file(self, path: str) -> MadeFile | None:
+        log = self._files().get(path)
+        return self._made(path) if log is None else MadeFile(bytes(log), len(log))
 
     def _list(self, asked: FtpPayload) -> FtpPayload:
         entries = self._entries(_path(asked))

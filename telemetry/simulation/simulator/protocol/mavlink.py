@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
@@ -80,7 +81,7 @@ class Endpoint:
         self._events = parts.events
         self._own_logs = OwnLogs(vehicle, dialect.mode_numbers, dialect.firmware, are_kept=dialect.keeps_logs)
         self._logs = LogProtocol(vehicle, self._own_logs)
-        self._files = FileProtocol(self._own_logs, dialect.log_folder)
+        self._files = FileProtocol(self._own_logs, dialect.log_folder, partial(dialect.made_file, vehicle.parameters))
         self._peers: dict[Hashable, _Peer] = {}
         self._news: list[tuple[float, Reply]] = []
         """That the other ground stations have not heard yet, and when they will."""
