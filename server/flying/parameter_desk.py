@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -12,10 +13,17 @@ from pathlib import Path
 from typing import Literal
 
 from planning.basics.plan_model import Firmware
+from planning.errors import FormatError
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
 from server.errors import ConflictError, NotReadyError
-from server.flying.descriptions import keep_descriptions, kept_descriptions
+from server.flying.descriptions import (
+    keep_descriptions,
+    keep_vehicle_descriptions,
+    kept_descriptions,
+    known_crcs,
+    vehicle_descriptions,
+)
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
 from server.schemas.parameter_docs import (
@@ -29,7 +37,7 @@ from server.schemas.parameter_docs import (
     WrittenDoc,
 )
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import NotAllowedError, NoVehicleError
+from telemetry.errors import NotAllowedError, NoVehicleError, TelemetryError
 from telemetry.flight.low_flight.low_plan import LowPlan, low_plan
 from telemetry.flight.low_flight.review import MULTIROTORS, review_settings
 from telemetry.parameters.comparing import compare, of_vehicle
@@ -45,11 +53,12 @@ from telemetry.parameters.files import (
 )
 from telemetry.topics.messages import PlanRecord
 from telemetry.topics.parameters import WHOLE_RANGES, Parameter, ParameterChange, ParameterWritten
-from telemetry.topics.requests import ListParameters, Operator, WriteParameters
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.requests import ListParameters, Operator, ReadMetadata, WriteParameters
+from telemetry.topics.vehicle import Autopilot, VehicleState
 
 FileFormat = Literal["vehicle.param", "vehicle.params"]
 _NONE = Description()
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +110,9 @@ class ParameterDesk:
         if self._vehicle()[0] != vehicle:
             raise ConflictError("Another vehicle was adopted meanwhile.", advice="Read the parameters again.")
         described, _ = await asyncio.to_thread(kept_descriptions, self._root, state.autopilot)
+        described |= await self._own_descriptions(state.autopilot)
+        if self._vehicle()[0] != vehicle:
+            raise ConflictError("Another vehicle was adopted meanwhile.", advice="Read the parameters again.")
         self._kept = _Read(vehicle, _title(state, self._name), state, listed.by_name(), described, time.time())
         return await self.doc()
 
@@ -154,8 +166,22 @@ class ParameterDesk:
         """Takes the makers' own file for this kind of autopilot. Raises FormatError."""
         autopilot = self._read_before().state.autopilot
         described = await asyncio.to_thread(keep_descriptions, self._root, autopilot, name, data)
+        described |= await self._own_descriptions(autopilot)
         self._kept = replace(self._read_before(), described=described)
         return await self.doc()
+
+    async def _own_descriptions(self, autopilot: Autopilot) -> dict[str, Description]:
+        """What the vehicle says of its own parameters: it goes before the makers' file, which may be of another
+        version. Empty where it says nothing, or nothing that can be used."""
+        known = await asyncio.to_thread(known_crcs, self._root, autopilot)
+        try:
+            found = await self._link.call(ReadMetadata(known))
+            if not found.content:
+                return await asyncio.to_thread(vehicle_descriptions, self._root, autopilot, found.crc)
+            return await asyncio.to_thread(keep_vehicle_descriptions, self._root, autopilot, found.crc, found.content)
+        except (TelemetryError, FormatError, OSError) as error:
+            _log.info("The vehicle's own description of its parameters is not used: %s", error)
+            return {}
 
     def _vehicle(self) -> tuple[str, VehicleState]:
         vehicle, state = self._aboard.vehicle, self._live.state

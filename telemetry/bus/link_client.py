@@ -13,7 +13,7 @@ from telemetry.bus.liveness import Liveness
 from telemetry.bus.node_lock import running_node, silence_counts
 from telemetry.errors import BusError, OvertakenError
 from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
-from telemetry.topics.parameters import ParameterList, ParameterWritten
+from telemetry.topics.parameters import ParameterList, ParameterWritten, VehicleMetadata
 from telemetry.topics.requests import (
     Connect,
     Download,
@@ -25,6 +25,7 @@ from telemetry.topics.requests import (
     ListVehicleLogs,
     Looks,
     Operator,
+    ReadMetadata,
     ReadParameters,
     ReadVehicleLog,
     StartAuto,
@@ -57,6 +58,7 @@ _ANSWERS: dict[type, Any] = {
     DownloadPlaces: tuple[Item, ...],
     ReadParameters: dict[str, float | None],
     ListParameters: ParameterList,
+    ReadMetadata: VehicleMetadata,
     WriteParameters: tuple[ParameterWritten, ...],
     ListVehicleLogs: tuple[VehicleLog, ...],
     ReadVehicleLog: bytes,
@@ -81,6 +83,8 @@ class LinkClient:
     async def call(self, request: ReadParameters) -> dict[str, float | None]: ...
     @overload
     async def call(self, request: ListParameters) -> ParameterList: ...
+    @overload
+    async def call(self, request: ReadMetadata) -> VehicleMetadata: ...
     @overload
     async def call(self, request: WriteParameters) -> tuple[ParameterWritten, ...]: ...
     @overload
@@ -138,7 +142,7 @@ def _patience_s(request: LinkRequest) -> float:
         return UPLOAD_S + UPLOAD_PER_ITEM_S * len(request.items)
     if isinstance(request, Download | DownloadPlaces):
         return DOWNLOAD_S
-    if isinstance(request, ListParameters):
+    if isinstance(request, ListParameters | ReadMetadata):
         return LIST_S
     if isinstance(request, ListVehicleLogs | ReadVehicleLog):
         return LOGS_S

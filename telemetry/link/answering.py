@@ -89,6 +89,7 @@ class Answering:
             requests.DownloadPlaces: self._download_places,
             requests.ReadParameters: self._read_parameters,
             requests.ListParameters: self._list_parameters,
+            requests.ReadMetadata: self._read_metadata,
             requests.WriteParameters: self._write_parameters,
             requests.ListVehicleLogs: self._list_logs,
             requests.ReadVehicleLog: self._read_log,
@@ -204,6 +205,9 @@ class Answering:
     async def _list_parameters(self, request: requests.ListParameters) -> object:
         del request
         return await self._link.need_session().transfers.list_parameters()
+
+    async def _read_metadata(self, request: requests.ReadMetadata) -> object:
+        return await self._link.need_session().transfers.read_metadata(request.known_crcs)
 
     async def _write_parameters(self, request: requests.WriteParameters) -> object:
         session, changes = self._link.need_session(), request.changes

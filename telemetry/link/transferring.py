@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Literal
 
+from planning.errors import FormatError
 from telemetry.errors import NotAllowedError, RefusedError, SilentError, TelemetryError, TransferError
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.log_reading import INFO, LogReading
@@ -16,12 +17,14 @@ from telemetry.mavlink.conversation import PLACE_LISTS
 from telemetry.mavlink.download import MissionDownload
 from telemetry.mavlink.parameters import packed
 from telemetry.mavlink.parameters.listing import ParameterListRead
+from telemetry.mavlink.parameters.metadata import MetadataAsk
 from telemetry.mavlink.parameters.reading import ParameterRead
 from telemetry.mavlink.parameters.writing import ParameterWrite
 from telemetry.mavlink.upload import MissionUpload
+from telemetry.parameters.vehicle_metadata import MOST_FILE_BYTES, check_crc, parameter_file, path_of
 from telemetry.topics.messages import ErrorInfo, TransferStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission, PlaceList, UploadReport
-from telemetry.topics.parameters import ParameterChange, ParameterList, ParameterWritten
+from telemetry.topics.parameters import ParameterChange, ParameterList, ParameterWritten, VehicleMetadata
 from telemetry.topics.requests import Upload, UploadPlaces
 
 TELL_EVERY_S = 0.05
@@ -150,6 +153,28 @@ class Transfers:
             self._has_packed = isinstance(error, NotAllowedError)
             self._vehicle.tell(INFO, f"Parameters are read one by one, not as a file. {error.what}")
             return None
+
+    async def read_metadata(self, known_crcs: tuple[int, ...]) -> VehicleMetadata:
+        """Without content where its CRC is known. Raises TelemetryError."""
+        announced = await self._vehicle.exchanges.run(MetadataAsk(target=self._vehicle.target))
+        assert isinstance(announced, tuple)
+        uri, crc = announced
+        if crc in known_crcs:
+            return VehicleMetadata(crc, b"")
+        try:
+            general = await self._file(uri, crc)
+            uri, its_crc = await asyncio.to_thread(parameter_file, general)
+            return VehicleMetadata(crc, await self._file(uri, its_crc))
+        except FormatError as error:
+            raise TransferError(error.what, where=error.where, advice=error.advice) from None
+
+    async def _file(self, uri: str, crc: int | None) -> bytes:
+        path = path_of(uri)
+        content = await self._files.whole_file(path, most_bytes=MOST_FILE_BYTES)
+        if content is None:
+            raise RefusedError(f"The vehicle does not give {path} now.", advice="Read it while it is on the ground.")
+        await asyncio.to_thread(check_crc, path, content, crc)
+        return content
 
     async def write_parameters(
         self, changes: tuple[ParameterChange, ...], *, even_armed: bool

@@ -1,10 +1,11 @@
 """What the autopilot's makers say of its parameters, from a file that the user has: ArduPilot's apm.pdef.xml, or PX4's
-parameters.json, also packed (.xz). None of it comes with Hedgehop."""
+parameters.json, also packed (.xz, .gz). None of it comes with Hedgehop."""
 
 from __future__ import annotations
 
 import lzma
 import math
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast
@@ -14,7 +15,9 @@ from planning.errors import FormatError
 from planning.formats.kml_reader import read_xml
 from planning.formats.safe_text import MAX_BYTES, clean_name, decode_text, load_json
 
-_XZ = b"\xfd7zXZ\x00"
+_XZ, _GZ = b"\xfd7zXZ\x00", b"\x1f\x8b"
+_GZ_ONLY = 31
+"""zlib: the largest window, and a header as gzip has it."""
 _ADVICE = "Give ArduPilot's apm.pdef.xml, or PX4's parameters.json or parameters.json.xz."
 MOST_WORDS = 4000
 """Characters of one text."""
@@ -55,18 +58,21 @@ class Description:
 def read_descriptions(name: str, data: bytes) -> dict[str, Description]:
     """By the parameters' names. Raises FormatError."""
     file = clean_name(name)
-    data = _unpacked(file, data) if data.startswith(_XZ) else data
+    data = unpacked(file, data)
     found = dict(_of_px4(file, data) if data.lstrip()[:1] == b"{" else _of_ardupilot(file, data))
     if not found:
         raise FormatError("The file describes no parameters.", where=file, advice=_ADVICE)
     return found
 
 
-def _unpacked(file: str, data: bytes) -> bytes:
+def unpacked(file: str, data: bytes) -> bytes:
+    """Of .xz and .gz; others as they are. Raises FormatError for one that is damaged or unpacks to too much."""
+    if not data.startswith((_XZ, _GZ)):
+        return data
     try:
-        unpacking = lzma.LZMADecompressor(memlimit=1 << 27)
+        unpacking = lzma.LZMADecompressor(memlimit=1 << 27) if data.startswith(_XZ) else zlib.decompressobj(_GZ_ONLY)
         text = unpacking.decompress(data, MAX_BYTES + 1)
-    except lzma.LZMAError:
+    except (lzma.LZMAError, zlib.error):
         raise FormatError("The archive is corrupt.", where=file, advice=_ADVICE) from None
     if len(text) > MAX_BYTES:
         raise FormatError(f"The file unpacks to more than {MAX_BYTES} bytes.", where=file, advice=_ADVICE)

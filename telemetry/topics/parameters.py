@@ -47,6 +47,16 @@ class ParameterList:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleMetadata:
+    """The vehicle's own description of its parameters."""
+
+    crc: int
+    """CRC-32 of the file that leads to it: the same one means the same description."""
+    content: bytes
+    """As it lies on the vehicle; empty where it was known before."""
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterChange:
     name: str
     value: float

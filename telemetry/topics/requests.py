@@ -142,6 +142,13 @@ class ListParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadMetadata:
+    """-> VehicleMetadata, without content where its CRC is among the known ones; RefusedError: the vehicle has none"""
+
+    known_crcs: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class WriteParameters(OperatorRequest):
     """Writes one after the other and reads each back. -> tuple[ParameterWritten, ...], in their order
 
@@ -326,7 +333,7 @@ class FlyRest(OperatorRequest):
     targets: tuple[GuidedTarget, ...]
 
 
-Looks = ReadParameters | ListParameters | HighestToken
+Looks = ReadParameters | ListParameters | ReadMetadata | HighestToken
 """Requests to the link that change nothing: anybody may ask them."""
 LinkRequest = (
     Connect
@@ -341,6 +348,7 @@ LinkRequest = (
     | DownloadPlaces
     | ReadParameters
     | ListParameters
+    | ReadMetadata
     | WriteParameters
     | ListVehicleLogs
     | ReadVehicleLog

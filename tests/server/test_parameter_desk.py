@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,11 +14,12 @@ import pytest
 
 from planning.errors import FormatError
 from server.errors import NotReadyError
+from server.flying.descriptions import MOST_KEPT, known_crcs
 from server.flying.parameter_desk import ParameterDesk
 from server.schemas.parameter_docs import FindingDoc, ParameterChangeDoc, ParametersDoc
-from telemetry.errors import NotAllowedError, NoVehicleError
-from telemetry.topics.parameters import Parameter, ParameterList, ParameterWritten
-from telemetry.topics.requests import ListParameters, Operator, WriteParameters
+from telemetry.errors import NotAllowedError, NoVehicleError, RefusedError
+from telemetry.topics.parameters import Parameter, ParameterList, ParameterWritten, VehicleMetadata
+from telemetry.topics.requests import ListParameters, Operator, ReadMetadata, WriteParameters
 from telemetry.topics.vehicle import VehicleState
 
 ME = Operator("Anna", 7)
@@ -31,6 +34,7 @@ class Link:
     def __init__(self) -> None:
         self.held = {"FS_GCS_ENABLE": 0.0, "RTL_ALT": 1500.0, "WPNAV_SPEED": 500.0}
         self.armed = False
+        self.own: VehicleMetadata | None = None
         self.asked: list[Any] = []
 
     async def call(self, request: Any) -> Any:
@@ -38,6 +42,10 @@ class Link:
         if isinstance(request, ListParameters):
             kinds = {"FS_GCS_ENABLE": 2}
             return ParameterList(tuple(Parameter(n, v, kinds.get(n, 9)) for n, v in self.held.items()))
+        if isinstance(request, ReadMetadata):
+            if self.own is None:
+                raise RefusedError("The vehicle has no description of itself.", advice="")
+            return self.own if self.own.crc not in request.known_crcs else VehicleMetadata(self.own.crc, b"")
         assert isinstance(request, WriteParameters)
         assert not request.even_armed
         if self.armed:
@@ -201,5 +209,30 @@ def test_vehicles_with_other_firmware_are_compared_with_a_word_of_caution(tmp_pa
         await bee.desk.read()
         (note,) = (await bee.desk.compared_with(wasp.desk)).notes
         assert "different firmware" in note
+
+    run(play())
+
+
+def test_what_the_vehicle_says_of_itself_goes_before_the_makers_file_and_is_kept(tmp_path: Path) -> None:
+    def own(crc: int, words: str) -> VehicleMetadata:
+        entry = {"name": "RTL_ALT", "shortDesc": words, "units": "m", "default": 1500}
+        return VehicleMetadata(crc, gzip.compress(json.dumps({"parameters": [entry]}).encode()))
+
+    async def play() -> None:
+        bench = Bench(tmp_path)
+        await bench.desk.read()
+        await bench.desk.describe("apm.pdef.xml", PDEF)
+        bench.link.own = own(5, "Its own words")
+        for _ in range(2):  # the second time it is found by its CRC
+            rtl = next(p for p in (await bench.desk.read()).parameters if p.name == "RTL_ALT")
+            assert (rtl.title, rtl.unit, rtl.changed) == ("Its own words", "m", False)
+        assert bench.link.asked[-1].known_crcs == (5,)
+        bench.link.own = VehicleMetadata(6, b"no description")
+        rtl = next(p for p in (await bench.desk.read()).parameters if p.name == "RTL_ALT")
+        assert rtl.title == "Return altitude"
+        for crc in range(10, 10 + 2 * MOST_KEPT):
+            bench.link.own = own(crc, "Other firmware")
+            await bench.desk.read()
+        assert len(known_crcs(tmp_path, "ardupilot")) == MOST_KEPT
 
     run(play())

@@ -1,4 +1,5 @@
-"""The four messages of MAVLink's events interface, which pymavlink's dialects do not have: importing adds them.
+"""The messages of MAVLink's events interface and of its component metadata, which pymavlink's dialect does not have:
+importing adds them.
 
 Numbers, order of fields and seeds of the checksum are those of MAVLink's common set.
 """
@@ -96,5 +97,11 @@ ResponseEventError = _added(
         "reason": BYTE,
     },
 )
+ComponentMetadata = _added(
+    397,
+    "COMPONENT_METADATA",
+    182,
+    {"time_boot_ms": LONG, "file_crc": LONG, "uri": ("uint8_t", 100)},
+)
 KNOWN_MESSAGES = mavlink.mavlink_map
-"""All that can be decoded, these four among them."""
+"""All that can be decoded, these among them."""

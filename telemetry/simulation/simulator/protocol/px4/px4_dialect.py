@@ -13,6 +13,7 @@ from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
 from telemetry.simulation.simulator.protocol.dialect import Dialect, Parts
 from telemetry.simulation.simulator.protocol.px4.px4_commands import Px4Commands
 from telemetry.simulation.simulator.protocol.px4.px4_events import Px4Events
+from telemetry.simulation.simulator.protocol.px4.px4_metadata import px4_file
 from telemetry.simulation.simulator.protocol.px4.px4_missions import Px4Missions
 from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.protocol.px4.px4_parameters_on_wire import Px4ParametersOnWire
@@ -54,4 +55,5 @@ PX4 = Dialect(
     unknown_message=DENIED,
     keeps_logs=False,
     log_folder="/fs/microsd/log",
+    made_file=px4_file,
 )

@@ -7,10 +7,12 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
+from telemetry.mavlink.texts.event_messages import ComponentMetadata
 from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, quaternion
 from telemetry.simulation.simulator.autopilot.pilot import Event, Reached
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
 from telemetry.simulation.simulator.protocol.common_streams import CommonStreams
+from telemetry.simulation.simulator.protocol.px4.px4_metadata import component_metadata
 from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
@@ -78,6 +80,7 @@ class Px4Streams(CommonStreams):
             wire.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self._servo_output,
             wire.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             wire.MAVLINK_MSG_ID_WIND_COV: self._wind_cov,
+            ComponentMetadata.id: self._component_metadata,
         }
 
     def on_event(self, event: Event) -> list[MAVLink_message]:
@@ -172,6 +175,9 @@ class Px4Streams(CommonStreams):
         amsl_m = self._vehicle.frame.alt_amsl_m + self._pilot.p_neu[2]
         hpa = 1013.25 * (1 - 2.25577e-5 * amsl_m) ** 5.25588
         return wire.MAVLink_scaled_pressure_message(self.boot_ms, hpa, 0.0, 2500)
+
+    def _component_metadata(self) -> MAVLink_message:
+        return component_metadata(round(self._vehicle.now_s * 1000))
 
     def _wind_cov(self) -> MAVLink_message:
         north, east, _ = self._vehicle.wind_neu
